@@ -1,0 +1,30 @@
+"""What palpate raises when something from outside is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class PalpateError(Exception):
+    """Base of every error that palpate raises on purpose."""
+
+
+class InputError(PalpateError, ValueError):
+    """A file, a flag or a number from outside is wrong.
+
+    The text is one line that says what is wrong, where, and what to do about it.
+    The command line prints it and exits with code 2.
+    """
+
+
+class MissingExtra(PalpateError, ImportError):
+    """An optional dependency is not installed; the text names the extra that brings it."""
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
+    """The error for a name that is not in a list: it names the nearest, or else all there are."""
+    names = sorted(known)
+    near = get_close_matches(name, names, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return InputError(f"unknown {kind} {name!r}; {hint}there are: {', '.join(names)}")

@@ -1,0 +1,46 @@
+"""A record: named columns of equal length, in SI units, with metadata."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError, unknown
+
+
+@dataclass(frozen=True)
+class Record:
+    """A table of signals, as a log or a run leaves it.
+
+    Args:
+        columns: signals by name, each of shape (n,), float64.
+        units: the SI unit of each column; "1" for a plain number.
+        meta: whatever else is known: source, seed, command, events. Plain JSON values only.
+
+    Raises:
+        InputError: columns of different lengths, or a column without a unit.
+    """
+
+    columns: Mapping[str, NDArray[np.float64]]
+    units: Mapping[str, str]
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        lengths = {name: len(column) for name, column in self.columns.items()}
+        if len(set(lengths.values())) > 1:
+            raise InputError(f"columns of a record must have one length, got {lengths}")
+        missing = sorted(set(self.columns) - set(self.units))
+        if missing:
+            raise InputError(f"columns without a unit: {', '.join(missing)}")
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        if name not in self.columns:
+            raise unknown("column", name, self.columns)
+        return self.columns[name]
