@@ -1,0 +1,254 @@
+"""The bridge to Numba: laws and parts, written once in plain Python, compiled when a kernel is first needed.
+
+`law` and `part` only register. The first call of a `kernel` imports Numba and loads the kernel from the cache;
+only where the cache has none does it hand Numba every law as it stands and every part's own methods as overloads,
+and compile.
+"""
+
+import functools
+import hashlib
+import importlib
+import inspect
+import operator
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from palpate import _vector
+
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
+
+_laws: list[Callable[..., Any]] = []
+_parts: dict[type, None] = {}
+_handed_over: set[Any] = set()
+_OPTIONS = {"error_model": "numpy", "nogil": True}  # division as NumPy's: no branch, no exception, inside a loop
+
+
+def law(function: F) -> F:
+    """Marks a plain function as usable inside kernels. It stays a plain function."""
+    _laws.append(function)
+    return function
+
+
+def part(cls: C) -> C:
+    """Marks a NamedTuple whose methods are usable inside kernels. It stays a plain class."""
+    _parts[cls] = None
+    return cls
+
+
+part(_vector.Vec3)
+part(_vector.Mat3)
+
+
+class Kernel:
+    """A function that runs compiled; `plain` is the same function as it was written."""
+
+    def __init__(self, function: Callable[..., Any]):
+        self.plain = function
+        functools.update_wrapper(self, function)
+
+    @functools.cached_property
+    def compiled(self) -> Any:
+        """The Numba dispatcher, made when first asked for."""
+        return _dispatcher(self.plain)
+
+    def __call__(self, *args: Any) -> Any:
+        return self.compiled(*args)
+
+    @property
+    def from_cache(self) -> bool:
+        """Whether every compiled version so far came out of the cache."""
+        return not self.compiled.stats.cache_misses
+
+
+def kernel(function: Callable[..., Any]) -> Kernel:
+    """Marks the entry of a compiled loop."""
+    return Kernel(function)
+
+
+@functools.cache
+def sources_stamp() -> str:
+    """A hash of all the package's sources: a kernel is stale when any file that it may call has changed."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _foreign_stamps(types_of_arguments: tuple[Any, ...]) -> tuple[str, ...]:
+    """Hashes of the files, outside the package, that define the parts among the arguments."""
+    home = Path(__file__).parent
+    files = {Path(inspect.getfile(cls)) for cls in _classes(types_of_arguments)}
+    return tuple(
+        sorted(hashlib.sha256(f.read_bytes()).hexdigest() for f in files if home not in f.parents and f.exists())
+    )
+
+
+def _classes(numba_types: Any) -> Any:
+    for kind in numba_types:
+        cls = getattr(kind, "instance_class", None)
+        if cls is not None and cls in _parts:
+            yield cls
+        members = getattr(kind, "types", None)
+        if members is not None:
+            yield from _classes(members)
+
+
+def _dispatcher(function: Callable[..., Any]) -> Any:
+    import numba
+    from numba.core import caching
+
+    class PackageCache(caching.FunctionCache):
+        def __init__(self, py_func: Callable[..., Any]):
+            super().__init__(py_func)
+            self._cache_file._source_stamp = sources_stamp()
+
+        def _index_key(self, sig: Any, codegen: Any) -> Any:
+            return (*super()._index_key(sig, codegen), _foreign_stamps(sig))
+
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            found = super().load_overload(sig, target_context)
+            if found is None:
+                _hand_over()
+            return found
+
+    dispatcher = numba.njit(**_OPTIONS)(function)
+    try:
+        dispatcher._cache = PackageCache(function)
+    except RuntimeError:  # nowhere to write: every process compiles anew
+        _hand_over()
+    return dispatcher
+
+
+def _hand_over() -> None:
+    """Gives Numba all laws and parts registered since the last time."""
+    if not _handed_over:
+        _handed_over.add("operators")
+        _operators()
+    while _laws:
+        importlib.import_module("numba.extending").register_jitable(_laws.pop())
+    for cls in [c for c in _parts if c not in _handed_over]:
+        _handed_over.add(cls)
+        _methods(cls)
+
+
+def _is_part(kind: Any) -> bool:
+    return getattr(kind, "instance_class", None) in _parts
+
+
+def _method(kind: Any, name: str) -> Any:
+    return getattr(kind.instance_class, name, None) if _is_part(kind) else None
+
+
+def _operators() -> None:
+    """Overloads of the operators and of `_vector`'s functions: each is the class's own method."""
+    from numba.extending import overload
+
+    for name in ("add", "sub", "mul", "truediv", "matmul"):
+        overload(getattr(operator, name), strict=False)(_binary(name))
+    _overload_method_of_first(operator.neg, "__neg__", "a")
+    _overload_method_of_first(abs, "__abs__", "a")
+    for function, name in _vector.METHODS.items():
+        _overload_method_of_first(function, name, *inspect.signature(function).parameters)
+    _scalar_functions()
+
+
+def _binary(name: str) -> Callable[..., Any]:
+    def typer(a: Any, b: Any) -> Any:
+        from numba import types
+        from numba.extending import register_jitable
+
+        if _method(a, f"__{name}__"):
+            return _method(a, f"__{name}__")
+        reflected = _method(b, f"__r{name}__")
+        if reflected and isinstance(a, types.Number):
+            swapped = register_jitable(reflected)
+            return lambda a, b: swapped(b, a)
+        return None
+
+    return typer
+
+
+def _overload_method_of_first(function: Any, name: str, *names: str) -> None:
+    """Overloads a function with the method `name` of its first argument's class."""
+    from numba.extending import overload
+
+    def typer(*args: Any) -> Any:
+        return _method(args[0], name)
+
+    # Numba calls a typer by its signature; a bare *args would be folded into one tuple.
+    typer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [inspect.Parameter(n, inspect.Parameter.POSITIONAL_OR_KEYWORD) for n in names]
+    )
+    overload(function, strict=False)(typer)
+
+
+def _scalar_functions() -> None:
+    """What `_vector`'s functions mean on plain numbers."""
+    import math
+
+    from numba import types
+    from numba.extending import overload
+
+    def numbers(function: Any, body: Callable[..., Any]) -> None:
+        def typer(*args: Any) -> Any:
+            return body if isinstance(args[0], types.Number) else None
+
+        typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
+        overload(function, strict=False)(typer)
+
+    numbers(_vector.exp, lambda a: math.exp(a))
+    numbers(_vector.sqrt, lambda a: math.sqrt(a))
+    numbers(_vector.sin, lambda a: math.sin(a))
+    numbers(_vector.cos, lambda a: math.cos(a))
+    numbers(_vector.sign, lambda a: float((a > 0.0) - (a < 0.0)))
+    numbers(_vector.clip, lambda a, limit: min(max(a, -limit), limit))
+    _widen()
+
+
+def _widen() -> None:
+    from numba import types
+    from numba.extending import overload
+
+    vector = _vector.Vec3
+
+    @overload(_vector.widen, strict=False)
+    def typer(b: Any) -> Any:
+        if _is_part(b):
+            return lambda b: b
+        if isinstance(b, types.Number):
+            return lambda b: vector(b, b, b)
+        return None
+
+
+def _methods(cls: type) -> None:
+    """Overloads of a part's public methods and properties, each looked up in the class it is called on."""
+    from numba import types
+    from numba.extending import overload_attribute, overload_method
+
+    for name, member in vars(cls).items():
+        if name.startswith("_") or name in _handed_over:
+            continue
+        if inspect.isfunction(member):
+            _handed_over.add(name)
+            overload_method(types.BaseNamedTuple, name, strict=False)(_method_typer(name, member))
+        elif isinstance(member, property):
+            _handed_over.add(name)
+            overload_attribute(types.BaseNamedTuple, name, strict=False)(_property_typer(name))
+
+
+def _method_typer(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
+    def typer(*args: Any) -> Any:
+        return _method(args[0], name)
+
+    typer.__signature__ = inspect.signature(method)  # type: ignore[attr-defined]
+    return typer
+
+
+def _property_typer(name: str) -> Callable[[Any], Any]:
+    def typer(self: Any) -> Any:
+        found = _method(self, name)
+        return found.fget if isinstance(found, property) else None
+
+    return typer
