@@ -1,0 +1,66 @@
+# A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint check bench docs lock clean
+
+BIN := .venv/bin
+OUT := runs/foam-hybrid
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PIP_INSTALL := $(PIP) install --only-binary :all: --no-warn-script-location
+# The Python to build .venv with; `make test PYTHON=python3.13` picks another.
+PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python3.14 python; do \
+	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then echo $$p; break; fi; done)
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 16
+
+demo: .venv/run.stamp ## set up, identify a small log, press on foam, and say where the report is
+	$(BIN)/palpate identify examples/data/press.csv --time time_s --position position_mm:mm --force force_N:N
+	$(BIN)/palpate run foam-hybrid --out $(OUT) --force
+	@echo "The report is $(CURDIR)/$(OUT)/report.html"
+
+test: .venv/dev.stamp ## set up and run the tests
+	$(BIN)/python -m pytest
+
+lint: .venv/dev.stamp ## lint, format, types, direction of imports
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+check: lint test ## everything that has to pass before a commit
+
+bench: .venv/run.stamp ## measure what one tick of the closed loop costs here
+	$(BIN)/palpate speed
+
+docs: .venv/dev.stamp ## build the documentation into site/
+	$(BIN)/zensical build --clean
+
+lock: .venv/python.stamp ## resolve the dependencies again and pin them with hashes
+	$(BIN)/python -m venv --clear build/lock
+	build/lock/bin/python -m pip --disable-pip-version-check --quiet install uv
+	build/lock/bin/uv $(LOCK) pyproject.toml --group build -o requirements/run.txt
+	build/lock/bin/uv $(LOCK) pyproject.toml --group dev -c requirements/run.txt -o requirements/dev.txt
+
+LOCK := pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
+	--fork-strategy fewest \
+	--no-header --no-annotate --no-emit-index-url --no-emit-find-links
+
+clean: ## remove the environment and everything that is made
+	rm -rf .venv build dist site .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+
+.venv/python.stamp:
+	@test -n "$(PYTHON)" || { echo "palpate needs Python 3.11 or newer on the PATH; or say which: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "$(PYTHON) is not Python 3.11 or newer; say which: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' || { echo "$(PYTHON) has no venv; install it (python3-venv on Debian and Ubuntu)" >&2; exit 1; }
+	@echo "setting up .venv: a few minutes on the first run, while packages are downloaded"
+	$(PYTHON) -m venv --clear .venv
+	@touch $@
+
+.venv/run.stamp: requirements/run.txt pyproject.toml .venv/python.stamp
+	$(PIP_INSTALL) --require-hashes -r requirements/run.txt
+	$(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+.venv/dev.stamp: requirements/dev.txt .venv/run.stamp
+	$(PIP_INSTALL) --require-hashes -r requirements/dev.txt
+	@touch $@
