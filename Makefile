@@ -43,7 +43,7 @@ lock: .venv/python.stamp ## resolve the dependencies again and pin them with has
 
 LOCK := pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
 	--fork-strategy fewest \
-	--no-header --no-annotate --no-emit-index-url --no-emit-find-links
+	--no-header --no-annotate --no-emit-index-url --no-emit-find-links --only-binary :all:
 
 clean: ## remove the environment and everything that is made
 	rm -rf .venv build dist site .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,0 +1,21 @@
+"""The command line: reads arguments, prints, exits with a code; no arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command of the program `palpate`.
+
+    Args:
+        argv: the words after the program's name; those of this process when None.
+
+    Returns:
+        The exit code: 0 done; 1 ran, and the answer is no; 2 the input is wrong; 130 interrupted.
+        Codes of the edge: 70 for a defect in palpate itself, 141 when the reader of the output has gone.
+    """
+    from palpate.cli._edge import guarded
+    from palpate.cli._program import program
+
+    return guarded(lambda: program()(argv))

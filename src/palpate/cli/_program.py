@@ -1,0 +1,36 @@
+"""The program and its commands, each imported only when it is asked for."""
+
+from __future__ import annotations
+
+from cyclopts import App
+
+# In the order of the help. Each is a function of its own name in the module of its own name,
+# and returns its exit code. The line is repeated here so that the help imports none of them.
+COMMANDS = {
+    "identify": "Find what a robot touched, from a log: stiffness, damping, mass.",
+    "run": "Run an experiment: the arm approaches, touches, presses.",
+    "speed": "Measure what one tick of the closed loop costs here.",
+}
+
+
+def _version() -> str:
+    from palpate import __version__
+
+    return str(__version__)
+
+
+def program() -> App:
+    """The whole command line; errors are raised, not printed, and results are returned."""
+    app = App(
+        name="palpate",
+        help="Identify what a robot touches, and press on it with exactly the force asked for.",
+        version=_version,
+        help_format="plaintext",
+        exit_on_error=False,
+        print_error=False,
+        result_action="return_value",
+        suppress_keyboard_interrupt=False,
+    )
+    for order, (name, line) in enumerate(COMMANDS.items()):
+        app.command(f"palpate.cli.{name}:{name}", name=name, help=line, sort_key=order)
+    return app
