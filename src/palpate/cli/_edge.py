@@ -41,7 +41,7 @@ def guarded(command: Callable[[], Any]) -> int:
     try:
         code = command()
         sys.stdout.flush()
-    except BaseException as error:
+    except BaseException as error:  # noqa: BLE001 - the last one out: exits and interrupts are codes too
         return _code_of(error)
     return DONE if code is None else int(code)
 
@@ -61,10 +61,10 @@ def _code_of(error: BaseException) -> int:
         case OSError():
             return _say(_system_line(error), WRONG_INPUT)
         case MemoryError():
-            return _say(f"not enough memory: {error or 'the input is too large for this machine'}", WRONG_INPUT)
+            return _say(f"not enough memory for this input: {error or 'give a shorter one'}", WRONG_INPUT)
         case _:
             traceback.print_exception(error)
-            return _say("this is a defect of palpate, not of the input; please report the lines above", DEFECT)
+            return _say("this is a defect of palpate, please report the lines above", DEFECT)
 
 
 def _say(text: str, code: int) -> int:
