@@ -202,9 +202,29 @@ def _scalar_functions() -> None:
     numbers(_vector.sqrt, lambda a: math.sqrt(a))
     numbers(_vector.sin, lambda a: math.sin(a))
     numbers(_vector.cos, lambda a: math.cos(a))
+    numbers(_vector.atan2, lambda y, x: math.atan2(y, x))
     numbers(_vector.sign, lambda a: float((a > 0.0) - (a < 0.0)))
     numbers(_vector.clip, lambda a, limit: min(max(a, -limit), limit))
     _widen()
+    _array_functions()
+
+
+def _array_functions() -> None:
+    """What `_vector`'s functions mean on NumPy arrays."""
+    import numpy as np
+    from numba import types
+    from numba.extending import overload
+
+    def arrays(function: Any, body: Callable[..., Any]) -> None:
+        def typer(*args: Any) -> Any:
+            return body if isinstance(args[0], types.Array) else None
+
+        typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
+        overload(function, strict=False)(typer)
+
+    arrays(_vector.outer, lambda a, b: np.outer(a, b))
+    arrays(_vector.trace, lambda A: np.trace(A))
+    arrays(_vector.exp, lambda a: np.exp(a))
 
 
 def _widen() -> None:

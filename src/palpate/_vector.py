@@ -111,6 +111,9 @@ class Mat3(NamedTuple):
     def T(A):
         return Mat3(Vec3(A.r1.x, A.r2.x, A.r3.x), Vec3(A.r1.y, A.r2.y, A.r3.y), Vec3(A.r1.z, A.r2.z, A.r3.z))
 
+    def map_trace(A):
+        return A.r1.x + A.r2.y + A.r3.z
+
     def map_solve(A, b):
         # Cramer's rule: exact enough for the well-conditioned 3x3 systems here (relative error ~ cond * eps).
         (a, b1, c), (d, e, f), (g, h, i) = A.r1, A.r2, A.r3
@@ -166,11 +169,25 @@ def cos(a):
     return np.cos(a) if isinstance(a, np.ndarray) else math.cos(a)
 
 
+def atan2(y, x):
+    return np.arctan2(y, x) if isinstance(y, np.ndarray) else math.atan2(y, x)
+
+
 def clip(a, limit):
     """a held within -limit ... +limit."""
     if isinstance(a, tuple):
         return a.map_clip(limit)
     return np.clip(a, -limit, limit) if isinstance(a, np.ndarray) else min(max(a, -limit), limit)
+
+
+def trace(A):
+    """The sum of the diagonal."""
+    return A.map_trace() if isinstance(A, tuple) else np.trace(A)
+
+
+def diagonal(v):
+    """The matrix with v on its diagonal and zero elsewhere: for setting up, not a law's word."""
+    return Mat3(Vec3(v.x, 0.0, 0.0), Vec3(0.0, v.y, 0.0), Vec3(0.0, 0.0, v.z))
 
 
 def solve(A, b):
@@ -198,6 +215,7 @@ METHODS = {
     sqrt: "map_sqrt",
     sign: "map_sign",
     clip: "map_clip",
+    trace: "map_trace",
     solve: "map_solve",
     resolve: "map_resolve",
 }

@@ -1,0 +1,6 @@
+"""Robots: what moves."""
+
+from palpate.robots.arm3 import MOTOR_TORQUE, Arm3, ArmModel
+from palpate.robots.planar3r import Planar3R
+
+__all__ = ["MOTOR_TORQUE", "Arm3", "ArmModel", "Planar3R"]
