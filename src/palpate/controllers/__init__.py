@@ -1,0 +1,10 @@
+"""Control laws: from what is sensed and what is asked for to joint torques.
+
+A controller is a part: a frozen NamedTuple of gains with ``start()``, the state before the first tick, and
+``step(state, sense, task, model) -> (torque, state)``. Gains are `Vec3` for the planar arm, or arrays of shape (m,).
+"""
+
+from palpate.controllers.hybrid import Hybrid
+from palpate.controllers.resolved_acceleration import ResolvedAcceleration
+
+__all__ = ["Hybrid", "ResolvedAcceleration"]

@@ -1,0 +1,41 @@
+"""Hybrid position/force control with the robot's dynamics (thesis, sec. 4.4; Raibert and Craig, 1981; Khatib, 1987)."""
+
+from typing import NamedTuple
+
+from palpate._jit import law, part
+from palpate._vector import Vec3, resolve
+from palpate.controllers.resolved_acceleration import position_command
+
+
+@law
+def hybrid(J, Jdqd, M, h, s, u_x, f_d, u_f):  # (4.13), friction aside
+    """Torque that follows u_x where s is 0 and presses with f_d + u_f where s is 1 [N m]."""
+    return M @ resolve(J, (1.0 - s) * u_x - Jdqd, M) + h + J.T @ (s * (f_d + u_f))
+
+
+@part
+class Hybrid(NamedTuple):
+    """Position where the surface leaves the robot free, force where it does not.
+
+    Args:
+        kp: position gain K_pp [1/s^2], shape (m,).
+        kv: velocity gain K_pv [1/s], shape (m,).
+        kf: force gain K_fp [1], shape (m,). With the feed-forward of the desired force the loop's gain is 1 + kf.
+        ki: integral gain K_fi [1 per sample], shape (m,): added to the force command at each tick, times the error.
+    """
+
+    kp: Vec3
+    kv: Vec3
+    kf: Vec3
+    ki: Vec3
+
+    def start(self):
+        """The force integral [N], shape (m,)."""
+        return 0.0 * self.ki
+
+    def step(self, state, sense, task, model):
+        error = task.s * (task.f - sense.f)
+        integral = state + self.ki * error
+        u_x = position_command(self.kp, self.kv, sense.x, sense.xd, task.x, task.xd, task.xdd)
+        u_f = self.kf * error + integral  # (4.15)
+        return hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f), integral

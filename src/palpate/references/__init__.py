@@ -1,0 +1,6 @@
+"""What is asked for: the approach to the surface, and the force to press with."""
+
+from palpate.references.approach import Approach
+from palpate.references.force_schedule import ForceSchedule
+
+__all__ = ["Approach", "ForceSchedule"]

@@ -1,0 +1,74 @@
+"""The values that pass between a bench, its controller and its identifiers.
+
+Fields that are marked `Vec3` or `Mat3` are those for the planar arm, and NumPy arrays for any other.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._jit import part
+from palpate._vector import Mat3, Vec3
+
+
+@part
+class ArmModel(NamedTuple):
+    """The robot as a controller sees it, at the present joint state."""
+
+    J: Mat3  # Jacobian, shape (m, n)
+    Jdqd: Vec3  # its time derivative times the joint rates [m/s^2, rad/s^2], shape (m,)
+    M: Mat3  # joint-space inertia [kg m^2], shape (n, n)
+    h: Vec3  # Coriolis and centrifugal torque [N m], shape (n,)
+
+
+@part
+class Sense(NamedTuple):
+    """What the controller knows at a tick."""
+
+    q: Vec3  # joint angles [rad], shape (n,)
+    qd: Vec3  # joint rates [rad/s], shape (n,)
+    x: Vec3  # pose [m, m, rad], shape (m,)
+    xd: Vec3  # its rate [m/s, m/s, rad/s], shape (m,)
+    f: Vec3  # wrench that the robot exerts on the environment, measured [N, N, N m], shape (m,)
+
+
+@part
+class Task(NamedTuple):
+    """What is asked of the controller at a tick."""
+
+    x: Vec3  # desired pose, shape (m,)
+    xd: Vec3  # its rate
+    xdd: Vec3  # its second rate
+    f: Vec3  # desired wrench on the environment, shape (m,)
+    s: Vec3  # selection: 1 where the force is controlled, 0 where the position is, shape (m,)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What an identifier knows so far.
+
+    Args:
+        names: of the parameters, in their order: ("M", "B", "K") for the thesis' regressor.
+        theta: the values, shape (n,), SI.
+        covariance: of theta, shape (n, n): the noise found in the data included.
+        samples: how many samples the data are worth (fewer than were seen when old ones are forgotten).
+    """
+
+    names: tuple[str, ...]
+    theta: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    samples: float
+
+    @property
+    def std(self) -> NDArray[np.float64]:
+        """Standard deviation of each parameter, shape (n,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def verdicts(self, tolerance: float = 0.25) -> dict[str, str]:
+        """"identified" where the 95 % half-width is at most `tolerance` of the value, else "not identifiable"."""
+        half = 1.96 * self.std
+        with np.errstate(invalid="ignore"):
+            good = np.isfinite(half) & (half <= tolerance * np.abs(self.theta))
+        return {n: "identified" if g else "not identifiable" for n, g in zip(self.names, good, strict=True)}
