@@ -48,6 +48,8 @@ def guarded(command: Callable[[], Any]) -> int:
 
 def _code_of(error: BaseException) -> int:
     match error:
+        case SystemExit(__context__=BrokenPipeError()):  # rich's way of saying it
+            return READER_GONE
         case SystemExit():
             return error.code if isinstance(error.code, int) else DONE
         case KeyboardInterrupt():

@@ -1,0 +1,161 @@
+"""Every way a command can end is an exit code, and what the user can mend is one line."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from palpate.cli import main
+from palpate.cli._edge import guarded
+from palpate.errors import InputError, MissingExtra
+
+
+def raising(error):
+    def command():
+        raise error
+
+    return command
+
+
+def one_line(capsys) -> str:
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("palpate: ")
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+@pytest.mark.parametrize(("returned", "code"), [(None, 0), (0, 0), (1, 1), (2, 2)])
+def test_the_result_of_a_command_is_the_exit_code(returned, code):
+    assert guarded(lambda: returned) == code
+
+
+def test_wrong_input_is_one_line_even_when_the_message_has_several(capsys):
+    assert guarded(raising(InputError("press.csv: row 3:\n   'a' is not a number"))) == 2
+    assert one_line(capsys) == "palpate: press.csv: row 3: 'a' is not a number\n"
+
+
+def test_a_missing_extra_is_wrong_input(capsys):
+    assert guarded(raising(MissingExtra("reading bags needs: pip install palpate[bags]"))) == 2
+    assert "palpate[bags]" in one_line(capsys)
+
+
+@pytest.mark.parametrize(
+    "number", [errno.ENOSPC, errno.EACCES, errno.EROFS, errno.ENOENT, errno.EISDIR, errno.EIO]
+)
+def test_the_system_says_no(capsys, number):
+    assert guarded(raising(OSError(number, os.strerror(number), "out/report.html"))) == 2
+    line = one_line(capsys)
+    assert "out/report.html" in line
+    assert os.strerror(number) in line
+    assert ";" in line, "what to do about it"
+
+
+def test_an_interrupt_is_130(capsys):
+    assert guarded(raising(KeyboardInterrupt())) == 130
+    assert "interrupted" in one_line(capsys)
+
+
+def test_a_defect_keeps_its_traceback_and_is_not_mistaken_for_an_answer(capsys):
+    assert guarded(raising(ZeroDivisionError("in a law"))) == 70
+    error = capsys.readouterr().err
+    assert "Traceback" in error
+    assert "ZeroDivisionError: in a law" in error
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["identfy", "log.csv"], "identify"),
+        (["runn"], "run"),
+        (["--verison"], "--version"),
+        (["run", "foam-hybrid", "--sed", "1"], "--seed"),
+        (["run", "foam-hybrid", "--seed", "one"], "one"),
+        (["identify"], "log"),
+    ],
+)
+def test_misspelt_words_are_answered_with_the_right_one(capsys, words, said):
+    assert main(words) == 2
+    line = one_line(capsys)
+    assert said in line.lower()
+    assert "--help" in line
+
+
+def test_help_lists_the_commands(capsys):
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert [name for name in ("identify", "run", "speed") if f" {name} " in text] == [
+        "identify",
+        "run",
+        "speed",
+    ]
+
+
+def test_every_module_of_a_command_is_a_command(root):
+    from palpate.cli._program import COMMANDS
+
+    modules = {path.stem for path in (root / "src/palpate/cli").glob("*.py") if not path.stem.startswith("_")}
+    assert modules == set(COMMANDS)
+
+
+@pytest.mark.parametrize("command", ["identify", "run", "speed"])
+def test_every_flag_of_a_command_is_explained(command):
+    from palpate.cli._program import program
+
+    arguments = program()[command].assemble_argument_collection(parse_docstring=True)
+    assert len(arguments) > 0
+    silent = [argument.name for argument in arguments if argument.show and not argument.parameter.help]
+    assert not silent
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    from importlib.metadata import version
+
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == version("palpate")
+
+
+def test_a_reader_that_leaves_is_no_error():
+    reader, writer = os.pipe()
+    os.close(reader)
+    ran = subprocess.run(
+        [sys.executable, "-m", "palpate", "--help"], stdout=writer, stderr=subprocess.PIPE, check=False
+    )
+    os.close(writer)
+    assert ran.returncode == 141
+    assert ran.stderr == b""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
+def test_a_full_disk_is_one_line():
+    with Path("/dev/full").open("w") as full:
+        ran = subprocess.run(
+            [sys.executable, "-m", "palpate", "--help"], stdout=full, stderr=subprocess.PIPE, check=False
+        )
+    assert ran.returncode == 2
+    assert ran.stderr.decode().count("\n") == 1
+    assert "No space left" in ran.stderr.decode()
+
+
+def test_control_c_ends_a_running_command():
+    code = (
+        "import time
+from palpate.cli._edge import guarded
+print('up', flush=True)
+"
+        "raise SystemExit(guarded(lambda: time.sleep(60)))"
+    )
+    child = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert child.stdout.readline() == "up\n"
+    time.sleep(0.2)
+    child.send_signal(signal.SIGINT)
+    _, error = child.communicate(timeout=20)
+    assert child.returncode == 130
+    assert error == "palpate: interrupted\n"

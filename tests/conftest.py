@@ -1,0 +1,44 @@
+"""What every test may lean on: the project's folder, the measured logs, the program."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# The same examples on every machine, and no failure because a machine was busy.
+settings.register_profile("palpate", deadline=None, derandomize=True, print_blob=True)
+settings.load_profile("palpate")
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The project's folder."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def measured() -> Path:
+    """The folder of measured logs that lies beside the project; without it the test is skipped."""
+    folder = ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip("the measured logs (../shared/data) are not on this machine")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def program():
+    """Run `palpate` with the given words in a process of its own; returns the completed process."""
+
+    def run(*words: str, **options) -> subprocess.CompletedProcess:
+        command = [sys.executable, "-m", "palpate", *map(str, words)]
+        options = {"capture_output": True, "text": True, "timeout": 300, **options}
+        return subprocess.run(command, check=False, **options)
+
+    return run

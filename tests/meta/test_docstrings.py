@@ -1,0 +1,44 @@
+"""Everything public says what it is."""
+
+import ast
+
+# The two methods of every part, told once in the class docstring's room.
+TOLD_ELSEWHERE = {"start", "step"}
+
+
+def undocumented(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    if ast.get_docstring(tree) is None:
+        yield "module"
+    yield from nameless(tree, "")
+
+
+def nameless(node, owner):
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        if child.name.startswith("_"):
+            continue
+        told = owner and child.name in TOLD_ELSEWHERE
+        if not told and ast.get_docstring(child) is None and not is_overload(child):
+            yield f"{owner}{child.name}"
+        if isinstance(child, ast.ClassDef):
+            yield from nameless(child, f"{child.name}.")
+
+
+def is_overload(node):
+    return any(
+        "overload" in ast.unparse(decorator) or "setter" in ast.unparse(decorator)
+        for decorator in node.decorator_list
+    )
+
+
+def test_every_public_name_has_a_docstring(root):
+    sources = sorted((root / "src" / "palpate").rglob("*.py"))
+    assert len(sources) > 5
+    found = []
+    for path in sources:
+        # The operators of vectors are named by the arithmetic that they are.
+        names = [] if path.name == "_vector.py" else undocumented(path)
+        found += [f"{path.relative_to(root)}: {name}" for name in names]
+    assert not found, "\n".join(found)

@@ -1,0 +1,55 @@
+"""The lock pins everything with hashes, and says nothing about where it was made."""
+
+import re
+import tomllib
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+LOCKS = ("run", "dev")
+
+
+def pins(root, lock: str) -> dict[str, Requirement]:
+    text = (root / "requirements" / f"{lock}.txt").read_text(encoding="utf-8").replace("\\\n", " ")
+    lines = [re.sub(r"--hash=\S+", "", line) for line in text.splitlines() if line.strip()]
+    requirements = [Requirement(line) for line in lines]
+    return {canonicalize_name(requirement.name): requirement for requirement in requirements}
+
+
+def declared(root) -> dict:
+    return tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_no_addresses_no_paths_no_options(root, lock):
+    text = (root / "requirements" / f"{lock}.txt").read_text(encoding="utf-8")
+    assert "://" not in text
+    assert not re.findall(r"(?m)^\s*(?:-[a-z]|#|--(?!hash=))", text)
+    assert " @ " not in text
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_every_line_is_one_version_with_hashes(root, lock):
+    text = (root / "requirements" / f"{lock}.txt").read_text(encoding="utf-8").replace("\\\n", " ")
+    lines = text.splitlines()
+    assert len(lines) > 20
+    for line in lines:
+        assert re.match(r"[A-Za-z0-9_.-]+==[^ ]+ .*--hash=sha256:[0-9a-f]{64}", line), line
+
+
+def test_the_lock_satisfies_what_is_declared(root):
+    project, groups = declared(root)["project"], declared(root)["dependency-groups"]
+    tools = [line for group in groups.values() for line in group if isinstance(line, str)]
+    for lock, lines in (("run", project["dependencies"]), ("dev", project["dependencies"] + tools)):
+        locked = pins(root, lock)
+        for wanted in map(Requirement, lines):
+            (pin,) = locked[canonicalize_name(wanted.name)].specifier
+            assert wanted.specifier.contains(pin.version), f"{lock}: {wanted} against {pin}; run `make lock`"
+
+
+def test_developers_run_what_users_run(root):
+    run, dev = pins(root, "run"), pins(root, "dev")
+    assert run
+    for name, requirement in run.items():
+        assert dev[name].specifier == requirement.specifier, f"{name} differs; run `make lock`"

@@ -1,0 +1,62 @@
+"""The program answers at once: nothing heavy is imported before it is needed."""
+
+import json
+import subprocess
+import sys
+import time
+
+HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "polars", "jinja2", "pandas", "mujoco", "sympy"}
+
+
+def modules_after(code: str) -> set[str]:
+    """Top-level packages in sys.modules after the code has run in a fresh interpreter."""
+    report = "print(json.dumps(sorted({name.split('.')[0] for name in sys.modules})), file=sys.stderr)"
+    ran = subprocess.run(
+        [sys.executable, "-c", f"{code}\nimport json, sys\n{report}"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return set(json.loads(ran.stderr))
+
+
+def seconds(*command: str) -> float:
+    """The shortest of seven runs: the cost itself, without what else the machine was doing."""
+
+    def once() -> float:
+        start = time.perf_counter()
+        subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
+        return time.perf_counter() - start
+
+    return min(once() for _ in range(7))
+
+
+def test_help_imports_nothing_heavy():
+    loaded = modules_after("from palpate.cli import main\nassert main(['--help']) == 0")
+    assert "cyclopts" in loaded
+    assert not loaded & (HEAVY | {"numpy"})
+
+
+def test_importing_palpate_is_light():
+    loaded = modules_after("import palpate")
+    assert "palpate" in loaded
+    assert not loaded & (HEAVY | {"numpy", "cyclopts", "rich"})
+
+
+def test_importing_laws_does_not_import_numba():
+    loaded = modules_after(
+        "import palpate.controllers, palpate.identifiers, palpate.robots, palpate.environments"
+    )
+    assert "numpy" in loaded
+    assert not loaded & HEAVY
+
+
+def test_help_of_each_command_compiles_nothing():
+    for command in ("identify", "run", "speed"):
+        loaded = modules_after(f"from palpate.cli import main\nassert main(['{command}', '--help']) == 0")
+        assert not loaded & HEAVY, command
+
+
+def test_help_answers_within_four_bare_starts_and_a_quarter_of_a_second():
+    bare = seconds(sys.executable, "-c", "pass")
+    assert seconds(sys.executable, "-m", "palpate", "--help") <= 4 * bare + 0.25
