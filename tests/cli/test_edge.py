@@ -144,10 +144,7 @@ def test_a_full_disk_is_one_line():
 
 def test_control_c_ends_a_running_command():
     code = (
-        "import time
-from palpate.cli._edge import guarded
-print('up', flush=True)
-"
+        "import time\nfrom palpate.cli._edge import guarded\nprint('up', flush=True)\n"
         "raise SystemExit(guarded(lambda: time.sleep(60)))"
     )
     child = subprocess.Popen(
