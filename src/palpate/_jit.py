@@ -1,8 +1,8 @@
 """The bridge to Numba: laws and parts, written once in plain Python, compiled when a kernel is first needed.
 
-`law` and `part` only register. The first call of a `kernel` imports Numba and loads the kernel from the cache;
-only where the cache has none does it hand Numba every law as it stands and every part's own methods as overloads,
-and compile.
+`law` and `part` only register. The first call of a `kernel` imports Numba and loads the kernel from the
+cache; only where the cache has none does it hand Numba every law as it stands and every part's own methods as
+overloads, and compile.
 """
 
 import functools
@@ -22,7 +22,8 @@ C = TypeVar("C", bound=type)
 _laws: list[Callable[..., Any]] = []
 _parts: dict[type, None] = {}
 _handed_over: set[Any] = set()
-_OPTIONS = {"error_model": "numpy", "nogil": True}  # division as NumPy's: no branch, no exception, inside a loop
+# Division as NumPy's: no branch and no exception inside a loop.
+_OPTIONS = {"error_model": "numpy", "nogil": True}
 
 
 def law(function: F) -> F:
@@ -80,9 +81,8 @@ def _foreign_stamps(types_of_arguments: tuple[Any, ...]) -> tuple[str, ...]:
     """Hashes of the files, outside the package, that define the parts among the arguments."""
     home = Path(__file__).parent
     files = {Path(inspect.getfile(cls)) for cls in _classes(types_of_arguments)}
-    return tuple(
-        sorted(hashlib.sha256(f.read_bytes()).hexdigest() for f in files if home not in f.parents and f.exists())
-    )
+    foreign = [f for f in files if home not in f.parents and f.exists()]
+    return tuple(sorted(hashlib.sha256(f.read_bytes()).hexdigest() for f in foreign))
 
 
 def _classes(numba_types: Any) -> Any:

@@ -20,8 +20,6 @@ class Vec3(NamedTuple):
     y: float
     z: float
 
-    __array_ufunc__ = None  # NumPy scalars leave the operators to this class
-
     def __add__(a, b):
         b = widen(b)
         return Vec3(a.x + b.x, a.y + b.y, a.z + b.z)
@@ -83,8 +81,6 @@ class Mat3(NamedTuple):
     r2: Vec3
     r3: Vec3
 
-    __array_ufunc__ = None
-
     def __add__(A, B):
         return Mat3(A.r1 + B.r1, A.r2 + B.r2, A.r3 + B.r3)
 
@@ -129,6 +125,9 @@ class Mat3(NamedTuple):
         return J.map_solve(a)
 
 
+for _cls in (Vec3, Mat3):
+    _cls.__array_ufunc__ = None  # type: ignore[attr-defined]  # NumPy leaves the operators to these classes
+
 ZERO3 = Vec3(0.0, 0.0, 0.0)
 
 
@@ -170,6 +169,7 @@ def cos(a):
 
 
 def atan2(y, x):
+    """The angle of (x, y), in [-pi, pi]."""
     return np.arctan2(y, x) if isinstance(y, np.ndarray) else math.atan2(y, x)
 
 

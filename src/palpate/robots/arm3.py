@@ -1,12 +1,12 @@
-"""The three-joint planar arm as laws: numbers in, numbers out, alone, in batches and inside compiled kernels.
+"""The three-joint planar arm as laws, for numbers, for batches and for compiled kernels.
 
-Everything is written in the absolute angles of the links, `t1 = q1`, `t2 = q1 + q2`, `t3 = q1 + q2 + q3`: with
-them the Jacobian, the inertia and the bias torque need three sines and three cosines between them, and the
-dynamics are two lines: the generalised force on `t_i` is the sum over j of
+Everything is written in the absolute angles of the links, `t1 = q1`, `t2 = q1 + q2`, `t3 = q1 + q2 + q3`:
+with them the Jacobian, the inertia and the bias torque need three sines and three cosines between them, and
+the dynamics are one line: the generalised force on `t_i` is the sum over j of
 
     H_ij (cos(t_i - t_j) t_j'' + sin(t_i - t_j) t_j'^2)
 
-with six constants `H_ij`. `Arm3.newton_euler` is the recursion of the thesis' appendix D, and does not use them.
+with six constants `H_ij`. `Arm3.newton_euler`, the recursion of the thesis' appendix D, does not use them.
 """
 
 from typing import NamedTuple
@@ -70,7 +70,7 @@ def coupling_terms(arm):
 
 @law
 def inertia(arm, c, s):
-    """M: with T = 1/2 w^T X w in the links' rates w, each element is the sum of X from there to its far corner."""
+    """M, from the inertia X in the links' rates: each element sums X from its row and its column on."""
     own, k = own_terms(arm), coupling_terms(arm)
     x12 = k.x * (c.x * c.y + s.x * s.y)
     x13 = k.y * (c.x * c.z + s.x * s.z)
@@ -96,7 +96,7 @@ def bias(arm, c, s, w):
 
 @law
 def carry_outward(a, qi, w, dw, ax, ay):
-    """Acceleration of a link's end in the link's own frame (App. D1-3, D2-3, D3-3) [m/s^2], and its cos and sin."""
+    """Acceleration of a link's end in its own frame (App. D1-3, D2-3, D3-3) [m/s^2]; its cosine and sine."""
     c, s = cos(qi), sin(qi)
     return c * ax + s * ay - a * w * w, c * ay - s * ax + a * dw, c, s
 
@@ -105,7 +105,7 @@ def carry_outward(a, qi, w, dw, ax, ay):
 def carry_inward(link, c, s, w, dw, ax, ay, fx, fy, n):
     """Force and torque on a link at its joint, in the frame of the link before it (App. D4, D5, D6).
 
-    `fx, fy, n` is what this link exerts at its end, in its own frame; `n` of the result is the joint's torque.
+    `fx, fy, n` is what the link exerts at its end, in its own frame; the `n` returned is the joint's torque.
     """
     a, com, m, moment = link
     Fx, Fy = m * (ax - com * w * w), m * (ay + com * dw)
@@ -128,9 +128,9 @@ class ArmModel(NamedTuple):
 class Arm3(NamedTuple):
     """The numbers of a planar arm with three revolute joints, and its laws.
 
-    The arguments of the laws are `Vec3` of numbers, or of arrays of one shape: joint angles q [rad], rates qd
-    [rad/s], accelerations qdd [rad/s^2]; pose (x [m], y [m], phi [rad]); wrench (F_x [N], F_y [N], N_z [N m]) that
-    the arm exerts on what it touches. The defaults are the arm of the thesis' appendices B and D.
+    The arguments of the laws are `Vec3` of numbers, or of arrays of one shape: joint angles q [rad], rates
+    qd [rad/s], accelerations qdd [rad/s^2]; pose (x [m], y [m], phi [rad]); wrench (F_x [N], F_y [N],
+    N_z [N m]) that the arm exerts on what it touches. The defaults are the thesis' appendices B and D.
 
     Args:
         length: joint to joint, the last one to the tip [m].
@@ -151,9 +151,9 @@ class Arm3(NamedTuple):
     def with_rotors(self):
         """The arm whose links carry their motors' rotors.
 
-        The motors are direct drives: a rotor is bolted to the link that it turns, and turns with it. So its inertia
-        belongs to that link's own moment, and reaches M in every element where that link's absolute rate does,
-        not on the diagonal alone.
+        The motors are direct drives: a rotor is bolted to the link that it turns, and turns with it. So its
+        inertia belongs to that link's own moment, and reaches every element of M that this moment reaches,
+        not the diagonal alone.
         """
         return Arm3(self.length, self.mass, self.com, self.moment + self.rotor, self.limits, ZERO3)
 
@@ -192,7 +192,7 @@ class Arm3(NamedTuple):
         return Mat3(first, Vec3(-first.x - last.x, -first.y - last.y, 1.0 - first.z - last.z), last)
 
     def beyond_reach(self, pose):
-        """Distance of joint 3 from where joints 1 and 2 can bring it [m]: positive outside, negative inside."""
+        """How far joint 3 lies from where joints 1 and 2 can bring it [m]: negative within reach."""
         a1, a2, a3 = self.length
         px, py = pose.x - a3 * cos(pose.z), pose.y - a3 * sin(pose.z)
         p, inner = sqrt(px * px + py * py), abs(a1 - a2)
@@ -202,13 +202,13 @@ class Arm3(NamedTuple):
     def inverse(self, pose, elbow):
         """Joint angles of a pose (1-8)-(1-10); elbow +1 bends joint 2 to the positive side, -1 to the other.
 
-        q1 and q2 lie in [-pi, pi] and q1 + q2 + q3 = phi, turns included. Out of reach, joint 2 stays straight or
-        folded and the arm points at the pose: ask `beyond_reach` first.
+        q1 and q2 lie in [-pi, pi] and q1 + q2 + q3 = phi, turns included. Out of reach, joint 2 is straight
+        or folded and the arm points at the pose: ask `beyond_reach` first.
         """
         a1, a2, a3 = self.length
         px, py = pose.x - a3 * cos(pose.z), pose.y - a3 * sin(pose.z)
         p = px * px + py * py
-        # Four times the squared area of the triangle a1, a2, sqrt(p): no cancellation next to the stretched arm.
+        # (2 a1 a2 sin q2)^2 in Heron's form: no cancellation next to the stretched arm.
         d = ((a1 + a2) * (a1 + a2) - p) * (p - (a1 - a2) * (a1 - a2))
         s2, c2 = elbow * sqrt(0.5 * (d + abs(d))), p - a1 * a1 - a2 * a2
         q2 = atan2(s2, c2)
@@ -222,7 +222,7 @@ class Arm3(NamedTuple):
         return inertia(self, c, s)
 
     def bias(self, q, qd):
-        """h(q, qd), centrifugal and Coriolis torque [N m]; the plane is level, so there is no gravity in it."""
+        """h(q, qd), centrifugal and Coriolis torque [N m]; the plane is level: no gravity."""
         c, s = directions(q)
         return bias(self, c, s, absolute(qd))
 
@@ -231,7 +231,10 @@ class Arm3(NamedTuple):
         c, s = directions(q)
         w = absolute(qd)
         return ArmModel(
-            jacobian(self, c, s), jacobian_rate_velocity(self, c, s, w), inertia(self, c, s), bias(self, c, s, w)
+            jacobian(self, c, s),
+            jacobian_rate_velocity(self, c, s, w),
+            inertia(self, c, s),
+            bias(self, c, s, w),
         )
 
     def newton_euler(self, q, qd, qdd, wrench):

@@ -14,32 +14,35 @@ from palpate.robots.arm3 import Arm3
 
 Array = NDArray[np.float64]
 
+_THESIS = Arm3()
+
 _REACH_TOLERANCE = 1e-9
 """How far beyond its reach a pose may lie and still be taken for the arm stretched out [m]: rounding."""
 
 _SINGULAR = 1e-6
-"""The sine of joint 2 under which the inverse Jacobian is refused; the condition number is about its inverse."""
+"""The sine of joint 2 under which the inverse Jacobian is refused: about the inverse of its condition."""
 
 
 @dataclass(frozen=True)
 class Planar3R:
     """A planar arm with three revolute joints, in a level plane.
 
-    Joint angles q [rad], rates qd [rad/s] and accelerations qdd [rad/s^2] are arrays of shape (..., 3); so are
-    poses (x [m], y [m], phi [rad]), torques [N m] and wrenches (F_x [N], F_y [N], N_z [N m]). Leading axes are
-    batches and broadcast against each other. The defaults are the arm of the thesis' appendices B and D.
+    Joint angles q [rad], rates qd [rad/s] and accelerations qdd [rad/s^2] are arrays of shape (..., 3); so
+    are poses (x [m], y [m], phi [rad]), torques [N m] and wrenches (F_x [N], F_y [N], N_z [N m]). Leading
+    axes are batches and broadcast against each other.
 
-    When to use it: planning, analysis, tests, a robot of one's own. Inside a control loop use the laws of `arm`,
-    of which this class is the array edge.
+    When to use it: planning, analysis, tests, an arm of one's own. Inside a control loop use the laws of
+    `arm`, of which this class is the array edge.
 
     Args:
-        arm: the numbers of the arm.
+        arm: the numbers of the arm; the default is the one of the thesis' appendices B and D.
 
     Raises:
-        InputError: a length, mass or moment of inertia that is not positive, or an array whose last axis is not 3.
+        InputError: a length, mass, moment of inertia or limit that is not positive; from every method, an
+            array whose last axis is not 3.
     """
 
-    arm: Arm3 = Arm3()
+    arm: Arm3 = _THESIS
 
     def __post_init__(self) -> None:
         numbers = Arm3(*(Vec3(*(float(v) for v in field)) for field in self.arm))
@@ -117,7 +120,9 @@ class Planar3R:
         """Centrifugal and Coriolis torque h(q, qd) [N m], shape (..., 3)."""
         return _joined(self.arm.bias(*_together(q=q, qd=qd)))
 
-    def inverse_dynamics(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, tip_wrench: ArrayLike = 0.0) -> Array:
+    def inverse_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, tip_wrench: ArrayLike = 0.0
+    ) -> Array:
         """Joint torques [N m], shape (..., 3), by recursive Newton-Euler: tau = M qdd + h + J^T w.
 
         Args:
@@ -128,9 +133,13 @@ class Planar3R:
         """
         return _joined(self.arm.newton_euler(*_together(q=q, qd=qd, qdd=qdd, tip_wrench=_wrench(tip_wrench))))
 
-    def forward_dynamics(self, q: ArrayLike, qd: ArrayLike, torque: ArrayLike, tip_wrench: ArrayLike = 0.0) -> Array:
+    def forward_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, torque: ArrayLike, tip_wrench: ArrayLike = 0.0
+    ) -> Array:
         """Joint accelerations [rad/s^2], shape (..., 3): the qdd of tau = M qdd + h + J^T w."""
-        return _joined(self.arm.accelerations(*_together(q=q, qd=qd, torque=torque, tip_wrench=_wrench(tip_wrench))))
+        return _joined(
+            self.arm.accelerations(*_together(q=q, qd=qd, torque=torque, tip_wrench=_wrench(tip_wrench)))
+        )
 
     def kinetic_energy(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """1/2 qd^T M qd [J], shape (...)."""
