@@ -1,0 +1,98 @@
+"""What the README and the pages tell the reader to type exists, and does what it says."""
+
+import re
+import shlex
+import subprocess
+import tomllib
+
+import pytest
+
+from palpate.cli import main
+from palpate.cli._program import program
+
+PAGES = ("README.md", "CONTRIBUTING.md", "docs/index.md", "docs/identify.md", "docs/run.md")
+FENCED = re.compile(r"(?ms)^```(\w*)\n(.*?)^```$")
+INDENTED = re.compile(r"(?m)^    (\S.*)$")
+
+
+def blocks(root, page: str, language: str) -> list[str]:
+    text = (root / page).read_text(encoding="utf-8")
+    return [body for name, body in FENCED.findall(text) if name == language]
+
+
+def commands(root, page: str, first: str) -> list[str]:
+    """Lines of code blocks, fenced or indented, that begin with the word."""
+    text = (root / page).read_text(encoding="utf-8")
+    fenced = [line for name, body in FENCED.findall(text) if name != "python" for line in body.splitlines()]
+    lines = fenced + INDENTED.findall(FENCED.sub("", text))
+    return [line.split(" #")[0].strip() for line in lines if line.split()[:1] == [first]]
+
+
+def test_the_readme_shows_the_program(root):
+    shown = " ".join(commands(root, "README.md", "palpate"))
+    assert all(word in shown for word in ("identify", "run", "speed"))
+    assert "make demo" in commands(root, "README.md", "make")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_palpate_understands_each_command(root, page):
+    for line in commands(root, page, "palpate"):
+        _, bound, _ = program().parse_args(shlex.split(line)[1:])
+        assert bound is not None, line
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_make_knows_each_target(root, page):
+    for line in commands(root, page, "make"):
+        ran = subprocess.run(
+            [*shlex.split(line), "--dry-run"], cwd=root, capture_output=True, text=True, check=False
+        )
+        assert ran.returncode == 0, f"{line}: {ran.stderr}"
+
+
+def test_each_make_target_has_a_line_of_help(root):
+    text = (root / "Makefile").read_text(encoding="utf-8")
+    phony = re.search(r"(?m)^\.PHONY: (.*)$", text).group(1).split()
+    shown = subprocess.run(["make", "help"], cwd=root, capture_output=True, text=True, check=True).stdout
+    assert phony
+    for target in phony:
+        assert re.search(rf"make {target} +\S", shown), target
+
+
+def test_python_of_the_readme_runs(root, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shown = blocks(root, "README.md", "python")
+    assert shown
+    for code in shown:
+        exec(compile(code, "README.md", "exec"), {})
+
+
+@pytest.mark.parametrize("line", ["palpate run --list"])
+def test_cheap_commands_of_the_readme_run(root, capsys, line):
+    assert line in commands(root, "README.md", "palpate")
+    assert main(shlex.split(line)[1:]) == 0
+    assert "foam-hybrid" in capsys.readouterr().out
+
+
+def test_the_log_of_the_readme_is_identified(root, capsys, monkeypatch, tmp_path):
+    (line,) = [line for line in commands(root, "README.md", "palpate") if " identify " in line]
+    words = shlex.split(line)[1:]
+    words[1] = str(root / words[1])
+    monkeypatch.chdir(tmp_path)
+    assert main(words) in {0, 1}
+    assert "K" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(root, page):
+    text = (root / page).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
+        if "://" not in target:
+            assert ((root / page).parent / target).exists(), f"{page}: {target}"
+
+
+def test_each_page_of_the_documentation_is_in_its_menu(root):
+    config = tomllib.loads((root / "zensical.toml").read_text(encoding="utf-8"))
+    menu = {name for entry in config["project"]["nav"] for name in entry.values()}
+    assert menu == {str(path.relative_to(root / "docs")) for path in (root / "docs").rglob("*.md")}
+    assert {f"docs/{name}" for name in menu} <= set(PAGES)
