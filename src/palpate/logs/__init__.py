@@ -1,0 +1,8 @@
+"""Files in and out: logs of any origin become records; records are kept as Parquet."""
+
+from __future__ import annotations
+
+from palpate.logs.read import read_log
+from palpate.logs.store import read_record, write_record
+
+__all__ = ["read_log", "read_record", "write_record"]

@@ -1,0 +1,183 @@
+"""Columns of a file as arrays of numbers, read with polars and only where they are asked for."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError, unknown
+from palpate.logs.layout import Layout, find_layout
+from palpate.logs.store import stored_about
+
+if TYPE_CHECKING:
+    import polars
+
+_PARQUET = b"PAR1"
+
+
+class Table:
+    """A file of columns: CSV in any of its dialects, or Parquet.
+
+    Args:
+        path: the file.
+        delimiter: of a CSV file; found when None.
+
+    Raises:
+        InputError: the file is missing, a folder, empty, or of a kind that palpate does not read.
+    """
+
+    def __init__(self, path: Path, delimiter: str | None = None) -> None:
+        self.path = _checked(path)
+        with path.open("rb") as file:
+            self.parquet = file.read(4) == _PARQUET
+        self.units: dict[str, str] = {}
+        self.meta: dict[str, Any] = {}
+        self.layout: Layout | None = None
+        if self.parquet:
+            self.names = self._open_parquet()
+        else:
+            self.layout = find_layout(path, delimiter)
+            self.names = list(self.layout.names)
+
+    def _open_parquet(self) -> list[str]:
+        import polars
+
+        about = stored_about(self.path) or {"units": {}, "meta": {}}
+        self.units, self.meta = dict(about["units"]), dict(about["meta"])  # type: ignore[arg-type]
+        return list(polars.read_parquet_schema(self.path))
+
+    def resolve(self, name: str) -> int:
+        """The place of a column given by its name, or else by its number from 0.
+
+        Raises:
+            InputError: there is no such column (those there are, are listed), or there are two.
+        """
+        places = [i for i, own in enumerate(self.names) if own == name]
+        if len(places) > 1:
+            numbers = ", ".join(map(str, places))
+            raise InputError(f"{self.path} has {len(places)} columns named {name!r}; name one by number: {numbers}")
+        if places:
+            return places[0]
+        if name.isdigit():
+            if int(name) < len(self.names):
+                return int(name)
+            raise InputError(f"{self.path} has no column {name}; its columns are 0 to {len(self.names) - 1}")
+        raise self._no_column(name)
+
+    def _no_column(self, name: str) -> InputError:
+        text = str(unknown("column", name, self.names))
+        if self.layout and len(self.names) == 1:
+            text += f" (only one column was found, parted by {self.layout.delimiter_name}; is the delimiter right?)"
+        return InputError(f"{self.path}: {text}")
+
+    def numbers(self, places: Sequence[int], missing: Sequence[str] = ()) -> list[NDArray[np.float64]]:
+        """The columns at these places; an empty cell, or one that holds a word of `missing`, is NaN.
+
+        Raises:
+            InputError: a cell that is not a finite number; its row and its text are named.
+        """
+        frame = self._frame(places)
+        columns = []
+        for place in places:
+            values = frame[str(place)].to_numpy().astype(float, copy=True)
+            values[np.isin(values, [float(word) for word in missing if _is_finite(word)])] = np.nan
+            if not np.isfinite(values).all():
+                self._check_cells(place, missing)
+                values[~np.isfinite(values)] = np.nan
+            columns.append(values)
+        return columns
+
+    def _frame(self, places: Sequence[int]) -> polars.DataFrame:
+        import polars
+
+        number = polars.Float64
+        try:
+            if self.parquet:
+                lazy = polars.scan_parquet(self.path)
+                picks = [polars.col(self.names[i]).cast(number, strict=False).alias(str(i)) for i in set(places)]
+            else:
+                lazy = self._text()
+                picks = [self._cell(i).cast(number, strict=False).alias(str(i)) for i in set(places)]
+            return lazy.select(picks).collect(engine="streaming")
+        except polars.exceptions.PolarsError as error:
+            line = (str(error).splitlines() or ["unreadable"])[0]
+            raise InputError(f"{self.path} cannot be read as a table: {line}") from None
+
+    def _cell(self, place: int) -> polars.Expr:
+        import polars
+
+        cell = polars.col(f"column_{place + 1}").str.strip_chars()
+        if self.layout and self.layout.decimal_comma:
+            cell = cell.str.replace(",", ".", literal=True)
+        return cell
+
+    def _text(self) -> polars.LazyFrame:
+        import polars
+
+        layout = self.layout
+        assert layout is not None
+        schema = {f"column_{i + 1}": polars.String for i in range(len(layout.names))}
+        source: Any = self.path
+        delimiter = layout.delimiter
+        if delimiter == " ":  # runs of spaces are one delimiter, which a CSV reader does not know
+            source, delimiter = io.BytesIO("\n".join(_words(self.path)).encode()), ","
+        return polars.scan_csv(
+            source,
+            separator=delimiter,
+            has_header=False,
+            skip_lines=layout.first_row - 1 if delimiter == layout.delimiter else int(layout.header),
+            schema=schema,
+            comment_prefix="#",
+            truncate_ragged_lines=True,
+        )
+
+    def _check_cells(self, place: int, missing: Sequence[str]) -> None:
+        """Find the first cell that holds something, and yet no finite number."""
+        import polars
+
+        lazy = polars.scan_parquet(self.path) if self.parquet else self._text()
+        cell = polars.col(self.names[place]).cast(polars.String) if self.parquet else self._cell(place)
+        value = cell.cast(polars.Float64, strict=False)
+        words = [word.lower() for word in ("", *missing)]
+        wrong = cell.is_not_null() & ~cell.str.to_lowercase().is_in(words) & ~value.is_finite().fill_null(False)
+        found = lazy.select(cell.alias("cell"), wrong.alias("wrong")).with_row_index("row").filter("wrong").head(1)
+        for row, text, _ in found.collect().rows():
+            raise InputError(self._bad_cell(place, int(row), text))
+
+    def _bad_cell(self, place: int, row: int, text: Any) -> str:
+        where = f"row {row + 1}"
+        if self.layout and not self.layout.skip and self.layout.delimiter != " ":
+            where += f" (line {self.layout.first_row + row})"
+        name = self.names[place]
+        return (
+            f"{self.path}: column {name!r}, {where} holds {str(text)!r}, which is no finite number;"
+            f" mend it, or say --missing {text} if it means that there is no reading"
+        )
+
+
+def _is_finite(word: str) -> bool:
+    try:
+        return bool(np.isfinite(float(word)))
+    except ValueError:
+        return False
+
+
+def _words(path: Path) -> list[str]:
+    with path.open(encoding="utf-8-sig") as file:
+        lines = (line.split() for line in file if not line.startswith("#"))
+        return [",".join(words) for words in lines if words]
+
+
+def _checked(path: Path) -> Path:
+    if not path.exists():
+        raise InputError(f"there is no file {path}; check the path")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; give a log file, CSV or Parquet")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path} is empty; give a log with a row of numbers for each sample")
+    return path
