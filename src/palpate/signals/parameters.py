@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from palpate._vector import Vec3
 from palpate.errors import InputError
 
 C = TypeVar("C", bound=type)
@@ -11,12 +12,13 @@ C = TypeVar("C", bound=type)
 def coerced(check: Callable[[Any], None] | None = None) -> Callable[[C], C]:
     """Decorates a NamedTuple of parameters: numbers become what their fields say, then `check` judges them.
 
-    Put it under `@part`. `_make` and `_replace` build the tuple directly and skip both.
+    A field marked `Any` takes a number or a `Vec3`. Put it under `@part`. `_make` and `_replace` build the tuple
+    directly and skip both.
     """
 
     def decorate(cls: C) -> C:
         plain_new = cls.__new__
-        kinds = [kind if kind in {float, int} else None for kind in cls.__annotations__.values()]
+        kinds = [{float: float, int: int, Any: _floats}.get(k) for k in cls.__annotations__.values()]
 
         def new(cls: Any, *args: Any, **kwargs: Any) -> Any:
             raw = plain_new(cls, *args, **kwargs)
@@ -35,3 +37,12 @@ def require(ok: bool, name: str, limit: str, value: Any) -> None:
     """Raises the error of a parameter outside its limit: what, the limit, what was given."""
     if not ok:
         raise InputError(f"{name} must be {limit}, got {value!r}")
+
+
+def components(value: Any) -> tuple[float, ...]:
+    """The numbers in a number or in a `Vec3`."""
+    return tuple(value) if isinstance(value, Vec3) else (value,)
+
+
+def _floats(value: Any) -> Any:
+    return Vec3(*map(float, value)) if isinstance(value, Vec3) else float(value)

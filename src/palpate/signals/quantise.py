@@ -8,6 +8,12 @@ _WHOLE = 1.5 * 2.0**52
 
 
 @law
+def whole(u):
+    """u to the nearest whole number."""
+    return u + _WHOLE - _WHOLE
+
+
+@law
 def quantise(u, step):
     """u to the nearest multiple of step (mid-tread: zero is a level)."""
-    return (u / step + _WHOLE - _WHOLE) * step
+    return whole(u / step) * step

@@ -1,0 +1,58 @@
+"""Spring, damper and mass side by side."""
+
+from typing import NamedTuple
+
+from palpate._jit import part
+from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
+from palpate.signals.parameters import coerced, require
+
+
+def _check(self):
+    require(self.stiffness > 0, "stiffness", "above 0 N/m", self.stiffness)
+    require(self.damping >= 0, "damping", "at least 0 N s/m", self.damping)
+    require(self.mass >= 0, "mass", "at least 0 kg", self.mass)
+
+
+@part
+@coerced(_check)
+class KelvinVoigt(NamedTuple):
+    """f = K p + B v + M a: the model that M, B, K estimators assume.
+
+    At touch with velocity v the force jumps by B v: the model says so.
+
+    Args:
+        stiffness: K [N/m].
+        damping: B [N s/m].
+        mass: M [kg].
+    """
+
+    stiffness: float
+    damping: float
+    mass: float
+
+    def start(self):
+        return UNTOUCHED
+
+    def force(self, state, p, v):
+        """Force on the surface at penetration p [m] and rate v [m/s], inertia left out [N]."""
+        return self.stiffness * p + self.damping * v
+
+    def relax(self, state, p, v, dt):
+        """The state after a step in contact that ended at p, v."""
+        return SurfaceState(p, v, 0.0, 1.0)
+
+    def free(self, state, dt):
+        """The state after a free step."""
+        weight = implicitness(self.mass, self.damping, self.stiffness, dt)
+        s, v = swing(
+            self.mass, self.damping, self.stiffness, 0.0, state.deflection, state.rate, weight, dt
+        )
+        return SurfaceState(s, v, 0.0, 0.0)
+
+    def stored(self, state):
+        """Energy that can be given back, motion of the mass included [J]."""
+        return 0.5 * (self.stiffness * state.deflection * state.deflection + self.mass * state.rate * state.rate)
+
+    def truth(self):
+        """Parameter names with value and unit, for reports."""
+        return {"K": (self.stiffness, "N/m"), "B": (self.damping, "N s/m"), "M": (self.mass, "kg")}

@@ -1,0 +1,81 @@
+"""What is true of every surface, whatever its law: its state, and what happens at touch and at parting.
+
+Penetration p and deflection s are positive into the surface; forces are those on the surface, positive when pressed.
+In contact the surface moves with the tip (s = p); free, it moves by its own law. The surface carries a light mass, so
+that a tip of mass m_t with acceleration a_0 in the absence of contact feels, while they move together,
+f_c = (f + m_s a_0) m_t/(m_t + m_s): it has the sign of f + m_s a_0, and where that is negative they part.
+"""
+
+from typing import NamedTuple
+
+from palpate._jit import law
+
+
+class SurfaceState(NamedTuple):
+    """The surface along its normal."""
+
+    deflection: float  # [m]
+    rate: float  # [m/s]
+    internal: float  # stretch of the relaxing branch's spring [m]; 0 where the model has none
+    contact: float  # 1 in contact, 0 free
+
+
+UNTOUCHED = SurfaceState(0.0, 0.0, 0.0, 0.0)
+
+
+@law
+def touch(state, v):
+    """The state in contact, at the common velocity v; the next `relax` takes the deflection to the tip."""
+    return SurfaceState(state.deflection, v, state.internal, 1.0)
+
+
+@law
+def part_from(state):
+    """The state after parting: the surface keeps its place and its velocity."""
+    return SurfaceState(state.deflection, state.rate, state.internal, 0.0)
+
+
+@law
+def impact(tip_mass, surface_mass, tip_velocity, surface_velocity):
+    """Common velocity [m/s] after an inelastic impact and the impulse [N s] that the tip gives: momentum is kept."""
+    common = (tip_mass * tip_velocity + surface_mass * surface_velocity) / (tip_mass + surface_mass)
+    return common, surface_mass * (common - surface_velocity)
+
+
+@law
+def contact_force(force, surface_mass, tip_mass, free_acceleration):
+    """Force [N] between tip and surface that move together; negative: they are about to part.
+
+    Args:
+        force: the surface's own, without inertia [N].
+        surface_mass: [kg].
+        tip_mass: effective mass of the tip along the normal, 1/(n^T J M^-1 J^T n) of an arm [kg].
+        free_acceleration: of the tip into the surface if there were no normal contact force [m/s^2].
+    """
+    return (force + surface_mass * free_acceleration) * (tip_mass / (tip_mass + surface_mass))
+
+
+@law
+def implicitness(mass, damping, stiffness, dt):
+    """Weight of the new state in a step: 1/2 (second order), towards 1 where the step outlasts the decay.
+
+    With it no decay changes its sign from step to step, however stiff; without mass it is 1.
+    """
+    if mass == 0.0:
+        return 1.0
+    reach = dt * (damping + dt * stiffness)
+    return 1.0 - mass / reach if reach > 2.0 * mass else 0.5
+
+
+@law
+def swing(mass, damping, stiffness, load, s, v, weight, dt):
+    """Deflection and rate after a free step of m s'' + b s' + k s + load = 0.
+
+    The mean rate r over the step solves m (v1 - v)/dt + b r + k (s + weight dt r) + load = 0 with
+    r = v + weight (v1 - v): energy never grows for weight >= 1/2.
+    """
+    inertia = mass / (weight * dt)
+    push = inertia * v - stiffness * s - load
+    resistance = inertia + damping + weight * dt * stiffness
+    rate = push / resistance if resistance > 0.0 else 0.0
+    return s + dt * rate, v + (rate - v) / weight

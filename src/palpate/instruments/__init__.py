@@ -1,0 +1,19 @@
+"""What is measured, and how late: each instrument states its own lag [s], its group delay at zero frequency."""
+
+from palpate.instruments.converters import AnalogToDigital, DigitalToAnalog
+from palpate.instruments.differentiator import Differentiator
+from palpate.instruments.encoder import Encoder
+from palpate.instruments.force_sensor import ForceSensor, ForceSensorState, force_sensor
+from palpate.instruments.sallen_key import analog_filter_190, sallen_key
+
+__all__ = [
+    "AnalogToDigital",
+    "Differentiator",
+    "DigitalToAnalog",
+    "Encoder",
+    "ForceSensor",
+    "ForceSensorState",
+    "analog_filter_190",
+    "force_sensor",
+    "sallen_key",
+]
