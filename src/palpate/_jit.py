@@ -10,6 +10,7 @@ import hashlib
 import importlib
 import inspect
 import operator
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,8 +21,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
 
 _laws: list[Callable[..., Any]] = []
+_foreign_laws: list[Callable[..., Any]] = []
 _parts: dict[type, None] = {}
-_handed_over: set[Any] = set()
+_PACKAGE = Path(__file__).parent
 # Division as NumPy's: no branch and no exception inside a loop.
 _OPTIONS = {"error_model": "numpy", "nogil": True}
 
@@ -29,6 +31,8 @@ _OPTIONS = {"error_model": "numpy", "nogil": True}
 def law(function: F) -> F:
     """Marks a plain function as usable inside kernels. It stays a plain function."""
     _laws.append(function)
+    if _PACKAGE not in Path(function.__code__.co_filename).parents:
+        _foreign_laws.append(function)
     return function
 
 
@@ -72,17 +76,31 @@ def kernel(function: Callable[..., Any]) -> Kernel:
 def sources_stamp() -> str:
     """A hash of all the package's sources: a kernel is stale when any file that it may call has changed."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    for path in sorted(_PACKAGE.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-def _foreign_stamps(types_of_arguments: tuple[Any, ...]) -> tuple[str, ...]:
-    """Hashes of the files, outside the package, that define the parts among the arguments."""
-    home = Path(__file__).parent
-    files = {Path(inspect.getfile(cls)) for cls in _classes(types_of_arguments)}
-    foreign = [f for f in files if home not in f.parents and f.exists()]
-    return tuple(sorted(hashlib.sha256(f.read_bytes()).hexdigest() for f in foreign))
+def _foreign_stamps(
+    function: Callable[..., Any], types_of_arguments: tuple[Any, ...]
+) -> tuple[str, ...] | None:
+    """Hashes of the user's own files that a kernel may depend on; None where there is no file to ask.
+
+    A kernel of the package that is given only the package's parts depends on none.
+    """
+    files = {_home_of(x) for x in (function, *_classes(types_of_arguments))}
+    if not files - {_PACKAGE}:
+        return ()
+    files |= {_home_of(x) for x in (*_foreign_laws, *_parts)}
+    if not all(path.is_file() or path == _PACKAGE for path in files):
+        return None
+    return tuple(sorted(hashlib.sha256(f.read_bytes()).hexdigest() for f in files - {_PACKAGE}))
+
+
+def _home_of(thing: Any) -> Path:
+    """The file that defines a function or a class; the package's folder for all of the package's own."""
+    path = Path(getattr(sys.modules.get(thing.__module__), "__file__", None) or "nowhere")
+    return _PACKAGE if _PACKAGE in path.parents else path
 
 
 def _classes(numba_types: Any) -> Any:
@@ -105,13 +123,18 @@ def _dispatcher(function: Callable[..., Any]) -> Any:
             self._cache_file._source_stamp = sources_stamp()
 
         def _index_key(self, sig: Any, codegen: Any) -> Any:
-            return (*super()._index_key(sig, codegen), _foreign_stamps(sig))
+            return (*super()._index_key(sig, codegen), _foreign_stamps(function, sig))
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
-            found = super().load_overload(sig, target_context)
+            known = _foreign_stamps(function, sig) is not None
+            found = super().load_overload(sig, target_context) if known else None
             if found is None:
                 _hand_over()
             return found
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            if _foreign_stamps(function, sig) is not None:
+                super().save_overload(sig, data)
 
     dispatcher = numba.njit(**_OPTIONS)(function)
     try:
@@ -122,15 +145,16 @@ def _dispatcher(function: Callable[..., Any]) -> Any:
 
 
 def _hand_over() -> None:
-    """Gives Numba all laws and parts registered since the last time."""
-    if not _handed_over:
-        _handed_over.add("operators")
-        _operators()
+    """Gives Numba the laws registered since the last time, and once and for all the way to ask parts."""
+    _operators_and_members()
     while _laws:
         importlib.import_module("numba.extending").register_jitable(_laws.pop())
-    for cls in [c for c in _parts if c not in _handed_over]:
-        _handed_over.add(cls)
-        _methods(cls)
+
+
+@functools.cache
+def _operators_and_members() -> None:
+    _operators()
+    _members()
 
 
 def _is_part(kind: Any) -> bool:
@@ -242,33 +266,84 @@ def _widen() -> None:
         return None
 
 
-def _methods(cls: type) -> None:
-    """Overloads of a part's public methods and properties, each looked up in the class it is called on."""
-    from numba import types
-    from numba.extending import overload_attribute, overload_method
+def _members() -> None:
+    """Methods and properties of parts, each looked up in the class that it is called on.
 
-    for name, member in vars(cls).items():
-        if name.startswith("_") or name in _handed_over:
-            continue
-        if inspect.isfunction(member):
-            _handed_over.add(name)
-            overload_method(types.BaseNamedTuple, name, strict=False)(_method_typer(name, member))
-        elif isinstance(member, property):
-            _handed_over.add(name)
-            overload_attribute(types.BaseNamedTuple, name, strict=False)(_property_typer(name))
+    Not `overload_method`: that has one Python signature for a name, whatever the class.
+    """
+    from numba.core import types
+    from numba.core.typing.templates import AttributeTemplate
+    from numba.extending import infer_getattr
+
+    @infer_getattr
+    class Members(AttributeTemplate):  # type: ignore[misc]
+        key = types.BaseNamedTuple
+
+        def generic_resolve(self, value: Any, attr: str) -> Any:
+            member = _method(value, attr)
+            if inspect.isfunction(member):
+                return types.BoundFunction(_bound(member), value)
+            if isinstance(member, property):
+                _lower_property(attr)
+                return _compiled_member(member.fget).get_call_type(self.context, (value,), {}).return_type
+            return None
 
 
-def _method_typer(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
-    def typer(*args: Any) -> Any:
-        return _method(args[0], name)
+def _compiled_member(function: Callable[..., Any]) -> Any:
+    """The Numba type of a method that is compiled as a function of its own."""
+    import numba
 
-    typer.__signature__ = inspect.signature(method)  # type: ignore[attr-defined]
-    return typer
+    return numba.types.Dispatcher(_member_dispatcher(function))
 
 
-def _property_typer(name: str) -> Callable[[Any], Any]:
-    def typer(self: Any) -> Any:
-        found = _method(self, name)
-        return found.fget if isinstance(found, property) else None
+@functools.cache  # the type holds it by a weak reference only
+def _member_dispatcher(function: Callable[..., Any]) -> Any:
+    import numba
 
-    return typer
+    return numba.njit(**_OPTIONS)(function)
+
+
+@functools.cache
+def _bound(method: Callable[..., Any]) -> Any:
+    """How Numba types and lowers a call of the method on an object."""
+    from numba.core import types
+    from numba.core.typing.templates import AbstractTemplate
+    from numba.extending import lower_builtin
+
+    compiled = _compiled_member(method)
+
+    class Call(AbstractTemplate):  # type: ignore[misc]
+        key = method
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            signature = compiled.get_call_type(self.context, (self.this, *args), kws)
+            return signature and signature.as_method()
+
+    @lower_builtin(method, types.BaseNamedTuple, types.VarArg(types.Any))
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return _call(compiled, context, builder, signature, args)
+
+    return Call
+
+
+@functools.cache
+def _lower_property(name: str) -> None:
+    """How Numba reads an attribute that is a property of one part, and perhaps a field of another."""
+    from numba.core import types
+    from numba.core.imputils import impl_ret_borrowed
+    from numba.extending import lower_getattr
+
+    @lower_getattr(types.BaseNamedTuple, name)
+    def lower(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+        if name in kind.fields:
+            index = kind.fields.index(name)
+            return impl_ret_borrowed(context, builder, kind[index], builder.extract_value(value, index))
+        compiled = _compiled_member(_method(kind, name).fget)
+        signature = compiled.get_call_type(context.typing_context, (kind,), {})
+        return _call(compiled, context, builder, signature, (value,))
+
+
+def _call(compiled: Any, context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    call = context.get_function(compiled, signature)
+    context.add_linking_libs(getattr(call, "libs", ()))
+    return call(builder, args)
