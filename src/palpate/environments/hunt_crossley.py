@@ -58,8 +58,8 @@ class HuntCrossley(NamedTuple):
 
     def stored(self, state):
         """Energy that can be given back, motion of the mass included [J]."""
-        n = self.exponent + 1.0
-        return self.stiffness * abs(state.deflection) ** n / n + 0.5 * self.mass * state.rate * state.rate
+        s, v, n = abs(state.deflection), state.rate, self.exponent + 1.0
+        return self.stiffness * s**n / n + 0.5 * self.mass * v * v
 
     def truth(self):
         """Parameter names with value and unit, for reports."""

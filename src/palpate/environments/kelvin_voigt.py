@@ -44,14 +44,13 @@ class KelvinVoigt(NamedTuple):
     def free(self, state, dt):
         """The state after a free step."""
         weight = implicitness(self.mass, self.damping, self.stiffness, dt)
-        s, v = swing(
-            self.mass, self.damping, self.stiffness, 0.0, state.deflection, state.rate, weight, dt
-        )
+        s, v = swing(self.mass, self.damping, self.stiffness, 0.0, state.deflection, state.rate, weight, dt)
         return SurfaceState(s, v, 0.0, 0.0)
 
     def stored(self, state):
         """Energy that can be given back, motion of the mass included [J]."""
-        return 0.5 * (self.stiffness * state.deflection * state.deflection + self.mass * state.rate * state.rate)
+        s, v = state.deflection, state.rate
+        return 0.5 * (self.stiffness * s * s + self.mass * v * v)
 
     def truth(self):
         """Parameter names with value and unit, for reports."""

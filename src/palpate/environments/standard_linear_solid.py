@@ -67,9 +67,7 @@ class StandardLinearSolid(NamedTuple):
     def free(self, state, dt):
         """The state after a free step."""
         time, k1, z = self.branch_time, self.branch_stiffness, state.internal
-        weight = max(
-            branch_weight(time, dt), implicitness(self.mass, self.damping, self.stiffness + k1, dt)
-        )
+        weight = max(branch_weight(time, dt), implicitness(self.mass, self.damping, self.stiffness + k1, dt))
         # The branch's spring at its weighted mean is (z + weight advance)/(1 + weight dt/time).
         softening = 1.0 / (1.0 + weight * dt / time)
         stiffness = self.stiffness + k1 * softening
@@ -79,8 +77,8 @@ class StandardLinearSolid(NamedTuple):
 
     def stored(self, state):
         """Energy that can be given back, motion of the mass included [J]."""
-        springs = self.stiffness * state.deflection * state.deflection + self.branch_stiffness * state.internal * state.internal
-        return 0.5 * (springs + self.mass * state.rate * state.rate)
+        s, v, z = state.deflection, state.rate, state.internal
+        return 0.5 * (self.stiffness * s * s + self.branch_stiffness * z * z + self.mass * v * v)
 
     def truth(self):
         """Parameter names with value and unit, for reports; K is the relaxed stiffness."""

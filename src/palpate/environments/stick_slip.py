@@ -22,7 +22,7 @@ class StickSlipState(NamedTuple):
 @part
 @coerced(_check)
 class StickSlip(NamedTuple):
-    """A spring and a damper bent by the tip's slide, held within the Coulomb cone; sliding drags the anchor along.
+    """A spring and a damper that the slide bends, within the Coulomb cone; sliding drags the anchor along.
 
     Args:
         stiffness: of the bristle [N/m].

@@ -10,6 +10,7 @@ from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 
 _KELVIN_VOIGT, _SOLID, _HUNT_CROSSLEY = 0, 1, 2
+_MEMBERS = (KelvinVoigt(1, 0, 0), StandardLinearSolid(1, 0, 0, 0, 1), HuntCrossley(1, 0, 1, 0))
 
 
 @part
@@ -65,14 +66,15 @@ class Surface(NamedTuple):
 
     def truth(self):
         """Parameter names with value and unit, for reports."""
-        return self[2 + self.kind].truth()
+        return (self.kelvin_voigt, self.solid, self.hunt_crossley)[self.kind].truth()
 
 
 def join(environment: KelvinVoigt | StandardLinearSolid | HuntCrossley) -> Surface:
     """The surface that behaves as this environment."""
-    members = (KelvinVoigt(1, 0, 0), StandardLinearSolid(1, 0, 0, 0, 1), HuntCrossley(1, 0, 1, 0))
-    for kind, member in enumerate(members):
-        if type(member) is type(environment):
-            return Surface(kind, environment.mass, *members[:kind], environment, *members[kind + 1 :])
-    known = ", ".join(type(member).__name__ for member in members)
-    raise InputError(f"cannot join a {type(environment).__name__}; there are: {known}")
+    kinds = [type(member) for member in _MEMBERS]
+    if type(environment) not in kinds:
+        known = ", ".join(kind.__name__ for kind in kinds)
+        raise InputError(f"cannot join a {type(environment).__name__}; there are: {known}")
+    kind = kinds.index(type(environment))
+    members = (*_MEMBERS[:kind], environment, *_MEMBERS[kind + 1 :])
+    return Surface._make((kind, environment.mass, *members))

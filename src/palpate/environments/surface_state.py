@@ -1,9 +1,10 @@
 """What is true of every surface, whatever its law: its state, and what happens at touch and at parting.
 
-Penetration p and deflection s are positive into the surface; forces are those on the surface, positive when pressed.
-In contact the surface moves with the tip (s = p); free, it moves by its own law. The surface carries a light mass, so
-that a tip of mass m_t with acceleration a_0 in the absence of contact feels, while they move together,
-f_c = (f + m_s a_0) m_t/(m_t + m_s): it has the sign of f + m_s a_0, and where that is negative they part.
+Penetration p and deflection s are positive into the surface; forces are those on the surface, positive when
+it is pressed. In contact the surface moves with the tip (s = p); free, it moves by its own law. The surface
+carries a light mass m_s: a tip of mass m_t, with acceleration a_0 if there were no contact, feels while they
+move together f_c = (f + m_s a_0) m_t/(m_t + m_s). It has the sign of f + m_s a_0, and where that is negative
+they part.
 """
 
 from typing import NamedTuple
@@ -37,7 +38,7 @@ def part_from(state):
 
 @law
 def impact(tip_mass, surface_mass, tip_velocity, surface_velocity):
-    """Common velocity [m/s] after an inelastic impact and the impulse [N s] that the tip gives: momentum is kept."""
+    """Common velocity [m/s] after an inelastic impact and the impulse [N s] that the tip gives."""
     common = (tip_mass * tip_velocity + surface_mass * surface_velocity) / (tip_mass + surface_mass)
     return common, surface_mass * (common - surface_velocity)
 

@@ -1,4 +1,4 @@
-"""What is measured, and how late: each instrument states its own lag [s], its group delay at zero frequency."""
+"""What is measured, and how late: each instrument states its lag [s], the group delay at zero frequency."""
 
 from palpate.instruments.converters import AnalogToDigital, DigitalToAnalog
 from palpate.instruments.differentiator import Differentiator

@@ -1,6 +1,7 @@
 """Between volts and numbers: converters quantise and saturate.
 
-Both use the codes -(2^(bits-1) - 1) ... 2^(bits-1) - 1: mid-tread and symmetric, the one code more below is left out.
+Both use the codes -(2^(bits-1) - 1) ... 2^(bits-1) - 1: mid-tread and symmetric. The one code more below is
+left out.
 """
 
 from typing import Any, NamedTuple

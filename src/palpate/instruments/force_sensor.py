@@ -44,7 +44,7 @@ class ForceSensor(NamedTuple):
         return ForceSensorState(self.analog.start(), 0.0, 0.0)
 
     def samples_at(self, k):
-        """Whether physics step k is a sampling instant: the first step at or after a multiple of 1/sampling."""
+        """Whether step k is a sampling instant: the first step at or after a multiple of 1/sampling."""
         return (k * self.sampling) % self.rate < self.sampling
 
     def sample(self, state, force, k, noise):

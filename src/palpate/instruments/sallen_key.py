@@ -9,7 +9,8 @@ from palpate.signals.parameters import require
 def sallen_key(r1: float, r2: float, c1: float, c2: float, rate: float) -> Biquad:
     """A unity-gain Sallen-Key low-pass, stepped at a physics rate [Hz] far above its corner.
 
-    w0^2 = 1/(R1 R2 C1 C2), w0/Q = (R1 + R2)/(R1 R2 C1), as thesis sec. 3.4 has it; resistances [Ohm], capacities [F].
+    w0^2 = 1/(R1 R2 C1 C2) and w0/Q = (R1 + R2)/(R1 R2 C1), thesis fig. 3.6; resistances [Ohm], capacities
+    [F].
     """
     require(min(r1, r2, c1, c2) > 0, "component values", "above 0", (r1, r2, c1, c2))
     w0 = 1.0 / math.sqrt(r1 * r2 * c1 * c2)

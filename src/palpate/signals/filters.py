@@ -1,7 +1,7 @@
 """Digital filters as parts: coefficients from the book, and one sample a step.
 
-All steps use operators only: a sample may be a number, a `Vec3` or an array. A filter that starts at rest on a sample
-u (`start_at(u)`) has passed u for ever; `start()` is `start_at(0.0)`. The lag is the group delay at zero frequency.
+All steps use operators only: a sample may be a number, a `Vec3` or an array. `start_at(u)` is the state after
+a constant u for ever; `start()` is that of zero. The lag is the group delay at zero frequency.
 """
 
 import math
@@ -96,7 +96,7 @@ def lowpass1(cutoff: float, rate: float) -> Biquad:
 
 
 def lowpass2(frequency: float, quality: float, rate: float) -> Biquad:
-    """Second-order low-pass of natural frequency [Hz] and quality factor; bilinear, prewarped at that frequency."""
+    """Second-order low-pass of natural frequency [Hz] and quality factor; bilinear, prewarped there."""
     require(quality > 0, "quality", "above 0", quality)
     w = _prewarped(frequency, rate)
     scale = 1 + w / quality + w * w
@@ -115,7 +115,7 @@ def butterworth3(cutoff: float, rate: float) -> Cascade:
 
 
 def _prewarped(cutoff: float, rate: float) -> float:
-    """tan(pi cutoff / rate): the analog frequency, in half-steps, that the bilinear transform puts at the cut-off."""
+    """tan(pi cutoff/rate): what the bilinear transform puts at the cut-off, in units of twice the rate."""
     require(0 < cutoff < rate / 2, "cut-off", f"between 0 and half the rate ({rate / 2:g} Hz)", cutoff)
     return math.tan(math.pi * cutoff / rate)
 
@@ -140,8 +140,8 @@ class StateVariableState(NamedTuple):
 class StateVariable(NamedTuple):
     """Low-pass F(s) = w^2/(s^2 + w s/quality + w^2) whose one step gives F u, s F u and s^2 F u.
 
-    The three have one denominator, so that a relation f = M a + B v + K x among signals holds exactly among their
-    channels: with s = (2/T)(z-1)/(z+1) for all three (state-variable filter; Zavalishin, 2012, ch. 4).
+    The three have one denominator, s = (2/T)(z-1)/(z+1) in each, so that a relation f = M a + B v + K x among
+    signals holds exactly among their channels (Zavalishin, The Art of VA Filter Design, 2012, ch. 4).
 
     Args:
         g: tan(pi cutoff/rate).

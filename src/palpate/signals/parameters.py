@@ -12,17 +12,18 @@ C = TypeVar("C", bound=type)
 def coerced(check: Callable[[Any], None] | None = None) -> Callable[[C], C]:
     """Decorates a NamedTuple of parameters: numbers become what their fields say, then `check` judges them.
 
-    A field marked `Any` takes a number or a `Vec3`. Put it under `@part`. `_make` and `_replace` build the tuple
-    directly and skip both.
+    A field marked `Any` takes a number or a `Vec3`. Put it under `@part`. `_make` and `_replace` build the
+    tuple directly: they skip both.
     """
 
     def decorate(cls: C) -> C:
         plain_new = cls.__new__
-        kinds = [{float: float, int: int, Any: _floats}.get(k) for k in cls.__annotations__.values()]
+        makers: dict[Any, Callable[[Any], Any]] = {float: float, int: int, Any: _floats}
+        kinds = [makers.get(kind, _as_it_is) for kind in cls.__annotations__.values()]
 
         def new(cls: Any, *args: Any, **kwargs: Any) -> Any:
             raw = plain_new(cls, *args, **kwargs)
-            self = tuple.__new__(cls, (kind(v) if kind else v for kind, v in zip(kinds, raw, strict=True)))
+            self = tuple.__new__(cls, (kind(v) for kind, v in zip(kinds, raw, strict=True)))
             if check is not None:
                 check(self)
             return self
@@ -42,6 +43,10 @@ def require(ok: bool, name: str, limit: str, value: Any) -> None:
 def components(value: Any) -> tuple[float, ...]:
     """The numbers in a number or in a `Vec3`."""
     return tuple(value) if isinstance(value, Vec3) else (value,)
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
 
 
 def _floats(value: Any) -> Any:

@@ -2,8 +2,8 @@
 
 from palpate._jit import law
 
-# Adding this to a double leaves no bits below one: the sum is rounded to a whole number, ties to even. It works on
-# numbers, vectors and arrays alike, up to 2^51 steps.
+# Adding this to a double leaves no bits below one: the sum is rounded to a whole number, ties to even. It
+# works on numbers, vectors and arrays alike, up to 2^51 steps.
 _WHOLE = 1.5 * 2.0**52
 
 
