@@ -1,0 +1,227 @@
+"""What the bridge to Numba promises: one meaning, one cache that is never stale, any name for any part."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import palpate
+from palpate._jit import kernel, law, part
+from palpate._vector import ZERO3, Mat3, solve, sqrt
+
+
+@part
+class Spring(NamedTuple):
+    stiffness: float
+
+    def step(self, state, v):
+        return self.stiffness * v, state + v
+
+    def pose(self, x, scale=2.0):
+        return scale * self.stiffness * x
+
+    @property
+    def lag(self):
+        return 2.0 * self.stiffness
+
+
+@part
+class Holder(NamedTuple):
+    """Its fields bear names that are methods and properties elsewhere."""
+
+    pose: float
+    lag: float
+    T: float
+
+    def step(self, z, v, dt):
+        return self.pose * v * dt + z
+
+
+@part
+class Delay(NamedTuple):
+    """A method here is a property elsewhere."""
+
+    base: float
+
+    def lag(self, x):
+        return self.base * x
+
+    def step(self):
+        return self.base
+
+
+@part
+class Nest(NamedTuple):
+    inner: Spring
+
+    def step(self, z):
+        force, z = self.inner.step(z, 3.0)
+        return force + self.inner.lag, z
+
+
+@law
+def with_defaults(a, b=3.0):
+    return a - b
+
+
+@kernel
+def everything(spring, holder, delay, nest):
+    calls = spring.step(1.0, 2.0), holder.step(1.0, 2.0, 3.0), delay.step(), nest.step(1.0)
+    fields = holder.pose, holder.lag, holder.T
+    names = spring.lag, delay.lag(2.0), spring.pose(2.0), spring.pose(2.0, 5.0), spring.pose(x=1.0, scale=4.0)
+    return calls, fields, names, with_defaults(1.0), with_defaults(1.0, b=2.0)
+
+
+def test_parts_share_names_with_their_own_signatures():
+    arguments = Spring(2.0), Holder(3.0, 4.0, 5.0), Delay(6.0), Nest(Spring(7.0))
+    assert everything(*arguments) == everything.plain(*arguments)
+    assert everything(*arguments)[1] == (3.0, 4.0, 5.0)
+
+
+@kernel
+def dividing(a, A):
+    return 1.0 / a, solve(A, ZERO3), sqrt(-1.0 - a)
+
+
+def test_division_by_zero_and_root_of_a_negative_do_not_interrupt_a_kernel():
+    inverse, x, root = dividing(0.0, Mat3(ZERO3, ZERO3, ZERO3))
+    assert inverse == float("inf")
+    assert x.x != x.x
+    assert root != root
+
+
+@kernel
+def adding(state, n):
+    for _ in range(n):
+        state = state + 1.0
+    return state
+
+
+def test_an_integer_is_another_type_and_the_plain_function_stays():
+    assert adding(1.0, 3) == adding.plain(1.0, 3) == 4.0
+    assert adding.__name__ == "adding"
+
+
+CALLEE = """
+from palpate._jit import law
+
+@law
+def twice(x):
+    return {factor} * x
+"""
+
+ENTRY = """
+from palpate._jit import kernel
+from palpate.callee import twice
+
+@kernel
+def entry(part, x):
+    return twice(part.step(x))
+"""
+
+MINE = """
+from typing import NamedTuple
+
+from helper import more
+from palpate._jit import part
+
+@part
+class Mine(NamedTuple):
+    gain: float
+
+    def step(self, x):
+        return more(self.gain * x) + {offset}
+"""
+
+HELPER = """
+from palpate._jit import law
+
+@law
+def more(x):
+    return x + {more}
+"""
+
+MAIN = """
+import sys
+
+from mine import Mine
+from palpate.entry import entry
+
+assert "numba" not in sys.modules, "registering must not import Numba"
+print(entry(Mine(3.0), 5.0), entry.from_cache)
+"""
+
+OWN = """
+from palpate._jit import kernel
+
+@kernel
+def mine(x):
+    return x + {number}
+
+print(mine(1.0), mine.from_cache)
+"""
+
+
+class Workshop:
+    """A copy of the bridge with a law and a kernel of its own, and a user's part outside it."""
+
+    def __init__(self, folder):
+        self.folder, self.package, self.user = folder, folder / "lib" / "palpate", folder / "user"
+        self.package.mkdir(parents=True)
+        self.user.mkdir()
+        here = Path(palpate.__file__).parent
+        (self.package / "__init__.py").write_text("")
+        for name in ("_jit.py", "_vector.py"):
+            (self.package / name).write_text((here / name).read_text())
+        (self.package / "entry.py").write_text(ENTRY)
+        (self.user / "main.py").write_text(MAIN)
+        self.write(factor=2.0, offset=0.0, more=0.0)
+
+    def write(self, **numbers):
+        files = {"factor": (self.package / "callee.py", CALLEE), "offset": (self.user / "mine.py", MINE)}
+        files["more"] = (self.user / "helper.py", HELPER)
+        for name, value in numbers.items():
+            path, text = files[name]
+            path.write_text(text.format(**{name: value}))
+
+    def run(self, main="main.py"):
+        done = subprocess.run(
+            [sys.executable, "-B", str(self.user / main)],
+            env={"PYTHONPATH": str(self.package.parent), "PATH": ""},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        value, cached = done.stdout.split()
+        return float(value), cached == "True"
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory):
+    return Workshop(tmp_path_factory.mktemp("workshop"))
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        pytest.param({}, (30.0, False), id="cold"),
+        pytest.param({}, (30.0, True), id="warm"),
+        pytest.param({"factor": 10.0}, (150.0, False), id="a callee in another file of the package changed"),
+        pytest.param({"offset": 1.0}, (160.0, False), id="the user's part changed"),
+        pytest.param({"more": 2.0}, (180.0, False), id="a law in another file of the user's changed"),
+        pytest.param({}, (180.0, True), id="warm again"),
+        pytest.param({"offset": 0.0}, (170.0, False), id="back, but not to the first combination"),
+    ],
+)
+def test_the_cache_is_used_and_never_stale(workshop, changed, expected):
+    workshop.write(**changed)
+    assert workshop.run() == expected
+
+
+def test_a_user_kernel_goes_stale_with_its_own_file(workshop):
+    for number, expected in ((1.0, (2.0, False)), (1.0, (2.0, True)), (5.0, (6.0, False))):
+        (workshop.user / "own.py").write_text(OWN.format(number=number))
+        assert workshop.run("own.py") == expected
