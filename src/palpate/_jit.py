@@ -171,6 +171,7 @@ def _operators() -> None:
 
     for name in ("add", "sub", "mul", "truediv", "matmul"):
         overload(getattr(operator, name), strict=False)(_binary(name))
+        overload(getattr(operator, f"i{name}"), strict=False)(_binary(name))  # a += b is a = a + b on values
     _overload_method_of_first(operator.neg, "__neg__", "a")
     _overload_method_of_first(abs, "__abs__", "a")
     for function, name in _vector.METHODS.items():

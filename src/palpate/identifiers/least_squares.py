@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from palpate._jit import law, part
-from palpate._vector import Mat3, Vec3, outer, trace
+from palpate._vector import Mat3, Vec3, outer, sqrt, trace
 
 
 @law
@@ -47,6 +47,11 @@ class LeastSquaresState(NamedTuple):
             return 0.0
         r = max(min(self.products / self.squares, 0.99), 0.0)
         return self.squares / max(self.weight - 3.0, 1.0) * (1.0 + r) / (1.0 - r)
+
+    def std(self):
+        """Standard deviation of each parameter."""
+        variance = Vec3(self.P.r1.x, self.P.r2.y, self.P.r3.z) * self.noise
+        return sqrt(variance)
 
 
 @part

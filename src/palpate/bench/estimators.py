@@ -1,0 +1,62 @@
+"""Three least-squares estimators side by side on one contact, so that what the front-end does is seen."""
+
+from typing import NamedTuple
+
+from palpate._jit import part
+from palpate._vector import Vec3
+from palpate.identifiers.front_ends import Centring, CentringState, Matched, MatchedState
+from palpate.identifiers.least_squares import LeastSquares, LeastSquaresState
+
+
+@part
+class EstimatorsState(NamedTuple):
+    thesis: LeastSquaresState
+    raw: LeastSquaresState
+    matched: LeastSquaresState
+    front: MatchedState
+    centring: CentringState
+
+
+@part
+class Estimators(NamedTuple):
+    """Recursive least squares for (M, B, K), fed in three ways.
+
+    thesis: force through 120 Hz, acceleration through 35 Hz, velocity and displacement as they are (sec. 6);
+    raw: nothing filtered (fig. 6.3); matched: every channel through the same lags, and the offset taken out.
+    The first two run while the contact controller does, as in the thesis. The matched one starts when the
+    touch is felt, or earlier data would be lost on it.
+
+    Args:
+        touch: filtered force from which the matched one takes the surface to be touched [N].
+    """
+
+    thesis: LeastSquares
+    raw: LeastSquares
+    matched: LeastSquares
+    front: Matched
+    centring: Centring
+    touch: float
+
+    def start_at(self, x):
+        return EstimatorsState(
+            self.thesis.start(),
+            self.raw.start(),
+            self.matched.start(),
+            self.front.start_at(x),
+            self.centring.start(),
+        )
+
+    def step(self, state, signals, pressing, x0):
+        """The state after a tick; `pressing` while the contact controller runs, x0 where it took over [m]."""
+        x, smooth_force = signals.sense.x.x, signals.sense.f.x
+        thesis, raw, matched, centring = state.thesis, state.raw, state.matched, state.centring
+        if pressing:
+            phi = Vec3(signals.smooth_acceleration, signals.velocity, x - x0)
+            _, thesis = self.thesis.step(thesis, phi, smooth_force)
+            phi = Vec3(signals.acceleration, signals.velocity, x - x0)
+            _, raw = self.raw.step(raw, phi, signals.force)
+        (phi, force), front = self.front.step(state.front, x, signals.force)
+        if pressing or smooth_force > self.touch:
+            (phi, force), centring = self.centring.step(centring, phi, force)
+            _, matched = self.matched.step(matched, phi, force)
+        return EstimatorsState(thesis, raw, matched, front, centring)

@@ -1,0 +1,49 @@
+"""The force's whole way into the controller: sensor, optional analog filter, converter."""
+
+from typing import NamedTuple
+
+from palpate._jit import part
+from palpate.instruments import AnalogToDigital, ForceSensor, ForceSensorState
+from palpate.signals.filters import Biquad, BiquadState
+
+
+@part
+class ForceInputState(NamedTuple):
+    sensor: ForceSensorState
+    analog: BiquadState
+    line: float  # on the converter's input [N]
+
+
+@part
+class ForceInput(NamedTuple):
+    """Stepped with the physics, read at each tick.
+
+    Args:
+        sensor: the force sensor.
+        analog: low-pass on the line from the sensor to the converter.
+        filtered: 1.0 if the line goes through it (as for fig. 3.5), 0.0 if not (as in all other experiments).
+        converter: the controller's.
+    """
+
+    sensor: ForceSensor
+    analog: Biquad
+    filtered: float
+    converter: AnalogToDigital
+
+    def start(self):
+        return ForceInputState(self.sensor.start(), self.analog.start(), 0.0)
+
+    def advance(self, state, force, k, noise):
+        """The state after physics step k under this force [N]; `noise` as the sensor's."""
+        line, sensor = self.sensor.sample(state.sensor, force, k, noise)
+        smooth, analog = self.analog.step(state.analog, line)
+        return ForceInputState(sensor, analog, smooth if self.filtered == 1.0 else line)
+
+    def sampled(self, state):
+        """What the converter reads now [N]."""
+        return self.converter.read(state.line)
+
+    @property
+    def lag(self):
+        """Seconds."""
+        return self.sensor.lag + self.filtered * self.analog.lag + self.converter.lag

@@ -1,0 +1,96 @@
+"""The arm, its friction and the surface it touches: what moves between two ticks."""
+
+from typing import NamedTuple
+
+from palpate._jit import law, part
+from palpate._vector import Vec3, solve
+from palpate.environments.stick_slip import StickSlip, StickSlipState
+from palpate.environments.surface import Surface
+from palpate.environments.surface_state import SurfaceState, contact_force, impact, part_from, touch
+from palpate.friction import LuGre
+from palpate.robots.arm3 import Arm3
+
+
+@part
+class PlantState(NamedTuple):
+    q: Vec3  # joint angles [rad]
+    qd: Vec3  # joint rates [rad/s]
+    bristles: Vec3  # of the joints' friction [rad]
+    surface: SurfaceState
+    side: StickSlipState  # friction along the surface
+
+
+@part
+class Touch(NamedTuple):
+    """What the tip exerts on the surface during a step."""
+
+    normal: float  # into the surface [N], never negative
+    tangential: float  # along y [N]
+    penetration: float  # of the tip [m], negative in the air
+    friction: Vec3  # torque lost in the joints [N m]
+
+
+@part
+class Plant(NamedTuple):
+    """A planar arm before a wall at x = `wall` that it can press in the direction of +x.
+
+    Args:
+        arm: with its rotors (`Arm3.with_rotors`).
+        friction: of the joints.
+        surface: along its normal.
+        side: friction along it.
+        wall: x of the undeformed surface [m].
+    """
+
+    arm: Arm3
+    friction: LuGre
+    surface: Surface
+    side: StickSlip
+    wall: float
+
+    def start_at(self, q):
+        """At rest in the air, at the joint angles q."""
+        return PlantState(q, 0.0 * q, self.friction.start(), self.surface.start(), self.side.start())
+
+    def advance(self, state, torque, dt):
+        """The state after dt [s] under constant torque [N m], and what was felt; semi-implicit Euler, first order.
+
+        The surface's mass moves with the tip while they touch, so the contact force is solved together with the
+        acceleration: it is the one that leaves both with the same acceleration.
+        """
+        model = self.arm.model(state.q, state.qd)
+        normal, along = model.J.r1, model.J.r2
+        p = self.arm.pose(state.q).x - self.wall
+        v = normal @ state.qd
+        friction, bristles = self.friction.step(state.bristles, state.qd, dt)
+        drive = torque - model.h - friction
+        per_normal = solve(model.M, normal)
+        tip_mass = 1.0 / (normal @ per_normal)
+        surface, side, force, slide = state.surface, state.side, 0.0, 0.0
+        if surface.contact == 1.0:
+            # The normal force before friction along the surface: its share in f is second order.
+            elastic = self.surface.force(surface, p, v)
+            a = normal @ solve(model.M, drive) + model.Jdqd.x
+            force = contact_force(elastic, self.surface.mass, tip_mass, a)
+            slide, side = self.side.slide(side, along @ state.qd, force, dt)
+            drive += along * slide
+            a = normal @ solve(model.M, drive) + model.Jdqd.x
+            force = contact_force(elastic, self.surface.mass, tip_mass, a)
+        qdd = solve(model.M, drive) - per_normal * max(force, 0.0)
+        qd = state.qd + dt * qdd
+        q = state.q + dt * qd
+        p = self.arm.pose(q).x - self.wall
+        v = normal @ qd
+        if force < 0.0:
+            surface, side = part_from(surface), self.side.start()
+        if surface.contact == 1.0:
+            surface = self.surface.relax(surface, p, v, dt)
+        else:
+            surface = self.surface.free(surface, dt)
+            if p >= surface.deflection and v > surface.rate:
+                common, impulse = impact(tip_mass, self.surface.mass, v, surface.rate)
+                qd -= per_normal * impulse
+                force = impulse / dt
+                surface = touch(surface, common)
+        felt = Touch(max(force, 0.0), -slide, p, friction)
+        return PlantState(q, qd, bristles, surface, side), felt
