@@ -99,11 +99,12 @@ class Planar3R:
             InputError: joint 2 is straight or folded (it names the determinant).
         """
         angles = _split(q, "q")
-        det = np.abs(self.arm.jac_det(angles))
+        det = np.asarray(np.abs(self.arm.jac_det(angles)))
         least = _SINGULAR * self.arm.length.x * self.arm.length.y
         if not np.all(det > least):
+            worst = np.unravel_index(np.argmin(np.where(np.isnan(det), 0.0, det)), det.shape)
             raise InputError(
-                f"the Jacobian is singular at q{_where(~(det > least))}: |det J| = {np.min(det):.3g} m^2, "
+                f"the Jacobian is singular at q{_at(worst)}: |det J| = {det[worst]:.3g} m^2, "
                 f"at least {least:.3g} is needed; bend joint 2 away from 0 and pi"
             )
         return _joined(self.arm.jac_inverse(angles))
@@ -149,12 +150,12 @@ class Planar3R:
         beyond = np.asarray(self.arm.beyond_reach(pose))
         if np.all(beyond <= _REACH_TOLERANCE):
             return
-        worst = int(np.argmax(np.where(np.isnan(beyond), np.inf, beyond)))
-        x, y, phi = (float(np.ravel(v)[worst]) for v in pose)
+        worst = np.unravel_index(np.argmax(np.where(np.isnan(beyond), np.inf, beyond)), beyond.shape)
+        x, y, phi = (float(np.asarray(v)[worst]) for v in pose)
         a1, a2, _ = self.arm.length
         raise InputError(
-            f"pose x = {x:.6g} m, y = {y:.6g} m, phi = {phi:.6g} rad{_where(beyond > _REACH_TOLERANCE)} "
-            f"is out of reach by {1e3 * float(np.ravel(beyond)[worst]):.3g} mm: joint 3 can be "
+            f"pose x = {x:.6g} m, y = {y:.6g} m, phi = {phi:.6g} rad{_at(worst)} "
+            f"is out of reach by {1e3 * float(beyond[worst]):.3g} mm: joint 3 can be "
             f"{1e3 * abs(a1 - a2):.1f} to {1e3 * (a1 + a2):.1f} mm from the base"
         )
 
@@ -204,6 +205,6 @@ def _frozen(v: Vec3) -> Array:
     return array
 
 
-def _where(bad: Any) -> str:
-    """Which entries of a batch are meant; nothing for a single one."""
-    return f" (index {tuple(int(i) for i in np.argwhere(bad)[0])})" if np.ndim(bad) else ""
+def _at(index: tuple[Any, ...]) -> str:
+    """Which entry of a batch is meant; nothing for a single one."""
+    return f" (index {tuple(int(i) for i in index)})" if index else ""
