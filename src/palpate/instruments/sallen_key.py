@@ -20,6 +20,6 @@ def sallen_key(r1: float, r2: float, c1: float, c2: float, rate: float) -> Biqua
 def analog_filter_190(rate: float = 20000.0) -> Biquad:
     """The thesis' filter: 189.6 Hz, Q 0.83, and so -3 dB at 217 Hz.
 
-    The values are printed in Ohm and uF; only as kOhm and nF do they give 190 Hz.
+    The values are printed in Ohm and uF, which give the same corner; an amplifier can only drive kOhm and nF.
     """
     return sallen_key(r1=100e3, r2=1.5e3, c1=470e-9, c2=10e-9, rate=rate)
