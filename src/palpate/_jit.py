@@ -51,15 +51,28 @@ class Kernel:
 
     def __init__(self, function: Callable[..., Any]):
         self.plain = function
+        self._waiting: Callable[[], None] | None = None
         functools.update_wrapper(self, function)
 
     @functools.cached_property
     def compiled(self) -> Any:
         """The Numba dispatcher, made when first asked for."""
-        return _dispatcher(self.plain)
+        return _dispatcher(self.plain, self._wait)
 
     def __call__(self, *args: Any) -> Any:
         return self.compiled(*args)
+
+    def run(self, waiting: Callable[[], None] | None, *args: Any) -> Any:
+        """Calls the kernel; calls `waiting` before, if it has to be compiled, which takes seconds."""
+        self._waiting = waiting
+        try:
+            return self.compiled(*args)
+        finally:
+            self._waiting = None
+
+    def _wait(self) -> None:
+        if self._waiting is not None:
+            self._waiting()
 
     @property
     def from_cache(self) -> bool:
@@ -113,7 +126,7 @@ def _classes(numba_types: Any) -> Any:
             yield from _classes(members)
 
 
-def _dispatcher(function: Callable[..., Any]) -> Any:
+def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
     import numba
     from numba.core import caching
 
@@ -129,6 +142,7 @@ def _dispatcher(function: Callable[..., Any]) -> Any:
             known = _foreign_stamps(function, sig) is not None
             found = super().load_overload(sig, target_context) if known else None
             if found is None:
+                wait()
                 _hand_over()
             return found
 

@@ -1,0 +1,146 @@
+"""From an experiment's numbers to the parts of a loop."""
+
+from __future__ import annotations
+
+import msgspec
+
+from palpate._vector import Mat3, Vec3, diagonal
+from palpate.bench.bench import Bench
+from palpate.bench.conditioning import Conditioning
+from palpate.bench.estimators import Estimators
+from palpate.bench.experiment import (
+    Experiment,
+    HuntCrossleySurface,
+    KelvinVoigtSurface,
+    StandardLinearSolidSurface,
+)
+from palpate.bench.force_input import ForceInput
+from palpate.bench.plant import Plant
+from palpate.bench.sequence import Sequence
+from palpate.bench.tick import Loop
+from palpate.controllers import Hybrid, ResolvedAcceleration
+from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, StickSlip, join
+from palpate.errors import InputError
+from palpate.friction import Coulomb, LuGre
+from palpate.identifiers.front_ends import Centring, Matched
+from palpate.identifiers.least_squares import LeastSquares
+from palpate.instruments import AnalogToDigital, DigitalToAnalog, Encoder, analog_filter_190, force_sensor
+from palpate.references import Approach, ForceSchedule
+from palpate.robots.arm3 import MOTOR_TORQUE, Arm3
+from palpate.signals.filters import butterworth2, butterworth3, delay, state_variable
+
+SURFACES = {
+    KelvinVoigtSurface: KelvinVoigt,
+    StandardLinearSolidSurface: StandardLinearSolid,
+    HuntCrossleySurface: HuntCrossley,
+}
+
+
+def build(experiment: Experiment) -> Bench:
+    """The bench of an experiment.
+
+    Raises:
+        InputError: a start pose out of reach, a wall that the arm already stands in, a filter above half the rate.
+    """
+    e = experiment
+    arm = Arm3(limits=Vec3(*e.robot.torque_limits), rotor=Vec3(*e.robot.rotor_inertia))
+    q = _start(arm, e)
+    rate, tick = float(e.run.rate), 1.0 / e.run.rate
+    loop = Loop(
+        plant=_plant(arm, e),
+        encoder=Encoder(Vec3(*e.encoders.counts), q),
+        force=_force_input(e),
+        output=DigitalToAnalog(12, MOTOR_TORQUE),
+        conditioning=Conditioning(
+            arm, butterworth2(e.filters.motion, rate), butterworth2(e.filters.force, rate), tick
+        ),
+        sequence=_sequence(e, tick),
+        schedule=_schedule(e),
+        approach=ResolvedAcceleration(_all(e.approach.kp), _all(e.approach.kv)),
+        controller=_controller(e),
+        compensation=Coulomb(Vec3(*e.compensation.level), Vec3(*e.compensation.blend)),
+        estimators=_estimators(e, rate),
+        tick=tick,
+        steps=e.run.steps,
+    )
+    meta = {"experiment": msgspec.to_builtins(e), "truth": _truth(loop)}
+    return Bench(loop, q, meta)
+
+
+def _all(value: float) -> Vec3:
+    return Vec3(float(value), float(value), float(value))
+
+
+def _start(arm: Arm3, e: Experiment) -> Vec3:
+    pose = Vec3(*(float(v) for v in e.robot.start))
+    if e.robot.elbow == 0:
+        raise InputError("elbow must be 1 or -1, got 0 in [robot]")
+    beyond = arm.beyond_reach(pose)
+    if beyond > 0.0:
+        raise InputError(f"start {tuple(pose)} in [robot] is out of reach by {1e3 * beyond:.1f} mm")
+    if pose.x > e.wall.x:
+        raise InputError(
+            f"the wall at x = {e.wall.x} m in [wall] lies behind the arm's start at x = {pose.x} m in [robot]; "
+            "move one of them"
+        )
+    return arm.inverse(pose, float(e.robot.elbow))
+
+
+def _plant(arm: Arm3, e: Experiment) -> Plant:
+    f = e.friction
+    friction = LuGre(
+        Vec3(*f.bristle_stiffness),
+        Vec3(*f.bristle_damping),
+        Vec3(*f.viscous),
+        Vec3(*f.coulomb),
+        Vec3(*f.static),
+        Vec3(*f.stribeck),
+    ).checked()
+    surface = SURFACES[type(e.surface)](**{k: float(v) for k, v in msgspec.structs.asdict(e.surface).items()})
+    side = StickSlip(e.wall.side_stiffness, e.wall.side_damping, e.wall.side_friction)
+    return Plant(arm.with_rotors(), friction, join(surface), side, float(e.wall.x))
+
+
+def _force_input(e: Experiment) -> ForceInput:
+    s, physics = e.force_sensor, e.run.rate * e.run.steps
+    sensor = force_sensor(s.cutoff, s.sampling, s.bits, s.full_scale, s.noise, physics)
+    analog = analog_filter_190(float(physics))
+    return ForceInput(sensor, analog, 1.0 if s.analog_filter else 0.0, AnalogToDigital(16, 200.0))
+
+
+def _sequence(e: Experiment, tick: float) -> Sequence:
+    a = e.approach
+    reference = Approach(float(e.robot.start[0]), a.hold, a.first, a.step, a.period)
+    return Sequence(Approach(*map(float, reference)), float(a.switch), float(a.release), float(a.wait), tick)
+
+
+def _schedule(e: Experiment) -> ForceSchedule:
+    f = e.force
+    second = f.first if f.second is None else f.second
+    return ForceSchedule(*map(float, (f.first, second, f.period, f.amplitude, f.frequency, f.restart)))
+
+
+def _controller(e: Experiment) -> Hybrid:
+    c = e.controller
+    return Hybrid(_all(c.kp), _all(c.kv), _all(c.kf), _all(c.ki))
+
+
+def _estimators(e: Experiment, rate: float) -> Estimators:
+    i, s = e.identification, e.force_sensor
+    P: Mat3 = diagonal(_all(i.covariance))
+    forgetting = float(i.forgetting)
+    thesis = LeastSquares(Vec3(*(float(v) for v in i.initial)), P, forgetting)
+    sensor = butterworth3(s.cutoff, rate)
+    front = Matched(
+        sensor.second,
+        sensor.first,
+        delay(1.5 / s.sampling, rate),  # one cycle of computing and half a cycle of holding
+        state_variable(i.cutoff, rate),
+    )
+    matched = LeastSquares(_all(0.0), P, forgetting)
+    return Estimators(thesis, thesis, matched, front, Centring(forgetting), float(i.touch))
+
+
+def _truth(loop: Loop) -> dict[str, dict[str, object]]:
+    surface = loop.plant.surface
+    return {name: {"value": value, "unit": unit} for name, (value, unit) in surface.truth().items()}

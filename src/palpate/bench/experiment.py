@@ -1,0 +1,243 @@
+"""An experiment: one TOML file with every number of a run, read and checked at the edge."""
+
+from __future__ import annotations
+
+import re
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct
+
+from palpate.errors import InputError, unknown
+
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+Triple = tuple[float, float, float]
+PositiveTriple = tuple[Positive, Positive, Positive]
+NotNegativeTriple = tuple[NotNegative, NotNegative, NotNegative]
+
+
+class Part(Struct, frozen=True, forbid_unknown_fields=True):
+    """A table of the file; keys that it does not know are refused."""
+
+
+class Run(Part):
+    press: Positive = 6.0
+    """Seconds of contact after which the run ends."""
+    duration: Annotated[float, Meta(gt=0, le=3600)] = 60.0
+    """Seconds after which it ends in any case."""
+    rate: Annotated[int, Meta(ge=100, le=20000)] = 1000
+    """Ticks a second."""
+    steps: Annotated[int, Meta(ge=1, le=1000)] = 20
+    """Steps of the physics between ticks."""
+
+
+class Robot(Part):
+    """The thesis' arm; its masses and lengths are those of appendix D."""
+
+    start: Triple = (0.454, 0.0, 0.0)
+    """Pose at the start: x [m], y [m], phi [rad]."""
+    elbow: Annotated[int, Meta(ge=-1, le=1)] = 1
+    torque_limits: PositiveTriple = (16.0, 2.5, 0.6)
+    rotor_inertia: NotNegativeTriple = (0.084, 0.009, 2.8e-5)
+    """[kg m^2]; in the plant, not in the controller's model."""
+
+
+class Friction(Part):
+    """LuGre friction of the joints."""
+
+    coulomb: PositiveTriple = (3.0, 0.25, 0.03)
+    static: PositiveTriple = (3.6, 0.3, 0.036)
+    stribeck: PositiveTriple = (0.01, 0.01, 0.01)
+    bristle_stiffness: NotNegativeTriple = (15000.0, 1250.0, 150.0)
+    bristle_damping: NotNegativeTriple = (120.0, 11.0, 0.65)
+    viscous: NotNegativeTriple = (0.0, 0.0, 0.0)
+
+
+class KelvinVoigtSurface(Part, tag="kelvin-voigt", tag_field="kind"):
+    stiffness: Positive
+    damping: NotNegative
+    mass: NotNegative
+
+
+class StandardLinearSolidSurface(Part, tag="standard-linear-solid", tag_field="kind"):
+    stiffness: Positive
+    damping: NotNegative
+    mass: NotNegative
+    branch_stiffness: NotNegative
+    branch_time: Positive
+
+
+class HuntCrossleySurface(Part, tag="hunt-crossley", tag_field="kind"):
+    stiffness: Positive
+    damping: NotNegative
+    exponent: Annotated[float, Meta(ge=1)]
+    mass: NotNegative
+
+
+class Wall(Part):
+    """Where the surface is, and how the tip sticks to it."""
+
+    x: float = 0.465
+    side_stiffness: Positive = 5000.0
+    side_damping: NotNegative = 20.0
+    side_friction: NotNegative = 0.7
+
+
+class Encoders(Part):
+    counts: PositiveTriple = (614400.0, 409600.0, 2000.0)
+
+
+class ForceSensor(Part):
+    noise: NotNegative = 0.6
+    """Standard deviation of a sample [N]."""
+    cutoff: Positive = 120.0
+    sampling: Annotated[int, Meta(ge=1)] = 480
+    bits: Annotated[int, Meta(ge=2, le=32)] = 12
+    full_scale: Positive = 200.0
+    analog_filter: bool = False
+    """The 190 Hz low-pass of fig. 3.6 between sensor and controller."""
+
+
+class Filters(Part):
+    motion: Positive = 35.0
+    """Of Cartesian velocity and acceleration, and of joint 3 [Hz]."""
+    force: Positive = 120.0
+
+
+class ApproachTable(Part):
+    hold: NotNegative = 5.0
+    first: float = 0.456
+    step: float = 0.001
+    period: Positive = 1.0
+    switch: Positive = 5.0
+    """Force at which the contact controller takes over [N]."""
+    release: float = 0.0
+    """Force under which the contact is taken to be lost [N]."""
+    wait: NotNegative = 1.0
+    kp: NotNegative = 400.0
+    kv: NotNegative = 80.0
+
+
+class DesiredForce(Part):
+    first: float = 20.0
+    second: float | None = None
+    """Of every other interval; as the first when left out."""
+    period: Positive = 2.5
+    amplitude: float = 0.0
+    frequency: NotNegative = 0.5
+    restart: NotNegative = 0.0
+
+
+class HybridController(Part, tag="hybrid", tag_field="kind"):
+    kp: NotNegative = 400.0
+    kv: NotNegative = 80.0
+    kf: NotNegative = 1.0
+    ki: NotNegative = 0.003
+    """Per sample."""
+
+
+class Compensation(Part):
+    """Of friction, by Coulomb's law with a blend through zero; level zero leaves it out."""
+
+    level: NotNegativeTriple = (0.0, 0.0, 0.0)
+    blend: PositiveTriple = (0.002, 0.002, 0.002)
+
+
+class Identification(Part):
+    forgetting: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    initial: Triple = (0.0, 0.0, 2e5)
+    """M, B, K of the thesis' estimators at the start; the matched one starts from nothing."""
+    covariance: Positive = 1e10
+    """P(0) is this times the identity."""
+    touch: Positive = 2.0
+    """Filtered force from which the matched estimator listens [N]."""
+    cutoff: Positive = 35.0
+    """Of the matched estimator's state-variable filter [Hz]."""
+
+
+class Experiment(Part, kw_only=True):
+    """Every number of a run."""
+
+    title: str
+    about: str = ""
+    surface: KelvinVoigtSurface | StandardLinearSolidSurface | HuntCrossleySurface
+    run: Run = Run()
+    robot: Robot = Robot()
+    friction: Friction = Friction()
+    wall: Wall = Wall()
+    encoders: Encoders = Encoders()
+    force_sensor: ForceSensor = ForceSensor()
+    filters: Filters = Filters()
+    approach: ApproachTable = ApproachTable()
+    force: DesiredForce = DesiredForce()
+    controller: HybridController = HybridController()
+    compensation: Compensation = Compensation()
+    identification: Identification = Identification()
+
+
+def names() -> list[str]:
+    """The experiments that come with palpate."""
+    folder = resources.files("palpate.bench") / "experiments"
+    return sorted(p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml"))
+
+
+def source(name: str) -> str:
+    """The text of an experiment: one that comes with palpate, or a TOML file of the user's.
+
+    Raises:
+        InputError: no such experiment, no such file, or not a text.
+    """
+    if name in names():
+        return (resources.files("palpate.bench") / "experiments" / f"{name}.toml").read_text("utf-8")
+    path = Path(name)
+    if path.suffix != ".toml" and not path.exists():
+        raise unknown("experiment", name, names())
+    if not path.is_file():
+        raise InputError(f"{name}: no such file; give an experiment's name or a TOML file")
+    try:
+        return path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{name}: not a text file ({error.reason}); give a TOML file") from error
+
+
+def load(name: str) -> Experiment:
+    """An experiment by its name, or from a TOML file.
+
+    Raises:
+        InputError: no such experiment or file, TOML that does not parse, an unknown key, a value out of range.
+    """
+    return parse(source(name), name)
+
+
+def parse(text: str, where: str) -> Experiment:
+    """An experiment from TOML; `where` names the text in errors."""
+    try:
+        return msgspec.toml.decode(text, type=Experiment)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{where}: {_explained(str(error))}") from error
+    except msgspec.DecodeError as error:
+        raise InputError(f"{where}: not TOML: {error}") from error
+
+
+def _explained(message: str) -> str:
+    """msgspec's message in the words of the file: the table's name for a path, and the nearest key."""
+    what, _, path = message.partition(" - at `$")
+    table = path.strip("`.")
+    place = f" in [{table}]" if table else ""
+    found = re.match(r"Object contains unknown field `(.+)`", what)
+    if found is None:
+        return f"{what}{place}"
+    return f"{unknown('key', found.group(1), _keys(table))}{place}"
+
+
+def _keys(table: str) -> list[str]:
+    """The keys of a table of the file; "" is the file itself."""
+    kinds: list[Any] = [Experiment]
+    for name in filter(None, table.split(".")):
+        fields = {f.encode_name: f.type for kind in kinds for f in msgspec.structs.fields(kind)}
+        kind = fields[name]
+        kinds = list(getattr(kind, "__args__", (kind,)))
+    return sorted({f.encode_name for kind in kinds for f in msgspec.structs.fields(kind)})
