@@ -15,6 +15,7 @@ class EstimatorsState(NamedTuple):
     matched: LeastSquaresState
     front: MatchedState
     centring: CentringState
+    listening: float  # 1 once the touch was felt, until the force is gone again
 
 
 @part
@@ -44,19 +45,26 @@ class Estimators(NamedTuple):
             self.matched.start(),
             self.front.start_at(x),
             self.centring.start(),
+            0.0,
         )
 
     def step(self, state, signals, pressing, x0):
         """The state after a tick; `pressing` while the contact controller runs, x0 where it took over [m]."""
         x, smooth_force = signals.sense.x.x, signals.sense.f.x
-        thesis, raw, matched, centring = state.thesis, state.raw, state.matched, state.centring
+        thesis, raw, matched = state.thesis, state.raw, state.matched
+        centring, listening = state.centring, state.listening
         if pressing:
             phi = Vec3(signals.smooth_acceleration, signals.velocity, x - x0)
             _, thesis = self.thesis.step(thesis, phi, smooth_force)
             phi = Vec3(signals.acceleration, signals.velocity, x - x0)
             _, raw = self.raw.step(raw, phi, signals.force)
         (phi, force), front = self.front.step(state.front, x, signals.force)
+        # Latched: samples picked by their own noisy force would be picked for their noise, and bias the fit.
         if pressing or smooth_force > self.touch:
+            listening = 1.0
+        elif smooth_force < 0.0:
+            listening = 0.0
+        if listening == 1.0:
             (phi, force), centring = self.centring.step(centring, phi, force)
             _, matched = self.matched.step(matched, phi, force)
-        return EstimatorsState(thesis, raw, matched, front, centring)
+        return EstimatorsState(thesis, raw, matched, front, centring, listening)
