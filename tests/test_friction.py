@@ -122,6 +122,16 @@ def test_the_papers_constant_damping_would_give_work_away():
     assert torque * v * 1e-9 > DRY.stored(new) - DRY.stored(z[-1])
 
 
+@pytest.mark.parametrize("v", [0.5, -5.0, 500.0])
+def test_the_damping_is_as_strong_as_passivity_allows(v):
+    """At the worst deflection, twice that of steady sliding, strong damping leaves just nothing over."""
+    friction = ONE._replace(sigma1=1e9, sigma2=0.0, static=0.6)
+    z, dt = np.sign(v) * 2.0 * 0.25 / 1250.0, 1e-9
+    torque, new = friction.step(z, v, dt)
+    spare = torque * v - (friction.stored(new) - friction.stored(z)) / dt
+    assert -1e-6 * abs(v) < spare < 1e-3 * abs(v)
+
+
 @given(motion=motions, dt=st.sampled_from([1e-6, DT, 1e-3, 1.0, 100.0]))
 def test_bristles_never_bear_more_than_the_static_level(motion, dt):
     _, deflections = slide(ONE, motion, dt)
