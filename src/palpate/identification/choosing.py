@@ -1,0 +1,184 @@
+"""Which contact model a log speaks for, and whether it speaks for any."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import unknown
+from palpate.identification.fitting import Fit, Lag, fit
+from palpate.identification.lagging import fit_with_lag
+from palpate.identification.models import (
+    CURVED,
+    CURVED_MASS,
+    KELVIN_VOIGT,
+    KELVIN_VOIGT_MASS,
+    NAMES,
+    Model,
+    Motion,
+    hunt_crossley,
+    standard_linear_solid,
+)
+from palpate.identification.parts import Disagreement, compare_parts
+
+Array = NDArray[np.float64]
+
+_BETTER = 0.7
+"""A richer model must leave less than this share of the mean square to be preferred."""
+_MUCH_BETTER = 0.5
+_ABOVE_NOISE = 5.0
+_UNEXPLAINED = 0.02
+_SIGNIFICANT = 3.0
+
+
+@dataclass(frozen=True)
+class Question:
+    """What all candidates are judged on.
+
+    Args:
+        motion, force: the filtered log; force of shape (n,).
+        spans: number of the contact that each row belongs to, shape (n,).
+        lag: what is known about it.
+        tolerance: largest half-width of an identified parameter's interval, as a share of its value.
+        free_noise: deviation of the filtered force out of contact [N]; None if it is never out of contact.
+    """
+
+    motion: Motion
+    force: Array
+    spans: Array
+    lag: Lag
+    tolerance: float
+    free_noise: float | None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A fitted model and what speaks against it."""
+
+    fit: Fit
+    against: tuple[str, ...]
+    disagreements: tuple[Disagreement, ...] = ()
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The model chosen.
+
+    Args:
+        candidate: its fit, and what speaks against it.
+        rejected: whether it does not describe the log, and stands here because no other does.
+        others: all candidates, the chosen one among them.
+    """
+
+    candidate: Candidate
+    rejected: bool
+    others: tuple[Candidate, ...] = field(default=())
+
+
+def choose(question: Question, name: str | None = None) -> Choice:
+    """Fit the models and choose.
+
+    Args:
+        question: the log.
+        name: a model to hold to, None to choose by Schwarz's criterion among those that nothing speaks against.
+
+    Raises:
+        InputError: there is no model of this name.
+    """
+    if name is not None and name not in NAMES:
+        raise unknown("model", name, NAMES)
+    fits = [fit_with_lag(model, question.motion, question.force, question.lag) for model in _offered(question, name)]
+    judged = _judge(fits, question)
+    if name is None:
+        return _chosen(judged, question)
+    asked = [c for c in judged if c.fit.model.name == name]
+    fine = [c for c in asked if not c.against]
+    best = min(fine, key=lambda c: len(c.fit.names)) if fine else asked[0]
+    return Choice(best if fine else _plain(best, question), not fine, tuple(judged))
+
+
+def _offered(question: Question, name: str | None) -> list[Model]:
+    """The models worth fitting: those for a probe that leaves the surface, or those for one fixed to it."""
+    motion = question.motion
+    makers: list[Callable[[], Model]] = [lambda: KELVIN_VOIGT, lambda: KELVIN_VOIGT_MASS]
+    if motion.bonded:
+        makers += [lambda: CURVED, lambda: CURVED_MASS]
+    if not motion.bonded or name == "standard-linear-solid" or len(motion.rows) < 20_000:
+        makers.append(lambda: standard_linear_solid(motion))
+    if not motion.bonded or name == "hunt-crossley":
+        makers.append(lambda: hunt_crossley(motion))
+    return [make() for make in makers]
+
+
+def _judge(fits: list[Fit], question: Question) -> list[Candidate]:
+    possible = [fitted for fitted in fits if not _impossible(fitted)]
+    best = min((fitted.rmse for fitted in possible), default=0.0)
+    return [_candidate(fitted, fits, best, question) for fitted in fits]
+
+
+def _candidate(fitted: Fit, fits: list[Fit], best: float, question: Question) -> Candidate:
+    against = [f"{name} would be below zero" for name in _impossible(fitted)]
+    if best**2 < _MUCH_BETTER * fitted.rmse**2:
+        winner = min((f for f in fits if f.rmse == best), key=lambda f: len(f.names))
+        label = winner.model.name + (" with a curved spring" if "K3" in winner.names else "")
+        against.append(f"{label} leaves {best**2 / fitted.rmse**2:.0%} of its squared misfit")
+    noise = question.free_noise
+    if noise is not None and fitted.rmse > _ABOVE_NOISE * noise and 1 - fitted.r2 > _UNEXPLAINED:
+        against.append(
+            f"its misfit of {fitted.rmse:.3g} is {fitted.rmse / max(noise, 1e-300):.3g} times the force's noise"
+            if noise > 1e-6 * fitted.rmse
+            else f"its misfit of {fitted.rmse:.3g} is not noise"
+        )
+    parts = compare_parts(fitted, question.motion, question.force, question.spans, question.tolerance)
+    against += [_said(part) for part in parts]
+    return Candidate(fitted, tuple(against), tuple(parts))
+
+
+def _said(part: Disagreement) -> str:
+    values = ", ".join(f"{value:.3g} in {label}" for label, value in part.parts.items())
+    return f"{part.name} is {values}"
+
+
+def _impossible(fitted: Fit) -> list[str]:
+    """Parameters below zero by more than chance, which no passive surface has."""
+    known = [name for name in fitted.model.positive if name in fitted.names]
+    return [name for name in known if fitted[name] + _SIGNIFICANT * fitted.std(name, lag_known=True) < 0]
+
+
+def _chosen(judged: list[Candidate], question: Question) -> Choice:
+    fine = [c for c in judged if not c.against and _needed(c.fit)]
+    if not fine:
+        plain = next(c for c in judged if c.fit.model is KELVIN_VOIGT)
+        mass = next(c for c in judged if c.fit.model is KELVIN_VOIGT_MASS)
+        with_mass = question.motion.bonded and mass.fit.rmse**2 < _MUCH_BETTER * plain.fit.rmse**2
+        return Choice(_plain(mass if with_mass else plain, question), True, tuple(judged))
+    effective = min(fine, key=lambda c: c.fit.rmse).fit.noise.effective
+    best = fine[0]
+    for candidate in fine[1:]:
+        better = candidate.fit.rmse**2 < _BETTER * best.fit.rmse**2 or _same_kind(candidate.fit, best.fit)
+        if better and candidate.fit.score(effective) < best.fit.score(effective):
+            best = candidate
+    return Choice(best, False, tuple(judged))
+
+
+def _needed(fitted: Fit) -> bool:
+    """Whether a mass in the model is more than nothing: it must stand clear of zero."""
+    if "M" not in fitted.names:
+        return True
+    return fitted["M"] > _SIGNIFICANT * fitted.std("M", lag_known=True)
+
+
+def _same_kind(one: Fit, other: Fit) -> bool:
+    return one.model is KELVIN_VOIGT_MASS and other.model is KELVIN_VOIGT
+
+
+def _plain(candidate: Candidate, question: Question) -> Candidate:
+    """A model that does not describe the log cannot tell its lag either: the plain fit stands for it."""
+    if question.lag.known or candidate.fit.lag == question.lag.value:
+        return candidate
+    fitted = fit(candidate.fit.model, question.motion, question.force, question.lag)
+    parts = compare_parts(fitted, question.motion, question.force, question.spans, question.tolerance)
+    return Candidate(fitted, candidate.against, tuple(parts))

@@ -1,0 +1,55 @@
+"""Every warning that an identification can give: a stable word, and what it means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Code(Enum):
+    """The warnings. The value is what a user should know about it; the word is `code.word`."""
+
+    FORCE_LAGS_POSITION = (
+        "The fit gives a negative damping, which no passive surface has: the force reading lags the position reading."
+        " Damping is refused. Calibrate the lag and give it with --lag."
+    )
+    LAG_DAMPING_CONFOUNDED = (
+        "A lag T of the force looks like a damping of -K T, and this log cannot tell the two apart."
+        " Calibrate the lag and give it with --lag, or excite the contact over a wider band."
+    )
+    SERIES_COMPLIANCE = (
+        "The contact is not much softer than what lies between the position sensor and the surface,"
+        " so K is mostly about the arm. Measure the position nearer to the surface."
+    )
+    LOW_EXCITATION = "The motion is too slow, too small or too short to show the parameter above the noise."
+    MODEL_REJECTED = "No model offered describes the log: its parts (loading and unloading, say) give different answers."
+    NONLINEAR_STIFFNESS = "The stiffness changes with the position; K is the slope at the middle of the motion."
+    HELD_SAMPLES = "A channel is refreshed more slowly than the rows are written; only its fresh readings are used."
+    MISSING_SAMPLES = "Rows without a reading; short stretches are bridged, long ones are left out."
+    IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
+    SATURATED = "A channel rests at its extreme value, as a reading at the end of its range does; these rows are left out."
+    UNIT_GUESS = "A unit was taken from a column's name, or the stiffness is so unusual that a unit is probably wrong."
+    FORCE_SIGN_REVERSED = "The force falls as the probe goes in; it was turned round."
+    POSITION_SIGN_REVERSED = "The position falls as the probe goes in; it was turned round."
+    LOW_RATE = "Rows are so rare that fast behaviour, damping and mass above all, may be missed."
+    NO_CONTACT = "The force never leaves its resting level for long enough: there is nothing to identify."
+    CONTACT_AT_START = "The log begins in contact, so the force without contact is not known and is estimated as an offset."
+    NEGATIVE_STIFFNESS = "The force falls as the penetration grows over the whole contact: no passive surface does that."
+
+    @property
+    def word(self) -> str:
+        """The stable word that scripts may rely on, such as `force-lags-position`."""
+        return self.name.lower().replace("_", "-")
+
+
+@dataclass(frozen=True)
+class Warn:
+    """One warning about one log: its code, and what was seen here."""
+
+    code: Code
+    text: str
+
+
+def from_word(word: str) -> Code:
+    """The code of a stable word."""
+    return Code[word.upper().replace("-", "_")]

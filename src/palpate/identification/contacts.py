@@ -1,0 +1,123 @@
+"""Where in a log the probe touches the surface, and which way each channel counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.codes import Code, Warn
+from palpate.identification.filters import Chain
+from palpate.identification.timebase import Channels
+
+Array = NDArray[np.float64]
+
+ONSET = 0.05
+"""Share of the peak force above rest at which contact is counted."""
+_REACHED = 0.2
+_BLOCKS = 100
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """What was found.
+
+    Args:
+        spans: first and past-the-last sample of each contact, in filtered samples.
+        bonded: the probe never leaves the surface (or pulls on it): the whole log is one contact.
+        force_sign, position_sign: +1 or -1, what to multiply the channels with so that both grow into the surface.
+        resting: force without contact, after the sign [N]; 0 for a bonded contact.
+        warnings: what was found.
+    """
+
+    spans: tuple[tuple[int, int], ...]
+    bonded: bool
+    force_sign: float
+    position_sign: float
+    resting: float
+    warnings: tuple[Warn, ...]
+
+
+def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) -> Contacts:
+    """Find the stretches in contact.
+
+    The force rests near zero out of contact and departs to one side in it; a force that goes to both sides by
+    comparable amounts is that of a probe fixed to the surface.
+
+    Args:
+        channels: evenly sampled.
+        chain: the filter that the fit will use, so that the spans count its delay.
+        bonded: True if the probe is fixed to the surface, False if not, None to find out.
+    """
+    force = chain(channels.force)
+    rest, peak = _extremes(force)
+    if bonded or (bonded is None and _both_sides(rest, peak)):
+        return Contacts(((0, len(force)),), True, 1.0, 1.0, 0.0, ())
+    sign = 1.0 if peak > rest else -1.0
+    level, top = sign * rest, sign * peak
+    spans = _spans(sign * force, level, top, chain)
+    if not spans:
+        text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
+        return Contacts((), False, sign, 1.0, level, (Warn(Code.NO_CONTACT, text),))
+    return _oriented(channels, chain, spans, sign, level)
+
+
+def _oriented(
+    channels: Channels, chain: Chain, spans: list[tuple[int, int]], sign: float, level: float
+) -> Contacts:
+    warnings = []
+    if sign < 0:
+        text = "the force goes to negative values in contact; its sign was turned round"
+        warnings.append(Warn(Code.FORCE_SIGN_REVERSED, text))
+    way = 1.0 if _together(channels, chain, spans, sign) >= 0 else -1.0
+    if way < 0:
+        text = "the position falls as the probe goes in; its sign was turned round"
+        warnings.append(Warn(Code.POSITION_SIGN_REVERSED, text))
+    if spans[0][0] == 0:
+        text = "the log begins in contact: the force at rest is not known and is estimated as an offset"
+        warnings.append(Warn(Code.CONTACT_AT_START, text))
+    return Contacts(tuple(spans), False, sign, way, level, tuple(warnings))
+
+
+def _extremes(force: Array) -> tuple[float, float]:
+    """The force at rest and at its peak: of the two ends of its range, rest is the one nearer to zero.
+
+    The ends are those of medians over a hundredth of the log, which a chattering probe does not reach.
+    """
+    width = len(force) // _BLOCKS
+    low, high = np.percentile(force, [0.1, 99.9])
+    if width >= 4:
+        windows = np.lib.stride_tricks.sliding_window_view(force, width)[:: max(width // 4, 1)]
+        middle = np.median(windows, axis=1)
+        if np.ptp(middle) > 0.2 * (high - low):
+            low, high = middle.min(), middle.max()
+    return (float(low), float(high)) if abs(low) <= abs(high) else (float(high), float(low))
+
+
+def _both_sides(rest: float, peak: float) -> bool:
+    return rest * peak < 0 and abs(rest) > abs(peak) / 2
+
+
+def _spans(force: Array, rest: float, peak: float, chain: Chain) -> list[tuple[int, int]]:
+    """Stretches above the onset that reach well above it and last longer than the filter needs to settle."""
+    height = peak - rest
+    free = force[force < rest + ONSET * height]
+    noise = 1.4826 * float(np.median(np.abs(free - np.median(free)))) if len(free) else 0.0
+    above = force > rest + max(ONSET * height, 5 * noise)
+    edges = np.diff(np.r_[0, above.astype(np.int8), 0])
+    spans: list[tuple[int, int]] = []
+    for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        if spans and (begin - spans[-1][1]) * chain.dt < chain.delay:
+            spans[-1] = (spans[-1][0], int(end))
+        else:
+            spans.append((int(begin), int(end)))
+    least = max(20, int(2 * chain.settling / chain.dt))
+    return [(b, e) for b, e in spans if e - b >= least and force[b:e].max() > rest + _REACHED * height]
+
+
+def _together(channels: Channels, chain: Chain, spans: list[tuple[int, int]], sign: float) -> float:
+    position, force = chain(channels.position), sign * chain(channels.force)
+    inside = np.concatenate([np.arange(b, e) for b, e in spans])
+    x, f = position[inside], force[inside]
+    return float((x - x.mean()) @ (f - f.mean()))

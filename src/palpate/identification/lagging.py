@@ -1,0 +1,72 @@
+"""What a log says about the lag between its channels, when nobody has calibrated it.
+
+If the force is read T later than the position, a fit without T finds B - K T for the damping and M - B T + K T^2 / 2
+for the mass. So a lag is told from damping only by what happens at higher frequencies; on slow or narrow motion it is not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.fitting import Fit, Lag, fit
+from palpate.identification.models import Model, Motion
+
+Array = NDArray[np.float64]
+
+_LONGEST = 0.25
+_SHARE = 1 / 50
+
+
+def unknown_lag(motion: Motion, rate: float) -> Lag:
+    """How large a lag may be that nobody has said anything about: two readings, or a fiftieth of the contact.
+
+    Args:
+        motion: of the log.
+        rate: fresh readings per second [1/s].
+    """
+    duration = len(motion.rows) * motion.chain.dt
+    return Lag(0.0, float(np.clip(duration * _SHARE, 2 / rate, max(_LONGEST, 2 / rate))), known=False)
+
+
+def fit_with_lag(model: Model, motion: Motion, force: Array, lag: Lag) -> Fit:
+    """Fit a model; a lag that is not known is looked for, and used if this log can tell it."""
+    if lag.known:
+        return fit(model, motion, force, lag)
+    free = fit(model, motion, force, lag, free_lag=True)
+    told = free.std("lag") < 0.5 * lag.std and abs(free.lag - lag.value) < 2.9 * lag.std
+    return free if told else fit(model, motion, force, lag)
+
+
+def _elastic(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+    """f = a curve of x alone: what is left of a passive contact when loading and unloading coincide."""
+    powers = [motion.filtered(motion.position**n, 0, lag) for n in (2, 3)]
+    return [motion.moved(0, lag), *powers, motion.ones]
+
+
+ELASTIC = Model("elastic", ("K", "K2", "K3", "offset"), _elastic)
+
+
+def closing_lag(motion: Motion, force: Array, start: float, spans: Array) -> tuple[float, float]:
+    """The lag that makes loading and unloading coincide, and its standard deviation [s].
+
+    A passive contact gives back less than it takes, so the true lag is this one or longer. The deviation is that over
+    the contacts where there are several, for they share the noise's slow part and the model's error.
+
+    Args:
+        motion: of the log.
+        force: filtered, at the motion's rows, shape (n,).
+        start: first guess, -B/K of a fit without a lag [s].
+        spans: number of the contact that each row belongs to, shape (n,).
+    """
+    whole = fit(ELASTIC, motion, force, Lag(start, max(abs(start), 2 * motion.chain.dt), False), free_lag=True)
+    lags = []
+    for number in np.unique(spans):
+        inside = spans == number
+        if inside.sum() < 60 or len(np.unique(spans)) < 3:
+            continue
+        part = Motion(motion.chain, motion.position, motion.penetration, motion.rows[inside], motion.bonded)
+        known = Lag(whole.lag, max(abs(whole.lag), 2 * motion.chain.dt), False)
+        lags.append(fit(ELASTIC, part, force[inside], known, free_lag=True).lag)
+    spread = float(np.std(lags, ddof=1)) if len(lags) >= 3 else 0.0
+    return whole.lag, max(spread, whole.std("lag"))

@@ -1,0 +1,94 @@
+"""Does one answer fit all parts of a log? A model that describes a contact gives the same in each of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.fitting import Fit, part_of
+from palpate.identification.models import Motion
+
+Array = NDArray[np.float64]
+
+_MOST_CONTACTS = 12
+_SIGNIFICANT = 4.0
+_EXPLAINED = 0.5
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Two parts of a log that give different values of one parameter.
+
+    Args:
+        name: the parameter.
+        parts: values by part, such as {"loading": 180.0, "unloading": 130.0}.
+        spread: standard deviation of the parts' values about the whole log's.
+    """
+
+    name: str
+    parts: dict[str, float]
+    spread: float
+
+
+def compare_parts(fitted: Fit, motion: Motion, force: Array, spans: Array, tolerance: float) -> list[Disagreement]:
+    """Fit each part of the log by itself and name the parameters on which the parts disagree.
+
+    They disagree where the values differ by more than the noise allows and by more than the tolerance: a misfit that
+    can be proved but changes nothing that matters is none.
+
+    Args:
+        fitted: of the whole log.
+        motion: its position.
+        force: filtered, at the motion's rows, shape (n,).
+        spans: number of the contact that each row belongs to, shape (n,).
+        tolerance: largest half-width of an identified parameter's interval, as a share of its value.
+    """
+    found: dict[str, Disagreement] = {}
+    for parts in _partitions(motion, spans, fitted.lag):
+        fits = {label: part_of(fitted, motion, force, inside)[0] for label, inside in parts.items()}
+        if len(fits) < 2 or not _explain(fitted, fits, parts):
+            continue
+        for name in fitted.model.linear[:-1]:
+            hit = _disagree(name, fitted, fits, tolerance)
+            if hit and (name not in found or hit.spread > found[name].spread):
+                found[name] = hit
+    return list(found.values())
+
+
+def _partitions(motion: Motion, spans: Array, lag: float) -> list[dict[str, NDArray[np.bool_]]]:
+    """Ways to cut a log in parts: loading and unloading, contact by contact, thirds of the time."""
+    partitions = []
+    if not motion.bonded:
+        speed = motion.moved(1, lag)
+        still = 0.05 * float(np.percentile(np.abs(speed), 95))
+        partitions.append({"loading": speed > still, "unloading": speed < -still})
+    numbers, sizes = np.unique(spans, return_counts=True)
+    if 1 < len(numbers) and not motion.bonded:
+        largest = np.sort(numbers[np.argsort(sizes)[::-1][:_MOST_CONTACTS]])
+        partitions.append({f"contact {int(i) + 1}": spans == i for i in largest})
+    if motion.bonded:
+        thirds = np.arange(len(spans)) * 3 // len(spans)
+        partitions.append({f"{word} third": thirds == i for i, word in enumerate(("first", "second", "last"))})
+    return [{k: v for k, v in parts.items() if v.sum() >= 30} for parts in partitions]
+
+
+def _explain(fitted: Fit, fits: dict[str, Fit], parts: dict[str, NDArray[np.bool_]]) -> bool:
+    """Whether the parts, each with its own answer, leave much less unexplained than one answer for all does."""
+    own = sum(float(fit.residuals @ fit.residuals) for fit in fits.values())
+    common = sum(float(fitted.residuals[inside] @ fitted.residuals[inside]) for inside in parts.values())
+    return own < (1 - _EXPLAINED) * common
+
+
+def _disagree(name: str, fitted: Fit, fits: dict[str, Fit], tolerance: float) -> Disagreement | None:
+    values = {label: fit[name] for label, fit in fits.items()}
+    stds = {label: fit.std(name) for label, fit in fits.items()}
+    low, high = min(values, key=values.__getitem__), max(values, key=values.__getitem__)
+    apart = values[high] - values[low]
+    if apart < _SIGNIFICANT * float(np.hypot(stds[low], stds[high])):
+        return None
+    if apart < 2 * tolerance * abs(fitted[name]):
+        return None
+    spread = float(np.sqrt(np.mean([(value - fitted[name]) ** 2 for value in values.values()])))
+    return Disagreement(name, {low: values[low], high: values[high]}, spread)

@@ -1,0 +1,150 @@
+"""From a fit to verdicts: what of it may be believed, and why not the rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.identification.choosing import Choice
+from palpate.identification.codes import Code, Warn
+from palpate.identification.fitting import Fit, Lag
+from palpate.identification.result import Parameter, Verdict
+from palpate.units import impedance_units
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What a verdict is passed on, besides the fit.
+
+    Args:
+        tolerance: largest half-width of an identified parameter's interval, as a share of its value.
+        calibration: relative standard deviation of the force's and position's scales together.
+        series: stiffness in series with the surface and its standard deviation [N/m]; None if it is not given.
+        force_unit, position_unit: of the record.
+        lags: the force was found to lag the position although no lag is calibrated.
+    """
+
+    tolerance: float
+    calibration: float
+    series: tuple[float, float] | None
+    force_unit: str
+    position_unit: str
+    lags: bool
+
+
+def verdicts(choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> dict[str, Parameter]:
+    """Pass a verdict on each parameter of the chosen model; warnings are added to the list given."""
+    fitted = choice.candidate.fit
+    names = [n for n in fitted.names if n not in ("offset", "lag", "x0")]
+    found = {name: _verdict(name, choice, lag, terms, warnings) for name in names}
+    low = [n for n, p in found.items() if p.verdict is Verdict.NOT_IDENTIFIABLE and "lag" not in p.reason]
+    low = [n for n in low if n in ("K", "B", "M", "K1", "tau", "n")]
+    if low:
+        text = f"the log does not show {', '.join(low)} above the noise: press faster, deeper or more often"
+        warnings.append(Warn(Code.LOW_EXCITATION, text))
+    return found
+
+
+def _verdict(name: str, choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> Parameter:
+    fitted = choice.candidate.fit
+    value = fitted[name]
+    std = _whole_std(name, choice, terms)
+    unit = unit_of(name, fitted, terms)
+    half = fitted.t * std
+    clear = half < abs(value)
+    if name in fitted.model.positive and value + half < 0:
+        return _refused(name, value, unit, terms, warnings)
+    if terms.lags and name in ("B", "M"):
+        return Parameter(None, None, None, unit, Verdict.REJECTED, _LAGS.format(fit=value, unit=unit))
+    if choice.rejected:
+        return _of_rejected(name, choice, value, std, half, unit)
+    if half <= terms.tolerance * abs(value) and clear:
+        reason = f"known to {_percent(half, value)} (95 %)"
+        return Parameter(value, std, (value - half, value + half), unit, Verdict.IDENTIFIED, reason)
+    reason = _why_not(name, fitted, lag, terms, half, value, unit, warnings)
+    return _reported(value, std, half, unit, Verdict.NOT_IDENTIFIABLE, reason)
+
+
+_LAGS = "the force lags the position, and a lag T counts as a damping of -K T: calibrate it and give --lag"
+
+
+def _refused(name: str, value: float, unit: str, terms: Terms, warnings: list[Warn]) -> Parameter:
+    what = f"the fit gives {value:.3g} {_shown(unit)}, below zero: no passive surface does that".replace("  ", " ")
+    if name == "K":
+        warnings.append(Warn(Code.NEGATIVE_STIFFNESS, f"K: {what}; a channel's sign or column may be wrong"))
+    elif not terms.lags:
+        warnings.append(Warn(Code.FORCE_LAGS_POSITION, f"{name}: {what}; {_LAGS}"))
+    return Parameter(None, None, None, unit, Verdict.REJECTED, f"{what}; {_LAGS if name != 'K' else 'check the signs'}")
+
+
+def _of_rejected(name: str, choice: Choice, value: float, std: float, half: float, unit: str) -> Parameter:
+    """The model does not hold. A stiffness is still a secant through the log; damping and mass are artefacts."""
+    mine = [d for d in choice.candidate.disagreements if d.name == name]
+    seen = "; ".join(choice.candidate.against[:2])
+    if mine:
+        parts = ", ".join(f"{v:.3g} in {label}" for label, v in mine[0].parts.items())
+        seen = f"alone it is {parts}"
+    if name == "K":
+        reason = f"a secant through the whole contact, no constant of the surface: {seen}"
+        return _reported(value, std, half, unit, Verdict.REJECTED, reason)
+    reason = f"the fit's {value:.3g} {_shown(unit)} is an artefact of a model that does not hold: {seen}"
+    return Parameter(None, None, None, unit, Verdict.REJECTED, reason)
+
+
+def _reported(value: float, std: float, half: float, unit: str, verdict: Verdict, reason: str) -> Parameter:
+    """A number only if its interval excludes zero."""
+    if half >= abs(value):
+        return Parameter(None, None, None, unit, verdict, reason)
+    return Parameter(value, std, (value - half, value + half), unit, verdict, reason)
+
+
+def _why_not(
+    name: str, fitted: Fit, lag: Lag, terms: Terms, half: float, value: float, unit: str, warnings: list[Warn]
+) -> str:
+    bounds = f"95 %: {value - half:.3g} to {value + half:.3g} {_shown(unit)}".rstrip()
+    alone = fitted.t * fitted.std(name, lag_known=True)
+    if lag.std and half > 1.5 * alone and alone <= max(terms.tolerance * abs(value), 0.67 * half):
+        known = f"{fitted.std('lag') * 1e3:.2g} ms"
+        text = f"{name} cannot be told from a lag of the force, which is known to {known} only ({bounds})"
+        if not any(w.code is Code.LAG_DAMPING_CONFOUNDED for w in warnings):
+            warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, f"{text}; calibrate the lag and give it with --lag"))
+        return text
+    limit = f"wider than {terms.tolerance:.0%}" if half < abs(value) else "zero is within it"
+    return f"the log does not show it above the noise ({bounds}; {limit})"
+
+
+def _whole_std(name: str, choice: Choice, terms: Terms) -> float:
+    fitted = choice.candidate.fit
+    value = fitted[name]
+    parts = [fitted.std(name), terms.calibration * value if name not in ("n", "tau") else 0.0]
+    if choice.rejected:
+        parts += [d.spread for d in choice.candidate.disagreements if d.name == name]
+    if terms.series and name == "K":
+        parts.append(terms.series[1] * (value / terms.series[0]) ** 2)
+    return float(np.sqrt(np.sum(np.square(parts))))
+
+
+def unit_of(name: str, fitted: Fit, terms: Terms) -> str:
+    """The unit of one parameter of a model."""
+    units = impedance_units(terms.force_unit, terms.position_unit)
+    plain = units["K"] == "1"
+    if name == "tau":
+        return "s"
+    if name == "n" or plain:
+        return "1"
+    if name in ("K2", "K3"):
+        return f"{terms.force_unit}/{terms.position_unit}^{name[1]}"
+    if fitted.model.name == "hunt-crossley":
+        n = fitted["n"]
+        power = f"{terms.position_unit}^{n:.3g}" if name == "K" else f"{terms.position_unit}^{n + 1:.3g}"
+        return f"{terms.force_unit}/{power}" if name == "K" else f"{terms.force_unit} s/{power}"
+    return units["K" if name == "K1" else name]
+
+
+def _percent(half: float, value: float) -> str:
+    return f"{half / abs(value):.2g}".replace("inf", "?") if value == 0 else f"{100 * half / abs(value):.2g} %"
+
+
+def _shown(unit: str) -> str:
+    return "" if unit == "1" else unit
