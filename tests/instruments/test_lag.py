@@ -12,7 +12,7 @@ SUBSTEPS = PHYSICS // 1000
 
 
 def chain_plain(sensor, analog, converter, digital, forces, out):
-    """The force at 1 kHz after sensor, analog filter, converter and digital filter; `forces` at each sub-step.
+    """The force at 1 kHz after sensor, analog filter, converter and digital filter; `forces` by sub-step.
 
     A tick reads what the physics steps before it left.
     """
@@ -56,9 +56,9 @@ def stated():
 
 @pytest.mark.parametrize("measure", [lag_by_ramp, lag_by_sine])
 def test_the_force_chain_is_as_late_as_it_says(measure):
-    # The two clocks start together: they meet in 12 phases only, and a tick that falls on a sample sees the one
-    # before, so that the mean age is 1/24000 s more than half a cycle. Samples are taken at the first physics step
-    # after their time, 1/3 step late in the mean, and are that much younger.
+    # The two clocks start together: they meet in 12 phases only, and a tick that falls on a sample sees the
+    # one before, so that the mean age is 1/24000 s more than half a cycle. Samples are taken at the first
+    # physics step after their time, 1/3 step late in the mean, and are that much younger.
     seen = stated() + 1 / 24000 - 1 / 3 / PHYSICS
     np.testing.assert_allclose(measure(chain)[[0, 2]], seen[[0, 2]], atol=2e-6)
     # The analog filter averages over the steps of the held line.

@@ -1,4 +1,4 @@
-"""Filters against scipy.signal, against the thesis' printed coefficients, and against their own stated lag."""
+"""Filters against scipy.signal, the thesis' printed coefficients, and their own stated lag."""
 
 import math
 

@@ -1,9 +1,9 @@
 """A contact whose area grows as it is pressed."""
 
+import math
 from typing import NamedTuple
 
 from palpate._jit import part
-from palpate._vector import sign
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
 from palpate.signals.parameters import coerced, require
 
@@ -39,7 +39,7 @@ class HuntCrossley(NamedTuple):
 
     def force(self, state, p, v):
         """Force on the surface at penetration p [m] and rate v [m/s], inertia left out [N]."""
-        return abs(p) ** self.exponent * (self.stiffness * sign(p) + self.damping * v)
+        return abs(p) ** self.exponent * (math.copysign(self.stiffness, p) + self.damping * v)
 
     def relax(self, state, p, v, dt):
         """The state after a step in contact that ended at p, v."""
