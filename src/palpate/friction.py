@@ -54,10 +54,10 @@ class LuGre(NamedTuple):
 
     def step(self, z, v, dt):
         """One step of dt [s] at v [rad/s]: the torque against the motion [N m], and the new z."""
-        g, speed = self.level(v), abs(v)
-        new = (z + dt * v) / (1.0 + dt * self.sigma0 * speed / g)
-        damping = self.sigma1 / (1.0 + 0.25 * self.sigma1 * speed / g)
-        return self.sigma0 * new + damping * ((new - z) / dt) + self.sigma2 * v, new
+        slip = abs(v) / self.level(v)
+        new = (z + dt * v) / (1.0 + dt * self.sigma0 * slip)
+        damping = self.sigma1 / (1.0 + 0.25 * self.sigma1 * slip)
+        return self.sigma0 * new + (1.0 / dt) * damping * (new - z) + self.sigma2 * v, new
 
     def level(self, v):
         """g(v), the dry friction of steady sliding [N m]."""
