@@ -10,6 +10,7 @@ import hashlib
 import importlib
 import inspect
 import operator
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +24,7 @@ C = TypeVar("C", bound=type)
 _laws: list[Callable[..., Any]] = []
 _foreign_laws: list[Callable[..., Any]] = []
 _parts: dict[type, None] = {}
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).resolve().parent
 # Division as NumPy's: no branch and no exception inside a loop.
 _OPTIONS = {"error_model": "numpy", "nogil": True}
 
@@ -85,35 +86,55 @@ def kernel(function: Callable[..., Any]) -> Kernel:
     return Kernel(function)
 
 
-@functools.cache
-def sources_stamp() -> str:
-    """A hash of all the package's sources: a kernel is stale when any file that it may call has changed."""
+_IMPORT = re.compile(r"^\s*from (palpate[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+
+
+def sources_stamp(*files: Path) -> str:
+    """A hash of these files and of all of the package's that they import, directly or not.
+
+    A kernel is stale when any file that it may call has changed, which Numba, left alone, does not see.
+    """
+    reached: dict[Path, bytes] = {}
+    waiting = [f.resolve() for f in files]
+    while waiting:
+        file = waiting.pop()
+        if file not in reached and file.exists():
+            reached[file] = file.read_bytes()
+            waiting.extend(_imported(reached[file].decode("utf-8", "replace")))
     digest = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        digest.update(path.read_bytes())
+    for file in sorted(reached):
+        digest.update(str(file).encode() + b"\0" + reached[file])
     return digest.hexdigest()
 
 
-def _foreign_stamps(
-    function: Callable[..., Any], types_of_arguments: tuple[Any, ...]
-) -> tuple[str, ...] | None:
-    """Hashes of the user's own files that a kernel may depend on; None where there is no file to ask.
+def _imported(text: str) -> list[Path]:
+    """The package's files that a source imports names from, or as modules."""
+    root = _PACKAGE.parent
+    found = []
+    for module, names in _IMPORT.findall(text):
+        place = root.joinpath(*module.split("."))
+        modules = [place, *(place / name.split(" as ")[0].strip(" ()\n\t") for name in names.split(","))]
+        for m in modules:
+            found += [p for p in (m.with_suffix(".py"), m / "__init__.py") if m.name and p.is_file()]
+    return found
 
-    A kernel of the package that is given only the package's parts depends on none.
+
+def _stamp_of(function: Callable[..., Any], types_of_arguments: tuple[Any, ...]) -> str | None:
+    """A hash of all that a kernel given such arguments may depend on; None where there is no file to ask.
+
+    A kernel of the package that is given only the package's parts depends on its own file, theirs, and what those
+    import. With something of the user's among them it may call any law and part registered from outside.
     """
-    files = {_home_of(x) for x in (function, *_classes(types_of_arguments))}
-    if not files - {_PACKAGE}:
-        return ()
-    files |= {_home_of(x) for x in (*_foreign_laws, *_parts)}
-    if not all(path.is_file() or path == _PACKAGE for path in files):
-        return None
-    return tuple(sorted(hashlib.sha256(f.read_bytes()).hexdigest() for f in files - {_PACKAGE}))
+    things = {function, *_classes(types_of_arguments)}
+    if any(_PACKAGE not in _home_of(x).parents for x in things):
+        things |= {*_foreign_laws, *_parts}
+    files = {_home_of(x) for x in things}
+    return sources_stamp(*files) if all(f.is_file() for f in files) else None
 
 
 def _home_of(thing: Any) -> Path:
-    """The file that defines a function or a class; the package's folder for all of the package's own."""
-    path = Path(getattr(sys.modules.get(thing.__module__), "__file__", None) or "nowhere")
-    return _PACKAGE if _PACKAGE in path.parents else path
+    """The file that defines a function or a class."""
+    return Path(getattr(sys.modules.get(thing.__module__), "__file__", None) or "nowhere").resolve()
 
 
 def _classes(numba_types: Any) -> Any:
@@ -133,13 +154,13 @@ def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
     class PackageCache(caching.FunctionCache):
         def __init__(self, py_func: Callable[..., Any]):
             super().__init__(py_func)
-            self._cache_file._source_stamp = sources_stamp()
+            self._cache_file._source_stamp = sources_stamp(_home_of(py_func))
 
         def _index_key(self, sig: Any, codegen: Any) -> Any:
-            return (*super()._index_key(sig, codegen), _foreign_stamps(function, sig))
+            return (*super()._index_key(sig, codegen), _stamp_of(function, sig))
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
-            known = _foreign_stamps(function, sig) is not None
+            known = _stamp_of(function, sig) is not None
             found = super().load_overload(sig, target_context) if known else None
             if found is None:
                 wait()
@@ -147,7 +168,7 @@ def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
             return found
 
         def save_overload(self, sig: Any, data: Any) -> None:
-            if _foreign_stamps(function, sig) is not None:
+            if _stamp_of(function, sig) is not None:
                 super().save_overload(sig, data)
 
     dispatcher = numba.njit(**_OPTIONS)(function)
