@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, SurfaceState, join
+from palpate.environments import (
+    HuntCrossley,
+    KelvinVoigt,
+    StandardLinearSolid,
+    SurfaceState,
+    join,
+    part_from,
+    touch,
+)
 from palpate.errors import InputError
 
 DT = 50e-6
@@ -48,6 +56,28 @@ def test_a_branch_does_not_ring_however_long_the_step(dt):
     for _ in range(20):
         before, state = state, FOAM.relax(state, 2e-3, 0.0, dt)
         assert 0.0 <= state.internal <= before.internal
+
+
+def test_pressed_at_once_a_solid_is_as_stiff_as_both_its_springs():
+    state = held(FOAM, 1e-3, 5.0, 1e-3)
+    more = FOAM.force(state, 1.1e-3, 0.0) - FOAM.force(state, 1.0e-3, 0.0)
+    assert more == pytest.approx(12500 * 1e-4, rel=1e-9)
+
+
+def test_touched_again_a_solid_remembers_its_branch():
+    state = SurfaceState(1e-3, 0.0, -3e-4, 0.0)
+    assert FOAM.force(touch(state, 0.0), 1e-3, 0.0) == FOAM.force(state, 1e-3, 0.0)
+    assert part_from(touch(state, 0.0)) == state
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e-9, 1e-4])
+def test_a_light_skins_rate_does_not_ring(mass):
+    surface = KelvinVoigt(5200, 200, mass)
+    state = SurfaceState(1e-3, 0.0, 0.0, 0.0)
+    for _ in range(300):
+        state = surface.free(state, DT)
+        # From the slow way back, v = -K s/B, it strays by the step's own error only.
+        assert -30.0 * state.deflection <= state.rate <= 0.0
 
 
 def test_a_solid_tells_its_instantaneous_stiffness():

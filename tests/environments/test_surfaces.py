@@ -60,7 +60,7 @@ def recover(surface, state, dt, out):
 
 @kernel
 def press(surface, tip_mass, p, v, push, dt, out):
-    """A tip of some mass under a given push: penetration, rate, contact force, energy given to the surface."""
+    """A tip of some mass under a push: penetration, rate, contact force, energy given to the surface."""
     state = surface.start()
     given = 0.0
     for k in range(push.size):
@@ -89,7 +89,7 @@ def press(surface, tip_mass, p, v, push, dt, out):
 
 
 def path(amplitudes, frequencies, depth, steps, dt):
-    """A smooth closed path that starts and ends at rest at p = 0, with rate and acceleration, each (steps,)."""
+    """A smooth closed path, at rest at p = 0 at both ends, with rate and acceleration, each (steps,)."""
     time = np.arange(steps) * dt
     length = time[-1]
     window, p = np.sin(np.pi * time / length) ** 4, np.zeros(steps)
