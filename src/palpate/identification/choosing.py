@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import unknown
 from palpate.identification.fitting import Fit, Lag, fit
-from palpate.identification.lagging import fit_with_lag
+from palpate.identification.lagging import freed
 from palpate.identification.models import (
     CURVED,
     CURVED_MASS,
@@ -22,16 +22,24 @@ from palpate.identification.models import (
     hunt_crossley,
     standard_linear_solid,
 )
-from palpate.identification.parts import Disagreement, compare_parts
+from palpate.identification.parts import Disagreement, compare_parts, halves
 
 Array = NDArray[np.float64]
 
 _BETTER = 0.7
 """A richer model must leave less than this share of the mean square to be preferred."""
 _MUCH_BETTER = 0.5
-_ABOVE_NOISE = 5.0
-_UNEXPLAINED = 0.02
+_HOPELESS = 4.0
+"""A model whose misfit is this many times the best one's is not saved by any lag."""
+_ABOVE_NOISE = 3.0
+_UNEXPLAINED = 0.01
+_SLOW_UNEXPLAINED = 0.04
+_SLOW = 0.1
 _SIGNIFICANT = 3.0
+
+
+_CHAIN_CORRELATION = 2 * 2.3
+"""Correlation time of white noise behind the filter chain, in its time constants: the integral of its autocorrelation."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +79,13 @@ class Choice:
         candidate: its fit, and what speaks against it.
         rejected: whether it does not describe the log, and stands here because no other does.
         others: all candidates, the chosen one among them.
+        halves: of a rejected model, what loading and unloading alone give: label, parameter, value.
     """
 
     candidate: Candidate
     rejected: bool
-    others: tuple[Candidate, ...] = field(default=())
+    others: tuple[Candidate, ...] = ()
+    halves: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
 def choose(question: Question, name: str | None = None) -> Choice:
@@ -90,14 +100,17 @@ def choose(question: Question, name: str | None = None) -> Choice:
     """
     if name is not None and name not in NAMES:
         raise unknown("model", name, NAMES)
-    fits = [fit_with_lag(model, question.motion, question.force, question.lag) for model in _offered(question, name)]
+    motion, force, lag = question.motion, question.force, question.lag
+    fits = [fit(model, motion, force, lag) for model in _offered(question, name)]
+    near = _HOPELESS * min(fitted.rmse for fitted in fits)
+    fits = [freed(fitted, motion, force, lag) if fitted.rmse <= near else fitted for fitted in fits]
     judged = _judge(fits, question)
     if name is None:
         return _chosen(judged, question)
     asked = [c for c in judged if c.fit.model.name == name]
     fine = [c for c in asked if not c.against]
     best = min(fine, key=lambda c: len(c.fit.names)) if fine else asked[0]
-    return Choice(best if fine else _plain(best, question), not fine, tuple(judged))
+    return Choice(best, False, tuple(judged)) if fine else _no_model(best, judged, question)
 
 
 def _offered(question: Question, name: str | None) -> list[Model]:
@@ -125,16 +138,26 @@ def _candidate(fitted: Fit, fits: list[Fit], best: float, question: Question) ->
         winner = min((f for f in fits if f.rmse == best), key=lambda f: len(f.names))
         label = winner.model.name + (" with a curved spring" if "K3" in winner.names else "")
         against.append(f"{label} leaves {best**2 / fitted.rmse**2:.0%} of its squared misfit")
-    noise = question.free_noise
-    if noise is not None and fitted.rmse > _ABOVE_NOISE * noise and 1 - fitted.r2 > _UNEXPLAINED:
-        against.append(
-            f"its misfit of {fitted.rmse:.3g} is {fitted.rmse / max(noise, 1e-300):.3g} times the force's noise"
-            if noise > 1e-6 * fitted.rmse
-            else f"its misfit of {fitted.rmse:.3g} is not noise"
-        )
+    against += _not_noise(fitted, question)
     parts = compare_parts(fitted, question.motion, question.force, question.spans, question.tolerance)
     against += [_said(part) for part in parts]
     return Candidate(fitted, tuple(against), tuple(parts))
+
+
+def _not_noise(fitted: Fit, question: Question) -> list[str]:
+    """What a fit leaves is noise only if it is no larger than the noise out of contact, and no slower."""
+    noise = question.free_noise
+    if noise is None:
+        return []
+    left = 1 - fitted.r2
+    if fitted.rmse > _ABOVE_NOISE * noise and left > _UNEXPLAINED:
+        times = f"{fitted.rmse / noise:.2g} times the" if noise > 1e-6 * fitted.rmse else "far above the"
+        return [f"its misfit of {fitted.rmse:.2g} N is {times} noise out of contact"]
+    chain = question.motion.chain
+    white = len(question.force) * chain.dt * chain.rate / _CHAIN_CORRELATION
+    if left > _SLOW_UNEXPLAINED and fitted.noise.effective < _SLOW * white:
+        return [f"its misfit ({left:.0%} of the force's variance) is too slow for noise"]
+    return []
 
 
 def _said(part: Disagreement) -> str:
@@ -154,7 +177,7 @@ def _chosen(judged: list[Candidate], question: Question) -> Choice:
         plain = next(c for c in judged if c.fit.model is KELVIN_VOIGT)
         mass = next(c for c in judged if c.fit.model is KELVIN_VOIGT_MASS)
         with_mass = question.motion.bonded and mass.fit.rmse**2 < _MUCH_BETTER * plain.fit.rmse**2
-        return Choice(_plain(mass if with_mass else plain, question), True, tuple(judged))
+        return _no_model(mass if with_mass else plain, judged, question)
     effective = min(fine, key=lambda c: c.fit.rmse).fit.noise.effective
     best = fine[0]
     for candidate in fine[1:]:
@@ -175,10 +198,10 @@ def _same_kind(one: Fit, other: Fit) -> bool:
     return one.model is KELVIN_VOIGT_MASS and other.model is KELVIN_VOIGT
 
 
-def _plain(candidate: Candidate, question: Question) -> Candidate:
+def _no_model(candidate: Candidate, judged: list[Candidate], question: Question) -> Choice:
     """A model that does not describe the log cannot tell its lag either: the plain fit stands for it."""
-    if question.lag.known or candidate.fit.lag == question.lag.value:
-        return candidate
-    fitted = fit(candidate.fit.model, question.motion, question.force, question.lag)
-    parts = compare_parts(fitted, question.motion, question.force, question.spans, question.tolerance)
-    return Candidate(fitted, candidate.against, tuple(parts))
+    fitted = candidate.fit
+    if not question.lag.known and fitted.lag != question.lag.value:
+        fitted = fit(fitted.model, question.motion, question.force, question.lag)
+        candidate = _candidate(fitted, [c.fit for c in judged], min(c.fit.rmse for c in judged), question)
+    return Choice(candidate, True, tuple(judged), halves(fitted, question.motion, question.force))

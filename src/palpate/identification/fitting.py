@@ -14,6 +14,7 @@ from palpate.identification.regression import Noise, covariance, noise_of, quant
 Array = NDArray[np.float64]
 
 _ROUNDS = 30
+_CONVERGED = 1e-6
 _LAG = "lag"
 
 
@@ -88,9 +89,7 @@ class _Point:
     theta: Array
     residuals: Array
 
-    @property
-    def rss(self) -> float:
-        return float(self.residuals @ self.residuals)
+    rss: float
 
 
 def fit(model: Model, motion: Motion, force: Array, lag: Lag, free_lag: bool = False) -> Fit:
@@ -111,7 +110,8 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag, free_lag: bool = F
 def _evaluate(model: Model, motion: Motion, force: Array, knobs: dict[str, float], lag: float) -> _Point:
     columns = np.column_stack(model.columns(motion, knobs, lag))
     theta = solve(columns, force)
-    return _Point(knobs, lag, columns, theta, force - columns @ theta)
+    residuals = force - columns @ theta
+    return _Point(knobs, lag, columns, theta, residuals, float(residuals @ residuals))
 
 
 def _best_start(model: Model, motion: Motion, force: Array, lag: float) -> _Point:
@@ -136,7 +136,7 @@ def _descend(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag
         if trial.rss < point.rss:
             gain = 1 - trial.rss / point.rss
             point, damping = trial, max(damping / 10, 1e-9)
-            if gain < 1e-7:
+            if gain < _CONVERGED:
                 break
         else:
             damping *= 10

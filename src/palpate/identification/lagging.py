@@ -29,18 +29,18 @@ def unknown_lag(motion: Motion, rate: float) -> Lag:
     return Lag(0.0, float(np.clip(duration * _SHARE, 2 / rate, max(_LONGEST, 2 / rate))), known=False)
 
 
-def fit_with_lag(model: Model, motion: Motion, force: Array, lag: Lag) -> Fit:
-    """Fit a model; a lag that is not known is looked for, and used if this log can tell it."""
+def freed(fixed: Fit, motion: Motion, force: Array, lag: Lag) -> Fit:
+    """The same model with the lag looked for in the log; the fit given, if the log cannot tell the lag."""
     if lag.known:
-        return fit(model, motion, force, lag)
-    free = fit(model, motion, force, lag, free_lag=True)
+        return fixed
+    free = fit(fixed.model, motion, force, lag, free_lag=True)
     told = free.std("lag") < 0.5 * lag.std and abs(free.lag - lag.value) < 2.9 * lag.std
-    return free if told else fit(model, motion, force, lag)
+    return free if told else fixed
 
 
 def _elastic(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
     """f = a curve of x alone: what is left of a passive contact when loading and unloading coincide."""
-    powers = [motion.filtered(motion.position**n, 0, lag) for n in (2, 3)]
+    powers = [motion.power(n, lag) for n in (2, 3)]
     return [motion.moved(0, lag), *powers, motion.ones]
 
 

@@ -30,11 +30,12 @@ class Motion:
     penetration: Array
     rows: NDArray[np.intp]
     bonded: bool
-    _kept: dict[tuple[str, int, float], Array] = field(default_factory=dict)
+    _kept: dict[tuple[int, float], Array] = field(default_factory=dict)
+    _powers: dict[int, Array] = field(default_factory=dict)
 
     def moved(self, derivative: int, lag: float) -> Array:
         """Filtered position or a derivative of it at t - lag, shape (m,)."""
-        key = ("x", derivative, lag)
+        key = (derivative, lag)
         if key not in self._kept:
             if len(self._kept) > 24:
                 self._kept.clear()
@@ -44,6 +45,12 @@ class Motion:
     def filtered(self, signal: Array, derivative: int, lag: float) -> Array:
         """Any raw signal through the same chain, at t - lag, shape (m,)."""
         return self.chain(signal, derivative, lag)[self.rows]
+
+    def power(self, n: int, lag: float) -> Array:
+        """The position squared or cubed, filtered, at t - lag, shape (m,)."""
+        if n not in self._powers:
+            self._powers[n] = self.position * self.position * (self.position if n == 3 else 1.0)
+        return self.filtered(self._powers[n], 0, lag)
 
     @property
     def ones(self) -> Array:
@@ -98,7 +105,7 @@ def _with_curve(columns: Columns) -> Columns:
     """The same with K2 x^2 + K3 x^3 beside K x, so that K is the slope at the origin."""
 
     def curved(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
-        powers = [motion.filtered(motion.position**n, 0, lag) for n in (2, 3)]
+        powers = [motion.power(n, lag) for n in (2, 3)]
         own = columns(motion, knobs, lag)
         return [*own[:-1], *powers, own[-1]]
 

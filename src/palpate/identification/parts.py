@@ -61,9 +61,7 @@ def _partitions(motion: Motion, spans: Array, lag: float) -> list[dict[str, NDAr
     """Ways to cut a log in parts: loading and unloading, contact by contact, thirds of the time."""
     partitions = []
     if not motion.bonded:
-        speed = motion.moved(1, lag)
-        still = 0.05 * float(np.percentile(np.abs(speed), 95))
-        partitions.append({"loading": speed > still, "unloading": speed < -still})
+        partitions.append(_ways(motion, lag))
     numbers, sizes = np.unique(spans, return_counts=True)
     if 1 < len(numbers) and not motion.bonded:
         largest = np.sort(numbers[np.argsort(sizes)[::-1][:_MOST_CONTACTS]])
@@ -72,6 +70,22 @@ def _partitions(motion: Motion, spans: Array, lag: float) -> list[dict[str, NDAr
         thirds = np.arange(len(spans)) * 3 // len(spans)
         partitions.append({f"{word} third": thirds == i for i, word in enumerate(("first", "second", "last"))})
     return [{k: v for k, v in parts.items() if v.sum() >= 30} for parts in partitions]
+
+
+def _ways(motion: Motion, lag: float) -> dict[str, NDArray[np.bool_]]:
+    speed = motion.moved(1, lag)
+    still = 0.05 * float(np.percentile(np.abs(speed), 95))
+    return {"loading": speed > still, "unloading": speed < -still}
+
+
+def halves(fitted: Fit, motion: Motion, force: Array) -> dict[str, dict[str, float]]:
+    """What loading alone and unloading alone give, by label and by parameter."""
+    found = {}
+    for label, inside in _ways(motion, fitted.lag).items():
+        if inside.sum() >= 30:
+            part = part_of(fitted, motion, force, inside)[0]
+            found[label] = {name: part[name] for name in part.names}
+    return found
 
 
 def _explain(fitted: Fit, fits: dict[str, Fit], parts: dict[str, NDArray[np.bool_]]) -> bool:

@@ -80,13 +80,12 @@ def _refused(name: str, value: float, unit: str, terms: Terms, warnings: list[Wa
 
 def _of_rejected(name: str, choice: Choice, value: float, std: float, half: float, unit: str) -> Parameter:
     """The model does not hold. A stiffness is still a secant through the log; damping and mass are artefacts."""
-    mine = [d for d in choice.candidate.disagreements if d.name == name]
     seen = "; ".join(choice.candidate.against[:2])
-    if mine:
-        parts = ", ".join(f"{v:.3g} in {label}" for label, v in mine[0].parts.items())
-        seen = f"alone it is {parts}"
+    alone = [f"{label} alone {values[name]:.3g}" for label, values in choice.halves.items() if name in values]
+    if len(alone) == 2:
+        seen = f"{', '.join(alone)} {_shown(unit)}".rstrip() + f"; {seen}"
     if name == "K":
-        reason = f"a secant through the whole contact, no constant of the surface: {seen}"
+        reason = f"a secant through the whole contact, not a constant of the surface: {seen}"
         return _reported(value, std, half, unit, Verdict.REJECTED, reason)
     reason = f"the fit's {value:.3g} {_shown(unit)} is an artefact of a model that does not hold: {seen}"
     return Parameter(None, None, None, unit, Verdict.REJECTED, reason)
