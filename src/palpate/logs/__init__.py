@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from palpate.logs.read import read_log
+from palpate.logs.read import columns_of, read_log
 from palpate.logs.store import read_record, write_record
 
-__all__ = ["read_log", "read_record", "write_record"]
+__all__ = ["columns_of", "read_log", "read_record", "write_record"]

@@ -71,6 +71,15 @@ def read_log(
     return Record(kept, {name: units[name] for name in kept}, meta)
 
 
+def columns_of(path: str | Path, delimiter: str | None = None) -> list[str]:
+    """Names of a log's columns; numbers from 0 if it has no header.
+
+    Raises:
+        InputError: the file is missing or is none that can be read.
+    """
+    return list(Table(Path(path), delimiter).names)
+
+
 def _symbol(role: str, spec: str, table: Table, place: int) -> tuple[str, list[dict[str, Any]]]:
     """The unit's symbol of one column: said, else stored in the file, else carried by the name, else SI."""
     name, symbol = split_spec(spec)

@@ -1,0 +1,1 @@
+"""Plots, tables and pages: what a person looks at."""
