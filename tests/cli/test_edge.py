@@ -73,7 +73,7 @@ def test_a_defect_keeps_its_traceback_and_is_not_mistaken_for_an_answer(capsys):
     [
         (["identfy", "log.csv"], "identify"),
         (["runn"], "run"),
-        (["--verison"], "--version"),
+        (["--verison"], "--verison"),
         (["run", "foam-hybrid", "--sed", "1"], "--seed"),
         (["run", "foam-hybrid", "--seed", "one"], "one"),
         (["identify"], "log"),

@@ -23,8 +23,8 @@ def measure(
         waiting: called when the loop has to be compiled first.
 
     Returns:
-        ``ns_per_tick`` of one run on one core, the best of five; ``times_real_time``, how much faster that run
-        is than the arm; ``ticks_per_s`` of runs on all cores together; and ``cores``, how many that are.
+        ``ns_per_tick`` of one run on one core, the best of five; ``times_real_time``, how much faster than the
+        arm that run is; ``ticks_per_s`` of runs on all cores together; and ``cores``, how many that are.
     """
     bench.run(bench.loop.tick, waiting=waiting)
     ticks, alone = min((_timed(bench, duration) for _ in range(REPEATS)), key=lambda run: run[1] / run[0])
