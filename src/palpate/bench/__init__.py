@@ -1,12 +1,24 @@
 """The closed loop: one tick is sense, think, act, move; a run is a record.
 
-    from palpate.bench import build, load
-    record = build(load("foam-hybrid")).run(duration=60.0, seed=1, press=8.0)
+from palpate.bench import build, load
+record = build(load("foam-hybrid")).run(duration=60.0, seed=1, press=8.0)
 """
 
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
 from palpate.bench.experiment import Experiment, load, names, source
+from palpate.bench.summary import summarise
 from palpate.bench.tick import Loop, march, start_at
 
-__all__ = ["Bench", "Experiment", "Loop", "build", "load", "march", "names", "source", "start_at"]
+__all__ = [
+    "Bench",
+    "Experiment",
+    "Loop",
+    "build",
+    "load",
+    "march",
+    "names",
+    "source",
+    "start_at",
+    "summarise",
+]

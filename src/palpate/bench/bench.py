@@ -58,7 +58,8 @@ class Bench:
             waiting: called when the loop has to be compiled first, which takes some ten seconds, once.
 
         Returns:
-            One row a tick; ``meta["end"]`` says why the run ended: "done", "no contact" or "diverged".
+            One row a tick; ``meta["end"]`` says why the run ended: "done", "no contact", "diverged", or "interrupted"
+            by the keyboard, with the rows so far.
 
         Raises:
             InputError: a duration that is not positive.
@@ -87,23 +88,26 @@ class _Run:
         """The rows of a run and why it ended."""
         generator = np.random.default_rng(self.seed)
         chunks: list[NDArray[np.float64]] = []
-        done, first, stop = 0, None, total
-        while done < stop:
+        done, first, stop, end = 0, None, total, ""
+        while done < stop and not end:
             out = np.empty((min(CHUNK, stop - done), len(COLUMNS)))
-            state = self._march(state, done, generator.standard_normal(len(out)), out)
-            chunks.append(out)
+            try:
+                state = self._march(state, done, generator.standard_normal(len(out)), out)
+            except KeyboardInterrupt:
+                end = "interrupted"
+                break
             finite = np.isfinite(out).all(axis=1)
             if not finite.all():
-                good = int(np.argmin(finite))
-                return np.concatenate(chunks)[: done + good], "diverged"
+                end, out = "diverged", out[: int(np.argmin(finite))]
+            chunks.append(out)
             if first is None and (out[:, 1] == CONTACT).any():
                 first = done + int(np.argmax(out[:, 1] == CONTACT))
-                if press is not None:
-                    stop = min(total, first + press)
+                stop = total if press is None else min(total, first + press)
             done += len(out)
             if progress is not None:
                 progress(done * self.loop.tick, "approach" if first is None else "contact")
-        return np.concatenate(chunks)[:stop], "no contact" if first is None else "done"
+        rows = np.concatenate(chunks)[:stop] if chunks else np.empty((0, len(COLUMNS)))
+        return rows, end or ("no contact" if first is None else "done")
 
     def _march(
         self, state: LoopState, k: int, noise: NDArray[np.float64], out: NDArray[np.float64]

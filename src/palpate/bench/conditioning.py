@@ -70,8 +70,6 @@ class Conditioning(NamedTuple):
         a = (xd.x - state.velocity) / self.tick
         smooth_a, acceleration = self.motion.step(state.acceleration, a)
         smooth_force, force_state = self.force.step(state.force, force)
-        sense = Sense(
-            Vec3(q.x, q.y, q3), Vec3(qd.x, qd.y, qd3), x, smooth_xd, Vec3(smooth_force, 0.0, 0.0)
-        )
+        sense = Sense(Vec3(q.x, q.y, q3), Vec3(qd.x, qd.y, qd3), x, smooth_xd, Vec3(smooth_force, 0.0, 0.0))
         signals = Signals(sense, xd.x, a, smooth_a, force)
         return signals, ConditioningState(q, x, xd.x, angle, rate, twist, acceleration, force_state)

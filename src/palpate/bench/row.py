@@ -1,6 +1,5 @@
 """What a run records at each tick: one row, every column a number with a unit."""
 
-
 from palpate._jit import law
 
 #: Name and unit of every column, in the order of `row_of`.

@@ -1,53 +1,44 @@
-"""What one tick of the closed loop costs on this machine."""
+"""How fast the loop runs here."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import time
 from concurrent.futures import ThreadPoolExecutor
-from time import perf_counter
 
-from palpate.bench.bench import Bench
+import numpy as np
 
+from palpate.bench.build import build
+from palpate.bench.experiment import load
+from palpate.bench.row import COLUMNS
+from palpate.bench.tick import compiled_march, start_at
+
+TICKS = 20_000
 REPEATS = 5
 
 
-def measure(
-    bench: Bench, duration: float = 15.0, waiting: Callable[[], None] | None = None
-) -> dict[str, float]:
-    """Times whole runs, recording included.
+def measure() -> dict[str, float | int]:
+    """Cost of a tick of foam-hybrid: on one core (the best of a few), and with a run a core side by side."""
+    bench = build(load("foam-hybrid"))
+    noise = np.random.default_rng(0).standard_normal(TICKS)
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
-    Args:
-        bench: the loop to time.
-        duration: of one run [s of simulated time].
-        waiting: called when the loop has to be compiled first.
+    def march(_: int) -> float:
+        out = np.empty((TICKS, len(COLUMNS)))
+        begun = time.perf_counter()
+        compiled_march(bench.loop, start_at(bench.loop, bench.q), 0, noise, out)
+        return time.perf_counter() - begun
 
-    Returns:
-        ``ns_per_tick`` of one run on one core, the best of five; ``times_real_time``, how much faster than the
-        arm that run is; ``ticks_per_s`` of runs on all cores together; and ``cores``, how many that are.
-    """
-    bench.run(bench.loop.tick, waiting=waiting)
-    ticks, alone = min((_timed(bench, duration) for _ in range(REPEATS)), key=lambda run: run[1] / run[0])
-    cores = _cores()
-    start = perf_counter()
+    march(0)
+    alone = min(march(i) for i in range(REPEATS)) / TICKS
     with ThreadPoolExecutor(cores) as pool:
-        done = sum(count for count, _ in pool.map(lambda _: _timed(bench, duration), range(2 * cores)))
-    together = perf_counter() - start
+        begun = time.perf_counter()
+        list(pool.map(march, range(REPEATS * cores)))
+        together = (time.perf_counter() - begun) / (REPEATS * cores * TICKS)
     return {
-        "ns_per_tick": 1e9 * alone / ticks,
-        "ticks_per_s": done / together,
+        "ns_per_tick": 1e9 * alone,
+        "ticks_per_s": 1.0 / together,
         "cores": cores,
-        "times_real_time": ticks * bench.loop.tick / alone,
+        "times_real_time": bench.loop.tick / alone,
+        "steps_per_tick": bench.loop.steps,
     }
-
-
-def _timed(bench: Bench, duration: float) -> tuple[int, float]:
-    """Ticks of one run, and the seconds that it took."""
-    start = perf_counter()
-    record = bench.run(duration)
-    return len(record), perf_counter() - start
-
-
-def _cores() -> int:
-    """Cores that this process may use, which can be fewer than the machine has."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -126,9 +126,7 @@ def tick(loop, state, k, noise, out):
     sampled = loop.force.sampled(state.force)
     signals, conditioning = loop.conditioning.step(state.conditioning, q, sampled)
     sequence = loop.sequence.step(state.sequence, signals.sense.x.x, signals.sense.f.x)
-    estimators = loop.estimators.step(
-        state.estimators, signals, sequence.phase == CONTACT, sequence.x0
-    )
+    estimators = loop.estimators.step(state.estimators, signals, sequence.phase == CONTACT, sequence.x0)
     command, desired, approach, controller = think(loop, state, signals, sequence)
     write(loop, state, k, signals, sequence, command, desired, estimators, out)
     plant, felt, force = move(loop, state.plant, state.force, command.applied, k, noise)

@@ -58,7 +58,9 @@ class Matched(NamedTuple):
         late, delay = self.delay.step(state.delay, late)
         (position, rate, second_rate), channel = self.filter.step(state.position, late)
         (y, _, _), force_channel = self.filter.step(state.force, force)
-        return (Vec3(second_rate, rate, position), y), MatchedState(second, first, delay, channel, force_channel)
+        return (Vec3(second_rate, rate, position), y), MatchedState(
+            second, first, delay, channel, force_channel
+        )
 
 
 @part

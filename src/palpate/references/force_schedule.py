@@ -31,5 +31,7 @@ class ForceSchedule(NamedTuple):
         # Half a microsecond forgives the rounding of k * dt, so that a step falls on its own tick.
         interval = math.floor((since + 5e-7) / self.period)
         level = self.first if interval % 2 == 0 else self.second
-        clock = since if self.restart <= 0.0 else since - self.restart * math.floor((since + 5e-7) / self.restart)
+        clock = (
+            since if self.restart <= 0.0 else since - self.restart * math.floor((since + 5e-7) / self.restart)
+        )
         return level + self.amplitude * math.sin(2.0 * math.pi * self.frequency * clock)

@@ -1,6 +1,6 @@
 """The values that pass between a bench, its controller and its identifiers.
 
-Fields that are marked `Vec3` or `Mat3` are those for the planar arm, and NumPy arrays for any other.
+Fields that are marked `Vec3` are those for the planar arm, and NumPy arrays for any other.
 """
 
 from dataclasses import dataclass
@@ -10,17 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate._jit import part
-from palpate._vector import Mat3, Vec3
-
-
-@part
-class ArmModel(NamedTuple):
-    """The robot as a controller sees it, at the present joint state."""
-
-    J: Mat3  # Jacobian, shape (m, n)
-    Jdqd: Vec3  # its time derivative times the joint rates [m/s^2, rad/s^2], shape (m,)
-    M: Mat3  # joint-space inertia [kg m^2], shape (n, n)
-    h: Vec3  # Coriolis and centrifugal torque [N m], shape (n,)
+from palpate._vector import Vec3
 
 
 @part
@@ -67,7 +57,7 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     def verdicts(self, tolerance: float = 0.25) -> dict[str, str]:
-        """"identified" where the 95 % half-width is at most `tolerance` of the value, else "not identifiable"."""
+        """ "identified" where the 95 % half-width is at most `tolerance` of the value, else "not identifiable"."""
         half = 1.96 * self.std
         with np.errstate(invalid="ignore"):
             good = np.isfinite(half) & (half <= tolerance * np.abs(self.theta))

@@ -1,0 +1,88 @@
+"""What a run comes to, in numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.records import Record
+
+BAND = 0.05
+"""Settled: within this share of the desired force."""
+WINDOW = 1.0
+"""Steady figures are means over the last so many seconds [s]."""
+FRONT_ENDS = ("thesis", "raw", "matched")
+PARAMETERS = {"K": "N/m", "B": "N s/m", "M": "kg"}
+
+
+def summarise(record: Record) -> dict[str, Any]:
+    """Plain JSON values: how the run went, the force, the motor limits, what was identified, and the truth."""
+    pressing = record["phase"] == CONTACT
+    t = record["t"]
+    summary: dict[str, Any] = {
+        "end": record.meta["end"],
+        "seed": record.meta["seed"],
+        "duration_s": float(t[-1]) if len(t) else 0.0,
+        "contact_at_s": float(t[np.argmax(pressing)]) if pressing.any() else None,
+        "contacts_lost": int(np.sum((record["phase"][1:] == LOST) & (record["phase"][:-1] == CONTACT))),
+        "force": None,
+        "tip": None,
+        "saturated": {f"joint{i}": _share(record[f"saturated{i}"]) for i in (1, 2, 3)},
+        "identified": None,
+        "truth": record.meta["truth"],
+    }
+    if pressing.any():
+        last = pressing & (t > t[pressing][-1] - WINDOW)
+        summary["force"] = _force(record, pressing, last)
+        summary["tip"] = {
+            "y_error_mm": 1e3 * float(np.mean(record["y"][last])),
+            "phi_error_deg": float(np.degrees(np.mean(record["phi"][last]))),
+        }
+        summary["identified"] = _identified(record, last)
+    return summary
+
+
+def _share(flags: NDArray[np.float64]) -> float:
+    return float(np.mean(flags)) if len(flags) else 0.0
+
+
+def _force(record: Record, pressing: NDArray[np.bool_], last: NDArray[np.bool_]) -> dict[str, Any]:
+    """Of the true force, which only a simulation knows; the noise of the measured one beside it."""
+    error = record["force"] - record["force_desired"]
+    desired = record["force_desired"][pressing]
+    steady = slice(0, _first_change(desired))
+    since, force = record["t"][pressing][steady] - record["t"][pressing][0], record["force"][pressing][steady]
+    target = float(desired[0])
+    outside = np.abs(force - target) > BAND * abs(target)
+    settled = None if outside[-1] else float(since[np.max(np.nonzero(outside)[0], initial=-1) + 1])
+    return {
+        "desired_N": float(desired[-1]),
+        "mean_N": float(np.mean(record["force"][last])),
+        "error_N": float(np.mean(error[last])),
+        "std_N": float(np.std(record["force"][last])),
+        "measured_std_N": float(np.std(record["force_measured"][last])),
+        "rms_error_N": float(np.sqrt(np.mean(error[pressing] ** 2))),
+        "settling_s": settled,
+        "overshoot_N": max(0.0, float(np.max(force)) - target),
+    }
+
+
+def _first_change(values: NDArray[np.float64]) -> int:
+    changed = np.nonzero(values != values[0])[0]
+    return int(changed[0]) if len(changed) else len(values)
+
+
+def _identified(record: Record, last: NDArray[np.bool_]) -> dict[str, Any]:
+    """The estimates at the end, the quotient f/x, and the standard deviations that the matched one states."""
+    end = int(np.nonzero(last)[0][-1])
+    found: dict[str, Any] = {
+        front: {p: float(record[f"{p}_{front}"][end]) for p in PARAMETERS} for front in FRONT_ENDS
+    }
+    found["matched_std"] = {p: float(record[f"{p}_matched_std"][end]) for p in PARAMETERS}
+    displacement = float(np.mean(record["displacement"][last]))
+    force = float(np.mean(record["force_measured"][last]))
+    found["force_over_displacement"] = {"K": force / displacement if displacement else None}
+    return found

@@ -1,0 +1,148 @@
+"""`palpate run`: one experiment, to a folder of results."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter, validators
+
+from palpate.cli._folder import fresh_folder
+from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from palpate.records import Record
+
+NAME_WIDTH = 20
+
+
+def run(
+    name: str | None = None,
+    /,
+    *,
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
+    out: Path | None = None,
+    force: bool = False,
+    list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
+    print_: Annotated[bool, Parameter(name="--print", negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Run an experiment: the arm approaches, touches, presses.
+
+    Args:
+        name: an experiment (see --list), or a TOML file of your own (see --print).
+        seed: of the noise; the same seed gives the same numbers.
+        out: folder for record.parquet, summary.json, figures and report.html; runs/NAME-SEED when left out.
+        force: replace the results that stand there already.
+        list_: list the experiments and stop.
+        print_: print the experiment's file, to copy and edit, and stop.
+        json: print the summary as JSON and nothing else.
+    """
+    from palpate.bench import experiment as experiments
+
+    if list_:
+        for known in experiments.names():
+            print(f"{known:<{NAME_WIDTH}}{experiments.load(known).title}")  # noqa: T201
+        return 0
+    if name is None:
+        raise InputError("run what? Name an experiment (palpate run --list shows them) or a TOML file")
+    source = experiments.source(name)
+    if print_:
+        sys.stdout.write(source)
+        return 0
+    folder = out if out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
+    with fresh_folder(folder, force=force) as fresh:
+        summary = _run(name, source, seed, folder, fresh, json)
+    return 130 if summary["end"] == "interrupted" else 0 if summary["end"] == "done" else 1
+
+
+def _run(name: str, source: str, seed: int, folder: Path, fresh: Path, as_json: bool) -> dict[str, Any]:
+    """Runs, writes everything into `fresh` and tells what came out; the summary."""
+    import msgspec
+    from rich.console import Console
+
+    from palpate.bench import summarise
+    from palpate.bench.experiment import parse
+    from palpate.logs import write_record
+
+    console = Console(stderr=as_json)
+    experiment = parse(source, name)
+    record = _record(console, experiment, seed)
+    command = f"palpate run {name} --seed {seed}"
+    record.meta["command"] = command
+    summary = {"experiment": Path(name).stem, "command": command, **summarise(record)}
+    write_record(record, fresh / "record.parquet")
+    (fresh / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n")
+    if len(record):
+        _report(record, experiment.title, experiment.about, source, summary, fresh)
+    if as_json:
+        sys.stdout.write(msgspec.json.encode(summary).decode() + "\n")
+    else:
+        _tell(console, experiment.title, summary, folder)
+    return summary
+
+
+def _record(console: Console, experiment: Any, seed: int) -> Record:
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    from palpate.bench import build
+
+    bench = build(experiment)
+    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task("starting", total=None, time="")
+
+        def waiting() -> None:
+            progress.update(bar, description="compiling the loop: some ten seconds, once after installation")
+
+        def show(time: float, phase: str) -> None:
+            progress.update(bar, description=f"{phase:9}", time=f"{time:6.1f} s simulated")
+
+        return bench.run(
+            experiment.run.duration, seed, press=experiment.run.press, progress=show, waiting=waiting
+        )
+
+
+def _report(
+    record: Record, title: str, about: str, source: str, summary: dict[str, Any], folder: Path
+) -> None:
+    from palpate.report.page import page
+    from palpate.report.run_figures import draw
+    from palpate.report.run_tables import notes, tables
+
+    captions = draw(record, folder)
+    text = page(
+        title=title,
+        about=about,
+        tables=tables(summary),
+        figures={folder / file: caption for file, caption in captions.items()},
+        command=summary["command"],
+        source=source,
+        notes=notes(summary),
+    )
+    (folder / "report.html").write_text(text, encoding="utf-8")
+
+
+def _tell(console: Console, title: str, summary: dict[str, Any], folder: Path) -> None:
+    from rich import box
+    from rich.markup import escape
+    from rich.table import Table
+
+    from palpate.report.run_tables import notes, tables
+
+    console.print(
+        f"[bold]{escape(title)}[/bold], seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    )
+    for content in tables(summary):
+        table = Table(title=content.title, title_justify="left", title_style="italic", box=box.SIMPLE_HEAD)
+        for i, head in enumerate(content.head):
+            table.add_column(escape(head), justify="left" if i == 0 else "right")
+        for row in content.rows:
+            table.add_row(*map(escape, row))
+        console.print(table)
+    for note in notes(summary):
+        console.print(f"[yellow]{escape(note)}[/yellow]")
+    console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False)

@@ -1,0 +1,87 @@
+"""A run's summary as tables, for the terminal and for the page."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from palpate.report.page import Table
+
+NONE = "-"
+
+
+def tables(summary: dict[str, Any]) -> list[Table]:
+    """The tables of a run: force first, then what was identified."""
+    if summary["force"] is None:
+        return []
+    return [_force(summary), _identified(summary)]
+
+
+def notes(summary: dict[str, Any]) -> list[str]:
+    """What a reader must not miss."""
+    texts = {
+        "no contact": "The arm met no surface: move the wall, or give the run more time ([run] duration).",
+        "diverged": f"The run diverged and was ended at {summary['duration_s']:.3f} s; the record holds it up to there.",
+        "interrupted": f"The run was interrupted at {summary['duration_s']:.1f} s.",
+    }
+    found = [texts[summary["end"]]] if summary["end"] in texts else []
+    if summary["contacts_lost"]:
+        found.append(f"Contact was lost {summary['contacts_lost']} times.")
+    worst, share = max(summary["saturated"].items(), key=lambda item: item[1])
+    if share > 0.01:
+        found.append(f"The motor of {worst} was at its torque limit in {100 * share:.1f} % of the ticks.")
+    return found
+
+
+def _force(summary: dict[str, Any]) -> Table:
+    f, tip = summary["force"], summary["tip"]
+    settling = "not within the run" if f["settling_s"] is None else f"{f['settling_s']:.3f} s"
+    return Table(
+        "Force",
+        ("", "value"),
+        (
+            ("contact at", f"{summary['contact_at_s']:.3f} s"),
+            ("desired at the end", f"{f['desired_N']:.2f} N"),
+            ("error, last second", f"{f['error_N']:+.3f} ± {f['std_N']:.3f} N"),
+            ("error since contact, RMS", f"{f['rms_error_N']:.3f} N"),
+            ("settling to 5 %", settling),
+            ("overshoot", f"{f['overshoot_N']:.2f} N"),
+            ("noise of the measured force", f"{f['measured_std_N']:.3f} N"),
+            ("tip off in y", f"{tip['y_error_mm']:+.2f} mm"),
+            ("tip off in angle", f"{tip['phi_error_deg']:+.2f}°"),
+        ),
+    )
+
+
+def _identified(summary: dict[str, Any]) -> Table:
+    found, truth = summary["identified"], summary["truth"]
+    names = {"K": "K [N/m]", "B": "B [N s/m]", "M": "M [kg]"}
+    ratio = found["force_over_displacement"]
+    rows = []
+    for name, label in names.items():
+        half = 1.96 * found["matched_std"][name]
+        rows.append(
+            (
+                label,
+                _number(found["thesis"][name]),
+                _number(found["raw"][name]),
+                _interval(found["matched"][name], half),
+                _number(ratio.get(name)),
+                _number(truth[name]["value"]) if name in truth else NONE,
+            )
+        )
+    head = ("", "as in the thesis", "raw signals", "matched, 95 %", "f / x", "truth")
+    return Table("The surface, by recursive least squares", head, rows)
+
+
+def _interval(value: float, half: float) -> str:
+    """Value and half-width, to two digits of the latter."""
+    if not half > 0.0:
+        return f"{_number(value)} ± ?"
+    decimals = max(0, 1 - math.floor(math.log10(half)))
+    return f"{value:.{decimals}f} ± {half:.{decimals}f}"
+
+
+def _number(value: float | None) -> str:
+    """Four digits where they mean something."""
+    return NONE if value is None else f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
