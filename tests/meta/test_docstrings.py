@@ -2,8 +2,8 @@
 
 import ast
 
-# The two methods of every part, told once in the class docstring's room.
-TOLD_ELSEWHERE = {"start", "step"}
+# The methods of every part, told once in CONTRIBUTING.md; and what a part remembers, told by its fields.
+METHODS_OF_A_PART = {"start", "start_at", "step"}
 
 
 def undocumented(path):
@@ -19,7 +19,7 @@ def nameless(node, owner):
             continue
         if child.name.startswith("_"):
             continue
-        told = owner and child.name in TOLD_ELSEWHERE
+        told = child.name in METHODS_OF_A_PART if owner else child.name.endswith("State")
         if not told and ast.get_docstring(child) is None and not is_overload(child):
             yield f"{owner}{child.name}"
         if isinstance(child, ast.ClassDef):
