@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint check bench docs lock clean
+.PHONY: help demo test lint check bench docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -34,6 +34,10 @@ bench: .venv/run.stamp ## measure what one tick of the closed loop costs here
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean
+
+pictures: .venv/run.stamp ## make the pictures of the README again
+	$(BIN)/palpate run foam-rls --seed 1 --out build/foam-rls --force
+	cp build/foam-rls/identification.png docs/foam-rls.png
 
 lock: .venv/python.stamp ## resolve the dependencies again and pin them with hashes
 	$(BIN)/python -m venv --clear build/lock
