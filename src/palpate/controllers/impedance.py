@@ -1,0 +1,49 @@
+"""Impedance control: the tip gives way like a mass, a damper and a spring (thesis, (2.1)-(2.3); Hogan, 1985)."""
+
+from typing import NamedTuple
+
+from palpate._jit import law, part
+from palpate._vector import Vec3, resolve
+
+
+@law
+def impedance_command(m, b, k, x, xd, x_d, xd_d, xdd_d, f):  # (2.3)
+    """Task acceleration of the target impedance under the wrench f on the environment [m/s^2, rad/s^2]."""
+    return xdd_d + (b * (xd_d - xd) + k * (x_d - x) - f) / m
+
+
+@law
+def impedance(J, Jdqd, M, h, u, f):
+    """Torque that gives the task acceleration u against the wrench f, were the model perfect [N m]."""
+    return M @ resolve(J, u - Jdqd, M) + h + J.T @ f
+
+
+@part
+class Impedance(NamedTuple):
+    """Presses by asking for a place inside the surface; the force is what both springs agree on.
+
+    It controls no force: in steady state f = k (target - x), friction aside, so on a surface of stiffness K_e the
+    force is k K_e/(k + K_e) times the depth of the target.
+
+    Args:
+        mass: M of the target [kg, kg m^2], shape (m,).
+        damping: B of the target [N s/m, N m s/rad], shape (m,).
+        stiffness: K of the target [N/m, N m/rad], shape (m,).
+        target: desired pose where a force is selected, beyond the surface [m, rad], shape (m,); elsewhere the
+            desired pose is the task's.
+    """
+
+    mass: Vec3
+    damping: Vec3
+    stiffness: Vec3
+    target: Vec3
+
+    def start(self):
+        return 0.0
+
+    def step(self, state, sense, task, model):
+        x_d = (1.0 - task.s) * task.x + task.s * self.target
+        u = impedance_command(
+            self.mass, self.damping, self.stiffness, sense.x, sense.xd, x_d, task.xd, task.xdd, sense.f
+        )
+        return impedance(model.J, model.Jdqd, model.M, model.h, u, sense.f), state

@@ -1,0 +1,50 @@
+"""Proportional-integral force control of a chosen bandwidth: what any other force controller is judged by."""
+
+import math
+from typing import NamedTuple
+
+from palpate._jit import part
+from palpate._vector import Vec3
+from palpate.controllers.hybrid import hybrid
+from palpate.controllers.resolved_acceleration import position_command
+from palpate.signals.parameters import require
+
+
+@part
+class ProportionalIntegral(NamedTuple):
+    """`Hybrid` with its integral gain per second, so that it keeps its bandwidth when the rate changes.
+
+    At frequencies where surface and arm give way at once the force is the force command, so with the desired force
+    fed forward the error obeys (1 + kf) e' = -ki e: a time constant of (1 + kf)/ki, whatever the surface.
+
+    Args:
+        kp: position gain K_pp [1/s^2], shape (m,).
+        kv: velocity gain K_pv [1/s], shape (m,).
+        kf: force gain K_p [1], shape (m,).
+        ki: integral gain K_i [1/s], shape (m,).
+        tick: time between steps [s].
+    """
+
+    kp: Vec3
+    kv: Vec3
+    kf: Vec3
+    ki: Vec3
+    tick: float
+
+    def start(self):
+        """The force integral [N], shape (m,)."""
+        return 0.0 * self.ki
+
+    def step(self, state, sense, task, model):
+        error = task.s * (task.f - sense.f)
+        integral = state + self.tick * self.ki * error
+        u_x = position_command(self.kp, self.kv, sense.x, sense.xd, task.x, task.xd, task.xdd)
+        u_f = self.kf * error + integral  # (4.15)
+        return hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f), integral
+
+
+def integral_gain(bandwidth: float, kf: float = 0.0) -> float:
+    """K_i [1/s] that gives the force loop this bandwidth [Hz] beside the force gain kf."""
+    require(bandwidth > 0.0, "bandwidth", "above 0 Hz", bandwidth)
+    require(kf > -1.0, "force gain", "above -1", kf)
+    return 2.0 * math.pi * bandwidth * (1.0 + kf)
