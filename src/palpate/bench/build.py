@@ -7,6 +7,7 @@ import msgspec
 from palpate._vector import Mat3, Vec3, diagonal
 from palpate.bench.bench import Bench
 from palpate.bench.conditioning import Conditioning
+from palpate.bench.controller_tables import controller_of
 from palpate.bench.estimators import Estimators
 from palpate.bench.experiment import (
     Experiment,
@@ -18,7 +19,7 @@ from palpate.bench.force_input import ForceInput
 from palpate.bench.plant import Plant
 from palpate.bench.sequence import Sequence
 from palpate.bench.tick import Loop
-from palpate.controllers import Hybrid, ResolvedAcceleration
+from palpate.controllers import ResolvedAcceleration
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, StickSlip, join
 from palpate.errors import InputError
 from palpate.friction import Coulomb, LuGre
@@ -57,7 +58,7 @@ def build(experiment: Experiment) -> Bench:
         sequence=_sequence(e, tick),
         schedule=_schedule(e),
         approach=ResolvedAcceleration(_all(e.approach.kp), _all(e.approach.kv)),
-        controller=_controller(e),
+        controller=controller_of(e.controller),
         compensation=Coulomb(Vec3(*e.compensation.level), Vec3(*e.compensation.blend)),
         estimators=_estimators(e, rate),
         tick=tick,
@@ -118,11 +119,6 @@ def _schedule(e: Experiment) -> ForceSchedule:
     f = e.force
     second = f.first if f.second is None else f.second
     return ForceSchedule(*map(float, (f.first, second, f.period, f.amplitude, f.frequency, f.restart)))
-
-
-def _controller(e: Experiment) -> Hybrid:
-    c = e.controller
-    return Hybrid(_all(c.kp), _all(c.kv), _all(c.kf), _all(c.ki))
 
 
 def _estimators(e: Experiment, rate: float) -> Estimators:

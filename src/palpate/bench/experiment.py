@@ -8,20 +8,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Meta
 
+from palpate.bench.controller_tables import ControllerTable, HybridController
+from palpate.bench.part_table import NotNegative, NotNegativeTriple, Part, Positive, PositiveTriple, Triple
 from palpate.errors import InputError, unknown
-
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
-Triple = tuple[float, float, float]
-PositiveTriple = tuple[Positive, Positive, Positive]
-NotNegativeTriple = tuple[NotNegative, NotNegative, NotNegative]
-
-
-class Part(Struct, frozen=True, forbid_unknown_fields=True):
-    """A table of the file; keys that it does not know are refused."""
-
 
 class Run(Part):
     press: Positive = 6.0
@@ -131,14 +122,6 @@ class DesiredForce(Part):
     restart: NotNegative = 0.0
 
 
-class HybridController(Part, tag="hybrid", tag_field="kind"):
-    kp: NotNegative = 400.0
-    kv: NotNegative = 80.0
-    kf: NotNegative = 1.0
-    ki: NotNegative = 0.003
-    """Per sample."""
-
-
 class Compensation(Part):
     """Of friction, by Coulomb's law with a blend through zero; level zero leaves it out."""
 
@@ -173,7 +156,7 @@ class Experiment(Part, kw_only=True):
     filters: Filters = Filters()
     approach: ApproachTable = ApproachTable()
     force: DesiredForce = DesiredForce()
-    controller: HybridController = HybridController()
+    controller: ControllerTable = HybridController()
     compensation: Compensation = Compensation()
     identification: Identification = Identification()
 

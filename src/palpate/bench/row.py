@@ -2,7 +2,7 @@
 
 from palpate._jit import law
 
-#: Name and unit of every column, in the order of `row_of`.
+#: Name and unit of every column, in the order of `tick.write`.
 COLUMNS = {
     "t": "s",
     "phase": "1",  # 0 approach, 1 contact, 2 lost contact
@@ -42,6 +42,10 @@ COLUMNS = {
     "M_matched_std": "kg",
     "B_matched_std": "N s/m",
     "K_matched_std": "N/m",
+    "memory_fx": "N",  # the force command that the controller has gathered or learned
+    "memory_fy": "N",
+    "memory_moment": "N m",
+    **{f"adapted{i}": "1" for i in (1, 2, 3)},  # what an adaptive controller reports of itself; zero for others
 }
 
 

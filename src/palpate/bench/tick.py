@@ -102,7 +102,7 @@ def think(loop, state, signals, sequence):
     else:
         task = Task(at, ZERO3, ZERO3, ZERO3, ZERO3)
         wanted, approach = loop.approach.step(approach, sense, task, model)
-        controller = loop.controller.start()
+        controller = loop.controller.rest(controller, sense)
     wanted += loop.compensation.torque(sense.qd)
     applied = loop.output.write(clip(wanted, arm.limits))
     return Command(wanted, applied), desired, approach, controller
@@ -128,13 +128,14 @@ def tick(loop, state, k, noise, out):
     sequence = loop.sequence.step(state.sequence, signals.sense.x.x, signals.sense.f.x)
     estimators = loop.estimators.step(state.estimators, signals, sequence.phase == CONTACT, sequence.x0)
     command, desired, approach, controller = think(loop, state, signals, sequence)
-    write(loop, state, k, signals, sequence, command, desired, estimators, out)
+    inside = loop.controller.report(controller)
+    write(loop, state, k, signals, sequence, command, desired, estimators, inside, out)
     plant, felt, force = move(loop, state.plant, state.force, command.applied, k, noise)
     return LoopState(plant, felt, force, conditioning, sequence, approach, controller, estimators)
 
 
 @law
-def write(loop, state, k, signals, sequence, command, desired, estimators, out):
+def write(loop, state, k, signals, sequence, command, desired, estimators, inside, out):
     """The row of a tick, in the order of `row.COLUMNS`."""
     plant, felt, sense = state.plant, state.felt, signals.sense
     out[0], out[1] = k * loop.tick, sequence.phase
@@ -156,7 +157,9 @@ def write(loop, state, k, signals, sequence, command, desired, estimators, out):
     at = put(out, at + 3, estimators.thesis.theta)
     at = put(out, at, estimators.raw.theta)
     at = put(out, at, estimators.matched.theta)
-    put(out, at, estimators.matched.std())
+    at = put(out, at, estimators.matched.std())
+    at = put(out, at, inside[0])
+    put(out, at, inside[1])
 
 
 @law

@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
-from palpate._jit import law, part
-from palpate._vector import Vec3, resolve
+from palpate._jit import law
+from palpate._vector import ZERO3, Vec3, resolve
+from palpate.controllers.controller import controller
 from palpate.controllers.resolved_acceleration import position_command
 
 
@@ -13,7 +14,7 @@ def hybrid(J, Jdqd, M, h, s, u_x, f_d, u_f):  # (4.13), friction aside
     return M @ resolve(J, (1.0 - s) * u_x - Jdqd, M) + h + J.T @ (s * (f_d + u_f))
 
 
-@part
+@controller
 class Hybrid(NamedTuple):
     """Position where the surface leaves the robot free, force where it does not.
 
@@ -39,3 +40,7 @@ class Hybrid(NamedTuple):
         u_x = position_command(self.kp, self.kv, sense.x, sense.xd, task.x, task.xd, task.xdd)
         u_f = self.kf * error + integral  # (4.15)
         return hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f), integral
+
+    def report(self, state):
+        """The force integral."""
+        return state, ZERO3

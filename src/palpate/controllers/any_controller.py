@@ -1,0 +1,74 @@
+"""One type for the built-in controllers, so that one compiled loop serves them all."""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+from palpate.controllers.controller import controller
+from palpate.controllers.neural import Neural
+from palpate.errors import InputError
+
+
+@cache
+def members() -> tuple[Any, ...]:
+    """One of each built-in controller, with any numbers: the type is what counts.
+
+    A new one needs its line here and nothing else.
+    """
+    every = (Neural.thesis(),)
+    for one in every:
+        controller(type(one))
+    return every
+
+
+@controller
+class AnyController(NamedTuple):
+    """One of two controllers, of which the second may again be one of two; `join` makes it.
+
+    Args:
+        chosen: 1 if the first acts, 0 if it is the second.
+        first: a controller.
+        second: another one.
+    """
+
+    chosen: int
+    first: Any
+    second: Any
+
+    def start(self):
+        return self.first.start(), self.second.start()
+
+    def step(self, state, sense, task, model):
+        first, second = state
+        if self.chosen == 1:
+            torque, first = self.first.step(first, sense, task, model)
+        else:
+            torque, second = self.second.step(second, sense, task, model)
+        return torque, (first, second)
+
+    def rest(self, state, sense):
+        first, second = state
+        if self.chosen == 1:
+            return self.first.rest(first, sense), second
+        return first, self.second.rest(second, sense)
+
+    def report(self, state):
+        if self.chosen == 1:
+            return self.first.report(state[0])
+        return self.second.report(state[1])
+
+
+def join(one: Any) -> Any:
+    """The controller that behaves as this one and has the same type for every built-in one.
+
+    Raises:
+        InputError: not a built-in controller.
+    """
+    kinds = [type(member) for member in members()]
+    if type(one) not in kinds:
+        known = ", ".join(kind.__name__ for kind in kinds)
+        raise InputError(f"cannot join a {type(one).__name__}; there are: {known}")
+    placed = [one if type(member) is type(one) else member for member in members()]
+    *others, joined = placed
+    for first in reversed(others):
+        joined = AnyController(int(first is one), first, joined)
+    return joined

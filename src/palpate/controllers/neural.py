@@ -1,0 +1,108 @@
+"""Neural force control: a network learns, in the loop, what the hybrid controller lacks (thesis, sec. 4.5)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from palpate._jit import law, part
+from palpate._vector import ZERO3, Vec3
+from palpate.controllers.controller import controller
+from palpate.controllers.hybrid import hybrid
+from palpate.controllers.resolved_acceleration import position_command
+from palpate.errors import InputError
+from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, thesis_layers
+
+INPUTS, OUTPUTS = 9, 3
+
+
+@part
+class NeuralState(NamedTuple):
+    network: NetworkState
+    x: Vec3  # pose of the tick before
+    command: Vec3  # the network's [N, N, N m]
+
+
+@controller
+class Neural(NamedTuple):
+    """The hybrid controller without its integral, and a network whose force command is added through J^T.
+
+    The network sees the pose, the pose of the tick before and the hybrid controller's torques; every tick it learns
+    from the error of force where the force is controlled and of the pose where that is. It keeps what it has learned
+    when the contact is lost.
+
+    When to use it: it needs no gains for the surface. To first order it is an integral controller
+    (`Network.gain`), and learning never stops: see what the thesis' reproduction says of long runs.
+
+    Args:
+        kp: position gain K_pp [1/s^2], shape (3,).
+        kv: velocity gain K_pv [1/s], shape (3,).
+        kf: force gain K_fp [1], shape (3,).
+        offset: added to both poses before the network sees them [m, m, rad].
+        network: of 9 inputs and 3 outputs.
+    """
+
+    kp: Vec3
+    kv: Vec3
+    kf: Vec3
+    offset: Vec3
+    network: Network
+
+    @classmethod
+    def thesis(cls, learning_rate: float = 5e-5) -> Neural:
+        """The thesis' controller: its gains, its 9-12-3 network and the weights that it starts from."""
+        net = network(thesis_layers(), THESIS_AMPLITUDE, learning_rate)
+        return cls(alike(400.0), alike(80.0), alike(0.25), Vec3(0.0, 0.01, 0.01), net)
+
+    def start(self):
+        return NeuralState(self.network.start(), ZERO3, ZERO3)
+
+    def step(self, state, sense, task, model):
+        u_x = position_command(self.kp, self.kv, sense.x, sense.xd, task.x, task.xd, task.xdd)  # (4.19)
+        u_f = self.kf * (task.s * (task.f - sense.f))  # (4.20)
+        torque = hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f)  # (4.18)
+        net, memory = self.network, state.network
+        see(memory.signals, sense.x + self.offset, state.x + self.offset, torque)
+        net.forward(memory)
+        command = Vec3(net.output(memory, 0), net.output(memory, 1), net.output(memory, 2))
+        error = task.s * (task.f - sense.f) + (1.0 - task.s) * (task.x - sense.x)
+        net.want(memory, 0, error.x)
+        net.want(memory, 1, error.y)
+        net.want(memory, 2, error.z)
+        net.learn(memory)
+        return torque + model.J.T @ command, NeuralState(memory, sense.x, command)
+
+    def rest(self, state, sense):
+        return NeuralState(state.network, sense.x, ZERO3)
+
+    def report(self, state):
+        """The network's command; norms of the hidden and of the output weights, and its integral gain per sample."""
+        net, memory = self.network, state.network
+        last = len(net.sizes) - 1
+        return state.command, Vec3(net.norm(memory, 1), net.norm(memory, last), net.gain(memory, 0))
+
+
+@law
+def see(signals, x, x_before, torque):
+    """Writes the network's nine inputs."""
+    signals[0], signals[1], signals[2] = x.x, x.y, x.z
+    signals[3], signals[4], signals[5] = x_before.x, x_before.y, x_before.z
+    signals[6], signals[7], signals[8] = torque.x, torque.y, torque.z
+
+
+def alike(value: float) -> Vec3:
+    """The same number for x, y and phi."""
+    return Vec3(float(value), float(value), float(value))
+
+
+def checked(net: Network) -> Network:
+    """The network, if it fits the controller.
+
+    Raises:
+        InputError: not 9 inputs and 3 outputs.
+    """
+    if net.sizes[0] != INPUTS or net.sizes[-1] != OUTPUTS:
+        raise InputError(
+            f"the neural controller's network has {INPUTS} inputs (pose, pose before, torques) and {OUTPUTS} outputs, "
+            f"got {net.sizes[0]} and {net.sizes[-1]}"
+        )
+    return net

@@ -1,0 +1,137 @@
+"""The network as a part of kernels: it stands in its state, learns in place and makes no array in a tick."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from palpate._jit import part
+from palpate._vector import sqrt
+from palpate.errors import InputError
+from palpate.networks.backpropagation import backward, descend, forward, squared_gradient
+
+
+@part
+class NetworkState(NamedTuple):
+    weights: NDArray[np.float64]  # (n_weights,), see `backpropagation`
+    signals: NDArray[np.float64]  # (n_neurons,)
+    deltas: NDArray[np.float64]  # (n_neurons,)
+
+
+@part
+class Network(NamedTuple):
+    """A perceptron with its weights at the start, which it never changes; `network` makes it.
+
+    Args:
+        sizes: neurons of each layer, inputs first, shape (n_layers,).
+        weights: at the start, shape (n_weights,), in the order of `backpropagation`.
+        amplitude: of each output, shape (n_out,).
+        learning_rate: eta.
+    """
+
+    sizes: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    amplitude: NDArray[np.float64]
+    learning_rate: float
+
+    def start(self):
+        """Fresh arrays: two runs from one network do not see each other."""
+        n = self.sizes.sum()
+        return NetworkState(self.weights.copy(), np.zeros(n), np.zeros(n))
+
+    def forward(self, state):
+        """From the inputs, the first of `state.signals`, to all signals."""
+        forward(self.sizes, state.weights, state.signals)
+
+    def output(self, state, k):
+        """Output k of the last `forward`."""
+        n = len(self.amplitude)
+        return self.amplitude[k] * state.signals[len(state.signals) - n + k]
+
+    def want(self, state, k, error):
+        """Says what output k lacked."""
+        state.deltas[len(state.deltas) - len(self.amplitude) + k] = error
+
+    def learn(self, state):
+        """One step of back-propagation for the errors that `want` was told."""
+        backward(self.sizes, state.weights, self.amplitude, state.signals, state.deltas)
+        descend(self.sizes, state.weights, state.signals, state.deltas, self.learning_rate)
+
+    def gain(self, state, k):
+        """What a step for error 1 of output k alone would add to that output, to first order.
+
+        A learning network is an integrator: this is its integral gain per sample, at this place and time.
+        """
+        for i in range(len(self.amplitude)):
+            self.want(state, i, 1.0 if i == k else 0.0)
+        backward(self.sizes, state.weights, self.amplitude, state.signals, state.deltas)
+        return self.learning_rate * squared_gradient(self.sizes, state.signals, state.deltas)
+
+    def norm(self, state, layer):
+        """Root of the sum of squares of the weights and thresholds into a layer, 1 being the first hidden one."""
+        first = 0
+        for i in range(1, layer):
+            first += self.sizes[i] * (self.sizes[i - 1] + 1)
+        total = 0.0
+        for w in range(first, first + self.sizes[layer] * (self.sizes[layer - 1] + 1)):
+            total += state.weights[w] * state.weights[w]
+        return sqrt(total)
+
+
+def network(layers: list[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> Network:
+    """A network from its layers' weights.
+
+    Args:
+        layers: each of shape (n, n_before + 1), thresholds in column 0; the last is the outputs'.
+        amplitude: of the outputs, one number or shape (n_out,).
+        learning_rate: eta, above 0.
+
+    Raises:
+        InputError: shapes that do not follow each other, numbers that are not finite, a rate not above 0.
+    """
+    matrices = [np.array(layer, dtype=np.float64) for layer in layers]
+    if not matrices:
+        raise InputError("a network needs at least one layer of weights, got none")
+    _check_layers(matrices)
+    n_out = len(matrices[-1])
+    scale = np.array(amplitude, dtype=np.float64)
+    if scale.shape not in ((), (n_out,)):
+        raise InputError(f"amplitude must be a number or have shape ({n_out},), got {scale.shape}")
+    if not (np.isfinite(scale).all() and (scale > 0.0).all()):
+        raise InputError(f"amplitude must be above 0, got {amplitude}")
+    if not (np.isfinite(learning_rate) and learning_rate > 0.0):
+        raise InputError(f"learning_rate must be above 0 and finite, got {learning_rate}")
+    sizes = np.array([matrices[0].shape[1] - 1, *map(len, matrices)], dtype=np.int64)
+    weights = np.concatenate([m.ravel() for m in matrices])
+    return Network(sizes, weights, np.full(n_out, 1.0) * scale, float(learning_rate))
+
+
+def _check_layers(matrices: list[NDArray[np.float64]]) -> None:
+    for i, m in enumerate(matrices):
+        if m.ndim != 2 or m.shape[0] < 1 or m.shape[1] < 2:
+            raise InputError(f"weights of layer {i + 1} must have shape (n, n_before + 1), got {m.shape}")
+        if not np.isfinite(m).all():
+            raise InputError(f"weights of layer {i + 1} must be finite")
+        if i > 0 and m.shape[1] != len(matrices[i - 1]) + 1:
+            raise InputError(
+                f"weights of layer {i + 1} must have {len(matrices[i - 1]) + 1} columns, a threshold and one for each "
+                f"neuron before, got {m.shape[1]}"
+            )
+
+
+def random_layers(sizes: tuple[int, ...], seed: int | np.random.Generator, scale: float) -> list[NDArray[np.float64]]:
+    """Weights and thresholds drawn evenly from -scale ... scale.
+
+    Args:
+        sizes: neurons of each layer, inputs first; at least two.
+        seed: or a generator.
+        scale: the largest.
+    """
+    if len(sizes) < 2 or min(sizes) < 1:
+        raise InputError(f"sizes must be two or more numbers above 0, inputs first, got {tuple(sizes)}")
+    if not (np.isfinite(scale) and scale >= 0.0):
+        raise InputError(f"scale must be finite and not negative, got {scale}")
+    generator = np.random.default_rng(seed)
+    return [generator.uniform(-scale, scale, (m, n + 1)) for n, m in zip(sizes[:-1], sizes[1:], strict=True)]

@@ -1,0 +1,156 @@
+"""The perceptron for a loop of one's own: forward and on-line back-propagation, compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from palpate._jit import kernel
+from palpate.errors import InputError
+from palpate.networks.backpropagation import backward, descend, forward
+from palpate.networks.network import network, random_layers
+
+
+class Perceptron:
+    """A network with one hidden layer or more, sigmoids 2/(1 + e^-u) - 1 and an amplitude for each output.
+
+    When to use it: as a term that learns in a control loop, or as a black-box model of a few signals; a `forward`
+    and a `learn` take about a microsecond each. Both are compiled in the constructor.
+
+    Args:
+        hidden: weights of the hidden layer, shape (n_hidden, n_in + 1), thresholds in column 0.
+        output: weights of the output layer, shape (n_out, n_hidden + 1), thresholds in column 0.
+        amplitude: the largest output, one number or shape (n_out,).
+        learning_rate: eta, above 0.
+
+    Raises:
+        InputError: shapes that do not fit, numbers that are not finite, a rate not above 0.
+    """
+
+    def __init__(self, hidden: ArrayLike, output: ArrayLike, amplitude: ArrayLike, learning_rate: float):
+        self._set([hidden, output], amplitude, learning_rate)
+
+    @classmethod
+    def of_layers(cls, layers: Sequence[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> Perceptron:
+        """A network of any number of layers: each of shape (n, n_before + 1), the last the outputs'."""
+        self = cls.__new__(cls)
+        self._set(list(layers), amplitude, learning_rate)
+        return self
+
+    @classmethod
+    def random(
+        cls,
+        sizes: Sequence[int],
+        amplitude: ArrayLike,
+        learning_rate: float,
+        seed: int | np.random.Generator = 0,
+        scale: float = 0.01,
+    ) -> Perceptron:
+        """A network of these sizes, inputs first, with weights drawn evenly from -scale ... scale."""
+        return cls.of_layers(random_layers(tuple(sizes), seed, scale), amplitude, learning_rate)
+
+    @classmethod
+    def thesis(cls, learning_rate: float = 5e-5) -> Perceptron:
+        """The 9-12-3 network of the thesis' controller, with the weights it starts from (App. E)."""
+        return cls.of_layers(thesis_layers(), THESIS_AMPLITUDE, learning_rate)
+
+    def _set(self, layers: list[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> None:
+        net = network(layers, amplitude, learning_rate)
+        self.learning_rate = net.learning_rate
+        self._sizes, self._amplitude = net.sizes, net.amplitude
+        self._weights, self._signals, self._deltas = net.start()
+        self._forward, self._learn = _forward.compiled, _learn.compiled
+        self._learned_from = False
+        self.forward(np.zeros(self._sizes[0]))
+        self._learn(self._sizes, self._weights, self._amplitude, self._signals, self._deltas, 0.0 * self._amplitude, 0.0)
+        self._learned_from = False
+
+    @property
+    def layers(self) -> tuple[NDArray[np.float64], ...]:
+        """The weights of each layer, shape (n, n_before + 1): views, so that writing in them changes the network."""
+        views, first = [], 0
+        for n, m in zip(self._sizes[:-1], self._sizes[1:], strict=True):
+            views.append(self._weights[first : first + m * (n + 1)].reshape(m, n + 1))
+            first += m * (n + 1)
+        return tuple(views)
+
+    @property
+    def hidden(self) -> NDArray[np.float64]:
+        """The weights of the first layer after the inputs, a view."""
+        return self.layers[0]
+
+    @property
+    def output(self) -> NDArray[np.float64]:
+        """The weights of the last layer, a view."""
+        return self.layers[-1]
+
+    @property
+    def amplitude(self) -> NDArray[np.float64]:
+        """The largest size of each output, shape (n_out,)."""
+        return self._amplitude.copy()
+
+    def forward(self, inputs: ArrayLike) -> NDArray[np.float64]:
+        """The outputs, shape (n_out,), for inputs of shape (n_in,).
+
+        Raises:
+            InputError: inputs of another shape, or not finite.
+        """
+        x = self._checked(inputs, int(self._sizes[0]), "inputs")
+        y = np.empty(len(self._amplitude))
+        self._forward(self._sizes, self._weights, self._amplitude, self._signals, x, y)
+        self._learned_from = True
+        return y
+
+    def learn(self, error: ArrayLike) -> None:
+        """One step of back-propagation from the last `forward`: error = desired - measured, shape (n_out,).
+
+        Raises:
+            InputError: errors of another shape, or not finite; no `forward` before.
+        """
+        e = self._checked(error, len(self._amplitude), "error")
+        if not self._learned_from:
+            raise InputError("learn needs the signals of a forward before it: call forward(inputs) first")
+        self._learn(
+            self._sizes, self._weights, self._amplitude, self._signals, self._deltas, e, self.learning_rate
+        )
+
+    @staticmethod
+    def _checked(values: ArrayLike, n: int, name: str) -> NDArray[np.float64]:
+        array = np.ascontiguousarray(values, dtype=np.float64)
+        if array.shape != (n,):
+            raise InputError(f"{name} must have shape ({n},), got {array.shape}")
+        if not np.isfinite(array).all():
+            raise InputError(f"{name} must be finite, got {array}; leave the sample out")
+        return array
+
+
+THESIS_AMPLITUDE = (20.0, 10.0, 1.0)
+"""Of the outputs of the thesis' controller [N, N, N m]."""
+
+
+def thesis_layers() -> list[NDArray[np.float64]]:
+    """The weights that the thesis' controller starts from (App. E): shapes (12, 10) and (3, 13)."""
+    from palpate.networks.thesis_weights import HIDDEN, OUTPUT
+
+    return [np.array(HIDDEN) / 1000.0, np.array(OUTPUT) / 1000.0]
+
+
+@kernel
+def _forward(sizes, weights, amplitude, signals, inputs, outputs):
+    for i in range(len(inputs)):
+        signals[i] = inputs[i]
+    forward(sizes, weights, signals)
+    first = len(signals) - len(outputs)
+    for k in range(len(outputs)):
+        outputs[k] = amplitude[k] * signals[first + k]
+
+
+@kernel
+def _learn(sizes, weights, amplitude, signals, deltas, error, learning_rate):
+    first = len(signals) - len(error)
+    for k in range(len(error)):
+        deltas[first + k] = error[k]
+    backward(sizes, weights, amplitude, signals, deltas)
+    descend(sizes, weights, signals, deltas, learning_rate)
