@@ -6,7 +6,7 @@ record = build(load("foam-hybrid")).run(duration=60.0, seed=1, press=8.0)
 
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.experiment import Experiment, load, names, source
+from palpate.bench.experiment import Experiment, changed, load, names, source
 from palpate.bench.summary import summarise
 from palpate.bench.tick import Loop, march, start_at
 
@@ -15,6 +15,7 @@ __all__ = [
     "Experiment",
     "Loop",
     "build",
+    "changed",
     "load",
     "march",
     "names",

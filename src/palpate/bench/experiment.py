@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
@@ -203,6 +204,25 @@ def parse(text: str, where: str) -> Experiment:
         raise InputError(f"{where}: {_explained(str(error))}") from error
     except msgspec.DecodeError as error:
         raise InputError(f"{where}: not TOML: {error}") from error
+
+
+def changed(experiment: Experiment, changes: Mapping[str, Any]) -> Experiment:
+    """The experiment with other values: {"friction.coulomb": (6.0, 0.5, 0.06), "run.press": 20.0}.
+
+    Raises:
+        InputError: a key that does not exist, or a value out of range.
+    """
+    tables = msgspec.to_builtins(experiment)
+    for path, value in changes.items():
+        *outer, key = path.split(".")
+        table = tables
+        for name in outer:
+            table = table[name]
+        table[key] = msgspec.to_builtins(value)
+    try:
+        return msgspec.convert(tables, Experiment)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{', '.join(changes)}: {_explained(str(error))}") from error
 
 
 def _explained(message: str) -> str:

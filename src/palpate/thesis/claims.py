@@ -1,0 +1,53 @@
+"""A claim of the thesis, and what became of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+Verdict = Literal["reproduced", "differs", "not checkable"]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One row of claims.json.
+
+    Args:
+        id: as in the table of claims, "RLS-S2"; with a suffix where one sentence claims several things: "RLS-S2.K".
+        source: where the thesis says it.
+        claim: what it says, in our words.
+        thesis: its value, with unit; or "in words" where it gives none.
+        measured: ours, with spread over the seeds, unit and seeds: see `spread`.
+        tolerance: the threshold that decides, stated before looking: "within 10 % of the value at 4 s by 0.12 s".
+        verdict: reproduced, differs, or not checkable.
+        note: one honest paragraph: why; what was chosen, and what follows from the choice; where it stops holding.
+    """
+
+    id: str
+    source: str
+    claim: str
+    thesis: str
+    measured: str
+    tolerance: str
+    verdict: Verdict
+    note: str
+
+
+def decided(holds: bool) -> Verdict:
+    """The verdict of a claim that can be checked."""
+    return "reproduced" if holds else "differs"
+
+
+def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
+    """Median and range over the seeds: "7.21 (7.05 to 7.38, 10 seeds) kN/m"."""
+    v = np.asarray(values, dtype=float)
+    good = v[np.isfinite(v)]
+    tail = f" {unit}" if unit else ""
+    if not len(good):
+        return f"never ({len(v)} seeds)"
+    lost = f", {len(v) - len(good)} without a value" if len(good) < len(v) else ""
+    low, middle, high = (f"{x:.{digits}g}" for x in (good.min(), np.median(good), good.max()))
+    return f"{middle} ({low} to {high}, {len(v)} seeds{lost}){tail}"

@@ -1,0 +1,57 @@
+"""Many runs of an experiment: over seeds, over parameters, on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from palpate.bench import Experiment, build
+from palpate.records import Record
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs experiments on the bench. Compiled loops release the interpreter, so threads fill the cores.
+
+    Args:
+        seeds: every measured claim is looked at over all of them; at least ten.
+        waiting: called when a loop has to be compiled first.
+    """
+
+    seeds: Sequence[int] = tuple(range(10))
+    waiting: Callable[[], None] | None = None
+
+    def one(self, experiment: Experiment, seed: int | None = None) -> Record:
+        """The record of one run, for a figure; of the first seed unless another is given."""
+        number = self.seeds[0] if seed is None else seed
+        run = experiment.run
+        return build(experiment).run(run.duration, number, press=run.press, waiting=self.waiting)
+
+    def over_seeds(self, experiment: Experiment, measure: Callable[[Record], T]) -> list[T]:
+        """`measure` of each seed's record; the records themselves are not kept (some 12 MB each)."""
+        return self.over([(experiment, seed) for seed in self.seeds], measure)
+
+    def over(self, cases: Iterable[tuple[Experiment, int]], measure: Callable[[Record], T]) -> list[T]:
+        """`measure` of the record of each case, an experiment and a seed, in their order."""
+
+        def work(case: tuple[Experiment, int]) -> T:
+            return measure(self.one(*case))
+
+        return self.map(work, list(cases))
+
+    def map(self, work: Callable[[Any], T], items: Sequence[Any]) -> list[T]:
+        """`work` of each item, in their order, on all cores; the first alone, so that kernels are compiled once."""
+        if not items:
+            return []
+        first = work(items[0])
+        with ThreadPoolExecutor(_cores()) as pool:
+            return [first, *pool.map(work, items[1:])]
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
