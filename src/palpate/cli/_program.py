@@ -9,6 +9,7 @@ from cyclopts import App
 COMMANDS = {
     "identify": "Find what a robot touched, from a log: stiffness, damping, mass.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
+    "thesis": "Measure every figure and every claim of the thesis again.",
     "speed": "Measure what one tick of the closed loop costs here.",
 }
 

@@ -42,7 +42,7 @@ def decided(holds: bool) -> Verdict:
 
 
 def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
-    """Median and range over the seeds: "7.21 (7.05 to 7.38, 10 seeds) kN/m"."""
+    """Median and range over the seeds: "7.21 kN/m (7.05 to 7.38, 10 seeds)"."""
     v = np.asarray(values, dtype=float)
     good = v[np.isfinite(v)]
     tail = f" {unit}" if unit else ""
@@ -50,4 +50,4 @@ def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
         return f"never ({len(v)} seeds)"
     lost = f", {len(v) - len(good)} without a value" if len(good) < len(v) else ""
     low, middle, high = (f"{x:.{digits}g}" for x in (good.min(), np.median(good), good.max()))
-    return f"{middle} ({low} to {high}, {len(v)} seeds{lost}){tail}"
+    return f"{middle}{tail} ({low} to {high}, {len(v)} seeds{lost})"
