@@ -14,7 +14,8 @@ help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 16
 
 demo: .venv/run.stamp ## set up, identify a small log, press on foam, and say where the report is
-	$(BIN)/palpate identify examples/data/press.csv --time time_s --position position_mm:mm --force force_N:N
+	@mkdir -p runs
+	$(BIN)/palpate identify examples/data/press.csv --time time_s --position position_mm:mm --force force_N:N --figure runs/press.png
 	$(BIN)/palpate run foam-hybrid --out $(OUT) --force
 	@echo "The report is $(CURDIR)/$(OUT)/report.html"
 
