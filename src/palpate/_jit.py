@@ -27,6 +27,8 @@ _parts: dict[type, None] = {}
 _PACKAGE = Path(__file__).resolve().parent
 # Division as NumPy's: no branch and no exception inside a loop.
 _OPTIONS = {"error_model": "numpy", "nogil": True}
+# What only kernels call needs no way in from outside: making those would be half of all compiling.
+_INSIDE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def law(function: F) -> F:
@@ -183,7 +185,7 @@ def _hand_over() -> None:
     """Gives Numba the laws registered since the last time, and once and for all the way to ask parts."""
     _operators_and_members()
     while _laws:
-        importlib.import_module("numba.extending").register_jitable(_laws.pop())
+        importlib.import_module("numba.extending").register_jitable(**_INSIDE)(_laws.pop())
 
 
 @functools.cache
@@ -200,13 +202,18 @@ def _method(kind: Any, name: str) -> Any:
     return getattr(kind.instance_class, name, None) if _is_part(kind) else None
 
 
-def _operators() -> None:
-    """Overloads of the operators and of `_vector`'s functions: each is the class's own method."""
+def _overload(function: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Numba's decorator for what a function means, given the types of its arguments."""
     from numba.extending import overload
 
+    return overload(function, strict=False, jit_options=_INSIDE)
+
+
+def _operators() -> None:
+    """Overloads of the operators and of `_vector`'s functions: each is the class's own method."""
     for name in ("add", "sub", "mul", "truediv", "matmul"):
-        overload(getattr(operator, name), strict=False)(_binary(name))
-        overload(getattr(operator, f"i{name}"), strict=False)(_binary(name))  # a += b is a = a + b on values
+        _overload(getattr(operator, name))(_binary(name))
+        _overload(getattr(operator, f"i{name}"))(_binary(name))  # a += b is a = a + b on values
     _overload_method_of_first(operator.neg, "__neg__", "a")
     _overload_method_of_first(abs, "__abs__", "a")
     for function, name in _vector.METHODS.items():
@@ -223,7 +230,7 @@ def _binary(name: str) -> Callable[..., Any]:
             return _method(a, f"__{name}__")
         reflected = _method(b, f"__r{name}__")
         if reflected and isinstance(a, types.Number):
-            swapped = register_jitable(reflected)
+            swapped = register_jitable(**_INSIDE)(reflected)
             return lambda a, b: swapped(b, a)
         return None
 
@@ -232,7 +239,6 @@ def _binary(name: str) -> Callable[..., Any]:
 
 def _overload_method_of_first(function: Any, name: str, *names: str) -> None:
     """Overloads a function with the method `name` of its first argument's class."""
-    from numba.extending import overload
 
     def typer(*args: Any) -> Any:
         return _method(args[0], name)
@@ -241,7 +247,7 @@ def _overload_method_of_first(function: Any, name: str, *names: str) -> None:
     typer.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [inspect.Parameter(n, inspect.Parameter.POSITIONAL_OR_KEYWORD) for n in names]
     )
-    overload(function, strict=False)(typer)
+    _overload(function)(typer)
 
 
 def _scalar_functions() -> None:
@@ -249,14 +255,13 @@ def _scalar_functions() -> None:
     import math
 
     from numba import types
-    from numba.extending import overload
 
     def numbers(function: Any, body: Callable[..., Any]) -> None:
         def typer(*args: Any) -> Any:
             return body if isinstance(args[0], types.Number) else None
 
         typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
-        overload(function, strict=False)(typer)
+        _overload(function)(typer)
 
     numbers(_vector.exp, lambda a: math.exp(a))
     numbers(_vector.sqrt, lambda a: math.sqrt(a))
@@ -273,14 +278,13 @@ def _array_functions() -> None:
     """What `_vector`'s functions mean on NumPy arrays."""
     import numpy as np
     from numba import types
-    from numba.extending import overload
 
     def arrays(function: Any, body: Callable[..., Any]) -> None:
         def typer(*args: Any) -> Any:
             return body if isinstance(args[0], types.Array) else None
 
         typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
-        overload(function, strict=False)(typer)
+        _overload(function)(typer)
 
     arrays(_vector.outer, lambda a, b: np.outer(a, b))
     arrays(_vector.trace, lambda A: np.trace(A))
@@ -289,11 +293,10 @@ def _array_functions() -> None:
 
 def _widen() -> None:
     from numba import types
-    from numba.extending import overload
 
     vector = _vector.Vec3
 
-    @overload(_vector.widen, strict=False)
+    @_overload(_vector.widen)
     def typer(b: Any) -> Any:
         if _is_part(b):
             return lambda b: b
@@ -336,7 +339,7 @@ def _compiled_member(function: Callable[..., Any]) -> Any:
 def _member_dispatcher(function: Callable[..., Any]) -> Any:
     import numba
 
-    return numba.njit(**_OPTIONS)(function)
+    return numba.njit(**_OPTIONS, **_INSIDE)(function)
 
 
 @functools.cache
