@@ -34,7 +34,7 @@ _HOPELESS = 4.0
 _ABOVE_NOISE = 3.0
 _UNEXPLAINED = 0.01
 _SLOW_UNEXPLAINED = 0.04
-_SLOW = 0.1
+_SLOW = 0.35
 _SIGNIFICANT = 3.0
 
 
@@ -188,10 +188,8 @@ def _chosen(judged: list[Candidate], question: Question) -> Choice:
 
 
 def _needed(fitted: Fit) -> bool:
-    """Whether a mass in the model is more than nothing: it must stand clear of zero."""
-    if "M" not in fitted.names:
-        return True
-    return fitted["M"] > _SIGNIFICANT * fitted.std("M", lag_known=True)
+    """Whether a mass in the model is a mass at all; whether it is worth its place is for the score to say."""
+    return "M" not in fitted.names or fitted["M"] > 0
 
 
 def _same_kind(one: Fit, other: Fit) -> bool:

@@ -17,6 +17,7 @@ ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""
 _REACHED = 0.2
 _BLOCKS = 100
+_WIDER = 4.0
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Contacts:
         bonded: the probe never leaves the surface (or pulls on it): the whole log is one contact.
         force_sign, position_sign: +1 or -1, what to multiply the channels with so that both grow into the surface.
         resting: force without contact, after the sign [N]; 0 for a bonded contact.
+        threshold: force above which contact is counted, after the sign [N].
         warnings: what was found.
     """
 
@@ -36,6 +38,7 @@ class Contacts:
     force_sign: float
     position_sign: float
     resting: float
+    threshold: float
     warnings: tuple[Warn, ...]
 
 
@@ -51,20 +54,21 @@ def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) 
         bonded: True if the probe is fixed to the surface, False if not, None to find out.
     """
     force = chain(channels.force)
-    rest, peak = _extremes(force)
-    if bonded or (bonded is None and _both_sides(rest, peak)):
-        return Contacts(((0, len(force)),), True, 1.0, 1.0, 0.0, ())
+    rest, peak = _extremes(force, channels.position)
+    if bonded or (bonded is None and _never_free(rest, peak)):
+        return Contacts(((0, len(force)),), True, 1.0, 1.0, 0.0, -np.inf, ())
     sign = 1.0 if peak > rest else -1.0
     level, top = sign * rest, sign * peak
-    spans = _spans(sign * force, level, top, chain)
+    threshold = _threshold(sign * force, level, top)
+    spans = _spans(sign * force, level, top, threshold, chain)
     if not spans:
         text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
-        return Contacts((), False, sign, 1.0, level, (Warn(Code.NO_CONTACT, text),))
-    return _oriented(channels, chain, spans, sign, level)
+        return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
+    return _oriented(channels, chain, spans, sign, level, threshold)
 
 
 def _oriented(
-    channels: Channels, chain: Chain, spans: list[tuple[int, int]], sign: float, level: float
+    channels: Channels, chain: Chain, spans: list[tuple[int, int]], sign: float, level: float, threshold: float
 ) -> Contacts:
     warnings = []
     if sign < 0:
@@ -77,34 +81,53 @@ def _oriented(
     if spans[0][0] == 0:
         text = "the log begins in contact: the force at rest is not known and is estimated as an offset"
         warnings.append(Warn(Code.CONTACT_AT_START, text))
-    return Contacts(tuple(spans), False, sign, way, level, tuple(warnings))
+    return Contacts(tuple(spans), False, sign, way, level, threshold, tuple(warnings))
 
 
-def _extremes(force: Array) -> tuple[float, float]:
-    """The force at rest and at its peak: of the two ends of its range, rest is the one nearer to zero.
+def _extremes(force: Array, position: Array) -> tuple[float, float]:
+    """The force at rest and at its peak: the two ends of its range.
 
-    The ends are those of medians over a hundredth of the log, which a chattering probe does not reach.
+    Out of contact the position may go anywhere without any force, in contact it may not: so rest is the end at which
+    the position spreads wider by far, and if neither does, the end nearer to zero. The ends are those of medians over
+    a hundredth of the log, which a chattering probe does not reach.
     """
     width = len(force) // _BLOCKS
     low, high = np.percentile(force, [0.1, 99.9])
+    ratio = 1.0
     if width >= 4:
-        windows = np.lib.stride_tricks.sliding_window_view(force, width)[:: max(width // 4, 1)]
-        middle = np.median(windows, axis=1)
+        step = max(width // 4, 1)
+        middle, place = (
+            np.median(np.lib.stride_tricks.sliding_window_view(values, width)[::step], axis=1)
+            for values in (force, position)
+        )
         if np.ptp(middle) > 0.2 * (high - low):
             low, high = middle.min(), middle.max()
-    return (float(low), float(high)) if abs(low) <= abs(high) else (float(high), float(low))
+            near = ONSET * (high - low)
+            ratio = _spread(place[middle < low + near]) / max(_spread(place[middle > high - near]), 1e-300)
+    from_low = abs(low) <= abs(high) if 1 / _WIDER < ratio < _WIDER else ratio > 1
+    return (float(low), float(high)) if from_low else (float(high), float(low))
 
 
-def _both_sides(rest: float, peak: float) -> bool:
-    return rest * peak < 0 and abs(rest) > abs(peak) / 2
+def _spread(values: Array) -> float:
+    return float(np.ptp(values)) if len(values) else 0.0
 
 
-def _spans(force: Array, rest: float, peak: float, chain: Chain) -> list[tuple[int, int]]:
-    """Stretches above the onset that reach well above it and last longer than the filter needs to settle."""
+def _never_free(rest: float, peak: float) -> bool:
+    """Whether the force goes to both sides of zero by comparable amounts, or stays far from zero all the time."""
+    return (rest * peak < 0 and abs(rest) > abs(peak) / 2) or (rest * peak > 0 and abs(rest) > 0.8 * abs(peak))
+
+
+def _threshold(force: Array, rest: float, peak: float) -> float:
+    """Clear of the noise at rest, and of a share of the peak."""
     height = peak - rest
     free = force[force < rest + ONSET * height]
     noise = 1.4826 * float(np.median(np.abs(free - np.median(free)))) if len(free) else 0.0
-    above = force > rest + max(ONSET * height, 5 * noise)
+    return rest + max(ONSET * height, 5 * noise)
+
+
+def _spans(force: Array, rest: float, peak: float, threshold: float, chain: Chain) -> list[tuple[int, int]]:
+    """Stretches above the onset that reach well above it and last longer than the filter needs to settle."""
+    above = force > threshold
     edges = np.diff(np.r_[0, above.astype(np.int8), 0])
     spans: list[tuple[int, int]] = []
     for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
@@ -113,7 +136,7 @@ def _spans(force: Array, rest: float, peak: float, chain: Chain) -> list[tuple[i
         else:
             spans.append((int(begin), int(end)))
     least = max(20, int(2 * chain.settling / chain.dt))
-    return [(b, e) for b, e in spans if e - b >= least and force[b:e].max() > rest + _REACHED * height]
+    return [(b, e) for b, e in spans if e - b >= least and force[b:e].max() > rest + _REACHED * (peak - rest)]
 
 
 def _together(channels: Channels, chain: Chain, spans: list[tuple[int, int]], sign: float) -> float:

@@ -68,6 +68,11 @@ class Chain:
         full = _convolve(padded, taps)
         return full[start : start + len(signal)] + (level if derivative == 0 else 0.0)
 
+    def noise_gain(self, derivatives: tuple[int, ...]) -> Array:
+        """Covariance of the filtered derivatives of white noise of unit variance, shape (k, k)."""
+        taps = np.stack([self._taps(derivative, 0.0)[0] for derivative in derivatives])
+        return taps @ taps.T
+
     def _taps(self, derivative: int, lag: float) -> tuple[Array, int]:
         """Samples of the response to one hat of a first-order hold, and the index of the first of them."""
         first = int(np.floor(lag / self.dt)) - 1
@@ -129,6 +134,15 @@ def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
     taps = b1 * powers
     taps[1:] += b0 * powers[:-1]
     return _convolve(signal, taps)[: len(signal)]
+
+
+def white_noise(signal: Array) -> float:
+    """Standard deviation of the white part of a signal, from its eighth differences: an upper bound, for what is left
+    of the motion itself in them counts as noise."""
+    differences = np.diff(signal, 8)
+    if not len(differences):
+        return 0.0
+    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(12870))  # 12870 is the sum of their squared weights
 
 
 def block_means(signal: Array, size: int) -> Array:

@@ -47,6 +47,7 @@ class Fit:
         r2, rmse: of the fit.
         noise: colour of the residuals.
         lag: the lag used [s].
+        attenuation: how far noise of the position may have pulled each parameter, shape (p,); part of `cov`.
     """
 
     model: Model
@@ -60,6 +61,7 @@ class Fit:
     rmse: float
     noise: Noise
     lag: float
+    attenuation: Array
 
     def __getitem__(self, name: str) -> float:
         return float(self.theta[self.names.index(name)])
@@ -112,6 +114,12 @@ def _evaluate(model: Model, motion: Motion, force: Array, knobs: dict[str, float
     theta = solve(columns, force)
     residuals = force - columns @ theta
     return _Point(knobs, lag, columns, theta, residuals, float(residuals @ residuals))
+
+
+def profile(fitted: Fit, motion: Motion, force: Array, lag: float) -> float:
+    """Sum of squared residuals of the same model and knobs at another lag."""
+    knobs = {knob.name: fitted[knob.name] for knob in fitted.model.knobs}
+    return _evaluate(fitted.model, motion, force, knobs, lag).rss
 
 
 def _best_start(model: Model, motion: Motion, force: Array, lag: float) -> _Point:
@@ -202,7 +210,8 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag)
     names = (*model.linear, *(k.name for k in model.knobs), _LAG)
     noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.known))
     fixed = np.zeros((len(names), len(names)))
-    fixed[:-1, :-1] = covariance(jacobian[:, :-1], motion.rows, noise)
+    pulled = _attenuation(model, motion, jacobian[:, :-1], point.theta)
+    fixed[:-1, :-1] = covariance(jacobian[:, :-1], motion.rows, noise) + np.outer(pulled, pulled)
     theta = np.array([*point.theta, *(point.knobs[k.name] for k in model.knobs), point.lag])
     spread = float(np.mean((force - force.mean()) ** 2))
     rmse = float(np.sqrt(point.rss / len(force)))
@@ -210,7 +219,7 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag)
         model=model,
         names=names,
         theta=theta,
-        cov=_with_lag(jacobian, fixed, motion, noise, lag),
+        cov=_with_lag(jacobian, fixed, motion, noise, lag, pulled),
         fixed_cov=fixed,
         predicted=force - point.residuals,
         residuals=point.residuals,
@@ -218,17 +227,34 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag)
         rmse=rmse,
         noise=noise,
         lag=point.lag,
+        attenuation=np.append(pulled, 0.0),
     )
 
 
-def _with_lag(jacobian: Array, fixed: Array, motion: Motion, noise: Noise, lag: Lag) -> Array:
+def _attenuation(model: Model, motion: Motion, jacobian: Array, theta: Array) -> Array:
+    """How far white noise of the position pulls the parameters: (Phi' Phi)^-1 n S theta, S the noise of the columns."""
+    shift = np.zeros(jacobian.shape[1])
+    if motion.noise == 0:
+        return shift
+    places = [model.linear.index(name) for name in model.derivatives]
+    spread = motion.chain.noise_gain(tuple(model.derivatives.values())) * motion.noise**2
+    shift[places] = len(motion.rows) * spread @ theta[places]
+    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
+    scale[scale == 0] = 1.0
+    gram = jacobian.T @ jacobian / np.outer(scale, scale)
+    return np.linalg.lstsq(gram, shift / scale, rcond=1e-12)[0] / scale
+
+
+def _with_lag(jacobian: Array, fixed: Array, motion: Motion, noise: Noise, lag: Lag, pulled: Array) -> Array:
     """The covariance with the lag's own uncertainty, be it calibrated (the log is not asked) or found in the log."""
     if lag.std == 0:
         return fixed
     if not lag.known:
         prior = np.full(jacobian.shape[1], np.inf)
         prior[-1] = lag.std
-        return covariance(jacobian, motion.rows, noise, prior)
+        found = covariance(jacobian, motion.rows, noise, prior)
+        found[:-1, :-1] += np.outer(pulled, pulled)
+        return found
     shift = -solve(jacobian[:, :-1], jacobian[:, -1])  # how the answer moves with the lag
     grown = fixed + np.pad(np.outer(shift, shift), (0, 1)) * lag.std**2
     grown[-1, :-1] = grown[:-1, -1] = shift * lag.std**2

@@ -12,8 +12,8 @@ from palpate.identification.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.choosing import Choice, Question, choose
 from palpate.identification.codes import Code, Warn
 from palpate.identification.contacts import Contacts, find_contacts
-from palpate.identification.filters import Chain, block_means
-from palpate.identification.fitting import Lag
+from palpate.identification.filters import Chain, block_means, white_noise
+from palpate.identification.fitting import Fit, Lag, fit
 from palpate.identification.lagging import closing_lag, unknown_lag
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS, Motion
 from palpate.identification.result import Comparison, Identification, Parameter, Traces, Verdict
@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 _SOFTEST, _STIFFEST = 1.0, 1e8
 _MOST_SAMPLES = 2_000_000
 _SHOWN = 20_000
+_FOLLOWS = 0.1
 
 
 def identify(
@@ -82,9 +83,9 @@ def identify(
         warnings.append(Warn(Code.FORCE_SIGN_REVERSED, text))
         question = _question(channels, chain, contacts, lag, lag_std, tolerance)
         choice = choose(question, model)
-    lagging = _lagging(choice, question)
-    if lagging:
-        question, choice = _at_lag(choice, question, lagging, model, warnings)
+    plain = _negative_damping(choice, question)
+    if plain is not None:
+        question, choice = _at_lag(plain, choice, question, model, warnings)
         terms = replace(terms, lags=True)
     return _report(channels, contacts, question, choice, terms, model)
 
@@ -148,34 +149,60 @@ def _question(
 ) -> Question:
     position = contacts.position_sign * channels.position
     force = chain(contacts.force_sign * channels.force)
-    rows, spans = _rows(channels, chain, contacts)
+    quick = Chain(FASTEST / channels.dt, channels.dt)(contacts.force_sign * channels.force)
+    rows, spans = _rows(channels, chain, contacts, quick)
     filtered = chain(position)
     if contacts.bonded:
         position = position - filtered[rows].mean()
         penetration = position
     else:
-        position = position - np.mean([filtered[begin] for begin, _ in contacts.spans])
+        position = position - _origin(filtered, rows, contacts)
         penetration = np.maximum(position, 0.0)
-    motion = Motion(chain, position, penetration, rows, contacts.bonded)
+    motion = Motion(chain, position, penetration, rows, contacts.bonded, white_noise(position))
     known = unknown_lag(motion, channels.rate) if lag is None else Lag(lag, lag_std)
     return Question(motion, force[rows], spans, known, tolerance, _free_noise(force, channels, chain, contacts))
 
 
-def _rows(channels: Channels, chain: Chain, contacts: Contacts) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Samples in contact whose filter has forgotten what was before, and the number of each one's contact."""
+def _origin(filtered: Array, rows: NDArray[np.intp], contacts: Contacts) -> float:
+    """Where the surface is: the position at the onset; the least in contact, if no onset is in the log."""
+    onsets = [filtered[begin] for begin, _ in contacts.spans if begin > 0]
+    return float(np.mean(onsets)) if onsets else float(filtered[rows].min())
+
+
+def _rows(
+    channels: Channels, chain: Chain, contacts: Contacts, quick: Array
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Samples in contact whose filter has forgotten what was before, and the number of each one's contact.
+
+    The end is that of the quickly filtered force, less half the delay of that: a slow filter shows contact for a while
+    after the probe has gone, but what it shows then is no contact any more.
+    """
     settling = int(np.ceil((chain.settling - chain.delay) / chain.dt))
     usable = _settled(channels.valid, int(np.ceil(chain.settling / chain.dt)))
     step = max(int(1 / (8 * chain.cutoff * chain.dt)), 1)
     rows, spans = [], []
     for number, (begin, end) in enumerate(contacts.spans):
-        own = np.arange(begin + min(settling, (end - begin) // 4), end, step)
+        last = end if contacts.bonded else max(_left(quick, contacts, begin, end), begin + (end - begin) // 2)
+        own = np.arange(begin + min(settling, (end - begin) // 4), last, step)
         own = own[usable[own]]
         rows.append(own)
         spans.append(np.full(len(own), number))
     found = np.concatenate(rows)
     if len(found) < 30:
-        raise InputError(f"only {len(found)} usable samples in contact; at least 30 are needed: log longer or faster")
+        raise InputError(_too_few(len(found), channels))
     return found, np.concatenate(spans)
+
+
+def _left(quick: Array, contacts: Contacts, begin: int, end: int) -> int:
+    above = np.flatnonzero(quick[begin:end] > contacts.threshold)
+    delay = int(5 / (4 * np.pi * FASTEST))
+    return begin + int(above[-1]) + 1 - delay if len(above) else end
+
+
+def _too_few(count: int, channels: Channels) -> str:
+    text = f"only {count} usable samples in contact; at least 30 are needed: log longer or faster"
+    lost = [w.text for w in channels.warnings if w.code in (Code.SATURATED, Code.MISSING_SAMPLES)]
+    return f"{text} ({'; '.join(lost)})" if lost else text
 
 
 def _settled(valid: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
@@ -206,32 +233,33 @@ def _reversed(choice: Choice) -> bool:
     return bool(mass) and all(mass[0][n] + 3 * mass[0].std(n, lag_known=True) < 0 for n in ("K", "M"))
 
 
-def _lagging(choice: Choice, question: Question) -> float | None:
-    """A first guess of the lag, if a fit without one finds a damping below zero by more than chance."""
-    if question.lag.known and question.lag.std == 0 and question.lag.value != 0:
+def _negative_damping(choice: Choice, question: Question) -> Fit | None:
+    """The fit without a lag, if it finds a damping below zero by more than chance and nobody has calibrated the lag."""
+    if question.lag.known:
         return None
-    wanted = KELVIN_VOIGT_MASS if choice.candidate.fit.model.name == "kelvin-voigt-mass" else KELVIN_VOIGT
-    plain = next(c.fit for c in choice.others if c.fit.model is wanted)
-    if not choice.rejected and choice.candidate.fit["B"] >= 0:
-        return None
-    damping, stiffness = plain["B"], plain["K"]
-    below = damping + 4 * plain.std("B", lag_known=True) < 0
-    return plain.lag - damping / stiffness if below and stiffness > 0 else None
+    with_mass = "M" in choice.candidate.fit.names
+    model = KELVIN_VOIGT_MASS if with_mass else KELVIN_VOIGT
+    plain = fit(model, question.motion, question.force, Lag())
+    return plain if plain["K"] > 0 and plain["B"] + 4 * plain.std("B") < 0 else None
 
 
 def _at_lag(
-    choice: Choice, question: Question, guess: float, model: str | None, warnings: list[Warn]
+    plain: Fit, choice: Choice, question: Question, model: str | None, warnings: list[Warn]
 ) -> tuple[Question, Choice]:
-    """Judge again with the lag at which loading and unloading coincide."""
-    plain = choice.candidate.fit
-    value, std = closing_lag(question.motion, question.force, guess, question.spans)
+    """Judge again with the lag that the log tells, or else with that at which loading and unloading coincide."""
+    told = choice.candidate.fit
+    if not choice.rejected and told["B"] >= 0 and told.lag > 0:
+        value, std, least = told.lag, told.std("lag"), ""
+    else:
+        value, std = closing_lag(question.motion, question.force, -plain["B"] / plain["K"], question.spans)
+        least = "at least "
     text = (
-        f"without a lag the fit gives B = {plain['B']:.3g}, below zero: the force is read at least"
-        f" {value:.3g} s (std {std:.2g} s) after the position; B is refused until the lag is calibrated (--lag)"
+        f"without a lag the fit gives B = {plain['B']:.3g}, below zero: the force is read {least}"
+        f"{value:.3g} s (std {std:.2g} s) after the position; B is refused until the lag is calibrated (--lag)"
     )
     warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
     shifted = replace(question, lag=Lag(value, std))
-    return shifted, choose(shifted, model or "kelvin-voigt")
+    return shifted, choose(shifted, model or choice.candidate.fit.model.name)
 
 
 def _report(
@@ -251,6 +279,9 @@ def _report(
     parameters = verdicts(choice, question.lag, terms, warnings)
     if model is None and "M" not in parameters:
         parameters = _with_mass(parameters, choice, terms)
+    if contacts.bonded and fitted.r2 < _FOLLOWS:
+        text = f"the force does not follow the position (R2 {fitted.r2:.2g}): nothing seems to be touched"
+        warnings.append(Warn(Code.NO_CONTACT, text))
     warnings += _curved(choice) + _doubtful_units(parameters, terms)
     traces = _traces(channels, contacts, question, choice, terms)
     return Identification(

@@ -9,13 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.fitting import Fit, Lag, fit
+from palpate.identification.fitting import Fit, Lag, fit, profile
 from palpate.identification.models import Model, Motion
 
 Array = NDArray[np.float64]
 
 _LONGEST = 0.25
 _SHARE = 1 / 50
+_WALK = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
+_WALK_UP_TO = 20_000
 
 
 def unknown_lag(motion: Motion, rate: float) -> Lag:
@@ -33,9 +35,18 @@ def freed(fixed: Fit, motion: Motion, force: Array, lag: Lag) -> Fit:
     """The same model with the lag looked for in the log; the fit given, if the log cannot tell the lag."""
     if lag.known:
         return fixed
-    free = fit(fixed.model, motion, force, lag, free_lag=True)
+    free = fit(fixed.model, motion, force, _start(fixed, motion, force, lag), free_lag=True)
     told = free.std("lag") < 0.5 * lag.std and abs(free.lag - lag.value) < 2.9 * lag.std
     return free if told else fixed
+
+
+def _start(fixed: Fit, motion: Motion, force: Array, lag: Lag) -> Lag:
+    """Where to look for the lag: the misfit may have several valleys, so a coarse walk comes first."""
+    if len(force) > _WALK_UP_TO:
+        return lag
+    steps = [lag.value + share * lag.std for share in _WALK]
+    fits = [profile(fixed, motion, force, step) for step in steps]
+    return Lag(steps[int(np.argmin(fits))], lag.std, known=False)
 
 
 def _elastic(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:

@@ -23,6 +23,7 @@ class Motion:
         penetration: max(position, 0) in contact and 0 outside, shape (n,); the position itself when bonded.
         rows: the samples that are fitted, shape (m,).
         bonded: whether the probe is fixed to the surface.
+        noise: standard deviation of the position's own white noise; it makes every column of the regression uncertain.
     """
 
     chain: Chain
@@ -30,6 +31,7 @@ class Motion:
     penetration: Array
     rows: NDArray[np.intp]
     bonded: bool
+    noise: float = 0.0
     _kept: dict[tuple[int, float], Array] = field(default_factory=dict)
     _powers: dict[int, Array] = field(default_factory=dict)
 
@@ -89,6 +91,11 @@ class Model:
     columns: Columns
     knobs: tuple[Knob, ...] = ()
     positive: tuple[str, ...] = ("K", "B", "M")
+
+    @property
+    def derivatives(self) -> dict[str, int]:
+        """Which parameters multiply which derivative of the position."""
+        return {name: k for name, k in (("K", 0), ("B", 1), ("M", 2)) if name in self.linear}
 
 
 def _kelvin_voigt(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:

@@ -109,6 +109,9 @@ def _why_not(
         if not any(w.code is Code.LAG_DAMPING_CONFOUNDED for w in warnings):
             warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, f"{text}; calibrate the lag and give it with --lag"))
         return text
+    pulled = abs(float(fitted.attenuation[fitted.names.index(name)]))
+    if fitted.t * pulled > 0.7 * half:
+        return f"noise of the position may have pulled it by {pulled:.2g} ({bounds}); filter lower with --cutoff"
     limit = f"wider than {terms.tolerance:.0%}" if half < abs(value) else "zero is within it"
     return f"the log does not show it above the noise ({bounds}; {limit})"
 
