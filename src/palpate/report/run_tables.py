@@ -66,11 +66,12 @@ def _identified(summary: dict[str, Any]) -> Table:
                 _number(found["thesis"][name]),
                 _number(found["raw"][name]),
                 _interval(found["matched"][name], half),
+                found["matched_verdict"][name],
                 _number(ratio.get(name)),
                 _number(truth[name]["value"]) if name in truth else NONE,
             )
         )
-    head = ("", "as in the thesis", "raw signals", "matched, 95 %", "f / x", "truth")
+    head = ("", "as in the thesis", "raw signals", "matched, 95 %", "verdict", "f / x", "truth")
     return Table("The surface, by recursive least squares", head, rows)
 
 

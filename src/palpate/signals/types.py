@@ -57,8 +57,11 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     def verdicts(self, tolerance: float = 0.25) -> dict[str, str]:
-        """ "identified" where the 95 % half-width is at most `tolerance` of the value, else "not identifiable"."""
-        half = 1.96 * self.std
-        with np.errstate(invalid="ignore"):
-            good = np.isfinite(half) & (half <= tolerance * np.abs(self.theta))
-        return {n: "identified" if g else "not identifiable" for n, g in zip(self.names, good, strict=True)}
+        """ "identified" or "not identifiable" by parameter, see `verdict`."""
+        pairs = zip(self.names, self.theta, self.std, strict=True)
+        return {name: verdict(float(value), float(std), tolerance) for name, value, std in pairs}
+
+
+def verdict(value: float, std: float, tolerance: float = 0.25) -> str:
+    """Whether a number may be trusted: "identified" if its 95 % half-width is at most `tolerance` of it."""
+    return "identified" if 1.96 * std <= tolerance * abs(value) else "not identifiable"
