@@ -71,8 +71,12 @@ def _identified(summary: dict[str, Any]) -> Table:
                 _number(truth[name]["value"]) if name in truth else NONE,
             )
         )
-    head = ("", "as in the thesis", "raw signals", "matched, 95 %", "verdict", "f / x", "truth")
-    return Table("The surface, by recursive least squares", head, rows)
+    head = ("", "thesis", "raw", "matched, 95 %", "verdict", "f / x", "truth")
+    return Table(
+        "The surface, by recursive least squares on the thesis' signals, on raw ones, and on matched channels",
+        head,
+        rows,
+    )
 
 
 def _interval(value: float, half: float) -> str:
