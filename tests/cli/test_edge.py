@@ -12,6 +12,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.cli._edge import guarded
+from palpate.cli._program import COMMANDS, program
 from palpate.errors import InputError, MissingExtra
 
 
@@ -97,16 +98,12 @@ def test_help_lists_the_commands(capsys):
 
 
 def test_every_module_of_a_command_is_a_command(root):
-    from palpate.cli._program import COMMANDS
-
     modules = {path.stem for path in (root / "src/palpate/cli").glob("*.py") if not path.stem.startswith("_")}
     assert modules == set(COMMANDS)
 
 
-@pytest.mark.parametrize("command", ["identify", "run", "speed"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_flag_of_a_command_is_explained(command):
-    from palpate.cli._program import program
-
     arguments = program()[command].assemble_argument_collection(parse_docstring=True)
     assert len(arguments) > 0
     silent = [argument.name for argument in arguments if argument.show and not argument.parameter.help]

@@ -4,13 +4,19 @@ import re
 import shlex
 import subprocess
 import tomllib
+from pathlib import Path
 
 import pytest
 
 from palpate.cli import main
 from palpate.cli._program import program
 
-PAGES = ("README.md", "CONTRIBUTING.md", "docs/index.md", "docs/identify.md", "docs/run.md")
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [
+    "README.md",
+    "CONTRIBUTING.md",
+    *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")),
+]
 FENCED = re.compile(r"(?ms)^```(\w*)\n(.*?)^```$")
 INDENTED = re.compile(r"(?m)^    (\S.*)$")
 
@@ -95,4 +101,3 @@ def test_each_page_of_the_documentation_is_in_its_menu(root):
     config = tomllib.loads((root / "zensical.toml").read_text(encoding="utf-8"))
     menu = {name for entry in config["project"]["nav"] for name in entry.values()}
     assert menu == {str(path.relative_to(root / "docs")) for path in (root / "docs").rglob("*.md")}
-    assert {f"docs/{name}" for name in menu} <= set(PAGES)

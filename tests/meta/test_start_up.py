@@ -5,6 +5,8 @@ import subprocess
 import sys
 import time
 
+from palpate.cli._program import COMMANDS
+
 HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "polars", "jinja2", "pandas", "mujoco", "sympy"}
 
 
@@ -52,7 +54,7 @@ def test_importing_laws_does_not_import_numba():
 
 
 def test_help_of_each_command_compiles_nothing():
-    for command in ("identify", "run", "speed"):
+    for command in COMMANDS:
         loaded = modules_after(f"from palpate.cli import main\nassert main(['{command}', '--help']) == 0")
         assert not loaded & HEAVY, command
 
