@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint check bench docs pictures lock clean
+.PHONY: help demo test lint format check bench docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -27,6 +27,10 @@ lint: .venv/dev.stamp ## lint, format, types, direction of imports
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+format: .venv/dev.stamp ## wrap the code, sort the imports, mend what ruff can mend
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
 
 check: lint test ## everything that has to pass before a commit
 
