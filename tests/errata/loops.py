@@ -90,6 +90,7 @@ def approach(law, gate: bool = False, seconds: float = 5.0) -> Approach:
     Args:
         law: torque from the arm's model (J, Jdqd, M, h) and the commanded tip acceleration.
         gate: the torque goes out only after 5 N were felt.
+        seconds: at most.
     """
     arm, dt, steps = Arm3(), 1e-3, 2
     q, qd, force, contact, far, most = Vec3(*START), Vec3(0.0, 0.0, 0.0), 0.0, False, 0.0, 0.0

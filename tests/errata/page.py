@@ -26,19 +26,20 @@ class Row(NamedTuple):
 def rows() -> list[Row]:
     """All rows of all tables of the page, in its order."""
     lines = PAGE.read_text(encoding="utf-8").splitlines()
-    cells = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines if line.startswith("|")]
+    table = [line.strip("|").split(" | ") for line in lines if line.startswith("|")]
+    cells = [[cell.strip() for cell in line] for line in table]
     return [Row(*row) for row in cells if row != COLUMNS and not set("".join(row)) <= set("-| ")]
 
 
-def tests() -> dict[str, set[str]]:
+def calls() -> dict[str, set[str]]:
     """For each id the functions that its tests call: the name of a test begins with its row's id."""
     found: dict[str, set[str]] = {}
     for path in sorted(HERE.glob("test_*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test_E"):
                 row = node.name.split("_")[1]
-                calls = (n.func.id for n in ast.walk(node) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name))
-                found.setdefault(row, set()).update(calls)
+                names = (getattr(n.func, "id", "") for n in ast.walk(node) if isinstance(n, ast.Call))
+                found.setdefault(row, set()).update(names)
     return found
 
 

@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 
 from errata.derivation import START, states
-from errata.loops import FOAM, KP, KV, ROBOT, TIP_MASS, approach, delayed_radius, growth, model, tip_acceleration
+from errata.loops import (
+    FOAM,
+    KP,
+    KV,
+    ROBOT,
+    TIP_MASS,
+    approach,
+    delayed_radius,
+    growth,
+    model,
+    tip_acceleration,
+)
 from errata.page import fails, holds
 from palpate._vector import Vec3, solve
 from palpate.controllers.hybrid import hybrid
@@ -77,7 +88,8 @@ def test_E23_jacobian_for_its_inverse():
 
     def rate(G):
         block = (at.J @ free @ G)[1:, 1:]
-        return np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-KP * block, -KV * block]])).real.max()
+        A = np.block([[np.zeros((2, 2)), np.eye(2)], [-KP * block, -KV * block]])
+        return np.linalg.eigvals(A).real.max()
 
     holds(rate(np.linalg.inv(at.J)) - (-KV / 2 + np.sqrt(KV**2 / 4 - KP)), 1e-9)
     fails(max(rate(at.J), 0.0), 4.0)
@@ -217,18 +229,21 @@ def test_E32_twice_the_friction_of_motor_1():
     assert driven > 0.0
 
 
+def noise_through_the_filter(seconds, runs):
+    """What the controller sees of a force sensor at rest in the air [N], shape (runs, ticks)."""
+    from scipy.signal import lfilter
+
+    sensor, smooth, ticks = force_sensor(), butterworth2(120.0, 1000.0), round(1000 * seconds)
+    sampled = np.random.default_rng(3).normal(0.0, sensor.noise, (runs, ticks))
+    held = sampled[:, np.arange(ticks) * sensor.sampling // 1000]
+    return lfilter((smooth.b0, smooth.b1, smooth.b2), (1.0, smooth.a1, smooth.a2), held)
+
+
 def test_E33_the_noise_alone_passes_0_8_newton():
-    """The sensor at rest in the air, through the 120 Hz filter: six seconds."""
-    sensor, smooth = force_sensor(), butterworth2(120.0, 1000.0)
-    generator, state, filtered = np.random.default_rng(3), sensor.start(), smooth.start()
-    felt = []
-    for k in range(120_000):
-        held, state = sensor.sample(state, 0.0, k, generator.standard_normal() if sensor.samples_at(k) else 0.0)
-        if k % 20 == 0:
-            value, filtered = smooth.step(filtered, held)
-            felt.append(value)
-    fails(felt, 0.8)
-    assert np.argmax(np.array(felt) > 0.8) < 100  # within a tenth of a second
+    """Fifty times the five seconds that the listing holds before it moves, with 0.6 N of noise: +-2 N at 3.3 sigma."""
+    felt = noise_through_the_filter(5.0, 50)
+    assert (felt > 0.8).any(axis=1).all()  # in every one of them
+    fails(5000 - np.median(np.argmax(felt > 0.8, axis=1)), 4900)  # and half of them within 0.1 s
     holds(felt, 5.0)
 
 
@@ -250,8 +265,8 @@ def test_E35_the_force_rate_lost_its_dots():
 
 def test_E36_impedance_control():
     """The acceleration of (2.3) leaves the impedance of (2.2), the wrench being what the arm exerts."""
-    mass, damper, spring = np.array([2.0, 3.0, 0.1]), np.array([30.0, 20.0, 1.0]), np.array([900.0, 400.0, 9.0])
-    off, off_rate, xdd_d = np.array([2e-3, -1e-3, 0.02]), np.array([0.01, 0.02, -0.1]), np.array([0.4, 0.0, -1.0])
+    mass, damper, spring = np.array([[2.0, 3.0, 0.1], [30.0, 20.0, 1.0], [900.0, 400.0, 9.0]])
+    off, off_rate, xdd_d = np.array([[2e-3, -1e-3, 0.02], [0.01, 0.02, -0.1], [0.4, 0.0, -1.0]])
     f = np.array([7.0, -2.0, 0.1])
     eq_2_3 = xdd_d + (damper * off_rate + spring * off - f) / mass
     for q, qd in zip(Q, QD, strict=True):

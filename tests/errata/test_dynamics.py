@@ -67,7 +67,9 @@ def test_E10_sign_in_the_first_line_of_d2_4():
 
     def place(q):
         t = np.cumsum(q)
-        return np.array([A1 * np.cos(t[0]) + (A2 + S2) * np.cos(t[1]), A1 * np.sin(t[0]) + (A2 + S2) * np.sin(t[1])])
+        return np.array(
+            [A1 * np.cos(t[0]) + (A2 + S2) * np.cos(t[1]), A1 * np.sin(t[0]) + (A2 + S2) * np.sin(t[1])]
+        )
 
     def measured(q, qd, qdd):
         ahead, behind = (place(q + side * h * qd + h * h / 2 * qdd) for side in (1, -1))
@@ -144,7 +146,6 @@ def test_E14_mass_matrix_00():
 def test_E15_mass_matrix_10():
     holds(on_states(lambda q: m_10(q, np.sin(q[2])), Q) - MASSES[:, 1, 0], 1e-13)
     fails(on_states(lambda q: m_10(q, np.cos(q[2])), Q) - MASSES[:, 1, 0], 0.01)
-    fails(on_states(lambda q: m_10(q, np.cos(q[2])), Q) - MASSES[:, 0, 1], 0.01)  # and M is no longer symmetric
 
 
 def test_E16_mass_matrix_21():
@@ -203,14 +204,16 @@ def test_E19_the_other_elements():
     def others(q):
         ta, tb, tc, _ = shorthand(q)
         reach, side, r3 = A2 * np.cos(q[2]) + A3 + S3, A2 * np.sin(q[2]), A3 + S3
-        return np.array([
-            I2 + I3 + M3 * (ta * reach + side * tb) + M2 * (A2 + S2) * tc,
-            I3 + M3 * r3 * ta,
-            I2 + I3 + M3 * (reach**2 + side**2) + M2 * (A2 + S2) ** 2,
-            I3 + M3 * r3 * reach,
-            I3 + M3 * r3 * ta,
-            I3 + M3 * r3**2,
-        ])
+        return np.array(
+            [
+                I2 + I3 + M3 * (ta * reach + side * tb) + M2 * (A2 + S2) * tc,
+                I3 + M3 * r3 * ta,
+                I2 + I3 + M3 * (reach**2 + side**2) + M2 * (A2 + S2) ** 2,
+                I3 + M3 * r3 * reach,
+                I3 + M3 * r3 * ta,
+                I3 + M3 * r3**2,
+            ]
+        )
 
     def omegas(q, qd):
         w1, w2, w3 = np.cumsum(qd)

@@ -2,11 +2,11 @@
 
 import pytest
 
-from errata.page import COLUMNS, PAGE, VERDICTS, fails, holds, rows, tests
+from errata.page import COLUMNS, PAGE, VERDICTS, calls, fails, holds, rows
 
 
 def test_each_row_has_a_test_and_each_test_a_row():
-    assert {row.id for row in rows()} == set(tests())
+    assert {row.id for row in rows()} == set(calls())
 
 
 def test_ids_count_without_gaps_in_the_page_s_order():
@@ -25,7 +25,7 @@ def test_every_table_has_the_same_columns():
 
 
 def test_what_is_wrong_is_seen_to_fail_and_what_is_right_to_hold():
-    called = tests()
+    called = calls()
     for row in rows():
         needed = {"right": {"holds"}, "undecided": {"holds"}}.get(row.verdict, {"holds", "fails"})
         assert needed <= called[row.id], f"{row.id} must call {sorted(needed)}"

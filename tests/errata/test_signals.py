@@ -84,7 +84,8 @@ def test_E53_the_resolvers_are_swapped():
     chapter_3, appendix_b = (614400.0, 409600.0, 2000.0), (409600.0, 614400.0, 2000.0)
 
     def off(counts):
-        return [motor_1 / motor_3 / (counts[0] / counts[2]) - 1.0, motor_2 / motor_3 / (counts[1] / counts[2]) - 1.0]
+        measured = np.array([motor_1, motor_2]) / motor_3
+        return measured / (np.array(counts[:2]) / counts[2]) - 1.0
 
     holds(off(chapter_3), 0.002)
     fails(off(appendix_b), 0.3)
@@ -99,7 +100,7 @@ def test_E54_inertia_is_no_force_times_area():
     torque, acceleration = newton + metre, np.array([0, 0, -2])
     fails(newton + 2 * metre - (torque - acceleration), 1)
     holds(kilogram + 2 * metre - (torque - acceleration), 0)
-    # Read as kgf m s^2 it would be 9.8 times as much: a radius of gyration of 18 cm and more, with the whole motor's mass.
+    # Read as kgf m s^2 it would be 9.8 times as much: radii of gyration of 18 and 12 cm with the whole motor's mass.
     for inertia, mass in ((0.084, 24.0), (0.009, 6.5)):
         holds(np.sqrt(inertia / mass), 0.06)
         fails(np.sqrt(9.80665 * inertia / mass), 0.115)
@@ -121,7 +122,7 @@ def test_E55_480_hertz_does_not_fold():
     held = np.sin(2.0 * np.pi * 20.0 * np.floor(fine * 480.0 + 1e-9) / 480.0)
     seen = spectrum(held[::48])
     holds(seen[60] - 0.032, 0.003)
-    holds(seen[20] - 1.0, 0.01)
+    holds(seen[20] - 1.0, 0.03)
 
 
 def low_pass(f, r1=100.0, r2=1.5, c1=470e-6, c2=10e-6):
@@ -183,3 +184,18 @@ def test_E59_the_zero_of_another_channel():
 
     holds(force(0x1F, 20.0) - 20.0, 1e-12)
     assert abs(force(0x10, 20.0) - 20.0) > 5.0
+
+
+def test_E60_the_timer_starts_before_the_zero_is_read():
+    """Force that the first three ticks see of a sensor at rest whose output stands at 25 mV."""
+
+    def felt(zero_read_at):
+        zero, forces = 0.0, []
+        for tick in range(3):
+            if tick >= zero_read_at:
+                zero = 0.025
+            forces.append(-200.0 * (0.025 - zero))
+        return forces
+
+    holds(felt(0), 0.0)
+    fails(felt(1), 4.9)
