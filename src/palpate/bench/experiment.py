@@ -15,6 +15,7 @@ from palpate.bench.controller_tables import ControllerTable, HybridController
 from palpate.bench.part_table import NotNegative, NotNegativeTriple, Part, Positive, PositiveTriple, Triple
 from palpate.errors import InputError, unknown
 
+
 class Run(Part):
     press: Positive = 6.0
     """Seconds of contact after which the run ends."""

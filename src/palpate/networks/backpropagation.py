@@ -62,15 +62,15 @@ def backward(sizes, weights, amplitude, signals, deltas):
 
 
 @law
-def descend(sizes, weights, signals, deltas, learning_rate):  # (4.28), (4.29), the sign set right
-    """One step of every weight against the gradient."""
+def descend(sizes, weights, signals, deltas, learning_rate, thresholds):  # (4.28), (4.29)
+    """One step of every weight against the gradient; thresholds go `thresholds` times as far: 1, or 0 to keep them."""
     w, before = 0, 0
     for layer in range(1, len(sizes)):
         n = sizes[layer - 1]
         here = before + n
         for j in range(here, here + sizes[layer]):
             d = learning_rate * deltas[j]
-            weights[w] += d
+            weights[w] += thresholds * d
             for i in range(n):
                 weights[w + 1 + i] += d * signals[before + i]
             w += n + 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +58,7 @@ class Network(NamedTuple):
     def learn(self, state):
         """One step of back-propagation for the errors that `want` was told."""
         backward(self.sizes, state.weights, self.amplitude, state.signals, state.deltas)
-        descend(self.sizes, state.weights, state.signals, state.deltas, self.learning_rate)
+        descend(self.sizes, state.weights, state.signals, state.deltas, self.learning_rate, 1.0)
 
     def gain(self, state, k):
         """What a step for error 1 of output k alone would add to that output, to first order.
@@ -78,6 +79,15 @@ class Network(NamedTuple):
         for w in range(first, first + self.sizes[layer] * (self.sizes[layer - 1] + 1)):
             total += state.weights[w] * state.weights[w]
         return sqrt(total)
+
+
+def layers_of(sizes: NDArray[np.int64], weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """The weights of each layer, shape (n, n_before + 1), thresholds in column 0: views of the flat array."""
+    views, first = [], 0
+    for n, m in pairwise(sizes):
+        views.append(weights[first : first + m * (n + 1)].reshape(m, n + 1))
+        first += m * (n + 1)
+    return tuple(views)
 
 
 def network(layers: list[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> Network:
@@ -121,7 +131,9 @@ def _check_layers(matrices: list[NDArray[np.float64]]) -> None:
             )
 
 
-def random_layers(sizes: tuple[int, ...], seed: int | np.random.Generator, scale: float) -> list[NDArray[np.float64]]:
+def random_layers(
+    sizes: tuple[int, ...], seed: int | np.random.Generator, scale: float
+) -> list[NDArray[np.float64]]:
     """Weights and thresholds drawn evenly from -scale ... scale.
 
     Args:
@@ -134,4 +146,4 @@ def random_layers(sizes: tuple[int, ...], seed: int | np.random.Generator, scale
     if not (np.isfinite(scale) and scale >= 0.0):
         raise InputError(f"scale must be finite and not negative, got {scale}")
     generator = np.random.default_rng(seed)
-    return [generator.uniform(-scale, scale, (m, n + 1)) for n, m in zip(sizes[:-1], sizes[1:], strict=True)]
+    return [generator.uniform(-scale, scale, (m, n + 1)) for n, m in pairwise(sizes)]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from palpate._jit import kernel
 from palpate.errors import InputError
 from palpate.networks.backpropagation import backward, descend, forward
-from palpate.networks.network import network, random_layers
+from palpate.networks.network import layers_of, network, random_layers
 
 
 class Perceptron:
@@ -62,19 +62,14 @@ class Perceptron:
         self._sizes, self._amplitude = net.sizes, net.amplitude
         self._weights, self._signals, self._deltas = net.start()
         self._forward, self._learn = _forward.compiled, _learn.compiled
-        self._learned_from = False
         self.forward(np.zeros(self._sizes[0]))
-        self._learn(self._sizes, self._weights, self._amplitude, self._signals, self._deltas, 0.0 * self._amplitude, 0.0)
-        self._learned_from = False
+        self._descend(0.0 * self._amplitude, 0.0)
+        self._heard = False  # both compiled, nothing learned
 
     @property
     def layers(self) -> tuple[NDArray[np.float64], ...]:
         """The weights of each layer, shape (n, n_before + 1): views, so that writing in them changes the network."""
-        views, first = [], 0
-        for n, m in zip(self._sizes[:-1], self._sizes[1:], strict=True):
-            views.append(self._weights[first : first + m * (n + 1)].reshape(m, n + 1))
-            first += m * (n + 1)
-        return tuple(views)
+        return layers_of(self._sizes, self._weights)
 
     @property
     def hidden(self) -> NDArray[np.float64]:
@@ -100,7 +95,7 @@ class Perceptron:
         x = self._checked(inputs, int(self._sizes[0]), "inputs")
         y = np.empty(len(self._amplitude))
         self._forward(self._sizes, self._weights, self._amplitude, self._signals, x, y)
-        self._learned_from = True
+        self._heard = True
         return y
 
     def learn(self, error: ArrayLike) -> None:
@@ -110,11 +105,12 @@ class Perceptron:
             InputError: errors of another shape, or not finite; no `forward` before.
         """
         e = self._checked(error, len(self._amplitude), "error")
-        if not self._learned_from:
+        if not self._heard:
             raise InputError("learn needs the signals of a forward before it: call forward(inputs) first")
-        self._learn(
-            self._sizes, self._weights, self._amplitude, self._signals, self._deltas, e, self.learning_rate
-        )
+        self._descend(e, self.learning_rate)
+
+    def _descend(self, error: NDArray[np.float64], rate: float) -> None:
+        self._learn(self._sizes, self._weights, self._amplitude, self._signals, self._deltas, error, rate)
 
     @staticmethod
     def _checked(values: ArrayLike, n: int, name: str) -> NDArray[np.float64]:
@@ -153,4 +149,4 @@ def _learn(sizes, weights, amplitude, signals, deltas, error, learning_rate):
     for k in range(len(error)):
         deltas[first + k] = error[k]
     backward(sizes, weights, amplitude, signals, deltas)
-    descend(sizes, weights, signals, deltas, learning_rate)
+    descend(sizes, weights, signals, deltas, learning_rate, 1.0)

@@ -1,0 +1,292 @@
+"""A network beside the surface that learns its force, and is asked for K, B and M (thesis, sec. 5.2 and 6.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from palpate._jit import kernel, law
+from palpate.errors import InputError, unknown
+from palpate.identifiers.neural_settings import SETTINGS
+from palpate.networks import Network, layers_of, network, random_layers
+from palpate.networks.backpropagation import backward, descend, forward
+from palpate.signals.types import Estimate
+
+CHANNELS = ("displacement", "velocity", "acceleration")
+UNITS = ("m", "m/s", "m/s^2")
+OUTSIDE = "probe-outside-learned"
+_HUGE = 1e300  # a sample beyond it, or not a number, is no sample
+
+
+@dataclass(frozen=True)
+class Probed:
+    """What a network answers to a probe: no measurement, and without a covariance.
+
+    Args:
+        stiffness, damping, mass: K [N/m], B [N s/m], M [kg] as the differences of its answers give them.
+        force_at_zero: its answer where nothing moves and nothing is pressed [N]; a spring would say 0, and what is
+            said instead is in K times the displacement.
+        warnings: (code, text) of what makes the answer doubtful.
+    """
+
+    stiffness: float
+    damping: float
+    mass: float
+    force_at_zero: float
+    warnings: tuple[tuple[str, str], ...]
+
+
+class NeuralProbe:
+    """Learns force from displacement, velocity and acceleration, a sample at a time; any curve, no model.
+
+    When to use it: to see what the thesis saw. For numbers to rely on, `RecursiveLeastSquares` or `identify`: a
+    network's answer depends on the weights it starts from, and carries no interval.
+
+    Args:
+        scale: of displacement, velocity and acceleration before the network sees them, shape (3,).
+        values: displacement [m], velocity [m/s] and acceleration [m/s^2] that it is asked at, shape (3,).
+        amplitude: the largest force that it can say [N]. The thesis does not give it; it must exceed the force.
+        learning_rate: eta, above 0.
+        layers: neurons of each hidden layer.
+        seed: of the weights at the start, or a generator.
+        weights: the largest of them. The thesis gives neither.
+        thresholds: False leaves them all at zero, so that the network says 0 N where nothing is pressed.
+
+    Raises:
+        InputError: numbers out of range.
+    """
+
+    def __init__(
+        self,
+        scale: ArrayLike,
+        values: ArrayLike,
+        amplitude: float = 40.0,
+        learning_rate: float = 1e-4,
+        layers: Sequence[int] = (4,),
+        seed: int | np.random.Generator = 0,
+        weights: float = 0.5,
+        thresholds: bool = True,
+    ):
+        start = random_layers((3, *layers, 1), seed, weights)
+        self._thresholds = 1.0 if thresholds else 0.0
+        for layer in start:
+            layer[:, 0] *= self._thresholds
+        self._net: Network = network(list(start), amplitude, learning_rate)
+        self.scale = _three(scale, "scale")
+        self.values = _probe_values(_three(values, "values"))
+        self.samples = 0
+        self._memory = self._net.start()
+        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
+        self._follow = _follow.compiled
+        self._take(np.empty((0, 3)), np.empty(0), np.empty((0, 4)))
+
+    @classmethod
+    def thesis(
+        cls,
+        surface: str,
+        amplitude: float = 40.0,
+        learning_rate: float = 1e-4,
+        seed: int | np.random.Generator = 0,
+        weights: float = 0.5,
+        thresholds: bool = True,
+    ) -> NeuralProbe:
+        """The 3-4-1 network with the scales and the probe of the thesis for "foam" or "rubber"."""
+        if surface not in SETTINGS:
+            raise unknown("surface", surface, SETTINGS)
+        s = SETTINGS[surface]
+        return cls(s.scale, s.values, amplitude, learning_rate, (4,), seed, weights, thresholds)
+
+    def update(self, regressor: ArrayLike, force: float) -> None:
+        """Takes one sample in: displacement, velocity and acceleration, shape (3,), and the force [N].
+
+        Raises:
+            InputError: a regressor of another shape, or a number that is not finite; the network is unchanged.
+        """
+        self.update_many(np.asarray(regressor, dtype=np.float64)[None], np.array([force], dtype=np.float64))
+
+    def update_many(self, regressors: ArrayLike, forces: ArrayLike) -> None:
+        """Takes k samples in, as k calls of `update` would: regressors of shape (k, 3), forces of shape (k,)."""
+        self._update(regressors, forces, trajectory=False)
+
+    def trajectory(self, regressors: ArrayLike, forces: ArrayLike) -> NDArray[np.float64]:
+        """As `update_many`; returns K, B, M after each sample and the error of the force before it, shape (k, 4)."""
+        return self._update(regressors, forces, trajectory=True)
+
+    def force(self, regressor: ArrayLike) -> float:
+        """The force that the network gives for displacement, velocity and acceleration, shape (3,) [N]."""
+        x = _three(regressor, "regressor")
+        signals = self._memory.signals.copy()
+        signals[:3] = self.scale * x
+        forward(self._net.sizes, self._memory.weights, signals)
+        return float(self._net.amplitude[0] * signals[-1])
+
+    def probe(
+        self,
+        displacement: float | None = None,
+        velocity: float | None = None,
+        acceleration: float | None = None,
+    ) -> Probed:
+        """K, B and M from four answers of the network, one input more set at a time.
+
+        Args:
+            displacement: [m], not 0; as in `values` when left out.
+            velocity: [m/s], not 0; likewise.
+            acceleration: [m/s^2], not 0; likewise.
+        """
+        given = (displacement, velocity, acceleration)
+        chosen = [own if v is None else v for v, own in zip(given, self.values, strict=True)]
+        x, v, a = map(float, _probe_values(_three(chosen, "values")))
+        still, pressed = self.force((0.0, 0.0, 0.0)), self.force((x, 0.0, 0.0))
+        moving, hastened = self.force((x, v, 0.0)), self.force((x, v, a))
+        return Probed(
+            pressed / x,
+            (moving - pressed) / v,
+            (hastened - moving) / a,
+            still,
+            self._warnings(np.array([x, v, a])),
+        )
+
+    def estimate(self) -> Estimate:
+        """K, B and M at the probe `values`, with a covariance that is not known: no verdict can be "identified"."""
+        p = self.probe()
+        theta = np.array([p.stiffness, p.damping, p.mass])
+        return Estimate(("K", "B", "M"), theta, np.full((3, 3), np.nan), float(self.samples))
+
+    @property
+    def layers(self) -> tuple[NDArray[np.float64], ...]:
+        """The weights of each layer, shape (n, n_before + 1), thresholds in column 0; copies."""
+        return layers_of(self._net.sizes, self._memory.weights.copy())
+
+    @property
+    def learned(self) -> NDArray[np.float64]:
+        """Smallest and largest displacement, velocity and acceleration seen, shape (2, 3)."""
+        return np.stack([self._low, self._high])
+
+    def _warnings(self, values: NDArray[np.float64]) -> tuple[tuple[str, str], ...]:
+        if not np.isfinite(self._low).all():
+            return ((OUTSIDE, "nothing has been learned yet: update the network first"),)
+        return tuple(
+            (
+                OUTSIDE,
+                f"the probe's {name} {v:g} {unit} lies outside what was learned, {low:g} ... {high:g} {unit}",
+            )
+            for name, unit, v, low, high in zip(CHANNELS, UNITS, values, self._low, self._high, strict=True)
+            if not low <= v <= high
+        )
+
+    def _update(self, regressors: ArrayLike, forces: ArrayLike, *, trajectory: bool) -> NDArray[np.float64]:
+        phi = np.ascontiguousarray(regressors, dtype=np.float64)
+        y = np.ascontiguousarray(forces, dtype=np.float64)
+        if phi.ndim != 2 or phi.shape[1] != 3 or y.shape != phi.shape[:1]:
+            raise InputError(
+                f"regressors must have shape (k, 3) and forces (k,), got {phi.shape} and {y.shape}"
+            )
+        out = np.empty((len(y) if trajectory else 0, 4))
+        done = self._take(phi, y, out)
+        self.samples += done
+        if done < len(y):
+            raise InputError(
+                f"sample {done} is not finite: regressor {phi[done]}, force {y[done]}; leave it out "
+                f"(the {done} before it were taken in)"
+            )
+        return out
+
+    def _take(self, phi: NDArray[np.float64], y: NDArray[np.float64], out: NDArray[np.float64]) -> int:
+        net, memory = self._net, self._memory
+        return int(
+            self._follow(
+                net.sizes,
+                memory.weights,
+                net.amplitude,
+                memory.signals,
+                memory.deltas,
+                net.learning_rate,
+                self._thresholds,
+                self.scale,
+                self.values,
+                self._low,
+                self._high,
+                phi,
+                y,
+                out,
+            )
+        )
+
+
+def _three(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    array = np.array(values, dtype=np.float64)
+    if array.shape != (3,):
+        raise InputError(f"{name} must have shape (3,): {', '.join(CHANNELS)}; got {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} must be finite, got {array}")
+    return array
+
+
+def _probe_values(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    if (values == 0.0).any():
+        raise InputError(f"a probe divides by its values: none may be 0, got {values}")
+    return values
+
+
+@law
+def answer(sizes, weights, signals, x, v, a):
+    """The network's output for scaled inputs, without its amplitude."""
+    signals[0], signals[1], signals[2] = x, v, a
+    forward(sizes, weights, signals)
+    return signals[len(signals) - 1]
+
+
+@law
+def absorb(sizes, weights, amplitude, signals, deltas, learning_rate, thresholds, scale, phi, y):
+    """One sample: the network answers, learns from its error, and the error before is returned [N]."""
+    x, v, a = scale[0] * phi[0], scale[1] * phi[1], scale[2] * phi[2]
+    error = y - amplitude[0] * answer(sizes, weights, signals, x, v, a)
+    deltas[len(deltas) - 1] = error
+    backward(sizes, weights, amplitude, signals, deltas)
+    descend(sizes, weights, signals, deltas, learning_rate, thresholds)
+    return error
+
+
+@law
+def ask(sizes, weights, amplitude, signals, scale, values):
+    """K, B and M by differences of the network's answers (sec. 6.2)."""
+    x, v, a = scale[0] * values[0], scale[1] * values[1], scale[2] * values[2]
+    pressed = amplitude[0] * answer(sizes, weights, signals, x, 0.0, 0.0)
+    moving = amplitude[0] * answer(sizes, weights, signals, x, v, 0.0)
+    hastened = amplitude[0] * answer(sizes, weights, signals, x, v, a)
+    return pressed / values[0], (moving - pressed) / values[1], (hastened - moving) / values[2]
+
+
+@kernel
+def _follow(
+    sizes,
+    weights,
+    amplitude,
+    signals,
+    deltas,
+    learning_rate,
+    thresholds,
+    scale,
+    values,
+    low,
+    high,
+    phi,
+    y,
+    out,
+):
+    """Index of the first sample that is not finite, or how many there are."""
+    for i in range(len(y)):
+        if not abs(phi[i, 0]) + abs(phi[i, 1]) + abs(phi[i, 2]) + abs(y[i]) < _HUGE:
+            return i
+        for c in range(3):
+            low[c], high[c] = min(low[c], phi[i, c]), max(high[c], phi[i, c])
+        error = absorb(
+            sizes, weights, amplitude, signals, deltas, learning_rate, thresholds, scale, phi[i], y[i]
+        )
+        if len(out) > 0:
+            out[i, 0], out[i, 1], out[i, 2] = ask(sizes, weights, amplitude, signals, scale, values)
+            out[i, 3] = error
+    return len(y)
