@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from controllers.ideal_arm import press, task
 
+from controllers.ideal_arm import press, task
 from palpate._vector import Vec3
 from palpate.controllers.decoupled_hybrid import DecoupledHybrid
 from palpate.controllers.hybrid import Hybrid

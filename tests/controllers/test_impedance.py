@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from controllers.ideal_arm import START, press, task
 from scipy.signal import StateSpace, lsim
 
+from controllers.ideal_arm import START, press, task
 from palpate._vector import Vec3
 from palpate.controllers.impedance import Impedance
 

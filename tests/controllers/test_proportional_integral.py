@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from controllers.ideal_arm import ARM, START, task
 
+from controllers.ideal_arm import ARM, START, task
 from palpate._vector import ZERO3, Vec3
 from palpate.controllers.hybrid import Hybrid
 from palpate.controllers.proportional_integral import ProportionalIntegral, integral_gain

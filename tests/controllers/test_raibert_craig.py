@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from controllers.ideal_arm import ARM, INTO, START, press, task
 
+from controllers.ideal_arm import ARM, INTO, START, press, task
 from palpate._vector import ZERO3, Vec3, solve
 from palpate.controllers.raibert_craig import RaibertCraig, growth_rate
 from palpate.signals.types import Sense

@@ -58,7 +58,7 @@ def build(experiment: Experiment) -> Bench:
         sequence=_sequence(e, tick),
         schedule=_schedule(e),
         approach=ResolvedAcceleration(_all(e.approach.kp), _all(e.approach.kv)),
-        controller=controller_of(e.controller),
+        controller=controller_of(e.controller, tick, e.wall.x),
         compensation=Coulomb(Vec3(*e.compensation.level), Vec3(*e.compensation.blend)),
         estimators=_estimators(e, rate),
         tick=tick,

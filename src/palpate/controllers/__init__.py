@@ -6,8 +6,25 @@ A controller is a part: a frozen NamedTuple of gains with ``start()``, the state
 
 from palpate.controllers.any_controller import AnyController, join
 from palpate.controllers.controller import controller
+from palpate.controllers.decoupled_hybrid import DecoupledHybrid
 from palpate.controllers.hybrid import Hybrid
+from palpate.controllers.impedance import Impedance
 from palpate.controllers.neural import Neural
+from palpate.controllers.proportional_integral import ProportionalIntegral
+from palpate.controllers.raibert_craig import RaibertCraig
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
+from palpate.controllers.self_tuning import SelfTuning
 
-__all__ = ["AnyController", "Hybrid", "Neural", "ResolvedAcceleration", "controller", "join"]
+__all__ = [
+    "AnyController",
+    "DecoupledHybrid",
+    "Hybrid",
+    "Impedance",
+    "Neural",
+    "ProportionalIntegral",
+    "RaibertCraig",
+    "ResolvedAcceleration",
+    "SelfTuning",
+    "controller",
+    "join",
+]

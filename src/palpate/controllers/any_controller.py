@@ -3,8 +3,13 @@
 from functools import cache
 from typing import Any, NamedTuple
 
+from palpate._vector import ZERO3, Vec3
 from palpate.controllers.controller import controller
+from palpate.controllers.decoupled_hybrid import DecoupledHybrid
+from palpate.controllers.impedance import Impedance
 from palpate.controllers.neural import Neural
+from palpate.controllers.proportional_integral import ProportionalIntegral
+from palpate.controllers.raibert_craig import RaibertCraig
 from palpate.errors import InputError
 
 
@@ -12,9 +17,17 @@ from palpate.errors import InputError
 def members() -> tuple[Any, ...]:
     """One of each built-in controller, with any numbers: the type is what counts.
 
-    A new one needs its line here and nothing else.
+    A new one needs its line here and nothing else. Each costs half a second of compiling for all, a second one
+    with arrays in its state four: that one (`SelfTuning`) has a loop of its own.
     """
-    every = (Neural.thesis(),)
+    some = Vec3(1.0, 1.0, 1.0)
+    every = (
+        Neural.thesis(),
+        ProportionalIntegral(some, some, some, some, 0.001),
+        DecoupledHybrid(some, some, some, some, 1.0),
+        Impedance(some, some, some, some),
+        RaibertCraig(some, some, ZERO3, 1.0, 1.0, 1.0, 0.001),
+    )
     for one in every:
         controller(type(one))
     return every

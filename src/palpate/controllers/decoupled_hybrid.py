@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
-from palpate._jit import law, part
+from palpate._jit import law
 from palpate._vector import Vec3, resolve
+from palpate.controllers.controller import controller
 from palpate.controllers.resolved_acceleration import position_command
 
 
@@ -13,7 +14,7 @@ def decoupled_hybrid(J, Jdqd, M, h, s, u_x, u_f, f):  # (4.19), friction aside
     return M @ resolve(J, (1.0 - s) * u_x + s * u_f - Jdqd, M) + h + J.T @ f
 
 
-@part
+@controller
 class DecoupledHybrid(NamedTuple):
     """Accelerations in every direction, so that no direction's command moves another.
 

@@ -2,8 +2,9 @@
 
 from typing import NamedTuple
 
-from palpate._jit import law, part
+from palpate._jit import law
 from palpate._vector import Vec3, resolve
+from palpate.controllers.controller import controller
 
 
 @law
@@ -18,7 +19,7 @@ def impedance(J, Jdqd, M, h, u, f):
     return M @ resolve(J, u - Jdqd, M) + h + J.T @ f
 
 
-@part
+@controller
 class Impedance(NamedTuple):
     """Presses by asking for a place inside the surface; the force is what both springs agree on.
 

@@ -3,14 +3,14 @@
 import math
 from typing import NamedTuple
 
-from palpate._jit import part
-from palpate._vector import Vec3
+from palpate._vector import ZERO3, Vec3
+from palpate.controllers.controller import controller
 from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.signals.parameters import require
 
 
-@part
+@controller
 class ProportionalIntegral(NamedTuple):
     """`Hybrid` with its integral gain per second, so that it keeps its bandwidth when the rate changes.
 
@@ -41,6 +41,10 @@ class ProportionalIntegral(NamedTuple):
         u_x = position_command(self.kp, self.kv, sense.x, sense.xd, task.x, task.xd, task.xdd)
         u_f = self.kf * error + integral  # (4.15)
         return hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f), integral
+
+    def report(self, state):
+        """The force integral."""
+        return state, ZERO3
 
 
 def integral_gain(bandwidth: float, kf: float = 0.0) -> float:

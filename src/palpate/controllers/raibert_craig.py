@@ -6,6 +6,7 @@ import numpy as np
 
 from palpate._jit import law, part
 from palpate._vector import Vec3, resolve
+from palpate.controllers.controller import controller
 
 
 @law
@@ -25,7 +26,7 @@ class RaibertCraigState(NamedTuple):
     torque: Vec3  # integral of the joints' torque error [N m s], shape (n,)
 
 
-@part
+@controller
 class RaibertCraig(NamedTuple):
     """Selects errors at the tip, then controls each joint by itself: PID on angles, PI on torques.
 
