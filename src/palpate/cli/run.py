@@ -89,6 +89,7 @@ def _record(console: Console, experiment: Any, seed: int) -> Record:
     from rich.progress import BarColumn, Progress, TextColumn
 
     from palpate.bench import build
+    from palpate.cli._waiting import COMPILING
 
     bench = build(experiment)
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
@@ -96,7 +97,7 @@ def _record(console: Console, experiment: Any, seed: int) -> Record:
         bar = progress.add_task("starting", total=None, time="")
 
         def waiting() -> None:
-            progress.update(bar, description="compiling the loop: some ten seconds, once after installation")
+            progress.console.print(COMPILING)
 
         def show(time: float, phase: str) -> None:
             progress.update(bar, description=f"{phase:9}", time=f"{time:6.1f} s simulated")

@@ -55,6 +55,7 @@ def _measure(chosen: Sequence[Study], folder: Path, seeds: Sequence[int], comman
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+    from palpate.cli._waiting import COMPILING
     from palpate.thesis.measuring import measure
     from palpate.thesis.runs import Runs
 
@@ -64,7 +65,7 @@ def _measure(chosen: Sequence[Study], folder: Path, seeds: Sequence[int], comman
         bar = progress.add_task("", total=len(chosen))
 
         def waiting() -> None:
-            progress.update(bar, description="compiling a loop: some ten seconds, once after installation")
+            progress.console.print(COMPILING)
 
         def started(one: Study) -> None:
             progress.update(bar, completed=chosen.index(one), description=f"{one.NUMBER}  {one.TITLE}")
