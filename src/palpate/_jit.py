@@ -286,7 +286,7 @@ def _array_functions() -> None:
         typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
         _overload(function)(typer)
 
-    arrays(_vector.outer, lambda a, b: np.outer(a, b))
+    arrays(_vector.outer, lambda a, b: np.expand_dims(a, 1) * b)
     arrays(_vector.trace, lambda A: np.trace(A))
     arrays(_vector.exp, lambda a: np.exp(a))
 

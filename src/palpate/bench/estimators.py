@@ -24,8 +24,8 @@ class Estimators(NamedTuple):
 
     thesis: force through 120 Hz, acceleration through 35 Hz, velocity and displacement as they are (sec. 6);
     raw: nothing filtered (fig. 6.3); matched: every channel through the same lags, and the offset taken out.
-    The first two run while the contact controller does, as in the thesis. The matched one starts when the
-    touch is felt, or earlier data would be lost on it.
+    The first two run while the contact controller does, as in the thesis. The matched one starts anew when a
+    touch is felt: it would lose the first moments, which tell most, if it waited for the switch.
 
     Args:
         touch: filtered force from which the matched one takes the surface to be touched [N].
@@ -60,9 +60,10 @@ class Estimators(NamedTuple):
             _, raw = self.raw.step(raw, phi, signals.force)
         (phi, force), front = self.front.step(state.front, x, signals.force)
         # Latched: samples picked by their own noisy force would be picked for their noise, and bias the fit.
-        if pressing or smooth_force > self.touch:
-            listening = 1.0
-        elif smooth_force < 0.0:
+        if listening == 0.0 and (pressing or smooth_force > self.touch):
+            # Anew at each touch: what noise alone once took for a touch is no data.
+            listening, matched, centring = 1.0, self.matched.start(), self.centring.start()
+        elif not pressing and smooth_force < 0.0:
             listening = 0.0
         if listening == 1.0:
             (phi, force), centring = self.centring.step(centring, phi, force)

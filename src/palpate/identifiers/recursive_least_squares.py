@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 from palpate._jit import kernel, law
 from palpate._vector import Mat3, Vec3
 from palpate.errors import InputError
-from palpate.identifiers.least_squares import LeastSquares, LeastSquaresState, bounded, rls
+from palpate.identifiers.least_squares import BLOCK, bounded, gathered, long_run, long_run_variance, rls
 from palpate.signals.types import Estimate
 
-_STATISTICS = 4  # weight, squares, products, last
+_STATISTICS = 6  # the last of a state: weight, squares, products, last, blocks, filled
 _HUGE = 1e300  # a sum of squares beyond it, or not a number, is no sample
 
 
@@ -19,7 +19,8 @@ class RecursiveLeastSquares:
     """Estimates theta in ``force = regressor . theta``, a sample at a time (thesis, eq. 5.7-5.10).
 
     When to use it: linear models, on line, each update in well under a microsecond of work; with `forgetting`
-    below 1 for surfaces that change. The update is compiled in the constructor, never in the first `update`.
+    below 1 for surfaces that change. The update is compiled in the constructor, never in the first `update`;
+    `update_many`, which is for records, when it is first called.
 
     Args:
         theta: initial estimate, shape (n,).
@@ -42,19 +43,20 @@ class RecursiveLeastSquares:
         start = np.array(theta, dtype=np.float64)
         P = np.array(covariance, dtype=np.float64)
         _check(start, P, forgetting)
+        # To the last bit: with forgetting, what P is askew grows for ever.
+        P = 0.5 * (P + P.T)
         n = self._n = len(start)
         self._shape = (n,)
         self.names = names if names is not None else tuple(f"theta{i}" for i in range(n))
         if len(self.names) != n:
             raise InputError(f"names must be as many as parameters: got {len(self.names)} names for {n}")
         self.forgetting = float(forgetting)
-        self._state = np.concatenate([start, P.ravel(), np.zeros(_STATISTICS)])
+        self._state = np.concatenate([start, P.ravel(), np.zeros(n + n * n + _STATISTICS)])
         self._limit = float(np.trace(P))
         one, many = (_one3, _many3) if n == 3 else (_one, _many)
         self._one, self._many = one.compiled, many.compiled
-        # An impossible sample compiles both and leaves the state alone.
+        # An impossible sample compiles the update and leaves the state alone.
         self._one(self._state, np.full(n, np.nan), 0.0, self.forgetting, self._limit)
-        self._many(self._state, np.empty((0, n)), np.empty(0), self.forgetting, self._limit)
 
     def update(self, regressor: ArrayLike, force: float) -> None:
         """Takes one sample in: regressor of shape (n,), force a number.
@@ -94,13 +96,17 @@ class RecursiveLeastSquares:
         return self._state[self._n : self._n + self._n**2].reshape(self._n, self._n).copy()
 
     def estimate(self) -> Estimate:
-        """The estimate with the covariance that the residuals' own variance and correlation give it."""
-        weight, squares, products, last = (float(v) for v in self._state[-_STATISTICS:])
-        statistics = LeastSquaresState(Vec3(0.0, 0.0, 0.0), _EYE, weight, squares, products, last)
-        return Estimate(self.names, self.theta, self.covariance * statistics.noise, weight)
+        """The estimate with the covariance that the residuals' own size and correlation in time give it.
 
-
-_EYE = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
+        Measured over blocks of samples: noise that stays correlated for longer than a block of 100 makes it too
+        small.
+        """
+        n = self._n
+        weight, squares, products, _, blocks, _ = (float(v) for v in self._state[-_STATISTICS:])
+        noise = long_run_variance(weight, squares, products, float(n))
+        scores, spread = np.split(self._state[n + n * n : -_STATISTICS], [n])
+        covariance = long_run(self.covariance, noise, scores, spread.reshape(n, n), blocks)
+        return Estimate(self.names, self.theta, covariance, weight)
 
 
 def _check(theta: NDArray[np.float64], P: NDArray[np.float64], forgetting: float) -> None:
@@ -119,33 +125,64 @@ def _check(theta: NDArray[np.float64], P: NDArray[np.float64], forgetting: float
 
 @law
 def _count(state, keep, e):
-    """Brings the statistics behind the estimate up to date, in place."""
+    """Brings the statistics behind the estimate up to date, in place; whether a block of scores is full."""
     k = len(state) - _STATISTICS
     state[k] = keep * state[k] + 1.0
     state[k + 1] = keep * state[k + 1] + e * e
     state[k + 2] = keep * state[k + 2] + e * state[k + 3]
     state[k + 3] = e
+    state[k + 4] *= keep * keep
+    state[k + 5] += 1.0
+    full = state[k + 5] >= BLOCK
+    if full:
+        state[k + 4] += 1.0
+        state[k + 5] = 0.0
+    return full
+
+
+@law
+def _vector(state, k):
+    return Vec3(state[k], state[k + 1], state[k + 2])
+
+
+@law
+def _matrix(state, k):
+    return Mat3(_vector(state, k), _vector(state, k + 3), _vector(state, k + 6))
+
+
+@law
+def _put(state, k, v):
+    state[k], state[k + 1], state[k + 2] = v.x, v.y, v.z
+
+
+@law
+def _put_matrix(state, k, A):
+    _put(state, k, A.r1)
+    _put(state, k + 3, A.r2)
+    _put(state, k + 6, A.r3)
+
+
+@law
+def _fill(state, k, values):
+    for i in range(len(values)):
+        state[k + i] = values[i]
 
 
 @law
 def _absorb3(state, phi, y, forgetting, limit):
     """One sample of three regressors, by value: no array is made. False where it is not finite."""
-    p = Vec3(phi[0], phi[1], phi[2])
+    p = _vector(phi, 0)
     if not abs(p @ p + y) < _HUGE:
         return False
-    theta = Vec3(state[0], state[1], state[2])
-    P = Mat3(
-        Vec3(state[3], state[4], state[5]),
-        Vec3(state[6], state[7], state[8]),
-        Vec3(state[9], state[10], state[11]),
-    )
+    P = _matrix(state, 3)
     keep = bounded(forgetting, P, limit)
-    theta, P, e = rls(theta, P, p, y, keep)
-    state[0], state[1], state[2] = theta.x, theta.y, theta.z
-    state[3], state[4], state[5] = P.r1.x, P.r1.y, P.r1.z
-    state[6], state[7], state[8] = P.r2.x, P.r2.y, P.r2.z
-    state[9], state[10], state[11] = P.r3.x, P.r3.y, P.r3.z
-    _count(state, keep, e)
+    theta, P, e = rls(_vector(state, 0), P, p, y, keep)
+    _put(state, 0, theta)
+    _put_matrix(state, 3, P)
+    full = _count(state, keep, e)
+    scores, spread = gathered(_vector(state, 12), _matrix(state, 15), p, e, keep, full)
+    _put(state, 12, scores)
+    _put_matrix(state, 15, spread)
     return True
 
 
@@ -155,12 +192,17 @@ def _absorb(state, phi, y, forgetting, limit):
     if not abs(phi @ phi + y) < _HUGE:
         return False
     n = len(phi)
-    theta, P = state[:n], state[n : n + n * n].reshape(n, n)
+    known = n + n * n
+    P = state[n:known].reshape(n, n)
     keep = bounded(forgetting, P, limit)
-    new_theta, new_P, e = rls(theta, P, phi, y, keep)
-    theta[:] = new_theta
-    P[:, :] = new_P
-    _count(state, keep, e)
+    theta, P, e = rls(state[:n], P, phi, y, keep)
+    _fill(state, 0, theta)
+    _fill(state, n, P.ravel())
+    full = _count(state, keep, e)
+    scores, spread = state[known : known + n], state[known + n : 2 * known].reshape(n, n)
+    scores, spread = gathered(scores, spread, phi, e, keep, full)
+    _fill(state, known, scores)
+    _fill(state, known + n, spread.ravel())
     return True
 
 
