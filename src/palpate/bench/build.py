@@ -47,10 +47,11 @@ def build(experiment: Experiment) -> Bench:
     arm = Arm3(limits=Vec3(*e.robot.torque_limits), rotor=Vec3(*e.robot.rotor_inertia))
     q = _start(arm, e)
     rate, tick = float(e.run.rate), 1.0 / e.run.rate
+    force = _force_input(e)
     loop = Loop(
         plant=_plant(arm, e),
         encoder=Encoder(Vec3(*e.encoders.counts), q),
-        force=_force_input(e),
+        force=force,
         output=DigitalToAnalog(12, MOTOR_TORQUE),
         conditioning=Conditioning(
             arm, butterworth2(e.filters.motion, rate), butterworth2(e.filters.force, rate), tick
@@ -60,7 +61,7 @@ def build(experiment: Experiment) -> Bench:
         approach=ResolvedAcceleration(_all(e.approach.kp), _all(e.approach.kv)),
         controller=controller_of(e.controller, tick, e.wall.x),
         compensation=Coulomb(Vec3(*e.compensation.level), Vec3(*e.compensation.blend)),
-        estimators=_estimators(e, rate),
+        estimators=_estimators(e, rate, force.lag),
         tick=tick,
         steps=e.run.steps,
     )
@@ -121,7 +122,7 @@ def _schedule(e: Experiment) -> ForceSchedule:
     return ForceSchedule(*map(float, (f.first, second, f.period, f.amplitude, f.frequency, f.restart)))
 
 
-def _estimators(e: Experiment, rate: float) -> Estimators:
+def _estimators(e: Experiment, rate: float, lag: float) -> Estimators:
     i, s = e.identification, e.force_sensor
     P: Mat3 = diagonal(_all(i.covariance))
     forgetting = float(i.forgetting)
@@ -130,7 +131,7 @@ def _estimators(e: Experiment, rate: float) -> Estimators:
     front = Matched(
         sensor.second,
         sensor.first,
-        delay(1.5 / s.sampling, rate),  # one cycle of computing and half a cycle of holding
+        delay(lag - sensor.lag, rate),  # computing, holding, and what the filter's model at this rate lacks
         state_variable(i.cutoff, rate),
     )
     matched = LeastSquares(_all(0.0), P, forgetting)
