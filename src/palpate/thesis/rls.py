@@ -27,9 +27,10 @@ RELAXING = changed(load("foam-viscoelastic"), {"run.press": PRESS})
 RUBBER = changed(load("rubber-rls"), {"run.press": PRESS})
 FOAMS = {"plain foam": PLAIN, "relaxing foam": RELAXING}
 COLUMNS = (
-    "t force force_sampled force_measured displacement x x_measured vx_raw ax_raw ax_measured penetration "
-    "M_thesis B_thesis K_thesis M_raw B_raw K_raw M_matched B_matched K_matched"
-).split()
+    *("t", "force", "force_sampled", "force_measured", "displacement", "x", "x_measured"),
+    *("vx_raw", "ax_raw", "ax_measured", "penetration"),
+    *(f"{key}_{front}" for front in ("thesis", "raw", "matched") for key in "MBK"),
+)
 SWEPT_SEEDS = 3
 
 
@@ -160,6 +161,7 @@ class Found:
     settled_M: float  # [s]
     settled_B: float
     settled_K: float
+    true_B: float  # of the surface; of one that relaxes, its dashpot's [N s/m]
 
     @property
     def apart(self) -> float:
@@ -178,7 +180,8 @@ def found(record: Record) -> Found:
     values = {name: at(press, f"{name}_thesis", end) for name in "MBK"}
     raw = {f"{name}_raw": at(press, f"{name}_raw", end) for name in "MBK"}
     settled = {f"settled_{name}": settled_after(press[f"{name}_thesis"]) for name in "MBK"}
-    return Found(ratio(press), **values, **raw, **settled)
+    damping = float(record.meta["experiment"]["surface"]["damping"])
+    return Found(ratio(press), **values, **raw, **settled, true_B=damping)
 
 
 def swept(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[Found]]:

@@ -45,7 +45,9 @@ def six(axes: list[Axes], presses: Mapping[str, Record], front: str, slot: tuple
     The thesis' letters, in its order read down the columns: (a)-(c) left, (d)-(f) right.
     """
     left, right = axes[0:6:2], axes[1:6:2]
-    for axis, letter, name in zip(left, "abc", ("Force", "Displacement", "Force / displacement"), strict=True):
+    for axis, letter, name in zip(
+        left, "abc", ("Force", "Displacement", "Force / displacement"), strict=True
+    ):
         titled(axis, letter, name)
     for axis, letter, name in zip(right, "def", ("Inertia", "Damping", "Stiffness"), strict=True):
         titled(axis, letter, name)

@@ -35,7 +35,9 @@ BAND = 0.10
 class Data:
     shown: dict[str, Record]  # one press of each surface
     found: dict[str, list[Found]]  # over the seeds
-    started: dict[str, dict[tuple[str, str], Array]]  # time to settle of M, B, K by P(0), by K(0) and its shape
+    started: dict[
+        str, dict[tuple[str, str], Array]
+    ]  # time to settle of M, B, K by P(0), by K(0) and its shape
     varied: dict[str, list[Found]]  # of the first surface
 
 
@@ -120,7 +122,9 @@ def _held(data: Data, surface: str, key: str, limit: float) -> str:
         f"{_reach(times[:, column] <= limit)} with K(0) = {start} and {shape}"
         for (start, shape), times in data.started[surface].items()
     ]
-    return f"Of P(0), tried from p = 1e2 to 1e12, it holds for {'; '.join(parts)}. The verdict rests on 1e10 I."
+    return (
+        f"Of P(0), tried from p = 1e2 to 1e12, it holds for {'; '.join(parts)}. The verdict rests on 1e10 I."
+    )
 
 
 def _reach(good: NDArray[np.bool_]) -> str:
@@ -195,7 +199,9 @@ def _starts(axis: Axes, data: Data, limit: float) -> None:
                 color=rls_drawing.COLORS[name],
                 alpha=1.0 if plain else 0.4,
                 linewidth=1.1,
-                label=f"K(0) {start}{'' if plain else ', scaled'}" if name == next(iter(data.started)) else None,
+                label=f"K(0) {start}{'' if plain else ', scaled'}"
+                if name == next(iter(data.started))
+                else None,
             )
     axis.axhline(limit, color=style.RED, linewidth=0.9, linestyle=":")
     axis.set(xscale="log", yscale="log", xlabel="p in P(0); no dot: $K_e$ never right", ylabel="time [s]")
@@ -208,7 +214,8 @@ def _conditions(axis: Axes, data: Data, limit: float) -> None:
     colors = {"$K_e$": style.BLUE, "$B_e$": style.VIOLET, "$M_e$": style.GREY}
     groups = {
         f"${key}_e$": {
-            name: [getattr(f, f"settled_{key}") for f in some] for name, some in {**nominal, **data.varied}.items()
+            name: [getattr(f, f"settled_{key}") for f in some]
+            for name, some in {**nominal, **data.varied}.items()
         }
         for key in "KBM"
     }

@@ -1,0 +1,189 @@
+"""A later slot of an identification, where K_e and f/x can be compared, and the off-line ratios: figures 6.2, 6.5."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.bench import Experiment
+from palpate.records import Record
+from palpate.report import style
+from palpate.thesis import rls, rls_drawing
+from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.rls import Array, Found, median
+from palpate.thesis.runs import Runs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOVING = 0.5
+"""Seconds after the change-over in which the surface moves enough for B and M to be looked for."""
+LEAST_VELOCITY = 1e-4
+"""[m/s]; less is no encoder count in a tick but rounding."""
+LEAST_ACCELERATION = 0.05
+"""[m/s^2]; less is what the filter leaves of no motion."""
+QUANTILES = (10.0, 50.0, 90.0)
+
+
+@dataclass(frozen=True)
+class Data:
+    shown: dict[str, Record]  # one press of each surface
+    found: dict[str, list[Found]]  # over the seeds
+    varied: dict[str, dict[str, list[Found]]]  # of each surface
+    ratios: dict[
+        str, Array
+    ]  # of the first surface: quantiles of K, B, M from single samples, shape (seeds, 3)
+    truth: dict[str, float]  # M, B, K of the first surface
+
+
+def run(runs: Runs, surfaces: Mapping[str, Experiment]) -> Data:
+    """One press a seed on each surface, and conditions varied."""
+    first = next(iter(surfaces.values()))
+    each = runs.over_seeds(first, lambda record: by_ratios(rls.contact(record)))
+    surface = first.surface
+    return Data(
+        shown={name: rls.contact(runs.one(e)) for name, e in surfaces.items()},
+        found={name: runs.over_seeds(e, rls.found) for name, e in surfaces.items()},
+        varied={name: rls.swept(runs, rls.conditions(e)) for name, e in surfaces.items()},
+        ratios={key: np.array([one[key] for one in each]) for key in "KBM"},
+        truth={"M": surface.mass, "B": surface.damping, "K": surface.stiffness},
+    )
+
+
+def by_ratios(press: Record) -> dict[str, Array]:
+    """Quantiles of what single samples give, by the three ratios of sec. 5.1, each with what the one before found.
+
+    K = f/x where all rests; B = (f - K x)/v while the surface moves; M = (f - K x - B v)/a. A ratio needs its
+    denominator: samples in which the encoders show no motion are left out.
+    """
+    rest, moving = rls.between(press, *rls.SLOT), rls.between(press, 0.0, MOVING)
+    f, x = press["force_measured"], press["displacement"]
+    v, a = press["vx_raw"][moving], press["ax_measured"][moving]
+    stiffness = f[rest] / x[rest]
+    left = f[moving] - np.median(stiffness) * x[moving]
+    seen = np.abs(v) > LEAST_VELOCITY
+    damping = left[seen] / v[seen]
+    left = left - np.median(damping) * v
+    seen = np.abs(a) > LEAST_ACCELERATION
+    inertia = left[seen] / a[seen]
+    return {
+        key: np.percentile(values, QUANTILES)
+        for key, values in (("K", stiffness), ("B", damping), ("M", inertia))
+    }
+
+
+def found_claim(
+    data: Data,
+    what: tuple[str, str, str, str],
+    measure: Callable[[Found], float],
+    holds: Callable[[Found], bool],
+    unit: str,
+    tolerance: str,
+    why: str,
+) -> Claim:
+    """A row that holds if it does for most of the seeds on the first surface.
+
+    Args:
+        data: of the figure.
+        what: id, source, the claim in words, the thesis' value.
+        measure: the number to be printed.
+        holds: whether one press shows it.
+        unit: of the number.
+        tolerance: the threshold in words.
+        why: first part of the note.
+    """
+    (surface, nominal), *_ = data.found.items()
+    fails = rls.failing(data.varied[surface], holds)
+    measured = "; ".join(f"{n} {spread([measure(f) for f in some], unit)}" for n, some in data.found.items())
+    others = [n for n in data.found if n != surface]
+    there = "".join(_elsewhere(n, sum(map(holds, data.found[n])), len(data.found[n])) for n in others)
+    note = f"{why} {rls.told(fails, len(data.varied[surface]))}{there}"
+    verdict = decided(2 * sum(map(holds, nominal)) > len(nominal))
+    return Claim(
+        what[0], what[1], what[2], what[3], measured, f"{tolerance}; most seeds, {surface}", verdict, note
+    )
+
+
+def _elsewhere(name: str, good: int, among: int) -> str:
+    return f" On {name} it holds for {good} of {among} seeds."
+
+
+def ratio_claim(data: Data, id_: str) -> Claim:
+    """The ratios of sec. 5.1: is it difficult to obtain B and M with them?"""
+    low, _, high = (data.ratios["B"][:, i] / data.truth["B"] for i in range(3))
+    m_low, _, m_high = (data.ratios["M"][:, i] for i in range(3))
+    f_low, f_middle, f_high = (median(list(1e-3 * data.ratios["K"][:, i])) for i in range(3))
+    wide = median(list(high - low))
+    return Claim(
+        id=id_,
+        source="sec. 5.1",
+        claim="B_e and M_e are difficult to obtain from ratios of single samples: velocity and acceleration are noisy.",
+        thesis="in words",
+        measured=(
+            f"eight of ten samples of B between {median(list(low)):.2g} and {median(list(high)):.2g} times the true B; "
+            f"of M between {median(list(m_low)):.2g} and {median(list(m_high)):.2g} kg (true {data.truth['M']:g} kg)"
+        ),
+        tolerance="the middle eight tenths of the samples of B span more than the true B itself",
+        verdict=decided(wide > 1.0),
+        note=(
+            f"Of the ratios only f/x at rest is of use: eight of ten samples between {f_low:.3g} and {f_high:.3g} kN/m "
+            f"around {f_middle:.3g} kN/m. It is not the surface's K, which is {1e-3 * data.truth['K']:g} kN/m: the "
+            "displacement counts from the 5 N point while the force is total, so 20 N are divided by the way of 15 N. "
+            "The ratio for B inherits that offset and divides it by a velocity of a few encoder counts; the one for M "
+            "divides what is left by an acceleration that is noise as soon as the push is over."
+        ),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """The thesis' six panels in the later slot; under them K against f/x by condition, and the ratios."""
+    drawing, axes = rls_drawing.grid(4)
+    rls_drawing.six(axes, data.shown, "thesis", rls.SLOT)
+    axes[5].set_ylim(*axes[4].get_ylim())
+    for name, press in data.shown.items():
+        level = 1e-3 * rls.ratio(press)
+        axes[4].axhline(level, color=rls_drawing.COLORS[name], linewidth=0.9, linestyle="--")
+        axes[5].axhline(level, color=rls_drawing.COLORS[name], linewidth=0.9, linestyle="--")
+    for axis, key in ((axes[1], "M"), (axes[3], "B")):
+        curves = [press[f"{key}_thesis"][rls.between(press, *rls.SLOT)] for press in data.shown.values()]
+        rls_drawing.calm_limits(axis, np.zeros(1), *curves)
+        axis.axhline(0.0, color=style.GREY, linewidth=0.9)
+    _gaps(axes[6], data)
+    _ratios(axes[7], data)
+    return drawing
+
+
+def _gaps(axis: Axes, data: Data) -> None:
+    rls_drawing.titled(axis, "g", "$K_e$ against f/x, under varied conditions")
+    groups = {
+        name: {
+            condition: [100.0 * f.apart for f in some]
+            for condition, some in {"as chosen": data.found[name], **data.varied[name]}.items()
+        }
+        for name in data.found
+    }
+    rls_drawing.dots(axis, groups, rls_drawing.COLORS)
+    for limit in (-6.0, 6.0):
+        axis.axvline(limit, color=style.RED, linewidth=0.9, linestyle=":")
+    axis.set_xlabel("difference [%]; dotted: the thesis' 6 %")
+
+
+def _ratios(axis: Axes, data: Data) -> None:
+    surface = next(iter(data.found))
+    rls_drawing.titled(axis, "h", f"Ratios of single samples (bars: 8 of 10), {surface}")
+    for i, key in enumerate("KBM"):
+        low, middle, high = np.median(data.ratios[key], axis=0) / data.truth[key]
+        axis.plot([low, high], [i, i], color=style.GREY, linewidth=6, solid_capstyle="butt")
+        axis.plot(middle, i, "|", color=style.INK, markersize=13, label="ratios, middle" if i == 0 else None)
+        fit = median([getattr(f, key) for f in data.found[surface]]) / data.truth[key]
+        axis.plot(fit, i, "o", color=style.BLUE, label="least squares" if i == 0 else None)
+    axis.axvline(1.0, color=style.GREEN, linewidth=1.0, label="true")
+    axis.set_xscale("symlog", linthresh=2.0)
+    axis.set_yticks(range(3), ["K", "B", "M"])
+    axis.set_ylim(2.6, -0.6)
+    axis.set_xlabel("share of the true value")
+    axis.legend(fontsize=7, frameon=False, loc="upper left")
