@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate._vector import Vec3
+from palpate.bench.ending import DONE, INTERRUPTED, NO_CONTACT, Ending, Watchman
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT
 from palpate.bench.tick import Loop, LoopState, compiled_march, march, start_at
+from palpate.controllers.controller import controller
 from palpate.errors import InputError
 from palpate.records import Record
 
@@ -30,11 +32,16 @@ class Bench:
         loop: all its parts.
         q: joint angles at the start [rad].
         meta: what the record is to carry along.
+        losses: of contact after which a run ends; 0 lets it go on whatever happens, short of numbers that are none.
     """
 
     loop: Loop
     q: Vec3
     meta: dict[str, Any] = field(default_factory=dict)
+    losses: int = 0
+
+    def __post_init__(self) -> None:
+        controller(type(self.loop.controller))  # a user's own may have only start and step
 
     def run(
         self,
@@ -58,8 +65,8 @@ class Bench:
             waiting: called when the loop has to be compiled first, which takes some ten seconds, once.
 
         Returns:
-            One row a tick; ``meta["end"]`` says why the run ended: "done", "no contact", "diverged", or "interrupted"
-            by the keyboard, with the rows so far.
+            One row a tick; ``meta["end"]`` says why the run ended: "done", "no contact", "lost contact", "diverged",
+            or "interrupted" by the keyboard, with the rows so far; ``meta["why"]`` says when and what, in a sentence.
 
         Raises:
             InputError: a duration that is not positive.
@@ -68,11 +75,11 @@ class Bench:
         if not duration >= tick:
             raise InputError(f"duration must be at least one tick ({tick} s), got {duration}")
         total = round(duration / tick)
-        rows, end = _Run(self.loop, seed, compiled, waiting).rows(
+        rows, ending = _Run(self.loop, seed, compiled, waiting, Watchman(self.losses)).rows(
             start_at(self.loop, self.q), total, None if press is None else round(press / tick), progress
         )
         columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
-        return Record(columns, COLUMNS, {**self.meta, "seed": seed, "end": end})
+        return Record(columns, COLUMNS, {**self.meta, "seed": seed, "end": ending.end, "why": ending.why})
 
 
 @dataclass
@@ -81,24 +88,25 @@ class _Run:
     seed: int
     compiled: bool
     waiting: Callable[[], None] | None
+    watchman: Watchman
 
     def rows(
         self, state: LoopState, total: int, press: int | None, progress: Progress | None
-    ) -> tuple[NDArray[np.float64], str]:
+    ) -> tuple[NDArray[np.float64], Ending]:
         """The rows of a run and why it ended."""
         generator = np.random.default_rng(self.seed)
         chunks: list[NDArray[np.float64]] = []
-        done, first, stop, end = 0, None, total, ""
-        while done < stop and not end:
+        done, first, stop = 0, None, total
+        end: Ending | None = None
+        while done < stop and end is None:
             out = np.empty((min(CHUNK, stop - done), len(COLUMNS)))
             try:
                 state = self._march(state, done, generator.standard_normal(len(out)), out)
             except KeyboardInterrupt:
-                end = "interrupted"
+                end = Ending(INTERRUPTED, f"interrupted at {done * self.loop.tick:.3f} s")
                 break
-            finite = np.isfinite(out).all(axis=1)
-            if not finite.all():
-                end, out = "diverged", out[: int(np.argmin(finite))]
+            keep, end = self.watchman.judge(out, self.loop.controller.trouble(state.controller))
+            out = out[:keep]
             chunks.append(out)
             if first is None and (out[:, 1] == CONTACT).any():
                 first = done + int(np.argmax(out[:, 1] == CONTACT))
@@ -107,11 +115,28 @@ class _Run:
             if progress is not None:
                 progress(done * self.loop.tick, "approach" if first is None else "contact")
         rows = np.concatenate(chunks)[:stop] if chunks else np.empty((0, len(COLUMNS)))
-        return rows, end or ("no contact" if first is None else "done")
+        if end is None:
+            end = Ending(NO_CONTACT, "no surface was felt") if first is None else Ending(DONE, "as asked for")
+        return rows, end
 
     def _march(
         self, state: LoopState, k: int, noise: NDArray[np.float64], out: NDArray[np.float64]
     ) -> LoopState:
         if not self.compiled:
-            return march(self.loop, state, k, noise, out)
+            return _march_plain(self.loop, state, k, noise, out)
         return compiled_march.run(self.waiting, self.loop, state, k, noise, out)
+
+
+def _march_plain(
+    loop: Loop, state: LoopState, k: int, noise: NDArray[np.float64], out: NDArray[np.float64]
+) -> LoopState:
+    """As compiled also where numbers are none: plain Python raises there, after the row that has them."""
+    out[:] = np.nan
+    try:
+        with np.errstate(all="ignore"):
+            return march(loop, state, k, noise, out)
+    except (ArithmeticError, ValueError):
+        written = np.isfinite(out[:, 0])
+        if np.isfinite(out[written]).all():
+            raise
+        return state

@@ -66,7 +66,7 @@ def build(experiment: Experiment) -> Bench:
         steps=e.run.steps,
     )
     meta = {"experiment": msgspec.to_builtins(e), "truth": _truth(loop)}
-    return Bench(loop, q, meta)
+    return Bench(loop, q, meta, e.run.losses)
 
 
 def _all(value: float) -> Vec3:

@@ -21,6 +21,8 @@ class Run(Part):
     """Seconds of contact after which the run ends."""
     duration: Annotated[float, Meta(gt=0, le=3600)] = 60.0
     """Seconds after which it ends in any case."""
+    losses: Annotated[int, Meta(ge=0)] = 3
+    """Losses of contact after which it ends; 0 lets it go on."""
     rate: Annotated[int, Meta(ge=100, le=20000)] = 1000
     """Ticks a second."""
     steps: Annotated[int, Meta(ge=1, le=1000)] = 20

@@ -69,6 +69,12 @@ class AnyController(NamedTuple):
             return self.first.report(state[0])
         return self.second.report(state[1])
 
+    def trouble(self, state):
+        """What is wrong with the one that acts."""
+        if self.chosen == 1:
+            return self.first.trouble(state[0])
+        return self.second.trouble(state[1])
+
 
 def join(one: Any) -> Any:
     """The controller that behaves as this one and has the same type for every built-in one.

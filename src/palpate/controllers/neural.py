@@ -13,6 +13,8 @@ from palpate.errors import InputError
 from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, thesis_layers
 
 INPUTS, OUTPUTS = 9, 3
+STUCK = 1e-3
+"""1 - y^2 of a sigmoid y under which it counts as saturated: its weights then learn with 1e-6 of the rate at 0."""
 
 
 @part
@@ -79,6 +81,17 @@ class Neural(NamedTuple):
         net, memory = self.network, state.network
         last = len(net.sizes) - 1
         return state.command, Vec3(net.norm(memory, 1), net.norm(memory, last), net.gain(memory, 0))
+
+    def trouble(self, state):
+        """Whether the force output is so far saturated that its errors teach it nothing any more."""
+        net = self.network
+        share = net.output(state.network, 0) / net.amplitude[0]
+        if 1.0 - share * share >= STUCK:
+            return ""
+        return (
+            f"the network's force output is saturated at {net.amplitude[0]:g} N and learns no more; lower the learning "
+            f"rate, {net.learning_rate:g}"
+        )
 
 
 @law

@@ -74,7 +74,7 @@ class NeuralProbe:
         self._thresholds = 1.0 if thresholds else 0.0
         for layer in start:
             layer[:, 0] *= self._thresholds
-        self._net: Network = network(list(start), amplitude, learning_rate)
+        self._net: Network = network(start, amplitude, learning_rate)
         self.scale = _three(scale, "scale")
         self.values = _probe_values(_three(values, "values"))
         self.samples = 0

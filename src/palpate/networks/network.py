@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -90,7 +91,7 @@ def layers_of(sizes: NDArray[np.int64], weights: NDArray[np.float64]) -> tuple[N
     return tuple(views)
 
 
-def network(layers: list[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> Network:
+def network(layers: Sequence[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> Network:
     """A network from its layers' weights.
 
     Args:
@@ -110,7 +111,7 @@ def network(layers: list[ArrayLike], amplitude: ArrayLike, learning_rate: float)
     if scale.shape not in ((), (n_out,)):
         raise InputError(f"amplitude must be a number or have shape ({n_out},), got {scale.shape}")
     if not (np.isfinite(scale).all() and (scale > 0.0).all()):
-        raise InputError(f"amplitude must be above 0, got {amplitude}")
+        raise InputError(f"amplitude must be above 0, got {scale}")
     if not (np.isfinite(learning_rate) and learning_rate > 0.0):
         raise InputError(f"learning_rate must be above 0 and finite, got {learning_rate}")
     sizes = np.array([matrices[0].shape[1] - 1, *map(len, matrices)], dtype=np.int64)

@@ -36,7 +36,7 @@ class Perceptron:
     def of_layers(cls, layers: Sequence[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> Perceptron:
         """A network of any number of layers: each of shape (n, n_before + 1), the last the outputs'."""
         self = cls.__new__(cls)
-        self._set(list(layers), amplitude, learning_rate)
+        self._set(layers, amplitude, learning_rate)
         return self
 
     @classmethod
@@ -56,7 +56,7 @@ class Perceptron:
         """The 9-12-3 network of the thesis' controller, with the weights it starts from (App. E)."""
         return cls.of_layers(thesis_layers(), THESIS_AMPLITUDE, learning_rate)
 
-    def _set(self, layers: list[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> None:
+    def _set(self, layers: Sequence[ArrayLike], amplitude: ArrayLike, learning_rate: float) -> None:
         net = network(layers, amplitude, learning_rate)
         self.learning_rate = net.learning_rate
         self._sizes, self._amplitude = net.sizes, net.amplitude
