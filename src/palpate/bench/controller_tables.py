@@ -29,6 +29,8 @@ Size = Annotated[int, Meta(ge=1, le=1000)]
 
 
 class HybridController(Part, tag="hybrid", tag_field="kind"):
+    """Hybrid control with the robot's dynamics, the integral gain per sample as in the thesis."""
+
     kp: NotNegative = 400.0
     kv: NotNegative = 80.0
     kf: NotNegative = 1.0
@@ -176,17 +178,15 @@ def _(c: NeuralController, tick: float, wall: float) -> Neural:
 def _(c: ProportionalIntegralController, tick: float, wall: float) -> ProportionalIntegral:
     if c.ki is not None and c.bandwidth is not None:
         raise InputError("ki and bandwidth in [controller] say the same thing; leave one out")
-    if c.bandwidth is not None:
-        ki = integral_gain(c.bandwidth, c.kf)
-    else:
-        ki = 5.0 if c.ki is None else c.ki
+    wanted = 5.0 if c.ki is None else float(c.ki)
+    ki = wanted if c.bandwidth is None else integral_gain(c.bandwidth, c.kf)
     return ProportionalIntegral(alike(c.kp), alike(c.kv), alike(c.kf), alike(ki), tick)
 
 
 @made.register
 def _(c: RaibertCraigController, tick: float, wall: float) -> RaibertCraig:
-    gains = (_vector(g) for g in (c.stiffness, c.damping, c.integral))
-    return RaibertCraig(*gains, float(c.kf), float(c.ki), float(c.feed_forward), tick)
+    stiffness, damping, integral = _vector(c.stiffness), _vector(c.damping), _vector(c.integral)
+    return RaibertCraig(stiffness, damping, integral, float(c.kf), float(c.ki), float(c.feed_forward), tick)
 
 
 @made.register

@@ -1,4 +1,4 @@
-"""Force control whose gains a network tunes in the loop: the indirect scheme (thesis, fig. 2.5; Fukuda et al., 1990)."""
+"""Force control whose gains a network tunes in the loop: the indirect scheme (thesis, fig. 2.5; Fukuda et al.)."""
 
 from typing import NamedTuple
 

@@ -1,0 +1,246 @@
+"""A bench of one joint: a motor turns a lever that presses on a surface (thesis, sec. 2.2; Yabuta and Yamada)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from palpate._jit import kernel, law, part
+from palpate._vector import clip
+from palpate.bench.force_input import ForceInput, ForceInputState
+from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
+from palpate.environments.surface import Surface
+from palpate.environments.surface_state import SurfaceState, contact_force, impact, part_from, touch
+from palpate.errors import InputError
+from palpate.friction import LuGre
+from palpate.instruments import AnalogToDigital, analog_filter_190, force_sensor
+from palpate.records import Record
+from palpate.references import ForceSchedule
+from palpate.signals.filters import Biquad, BiquadState, butterworth2
+
+COLUMNS = {
+    "t": "s",
+    "angle": "rad",
+    "rate": "rad/s",
+    "penetration": "m",
+    "touching": "1",
+    "force": "N",  # true, during the step before
+    "force_sampled": "N",
+    "force_measured": "N",  # filtered: what the controller sees
+    "force_desired": "N",
+    "torque": "N m",  # as applied
+    "saturated": "1",
+    "friction": "N m",
+    "gain": "N m/N",  # integral gain of the controller, per sample
+}
+
+
+@part
+class JointState(NamedTuple):
+    q: float  # [rad]
+    qd: float  # [rad/s]
+    bristles: float  # of the friction [rad]
+    surface: SurfaceState
+
+
+@part
+class JointTouch(NamedTuple):
+    """What was felt during a step."""
+
+    force: float  # into the surface [N]
+    friction: float  # torque lost [N m]
+
+
+@part
+class Joint(NamedTuple):
+    """A lever that touches the surface at angle zero; small angles, so its tip moves by lever times angle.
+
+    Args:
+        inertia: about the joint [kg m^2].
+        lever: from the joint to the tip [m].
+        friction: of the joint, in numbers instead of vectors.
+        surface: that the tip presses.
+    """
+
+    inertia: float
+    lever: float
+    friction: LuGre
+    surface: Surface
+
+    def start(self):
+        """At rest, just not pressing."""
+        return JointState(0.0, 0.0, self.friction.start(), self.surface.start())
+
+    def advance(self, state, torque, dt):
+        """The state after dt [s] under constant torque [N m], and what was felt; semi-implicit Euler."""
+        tip_mass = self.inertia / (self.lever * self.lever)
+        friction, bristles = self.friction.step(state.bristles, state.qd, dt)
+        drive, surface, force = torque - friction, state.surface, 0.0
+        if surface.contact == 1.0:
+            elastic = self.surface.force(surface, self.lever * state.q, self.lever * state.qd)
+            force = contact_force(elastic, self.surface.mass, tip_mass, self.lever * drive / self.inertia)
+        qd = state.qd + dt * (drive - self.lever * max(force, 0.0)) / self.inertia
+        q = state.q + dt * qd
+        p, v = self.lever * q, self.lever * qd
+        if force < 0.0:
+            surface = part_from(surface)
+        if surface.contact == 1.0:
+            surface = self.surface.relax(surface, p, v, dt)
+        else:
+            surface = self.surface.free(surface, dt)
+            if p >= surface.deflection and v > surface.rate:
+                common, impulse = impact(tip_mass, self.surface.mass, v, surface.rate)
+                qd -= self.lever * impulse / self.inertia
+                force = impulse / dt
+                surface = touch(surface, common)
+        return JointState(q, qd, bristles, surface), JointTouch(max(force, 0.0), friction)
+
+
+@part
+class JointLoop(NamedTuple):
+    """Everything that a tick needs.
+
+    Args:
+        joint: the plant.
+        force: the force's way into the controller.
+        filter: of the sampled force.
+        schedule: desired force.
+        controller: ``step(state, desired, f) -> (torque, state)`` and ``gain(state)``.
+        limit: largest torque of the motor [N m].
+        tick: [s].
+        steps: of the plant between ticks.
+    """
+
+    joint: Joint
+    force: ForceInput
+    filter: Biquad
+    schedule: ForceSchedule
+    controller: Any
+    limit: float
+    tick: float
+    steps: int
+
+
+@part
+class JointLoopState(NamedTuple):
+    joint: JointState
+    felt: JointTouch
+    force: ForceInputState
+    filter: BiquadState
+    controller: Any
+
+
+@law
+def start_loop(loop):
+    """At rest, just not pressing."""
+    filtered = loop.filter.start_at(0.0)
+    return JointLoopState(
+        loop.joint.start(), JointTouch(0.0, 0.0), loop.force.start(), filtered, loop.controller.start()
+    )
+
+
+@law
+def tick(loop, state, k, noise, out):
+    """The k-th tick: the new state; its row is written into `out`. `noise`: one standard normal number."""
+    sampled = loop.force.sampled(state.force)
+    measured, filtered = loop.filter.step(state.filter, sampled)
+    desired = loop.schedule.force(k * loop.tick)
+    wanted, controller = loop.controller.step(state.controller, desired, measured)
+    torque = clip(wanted, loop.limit)
+    joint, felt = state.joint, state.felt
+    out[0], out[1], out[2], out[3] = k * loop.tick, joint.q, joint.qd, loop.joint.lever * joint.q
+    out[4], out[5], out[6], out[7], out[8] = joint.surface.contact, felt.force, sampled, measured, desired
+    out[9], out[10], out[11] = torque, 1.0 if abs(wanted) > loop.limit else 0.0, felt.friction
+    out[12] = loop.controller.gain(controller)
+    force, dt = state.force, loop.tick / loop.steps
+    for j in range(loop.steps):
+        joint, felt = loop.joint.advance(joint, torque, dt)
+        force = loop.force.advance(force, felt.force, k * loop.steps + j, noise)
+    return JointLoopState(joint, felt, force, filtered, controller)
+
+
+@law
+def march_joint(loop, state, noise, out):
+    """len(noise) ticks; row i of `out` is tick i."""
+    for i in range(len(noise)):
+        state = tick(loop, state, i, noise[i], out[i])
+    return state
+
+
+compiled_march = kernel(march_joint)
+
+
+@dataclass(frozen=True)
+class OneJoint:
+    """A bench of one joint, ready to run; `one_joint` makes it."""
+
+    loop: JointLoop
+
+    def run(self, duration: float, seed: int = 0, *, compiled: bool = True) -> Record:
+        """Runs from rest at the surface.
+
+        Args:
+            duration: [s].
+            seed: of the noise; the same seed gives the same record, bit for bit.
+            compiled: False runs the same code in plain Python.
+
+        Returns:
+            One row a tick; ``meta["end"]`` is "done", or "diverged" where numbers ceased to be finite.
+
+        Raises:
+            InputError: a duration that is not positive.
+        """
+        if not duration >= self.loop.tick:
+            raise InputError(f"duration must be at least one tick ({self.loop.tick} s), got {duration}")
+        noise = np.random.default_rng(seed).standard_normal(round(duration / self.loop.tick))
+        rows = np.empty((len(noise), len(COLUMNS)))
+        (compiled_march if compiled else march_joint)(self.loop, start_loop(self.loop), noise, rows)
+        finite = np.isfinite(rows).all(axis=1)
+        end = "done" if finite.all() else "diverged"
+        rows = rows if finite.all() else rows[: int(np.argmin(finite))]
+        columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
+        return Record(columns, COLUMNS, {"seed": seed, "end": end})
+
+
+#: Joint 2 of the thesis' arm: its friction, chosen as the bench's. [N m/rad], [N m s/rad], [N m], [rad/s]
+JOINT_FRICTION = LuGre(1250.0, 11.0, 0.0, 0.25, 0.3, 0.01)  # type: ignore[arg-type]
+
+
+def one_joint(
+    surface: KelvinVoigt | StandardLinearSolid | HuntCrossley,
+    controller: Any,
+    schedule: ForceSchedule,
+    *,
+    friction: LuGre = JOINT_FRICTION,
+    noise: float = 0.6,
+    inertia: float = 0.126,
+    lever: float = 0.113,
+    limit: float = 2.5,
+    rate: int = 1000,
+    steps: int = 20,
+) -> OneJoint:
+    """A bench of one joint, by default joint 2 of the thesis' arm: the one that presses where its experiments start.
+
+    Args:
+        surface: that it presses.
+        controller: `DirectNeural`, `DirectIntegral` or one of the user's own.
+        schedule: desired force.
+        friction: of the joint, in numbers.
+        noise: standard deviation of a force sample [N].
+        inertia: of link and rotor about the joint [kg m^2].
+        lever: [m].
+        limit: torque [N m].
+        rate: ticks a second.
+        steps: of the plant between ticks.
+    """
+    for name, value in (("inertia", inertia), ("lever", lever), ("limit", limit), ("rate", rate), ("steps", steps)):
+        if not value > 0:
+            raise InputError(f"{name} must be above 0, got {value}")
+    physics = rate * steps
+    sensor = force_sensor(noise=noise, rate=physics)
+    force = ForceInput(sensor, analog_filter_190(float(physics)), 0.0, AnalogToDigital(16, 200.0))
+    joint = Joint(float(inertia), float(lever), friction.checked(), join(surface))
+    smooth = butterworth2(120.0, float(rate))
+    return OneJoint(JointLoop(joint, force, smooth, schedule, controller, float(limit), 1.0 / rate, int(steps)))

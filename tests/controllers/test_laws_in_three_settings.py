@@ -1,0 +1,119 @@
+"""Every controller means the same on `Vec3`, compiled, and on arrays; and serves arms with joints to spare."""
+
+import numpy as np
+import pytest
+
+from palpate._jit import kernel
+from palpate._vector import Mat3, Vec3
+from palpate.controllers import (
+    DecoupledHybrid,
+    Hybrid,
+    Impedance,
+    ProportionalIntegral,
+    RaibertCraig,
+    ResolvedAcceleration,
+    SelfTuning,
+)
+from palpate.networks import network, random_layers
+from palpate.robots.arm3 import ArmModel
+from palpate.signals.types import Sense, Task
+
+NET = network(list(random_layers((3, 4, 3), 5, 0.5)), (0.25, 5.0, 0.004), 1e-3)
+MIDDLE, SCALE = Vec3(0.25, 5.0, 0.004), Vec3(10.0, 5.0, 100.0)
+#: From the shapes of a task direction's and of a joint's gain to a controller.
+MAKERS = {
+    "hybrid": lambda m, n: Hybrid(m(400.0), m(80.0), m(1.0), m(0.003)),
+    "resolved acceleration": lambda m, n: ResolvedAcceleration(m(400.0), m(80.0)),
+    "proportional-integral": lambda m, n: ProportionalIntegral(m(400.0), m(80.0), m(0.25), m(5.0), 0.001),
+    "raibert-craig": lambda m, n: RaibertCraig(n(50.0), n(10.0), n(3.0), 1.0, 3.0, 0.5, 0.001),
+    "decoupled": lambda m, n: DecoupledHybrid.corrected(m(400.0), m(80.0), m(3000.0), m(110.0), 5200.0),
+    "decoupled, printed": lambda m, n: DecoupledHybrid.printed(m(400.0), m(80.0), m(3000.0), 5200.0),
+    "impedance": lambda m, n: Impedance(m(5.0), m(600.0), m(2000.0), m(0.47)),
+    "self-tuning": lambda m, n: SelfTuning(m(400.0), m(80.0), MIDDLE, SCALE, 0.5, 0.01, 0.001, NET),
+}
+each = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
+
+
+def alike(value):
+    return Vec3(value, value, value)
+
+
+def inputs(m, n, seed):
+    """Random senses, a task and a model, as arrays: m directions, n joints."""
+    g = np.random.default_rng(seed)
+    root = g.normal(size=(n, n))
+    model = ArmModel(g.normal(size=(m, n)), g.normal(size=m), root @ root.T + n * np.eye(n), g.normal(size=n))
+    sense = Sense(g.normal(size=n), g.normal(size=n), g.normal(size=m), g.normal(size=m), g.normal(size=m))
+    s = np.zeros(m)
+    s[0] = 1.0
+    task = Task(g.normal(size=m), g.normal(size=m), g.normal(size=m), s * 20.0, s)
+    return sense, task, model
+
+
+def by_value(value):
+    """Arrays of three and of three by three as `Vec3` and `Mat3`, inside a NamedTuple."""
+    as_vector = [Vec3(*a) if a.ndim == 1 else Mat3(*(Vec3(*row) for row in a.tolist())) for a in value]
+    return type(value)(*(Vec3(*map(float, a)) if isinstance(a, Vec3) else a for a in as_vector))
+
+
+def walk(controller, sense, task, model, torques):
+    """Several ticks under the same senses: the torque of each."""
+    state = controller.start()
+    for k in range(len(torques)):
+        torque, state = controller.step(state, sense, task, model)
+        torques[k, 0], torques[k, 1], torques[k, 2] = torque.x, torque.y, torque.z
+
+
+compiled_walk = kernel(walk)
+
+
+def walk_on_arrays(controller, sense, task, model, ticks=5):
+    state, torques = controller.start(), []
+    for _ in range(ticks):
+        torque, state = controller.step(state, sense, task, model)
+        torques.append(torque)
+    return np.array(torques)
+
+
+@each
+def test_plain_and_compiled_are_the_same_to_the_last_bit(make):
+    controller = make(alike, alike)
+    values = [by_value(v) for v in inputs(3, 3, 1)]
+    plain, compiled = np.empty((5, 3)), np.empty((5, 3))
+    walk(controller, *values, plain)
+    compiled_walk(controller, *values, compiled)
+    assert np.array_equal(plain, compiled)
+
+
+@each
+@pytest.mark.parametrize("seed", range(3))
+def test_on_arrays_it_means_the_same(make, seed):
+    arrays = inputs(3, 3, seed)
+    values = [by_value(v) for v in arrays]
+    plain = np.empty((5, 3))
+    walk(make(alike, alike), *values, plain)
+    on_arrays = walk_on_arrays(make(lambda v: np.full(3, v), lambda v: np.full(3, v)), *arrays)
+    assert on_arrays == pytest.approx(plain, rel=1e-9)
+
+
+@each
+def test_an_arm_of_seven_joints_follows_a_task_of_six(make):
+    arrays = inputs(6, 7, 4)
+    torques = walk_on_arrays(make(lambda v: np.full(6, v), lambda v: np.full(7, v)), *arrays)
+    assert torques.shape == (5, 7)
+    assert np.isfinite(torques).all()
+
+
+@pytest.mark.parametrize("name", ["resolved acceleration", "decoupled", "impedance"])
+def test_seven_joints_accelerate_as_the_six_directions_were_told(name):
+    """These compensate all of the dynamics: what is left is J qdd + Jdot qd = u."""
+    sense, task, model = inputs(6, 7, 6)
+    (torque,) = walk_on_arrays(MAKERS[name](lambda v: np.full(6, v), lambda v: np.full(7, v)), sense, task, model, 1)
+    outside = 0.0 if name == "resolved acceleration" else sense.f
+    qdd = np.linalg.solve(model.M, torque - model.h - model.J.T @ (outside + np.zeros(6)))
+    xdd = model.J @ qdd + model.Jdqd
+    free = task.xdd + 80.0 * (task.xd - sense.xd) + 400.0 * (task.x - sense.x)
+    if name == "impedance":
+        free = task.xdd + (600.0 * (task.xd - sense.xd) + 2000.0 * (task.x - sense.x) - sense.f) / 5.0
+    first = 0 if name == "resolved acceleration" else 1  # in direction 0 the force is controlled
+    assert xdd[first:] == pytest.approx(free[first:])
