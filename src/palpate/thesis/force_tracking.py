@@ -1,0 +1,235 @@
+"""What the figures of force control share: their experiments, when a force is said to follow, and what is varied."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.bench import Experiment, changed, load
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.records import Record
+from palpate.thesis.claims import spread
+from palpate.thesis.runs import Runs
+
+SETTLE = 0.5
+"""Seconds after a step of the desired force that are not judged [s]."""
+LIMIT = 1.5
+"""Largest RMS error of a force that follows [N]: 10 % of 15 N, which is what is asked for on average."""
+SHARE = 0.10
+"""Largest mean error in the last second of an interval, as a share of the desired force there."""
+ENOUGH = 0.9
+"""Share of the seeds that a claim has to hold for."""
+FOLLOWS = (
+    f"in 9 of 10 runs: no loss of contact; RMS of the true force's error at most {LIMIT:g} N (10 % of the mean desired "
+    f"force) outside the first {SETTLE:g} s after each step; mean error in the last second of each interval at most "
+    f"{SHARE:.0%} of the desired force"
+)
+VARIED_SEEDS = 5
+"""Runs of each variation; the nominal case has all seeds."""
+
+Array = NDArray[np.float64]
+
+SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.463, "approach.hold": 0.5}
+"""The last three millimetres of the approach: the rest of it takes ten seconds and changes nothing in contact."""
+SINE = {"force.amplitude": 4.0, "force.frequency": 0.5, "force.restart": 5.0}
+"""4 sin(pi t), its clock started anew every 5 s as the listing does; that turns the sine's sign each time."""
+RELAXING_FOAM = {
+    "surface": {
+        "kind": "standard-linear-solid",
+        "stiffness": 5600.0,
+        "damping": 13.0,
+        "mass": 0.02,
+        "branch_stiffness": 6900.0,
+        "branch_time": 0.23,
+    }
+}
+FOAM = changed(load("foam-neural"), SHORT)
+RUBBER = changed(load("rubber-neural"), SHORT)
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How the true force kept to the desired one within a window."""
+
+    rms: float  # of the error, steps included [N]
+    settled: float  # of the error outside the first half second after each step [N]
+    off: float  # largest mean error in the last second of an interval, as a share of the desired force
+    saturated: float  # share of the time that motor 2 is at its limit
+    lost: int  # how often contact was lost, from the start on
+
+    @property
+    def follows(self) -> bool:
+        """Whether all that `FOLLOWS` asks for holds."""
+        return self.lost == 0 and self.settled <= LIMIT and self.off <= SHARE
+
+
+NEVER = Tracking(np.nan, np.nan, np.nan, np.nan, 0)
+
+
+def since_contact(record: Record) -> Array:
+    """Time since the first contact [s], shape (n,); negative before."""
+    pressing = record["phase"] == CONTACT
+    return record["t"] - record["t"][np.argmax(pressing)]
+
+
+def losses(record: Record) -> int:
+    """How often contact was lost."""
+    phase = record["phase"]
+    return int(np.sum((phase[1:] == LOST) & (phase[:-1] == CONTACT)))
+
+
+def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
+    """Measures a record from `start` to `end` after contact [s]."""
+
+    def measure(record: Record) -> Tracking:
+        pressing = record["phase"] == CONTACT
+        if not pressing.any():
+            return NEVER
+        t = since_contact(record)
+        inside = pressing & (t >= start - 5e-7) & (t < end - 5e-7)
+        if not inside.any():
+            return Tracking(np.nan, np.nan, np.nan, np.nan, losses(record))
+        period = record.meta["experiment"]["force"]["period"]
+        t, desired, force = t[inside], record["force_desired"][inside], record["force"][inside]
+        interval = np.floor((t + 5e-7) / period)
+        late = t - period * interval
+        error = force - desired
+        settled = late >= SETTLE
+        ends = [(interval == i) & (late >= period - 1.0) for i in np.unique(interval)]
+        off = [abs(error[e].mean()) / desired[e].mean() for e in ends if e.any()]
+        return Tracking(
+            rms(error), rms(error[settled]), float(max(off)), float(record["saturated2"][inside].mean()), losses(record)
+        )
+
+    return measure
+
+
+def rms(error: Array) -> float:
+    """Root of the mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
+
+
+def following(found: Sequence[Tracking]) -> bool:
+    """Whether enough runs follow."""
+    return sum(f.follows for f in found) >= ENOUGH * len(found)
+
+
+def told(found: Sequence[Tracking]) -> str:
+    """The measured column of a claim."""
+    worst = spread([100 * f.off for f in found], "%", 2)
+    text = f"RMS {spread([f.settled for f in found], 'N')} outside the steps, interval ends off by {worst}"
+    lost = sum(f.lost > 0 for f in found)
+    return f"{text}; {sum(f.follows for f in found)} of {len(found)} runs follow" + (
+        f", {lost} lost contact" if lost else ""
+    )
+
+
+@dataclass(frozen=True)
+class Slot:
+    """What a figure draws: time since contact and signals."""
+
+    t: Array
+    desired: Array
+    measured: Array
+    true: Array
+    limited: Array  # 1 where a motor is at its limit
+    y: Array  # measured [m]
+    phi: Array  # measured [rad]
+
+
+def slot(record: Record, start: float, end: float) -> Slot:
+    """The signals of a record from `start` to `end` after contact [s]."""
+    t = since_contact(record)
+    shown = (t >= start) & (t < end)
+    limited = np.maximum.reduce([record[f"saturated{i}"] for i in (1, 2, 3)])
+    names = ("force_desired", "force_measured", "force")
+    desired, measured, true = (record[n][shown] for n in names)
+    return Slot(
+        t[shown], desired, measured, true, limited[shown], record["y_measured"][shown], record["phi_measured"][shown]
+    )
+
+
+def moved(experiment: Experiment, x: float) -> Mapping[str, Any]:
+    """Changes that bring start, approach and wall together to a wall at x [m]."""
+    by = x - experiment.wall.x
+    start = experiment.robot.start
+    return {
+        "wall.x": x,
+        "robot.start": (start[0] + by, *start[1:]),
+        "approach.first": experiment.approach.first + by,
+    }
+
+
+def rougher(experiment: Experiment, factor: float) -> Mapping[str, Any]:
+    """Changes that multiply the joints' friction."""
+    f = experiment.friction
+    names = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
+    return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names}
+
+
+def variations(experiment: Experiment, seed: int) -> dict[str, Experiment]:
+    """The experiment under other friction, at other poses, on the other foam, from other weights, and as the listing has it."""
+    e = experiment
+    by: dict[str, Mapping[str, Any]] = {
+        "friction\nhalf": rougher(e, 0.5),
+        "friction\ndouble": rougher(e, 2.0),
+        "wall at\n0.40 m": moved(e, 0.40),
+        "wall at\n0.49 m": moved(e, 0.49),
+    }
+    if e.surface == FOAM.surface:
+        by["relaxing\nfoam"] = RELAXING_FOAM
+    if e.controller.__class__ is FOAM.controller.__class__:
+        by["random\nweights"] = {"controller.weights": "random", "controller.weights_seed": seed}
+        by["rate of\nthe listing"] = {"controller.learning_rate": 1e-4}
+    if e.force.restart > 0.0:
+        by["clock\nruns on"] = {"force.restart": 0.0}
+    return {name: changed(e, changes) for name, changes in by.items()}
+
+
+def robustness(
+    runs: Runs, experiment: Experiment, nominal: Sequence[Tracking], measure: Callable[[Record], Tracking]
+) -> dict[str, list[Tracking]]:
+    """`measure` of each variation, the nominal case first."""
+    seeds = runs.seeds[:VARIED_SEEDS]
+    cases = [(name, e, seed) for seed in seeds for name, e in variations(experiment, seed).items()]
+    measured = runs.over([(e, seed) for _, e, seed in cases], measure)
+    found: dict[str, list[Tracking]] = {"as\nchosen": list(nominal)}
+    for (name, _, _), one in zip(cases, measured, strict=True):
+        found.setdefault(name, []).append(one)
+    return found
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What the figure of a force that is to be followed is made of."""
+
+    shown: Slot
+    nominal: list[Tracking]
+    varied: dict[str, list[Tracking]]
+
+
+def tracked(runs: Runs, experiment: Experiment, shown: tuple[float, float], judged: tuple[float, float]) -> Tracked:
+    """Runs an experiment over the seeds and under its variations.
+
+    Args:
+        runs: of how many seeds.
+        experiment: long enough for both windows.
+        shown, judged: from when to when after contact the force is drawn, and is measured [s].
+    """
+    measure = tracking(*judged)
+    nominal = runs.over_seeds(experiment, measure)
+    return Tracked(slot(runs.one(experiment), *shown), nominal, robustness(runs, experiment, nominal, measure))
+
+
+def stops_holding(found: Mapping[str, Sequence[Tracking]], holds: Callable[[Tracking], bool]) -> str:
+    """A sentence: under which variations a conclusion holds in fewer than all runs."""
+    names = [(name.replace("\n", " "), sum(map(holds, f)), len(f)) for name, f in found.items()]
+    broken = [f"{name} ({good} of {total} runs)" for name, good, total in names if good < ENOUGH * total]
+    kept = [name for name, good, total in names if good >= ENOUGH * total]
+    if not broken:
+        return f"It holds under every variation tried: {', '.join(kept)}."
+    return f"It stops holding with: {', '.join(broken)}" + (f"; it holds with: {', '.join(kept)}." if kept else ".")

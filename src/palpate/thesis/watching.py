@@ -1,0 +1,70 @@
+"""A long run of the neural controller, with its network's weights looked at once a second; a record keeps only sums of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.bench import Experiment, build
+from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.bench.tick import compiled_march, start_at
+from palpate.controllers.neural import NeuralState
+
+LOOK = 1000
+"""Ticks between two looks."""
+COLUMN = {name: i for i, name in enumerate(COLUMNS)}
+
+
+@dataclass(frozen=True)
+class Look:
+    """The controller at a moment, and what went on since the look before."""
+
+    t: float  # since contact [s]
+    rows: NDArray[np.float64]  # of the ticks since the look before, in contact, shape (n, columns)
+    neural: NeuralState | None  # None of any other controller
+
+
+def watch(
+    experiment: Experiment,
+    seed: int,
+    duration: float,
+    look: Callable[[Look], None],
+    waiting: Callable[[], None] | None = None,
+) -> float | None:
+    """Runs like `Bench.run`, from the same random numbers, but keeps nothing and ends when contact is lost.
+
+    Args:
+        experiment: any; `look` is called in contact.
+        seed: of the noise.
+        duration: of contact [s].
+        look: called once a second of contact; must copy what it keeps of the weights.
+        waiting: called when the loop has to be compiled first.
+
+    Returns:
+        When contact was lost, since it was made [s]; None if it was not, NaN if it was never made.
+    """
+    bench = build(experiment)
+    loop, state = bench.loop, start_at(bench.loop, bench.q)
+    generator = np.random.default_rng(seed)
+    begun, k = None, 0
+    rows = np.empty((LOOK, len(COLUMNS)))
+    phase = rows[:, COLUMN["phase"]]
+    while k * loop.tick < experiment.run.duration + duration:
+        state = compiled_march.run(waiting, loop, state, k, generator.standard_normal(LOOK), rows)
+        if begun is None and (phase == CONTACT).any():
+            begun = k + int(np.argmax(phase == CONTACT))
+        k += LOOK
+        if begun is None:
+            continue
+        gone = (phase == LOST) | ~np.isfinite(rows).all(axis=1)
+        if gone.any():
+            return (k - LOOK + int(np.argmax(gone)) - begun) * loop.tick
+        neural = state.controller[0] if isinstance(state.controller, tuple) else None
+        look(Look((k - begun) * loop.tick, rows[phase == CONTACT], neural if type(neural) is NeuralState else None))
+        if (k - begun) * loop.tick >= duration:
+            return None
+    return None if begun is not None else float("nan")
