@@ -25,6 +25,11 @@ FOAM = rls.nearer(changed(load("foam-rls"), {"run.press": PRESS, "surface.stiffn
 RUBBER = rls.nearer(changed(load("rubber-rls"), {"run.press": PRESS, "surface.stiffness": 48500.0}))
 """A rubber of its own: f/x is 62 kN/m in this run of the thesis and 44 in the one for least squares."""
 RELAXING = rls.nearer(changed(load("foam-viscoelastic"), {"run.press": PRESS}))
+STIFFENING = {
+    "foam": {"kind": "hunt-crossley", "stiffness": 5.6e5, "damping": 1e7, "exponent": 2.0, "mass": 0.1},
+    "rubber": {"kind": "hunt-crossley", "stiffness": 4.8e7, "damping": 1.9e9, "exponent": 2.0, "mass": 0.05},
+}
+"""Surfaces whose force grows with the square of the depth: from 5 to 20 N over the same way as the linear ones."""
 
 STARTS = tuple(range(10))
 """Seeds of the weights at the start; all are tried on the press of every noise seed."""
@@ -54,6 +59,11 @@ class Press:
     force: Array
     ratio: float
     squares: Array
+
+    @property
+    def rest(self) -> float:
+        """Mean displacement at the end [m]."""
+        return float(self.inputs[-round(LATE / TICK) :, 0].mean())
 
 
 def press_of(record: Record, surface: str) -> Press:
@@ -118,6 +128,9 @@ class Answer:
     settled_B: float
     settled_M: float
     error_gone: float  # from when on the mean error of the output is within GONE [s]; infinite: never
+    at_zero: float  # what the network says where nothing is pressed and nothing moves [N]
+    tangent: float  # slope of its force at the displacement that it rests at [N/m]
+    outside: bool  # whether the probe was warned of
 
     @property
     def over(self) -> float:
@@ -127,12 +140,28 @@ class Answer:
 
 def answer(press: Press, choice: Choice, start: int) -> Answer:
     """Lets one network learn from one press."""
-    _, answers = learned(press, choice, start)
-    K, B, M = answers[-round(LATE / TICK) :, :3].mean(axis=0)
+    probe, answers = learned(press, choice, start)
+    K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
     settled = [rls.settled_after(answers[:, i], end=len(answers) * TICK) for i in range(3)]
+    asked = probe.probe()
     return Answer(
-        float(K), float(B), float(M), press.ratio, float(press.squares[-1, 1]), *settled, error_gone(answers[:, 3])
+        K,
+        B,
+        M,
+        press.ratio,
+        float(press.squares[-1, 1]),
+        *settled,
+        error_gone(answers[:, 3]),
+        asked.force_at_zero,
+        tangent(probe, press.rest),
+        bool(asked.warnings),
     )
+
+
+def tangent(probe: NeuralProbe, x: float, share: float = 0.02) -> float:
+    """Slope of the network's force over displacement at x, by central difference [N/m]."""
+    d = share * x
+    return (probe.force((x + d, 0.0, 0.0)) - probe.force((x - d, 0.0, 0.0))) / (2.0 * d)
 
 
 def learned(press: Press, choice: Choice, start: int) -> tuple[NeuralProbe, Array]:
@@ -166,11 +195,16 @@ def swept(runs: Runs, some: Sequence[Press], choices: Sequence[Choice] = tuple(S
 
 
 def conditions(experiment: Experiment) -> dict[str, Experiment]:
-    """What else the thesis does not give, one at a time: friction, pose, the surface's B and M; memory, of foam."""
+    """What else the thesis does not give, one at a time: friction, pose, and the surface's B, M and law."""
     cases = dict(rls.conditions(experiment))
-    if experiment.surface == FOAM.surface:
-        cases["relaxing foam"] = RELAXING
+    cases["stiffening"] = changed(experiment, {"surface": STIFFENING[_kind(experiment)]})
+    if _kind(experiment) == "foam":
+        cases["relaxing"] = RELAXING
     return cases
+
+
+def _kind(experiment: Experiment) -> str:
+    return "foam" if experiment.surface == FOAM.surface else "rubber"
 
 
 def varied(runs: Runs, experiment: Experiment, surface: str) -> dict[str, list[Answer]]:

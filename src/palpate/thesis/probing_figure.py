@@ -1,0 +1,161 @@
+"""The figures of the neural identifier on one surface, 6.7 and 6.9: the thesis' six panels, and where its claims hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.bench import Experiment
+from palpate.identifiers.neural_settings import SETTINGS
+from palpate.records import Record
+from palpate.report import style
+from palpate.thesis import probing, rls_drawing
+from palpate.thesis.probing import AMPLITUDES, STARTS, WEIGHTS, Answer, Choice, Press
+from palpate.thesis.probing_claims import Grounds, Part, share
+from palpate.thesis.rls import Array
+from palpate.thesis.runs import Runs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SHOWN_STARTS = 5
+NAMES = {"foam": "plain foam", "rubber": "rubber"}
+
+
+@dataclass(frozen=True)
+class Data:
+    press: Press  # that of the first noise seed
+    curves: list[Array]  # K, B, M and error of a few starts on it
+    grounds: Grounds
+
+
+def run(runs: Runs, experiment: Experiment, surface: str) -> Data:
+    """One press a noise seed, all starts on each; then the network and the conditions varied."""
+    some = probing.presses(runs, experiment, surface)
+    return Data(
+        some[0],
+        [probing.learned(some[0], Choice(), start)[1] for start in STARTS[:SHOWN_STARTS]],
+        grounds(runs, experiment, surface, some),
+    )
+
+
+def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[Press]) -> Grounds:
+    """What claims about a surface are decided from."""
+    x = SETTINGS[surface].values[0]
+    at_probe = experiment.approach.switch + experiment.surface.stiffness * x
+    return Grounds(
+        surface,
+        probing.answers(runs, some, Choice()),
+        probing.swept(runs, some),
+        probing.varied(runs, experiment, surface),
+        at_probe / x / float(np.median([press.ratio for press in some])),
+        len(STARTS),
+    )
+
+
+def plot(data: Data, parts: Sequence[Part], thesis: tuple[float, float]) -> Figure:
+    """Six panels as in the thesis; (g), (h) where in the sweep each part holds; (i) under conditions; (j) all answers.
+
+    Args:
+        data: of `run`.
+        parts: of the claim.
+        thesis: K over f/x and M that the thesis has, for (j); M as its word "small".
+    """
+    drawing, axes = rls_drawing.grid(5)
+    name = NAMES[data.grounds.surface]
+    rls_drawing.six(axes[:6], {name: _record(data)}, "probe", (0.0, probing.PRESS))
+    _others(axes[1:6:2], data, rls_drawing.COLORS[name])
+    for axis, thresholds, letter in zip(axes[6:8], (True, False), "gh", strict=True):
+        _map(axis, data.grounds.swept, parts, thresholds=thresholds)
+        kind = "thresholds that learn" if thresholds else "thresholds fixed at zero"
+        rls_drawing.titled(axis, letter, f"Share of runs in which each part holds: {kind}")
+    _conditions(axes[8], data.grounds, parts)
+    rls_drawing.titled(axes[8], "i", "The same as chosen, under varied conditions")
+    _cloud(axes[9], data.grounds, thesis)
+    rls_drawing.titled(axes[9], "j", "All answers: $M_e$ over $K_e$")
+    return drawing
+
+
+def _record(data: Data) -> Record:
+    K, B, M, _ = data.curves[0].T
+    press = data.press
+    columns = {
+        "t": np.arange(len(press.force)) * probing.TICK,
+        "displacement": press.inputs[:, 0].copy(),
+        "force_measured": press.force,
+        "M_probe": M.copy(),
+        "B_probe": B.copy(),
+        "K_probe": K.copy(),
+    }
+    units = {"t": "s", "displacement": "m", "force_measured": "N"}
+    return Record(columns, {**units, "M_probe": "kg", "B_probe": "N s/m", "K_probe": "N/m"}, {})
+
+
+def _others(axes: list[Axes], data: Data, color: str) -> None:
+    """Other starts, and least squares, into the panels of M, B and K."""
+    t = np.arange(len(data.press.force)) * probing.TICK
+    for axis, key, (_, scale) in zip(axes, "MBK", rls_drawing.PARAMETERS.values(), strict=True):
+        column = "KBM".index(key)
+        curves = [scale * curve[:, column] for curve in data.curves]
+        for other in curves[1:]:
+            axis.plot(t, other, color=color, linewidth=0.8, alpha=0.35)
+        squares = scale * data.press.squares[:, "MBK".index(key)]
+        axis.plot(t, squares, color=style.GREY, linewidth=1.0, linestyle="--")
+        rls_drawing.calm_limits(axis, *(c[30:] for c in curves), squares[200:], margin=0.1)
+    axes[2].plot(t, 1e-3 * np.full(len(t), data.press.ratio), color=style.ORANGE, linewidth=1.0, linestyle=":")
+    lines = ("network, five starts", "", "", "", "", "least squares", "f/x at the end")
+    handles = [line for line, label in zip(axes[2].lines, lines, strict=True) if label]
+    axes[2].legend(handles, [label for label in lines if label], fontsize=7, frameon=False, ncols=3, loc="lower right")
+
+
+def _map(axis: Axes, swept: Mapping[Choice, Sequence[Answer]], parts: Sequence[Part], *, thresholds: bool) -> None:
+    shares = np.array(
+        [
+            [share(swept[Choice(a, w, thresholds)], part) for a in AMPLITUDES for w in WEIGHTS]
+            for part in parts
+        ]
+    )
+    _shares(axis, shares, [part.suffix for part in parts])
+    n = len(WEIGHTS)
+    for i in range(1, len(AMPLITUDES)):
+        axis.axvline(i * n - 0.5, color=style.INK, linewidth=0.6)
+    middles = [i * n + (n - 1) / 2 for i in range(len(AMPLITUDES))]
+    axis.set_xticks(middles, [f"{a:g}" for a in AMPLITUDES])
+    axis.set_xlabel(f"output amplitude [N]; within each, weights {WEIGHTS[0]:g} to {WEIGHTS[-1]:g}", fontsize=8)
+
+
+def _conditions(axis: Axes, grounds: Grounds, parts: Sequence[Part]) -> None:
+    cases = {"as chosen": grounds.nominal, **grounds.varied}
+    shares = np.array([[share(some, part) for some in cases.values()] for part in parts])
+    _shares(axis, shares, [part.suffix for part in parts])
+    axis.set_xticks(range(len(cases)), list(cases), rotation=38, ha="right", fontsize=7)
+
+
+def _shares(axis: Axes, shares: Array, rows: Sequence[str]) -> None:
+    """Shares from 0 to 1 as shades; a dot where a claim holds."""
+    axis.imshow(shares, aspect="auto", cmap="Greens", vmin=0.0, vmax=1.2, interpolation="nearest")
+    row, column = np.nonzero(shares >= 0.9)
+    axis.plot(column, row, ".", color=style.INK, markersize=4)
+    axis.set_yticks(range(len(rows)), rows, fontsize=8)
+    axis.grid(visible=False)
+    axis.tick_params(length=0)
+
+
+def _cloud(axis: Axes, grounds: Grounds, thesis: tuple[float, float]) -> None:
+    fixed = [a for choice, some in grounds.swept.items() if not choice.thresholds for a in some]
+    learning = [a for choice, some in grounds.swept.items() if choice.thresholds for a in some]
+    for some, color, label in (
+        (learning, style.BLUE, "thresholds learn, swept"),
+        (fixed, style.ORANGE, "fixed, swept"),
+        (grounds.nominal, style.INK, "as chosen"),
+    ):
+        axis.plot([a.over for a in some], [a.M for a in some], ".", color=color, markersize=3, label=label, alpha=0.7)
+    axis.axvline(grounds.perfect, color=style.GREY, linewidth=0.9, linestyle="--")
+    axis.plot(*thesis, "*", color=style.RED, markersize=11, label="the thesis")
+    axis.set(xlim=(0.5, 2.5), xlabel="$K_e$ over f/x (dashed: a network without error)", ylabel="$M_e$ [kg]")
+    axis.set_yscale("symlog", linthresh=0.1)
+    axis.legend(fontsize=7, frameon=False, ncols=2, loc="lower left")
