@@ -194,6 +194,7 @@ def _signs(axis: Axes, data: Data) -> None:
     axis.axhline(0.0, color=style.GREY, linewidth=0.9)
     axis.axvline(0.0, color=style.GREY, linewidth=0.9)
     axis.set_xscale("symlog", linthresh=50.0)
+    axis.set_xticks([-100.0, 0.0, 100.0, 1000.0], ["-100", "0", "100", "1000"])
     (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()
     left = min(left, -60.0)
     axis.fill_between([left, 0.0], bottom, 0.0, color=style.RED, alpha=0.10, linewidth=0.0)

@@ -1,0 +1,197 @@
+"""Figure 4.2: the force through the switch from position to hybrid control."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.bench import changed, load
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.records import Record
+from palpate.report import style
+from palpate.thesis import rls
+from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.rls_drawing import titled
+from palpate.thesis.runs import Runs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+NUMBER = "4.2"
+TITLE = "From position control to hybrid control"
+CAPTION = (
+    "(a) Measured force around the moment at which it reaches 5 N and hybrid control takes over from position control, "
+    "with 20 N asked for. (b) Share of runs whose controller was switched in the air by noise, and true force at the "
+    "switch, by threshold; the thesis chose 5 N because of the noise, its listing has 0.8 N."
+)
+PARAMETERS = {
+    "foam": changed(load("foam-hybrid"), {"run.press": 4.0}),
+    "rubber": changed(load("rubber-hybrid"), {"run.press": 4.0}),
+}
+THRESHOLDS = (0.8, 1.2, 1.6, 2.0, 3.0, 5.0)
+CHOSEN = 5.0
+DESIRED, NEAR, OVERSHOOT = 20.0, 1.0, 0.25
+BEFORE, AFTER = 0.6, 1.5
+
+
+@dataclass(frozen=True)
+class Switch:
+    """What happened at the change-over of one run."""
+
+    true_force: float  # at the change-over [N]
+    lost: bool  # whether the contact was lost afterwards
+    last: float  # mean force of the last second [N]
+    most: float  # largest force [N]
+
+    @property
+    def clean(self) -> bool:
+        """Contact kept, no large overshoot, and the desired force reached."""
+        reached = abs(self.last - DESIRED) <= NEAR and self.most <= (1.0 + OVERSHOOT) * DESIRED
+        return self.true_force > 0.0 and not self.lost and reached
+
+
+@dataclass(frozen=True)
+class Data:
+    shown: dict[str, tuple[Array, Array]]  # time from the switch [s], measured force [N]
+    switches: dict[str, list[Switch]]  # at 5 N, over the seeds
+    by_threshold: dict[float, list[Switch]]  # on foam
+    varied: dict[str, list[Switch]]  # on foam
+
+
+def run(runs: Runs) -> Data:
+    """One run a seed on each surface; thresholds and conditions varied on foam."""
+    few = list(runs.seeds)[: rls.SWEPT_SEEDS]
+    foam = rls.nearer(PARAMETERS["foam"])
+    thresholds = {
+        f: changed(foam, {"approach.switch": f, "run.press": 2.0, "run.duration": 20.0}) for f in THRESHOLDS
+    }
+    varied = {name: [(e, s) for s in few] for name, e in rls.conditions(foam).items()}
+    return Data(
+        shown={name: _around(runs.one(e)) for name, e in PARAMETERS.items()},
+        switches={name: runs.over_seeds(e, _switch) for name, e in PARAMETERS.items()},
+        by_threshold={f: runs.over_seeds(e, _switch) for f, e in thresholds.items()},
+        varied={name: runs.over(cases, _switch) for name, cases in varied.items()},
+    )
+
+
+def _start(record: Record) -> int:
+    return int(np.argmax(record["phase"] == CONTACT))
+
+
+def _around(record: Record) -> tuple[Array, Array]:
+    t = record["t"] - record["t"][_start(record)]
+    shown = (t >= -BEFORE) & (t <= AFTER)
+    return t[shown], record["force_measured"][shown]
+
+
+def _switch(record: Record) -> Switch:
+    force = record["force_measured"]
+    return Switch(
+        true_force=float(record["force"][_start(record)]),
+        lost=bool((record["phase"] == LOST).any()),
+        last=float(force[-1000:].mean()),
+        most=float(force.max()),
+    )
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """The switch is clean, and 5 N is a threshold that noise does not reach."""
+    return [_clean(data), _threshold(data)]
+
+
+def _clean(data: Data) -> Claim:
+    good = {name: sum(s.clean for s in some) for name, some in data.switches.items()}
+    fails = [name for name, some in data.varied.items() if 2 * sum(s.clean for s in some) <= len(some)]
+    foam, rubber = data.switches["foam"], data.switches["rubber"]
+    return Claim(
+        id="F4.2",
+        source="fig. 4.2, ch. 4",
+        claim="When the force reaches 5 N control is switched from position to hybrid, and the force goes on to 20 N.",
+        thesis="switch at 5 N",
+        measured=(
+            f"foam: last second {spread([s.last for s in foam], 'N')}, most {spread([s.most for s in foam], 'N')}; "
+            f"rubber: last second {spread([s.last for s in rubber], 'N')}, most {spread([s.most for s in rubber], 'N')}"
+        ),
+        tolerance=(
+            "the contact is not lost again, the force stays under 25 N, and its mean 3 to 4 s after the switch is "
+            "within 1 N of 20 N, on most seeds of both surfaces"
+        ),
+        verdict=decided(all(2 * count > len(data.switches[name]) for name, count in good.items())),
+        note=(
+            "The figure is lost and the text gives no number but the 5 N; the threshold is ours. Friction of joint 2 "
+            "decides how the last newtons are reached: without the integral gain some 2 N would stay. "
+            f"{rls.told(fails, len(data.varied))}"
+        ),
+    )
+
+
+def _false(some: Sequence[Switch]) -> float:
+    """Share of the runs that were switched before anything was touched."""
+    return sum(s.true_force <= 0.0 for s in some) / len(some)
+
+
+def _threshold(data: Data) -> Claim:
+    early = [f for f, some in data.by_threshold.items() if _false(some) > 0.0]
+    chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
+    return Claim(
+        id="F4.2.threshold",
+        source="ch. 4",
+        claim="With noise of almost ±2 N contact is not evident at low force; 5 N is a proper threshold.",
+        thesis="5 N",
+        measured=(
+            f"switched in the air: {100 * _false(chosen):.0f} % of the runs at 5 N, {100 * _false(listing):.0f} % at "
+            "0.8 N"
+        ),
+        tolerance="no run is switched in the air at 5 N",
+        verdict=decided(_false(chosen) == 0.0),
+        note=(
+            f"Noise alone switches at thresholds up to {max(early, default=0.0):g} N on this bench, so that 0.8 N, "
+            "which the listing has, cannot have run with this noise. 5 N is more than is needed: 3 N would do. What it "
+            "costs: all displacements count from the 5 N point, and every K_e comes out a quarter too high."
+        ),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """The force around the switch; below, the thresholds."""
+    drawing, _ = style.figure(1, height=5.4)
+    drawing.clear()
+    upper, lower = drawing.subplots(2, 1, height_ratios=(1.5, 1.0))
+    for axis in (upper, lower):
+        axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
+        axis.set_axisbelow(True)
+        axis.spines[["top", "right"]].set_visible(False)
+    _force(upper, data)
+    _thresholds(lower, data)
+    return drawing
+
+
+def _force(axis: Axes, data: Data) -> None:
+    titled(axis, "a", "Force through the switch")
+    for (name, (t, force)), color in zip(data.shown.items(), (style.BLUE, style.GREEN), strict=True):
+        axis.plot(t, force, color=color, linewidth=1.0, label=name)
+    axis.plot([0.0, AFTER], [DESIRED, DESIRED], color=style.ORANGE, linewidth=1.2, label="desired")
+    axis.axvspan(-BEFORE, 0.0, color=style.GREY, alpha=0.10, linewidth=0.0)
+    axis.text(-0.98 * BEFORE, 21.0, "position control", fontsize=8, color=style.INK)
+    axis.text(0.02, 23.2, "hybrid control", fontsize=8, color=style.INK)
+    axis.axhline(CHOSEN, color=style.RED, linewidth=0.9, linestyle=":")
+    axis.set(xlabel="time since 5 N [s]", ylabel="force [N]", xlim=(-BEFORE, AFTER), ylim=(-2.5, 25.0))
+    style.legend(axis)
+
+
+def _thresholds(axis: Axes, data: Data) -> None:
+    titled(axis, "b", "Thresholds, foam; above: share of the runs that noise switched in the air")
+    for f, some in data.by_threshold.items():
+        axis.plot(np.full(len(some), f), [s.true_force for s in some], "o", color=style.BLUE, markersize=3.5)
+        axis.annotate(f"{100 * _false(some):.0f} %", (f, 5.6), ha="center", fontsize=7.5, color=style.RED)
+    axis.plot([0.0, 5.5], [0.0, 5.5], color=style.GREY, linewidth=0.9, linestyle="--")
+    axis.set(
+        xlabel="threshold of the measured force [N]", ylabel="true force at the switch [N]", ylim=(-0.5, 6.3)
+    )
