@@ -1,0 +1,132 @@
+"""Figure 6.17: the neural controller on rubber from the first touch, steps of force with a sine on top."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.bench import changed
+from palpate.records import Record
+from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.force_panels import following_panel, force_panel, panels
+from palpate.thesis.force_tracking import (
+    FOLLOWS,
+    LIMIT,
+    RUBBER,
+    SINE,
+    Tracked,
+    following,
+    since_contact,
+    stops_holding,
+    told,
+    tracked,
+)
+from palpate.thesis.runs import Runs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NUMBER = "6.17"
+TITLE = "Neural controller on rubber from the first touch: steps with 4 sin(πt) added"
+CAPTION = (
+    "The first ten seconds on rubber, network and all. The thesis says that the force follows well and that the "
+    "controller adapts in almost 5 s. The red bar at the lower edge: motor 2 at its limit, near the peaks of 24 N; the "
+    "sine starts anew every 5 s as in the listing. Below the runs: how far the force is from what it settles to."
+)
+PARAMETERS = changed(RUBBER, {**SINE, "run.press": 20.0})
+SHOWN, JUDGED = (0.0, 10.0), (0.0, 10.0)
+CYCLE = 5.0
+"""The desired force repeats itself [s]."""
+SMOOTHED = 0.25
+"""Over which deviations are averaged [s]."""
+
+
+@dataclass(frozen=True)
+class Data:
+    tracked: Tracked
+    t: NDArray[np.float64]
+    away: NDArray[np.float64]  # of the first seed: from the settled cycle, smoothed [N]
+    adapted: list[float]  # when the force has come to stay near it, one a seed [s]
+
+
+def run(runs: Runs) -> Data:
+    """Four cycles; the last two are what the first is compared with."""
+    found = tracked(runs, PARAMETERS, SHOWN, JUDGED)
+    away = runs.over_seeds(PARAMETERS, _away)
+    times = [_adapted(one) for one in away]
+    return Data(found, np.arange(len(away[0])) * 1e-3 + SMOOTHED / 2, away[0], times)
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """The force has to follow from the start; and adapting has to take from 2.5 to 7.5 s."""
+    found = data.tracked
+    limited = 100 * float(np.median([one.saturated for one in found.nominal]))
+    middle = float(np.median(data.adapted))
+    return [
+        Claim(
+            id="NNC-R2",
+            source="fig. 6.17, sec. 6.3",
+            claim="On rubber it follows steps with 4 sin(πt) added, from the start.",
+            thesis="follows well",
+            measured=f"{told(found.nominal)}; motor 2 at its limit {limited:.0f} % of the time",
+            tolerance=f"{FOLLOWS}, from 0 to 10 s",
+            verdict=decided(following(found.nominal)),
+            note=(
+                "The peaks of 24 N are more than motor 2 can press with at this pose: 2.5 N m are 23.7 N, less about "
+                "2.4 N of friction on the way up, so they are cut off whatever the controller, and the network learns on "
+                "against the limit, which makes it late on the way down. The limits of following were set before looking "
+                f"and the outcome lies close to them. {stops_holding(found.varied, lambda one: one.follows)}"
+            ),
+        ),
+        Claim(
+            id="NNC-R2.adapts",
+            source="fig. 6.17, sec. 6.3",
+            claim="The controller adapts in almost 5 s.",
+            thesis="almost 5 s",
+            measured=spread(data.adapted, "s"),
+            tolerance=(
+                f"the force (mean over {SMOOTHED:g} s) comes within {LIMIT:g} N of what it does at the same place of "
+                "the settled cycles, from 10 to 20 s, and stays there, between 2.5 and 7.5 s after contact"
+            ),
+            verdict=decided(2.5 <= middle <= 7.5),
+            note=(
+                "As an upper bound the claim holds. But an integrator with K_i = 5 per second beside K_fp = 0.25 has a "
+                "time constant of a quarter of a second, and most of the force is fed forward: from the first touch on "
+                f"the force is what it will be in later cycles ({SMOOTHED:g} s is the least that can be told here). What "
+                "looked like adapting in 5 s may have been the first cycle of the reference, which is 5 s long, or a rate "
+                "smaller than the one printed: at 1e-5 it takes seconds (fig. 6.13)."
+            ),
+        ),
+    ]
+
+
+def plot(data: Data) -> Figure:
+    """The beginning, the runs, and the way to the settled cycle."""
+    drawing, ((force,), (dots,), (away,)) = panels([3.2, 2.0, 1.5])
+    force_panel(force, data.tracked.shown)
+    following_panel(dots, data.tracked.varied)
+    shown = data.t < SHOWN[1]
+    away.plot(data.t[shown], data.away[shown])
+    away.axhline(LIMIT, color="#222222", linewidth=1, linestyle="--")
+    away.set(xlabel="time since contact [s]", ylabel="deviation [N]", xlim=SHOWN, ylim=(0.0, None))
+    away.set_title("from the settled cycles, mean over 0.25 s; dashed: what counts as adapted", loc="left", fontsize=9.5)
+    return drawing
+
+
+def _away(record: Record) -> NDArray[np.float64]:
+    """Smoothed distance of the force from the mean of the last two cycles, from contact on [N]."""
+    force = record["force"][since_contact(record) >= 0.0]
+    ticks = round(CYCLE * 1000)
+    cycles = force[: len(force) // ticks * ticks].reshape(-1, ticks)
+    away = (cycles - cycles[-2:].mean(axis=0)).ravel()
+    return np.abs(np.convolve(away, np.full(round(SMOOTHED * 1000), 1e-3 / SMOOTHED), "valid"))
+
+
+def _adapted(away: NDArray[np.float64]) -> float:
+    """When the distance has come below the limit for good [s]."""
+    beyond = np.nonzero(away > LIMIT)[0]
+    return SMOOTHED + (float(beyond[-1]) * 1e-3 if len(beyond) else 0.0)
