@@ -131,16 +131,16 @@ def _read(
         names["time"] = time or ("time" if "time" in there else None)
     for role in ("position", "force"):
         names[role] = names[role] or (role if role in there else None)
-    lacking = [role for role, name in names.items() if name is None and not (role == "time" and rate is not None)]
+    lacking = [
+        role for role, name in names.items() if name is None and not (role == "time" and rate is not None)
+    ]
     if lacking:
         options = ", ".join(f"--{role}" for role in lacking)
         if "time" in lacking:
             options += " (or --rate)"
         raise InputError(f"name the columns of {log} with {options}; there are: {', '.join(there)}")
     columns = {role: name for role, name in names.items() if name is not None}
-    return read_log(
-        log, rate=rate, start=start, end=end, missing=missing, delimiter=delimiter, **columns
-    )
+    return read_log(log, rate=rate, start=start, end=end, missing=missing, delimiter=delimiter, **columns)
 
 
 def _with_std(option: str, text: str | None) -> tuple[float, float] | None:
@@ -151,7 +151,9 @@ def _with_std(option: str, text: str | None) -> tuple[float, float] | None:
         value, _, std = text.partition(":")
         return float(value), float(std) if std else 0.0
     except ValueError:
-        raise InputError(f"--{option} needs VALUE or VALUE:STD, as 0.0076 or 0.0076:0.0002, got {text!r}") from None
+        raise InputError(
+            f"--{option} needs VALUE or VALUE:STD, as 0.0076 or 0.0076:0.0002, got {text!r}"
+        ) from None
 
 
 def _picture(log: Path, figure: Path | None, wanted: bool) -> Path | None:

@@ -18,14 +18,17 @@ def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> floa
     """The cut-off [Hz] that passes what stands above the noise in both channels.
 
     Args:
-        position, force: shape (n,), of the stretch that will be fitted.
+        position: of the stretch that will be fitted, shape (n,).
+        force: likewise.
         dt: their sampling period [s].
         rate: fresh readings per second of the slower channel [1/s].
     """
     highest = FASTEST * rate
     if len(position) < _FEWEST_SEGMENT:
         return highest
-    edge = 2 * min(_edge(position, dt), _edge(force, dt))  # five lags in a row halve the power at 0.39 of their cut-off
+    edge = 2 * min(
+        _edge(position, dt), _edge(force, dt)
+    )  # five lags in a row halve the power at 0.39 of their cut-off
     lowest = min(highest, 10 / (len(position) * dt))
     return float(np.clip(edge, max(lowest, highest / 50), highest))
 

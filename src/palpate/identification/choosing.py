@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 _BETTER = 0.7
 """A richer model must leave less than this share of the mean square to be preferred."""
 _MUCH_BETTER = 0.5
+_NEGLIGIBLE = 0.0005
+"""Share of the force's variance below which a misfit asks for no richer model."""
 _HOPELESS = 4.0
 """A model whose misfit is this many times the best one's is not saved by any lag."""
 _ABOVE_NOISE = 3.0
@@ -39,7 +41,7 @@ _SIGNIFICANT = 3.0
 
 
 _CHAIN_CORRELATION = 2 * 2.3
-"""Correlation time of white noise behind the filter chain, in its time constants: the integral of its autocorrelation."""
+"""Integral of the autocorrelation of white noise behind the filter chain, in its time constants."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Question:
 
     motion: Motion
     force: Array
-    spans: Array
+    spans: NDArray[np.intp]
     lag: Lag
     tolerance: float
     free_noise: float | None
@@ -101,7 +103,9 @@ def choose(question: Question, name: str | None = None) -> Choice:
     if name is not None and name not in NAMES:
         raise unknown("model", name, NAMES)
     motion, force, lag = question.motion, question.force, question.lag
-    fits = [fit(model, motion, force, lag) for model in _offered(question, name)]
+    fits = [fit(model, motion, force, lag) for model in (KELVIN_VOIGT, KELVIN_VOIGT_MASS)]
+    if name is not None or min(1 - fitted.r2 for fitted in fits) > _NEGLIGIBLE:
+        fits += [fit(model, motion, force, lag) for model in _richer(question, name)]
     near = _HOPELESS * min(fitted.rmse for fitted in fits)
     fits = [freed(fitted, motion, force, lag) if fitted.rmse <= near else fitted for fitted in fits]
     judged = _judge(fits, question)
@@ -113,10 +117,10 @@ def choose(question: Question, name: str | None = None) -> Choice:
     return Choice(best, False, tuple(judged)) if fine else _no_model(best, judged, question)
 
 
-def _offered(question: Question, name: str | None) -> list[Model]:
-    """The models worth fitting: those for a probe that leaves the surface, or those for one fixed to it."""
+def _richer(question: Question, name: str | None) -> list[Model]:
+    """The models worth trying beside the plain ones: for a probe that leaves the surface, or one fixed to it."""
     motion = question.motion
-    makers: list[Callable[[], Model]] = [lambda: KELVIN_VOIGT, lambda: KELVIN_VOIGT_MASS]
+    makers: list[Callable[[], Model]] = []
     if motion.bonded:
         makers += [lambda: CURVED, lambda: CURVED_MASS]
     if not motion.bonded or name == "standard-linear-solid" or len(motion.rows) < 20_000:
@@ -134,7 +138,7 @@ def _judge(fits: list[Fit], question: Question) -> list[Candidate]:
 
 def _candidate(fitted: Fit, fits: list[Fit], best: float, question: Question) -> Candidate:
     against = [f"{name} would be below zero" for name in _impossible(fitted)]
-    if best**2 < _MUCH_BETTER * fitted.rmse**2:
+    if best**2 < _MUCH_BETTER * fitted.rmse**2 and 1 - fitted.r2 > _NEGLIGIBLE:
         winner = min((f for f in fits if f.rmse == best), key=lambda f: len(f.names))
         label = winner.model.name + (" with a curved spring" if "K3" in winner.names else "")
         against.append(f"{label} leaves {best**2 / fitted.rmse**2:.0%} of its squared misfit")

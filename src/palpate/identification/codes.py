@@ -22,19 +22,29 @@ class Code(Enum):
         " so K is mostly about the arm. Measure the position nearer to the surface."
     )
     LOW_EXCITATION = "The motion is too slow, too small or too short to show the parameter above the noise."
-    MODEL_REJECTED = "No model offered describes the log: its parts (loading and unloading, say) give different answers."
-    NONLINEAR_STIFFNESS = "The stiffness changes with the position; K is the slope at the middle of the motion."
-    HELD_SAMPLES = "A channel is refreshed more slowly than the rows are written; only its fresh readings are used."
+    MODEL_REJECTED = "No model offered describes the log: its parts give different answers, say."
+    NONLINEAR_STIFFNESS = (
+        "The stiffness changes with the position; K is the slope at the middle of the motion."
+    )
+    HELD_SAMPLES = (
+        "A channel is refreshed more slowly than the rows are written; only its fresh readings are used."
+    )
     MISSING_SAMPLES = "Rows without a reading; short stretches are bridged, long ones are left out."
     IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
-    SATURATED = "A channel rests at its extreme value, as a reading at the end of its range does; these rows are left out."
-    UNIT_GUESS = "A unit was taken from a column's name, or the stiffness is so unusual that a unit is probably wrong."
+    SATURATED = (
+        "The force rests at its extreme value while the probe moves on: it is at the end of its range."
+    )
+    UNIT_GUESS = (
+        "A unit was taken from a column's name, or the stiffness is so unusual that a unit is probably wrong."
+    )
     FORCE_SIGN_REVERSED = "The force falls as the probe goes in; it was turned round."
     POSITION_SIGN_REVERSED = "The position falls as the probe goes in; it was turned round."
     LOW_RATE = "Rows are so rare that fast behaviour, damping and mass above all, may be missed."
     NO_CONTACT = "The force never leaves its resting level for long enough: there is nothing to identify."
-    CONTACT_AT_START = "The log begins in contact, so the force without contact is not known and is estimated as an offset."
-    NEGATIVE_STIFFNESS = "The force falls as the penetration grows over the whole contact: no passive surface does that."
+    CONTACT_AT_START = (
+        "The log begins in contact: the force without contact is not known, and is estimated as an offset."
+    )
+    NEGATIVE_STIFFNESS = "The force falls as the penetration grows: no passive surface does that."
 
     @property
     def word(self) -> str:

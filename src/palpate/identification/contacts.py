@@ -68,7 +68,12 @@ def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) 
 
 
 def _oriented(
-    channels: Channels, chain: Chain, spans: list[tuple[int, int]], sign: float, level: float, threshold: float
+    channels: Channels,
+    chain: Chain,
+    spans: list[tuple[int, int]],
+    sign: float,
+    level: float,
+    threshold: float,
 ) -> Contacts:
     warnings = []
     if sign < 0:
@@ -114,7 +119,9 @@ def _spread(values: Array) -> float:
 
 def _never_free(rest: float, peak: float) -> bool:
     """Whether the force goes to both sides of zero by comparable amounts, or stays far from zero all the time."""
-    return (rest * peak < 0 and abs(rest) > abs(peak) / 2) or (rest * peak > 0 and abs(rest) > 0.8 * abs(peak))
+    return (rest * peak < 0 and abs(rest) > abs(peak) / 2) or (
+        rest * peak > 0 and abs(rest) > 0.8 * abs(peak)
+    )
 
 
 def _threshold(force: Array, rest: float, peak: float) -> float:

@@ -49,6 +49,11 @@ class Chain:
         """Time after which a disturbance has left the filtered signal but for 1 % [s]."""
         return 11.6 / self.rate
 
+    @property
+    def thorough_settling(self) -> float:
+        """The same, but for 2e-5 of it [s]."""
+        return 20.0 / self.rate
+
     def __call__(self, signal: Array, derivative: int = 0, lag: float = 0.0) -> Array:
         """The filtered signal, or one of its derivatives, at the times t - lag.
 
@@ -121,7 +126,8 @@ def _convolve(signal: Array, taps: Array) -> Array:
     if len(taps) <= 256:
         return np.convolve(signal, taps)
     size = 1 << (len(signal) + len(taps) - 2).bit_length()
-    return np.fft.irfft(np.fft.rfft(signal, size) * np.fft.rfft(taps, size), size)[: len(signal) + len(taps) - 1]
+    product = np.fft.rfft(signal, size) * np.fft.rfft(taps, size)
+    return np.fft.irfft(product, size)[: len(signal) + len(taps) - 1]
 
 
 def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
@@ -137,15 +143,19 @@ def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
 
 
 def white_noise(signal: Array) -> float:
-    """Standard deviation of the white part of a signal, from its eighth differences: an upper bound, for what is left
-    of the motion itself in them counts as noise."""
+    """Standard deviation of the white part of a signal, from its eighth differences.
+
+    An upper bound: what is left of the motion itself in the differences counts as noise.
+    """
     differences = np.diff(signal, 8)
     if not len(differences):
         return 0.0
-    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(12870))  # 12870 is the sum of their squared weights
+    gain = float(np.sqrt(12870))  # root of the sum of the squared weights of an eighth difference
+    return float(1.4826 * np.median(np.abs(differences)) / gain)
 
 
 def block_means(signal: Array, size: int) -> Array:
     """Means of neighbouring blocks of `size` samples, shape (n // size,); the rest at the end is dropped."""
     count = len(signal) // size
-    return signal[: count * size].reshape(count, size).mean(axis=1)
+    means: Array = signal[: count * size].reshape(count, size).mean(axis=1)
+    return means

@@ -137,7 +137,7 @@ def _descend(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag
         return point
     damping = 1e-3
     for _ in range(_ROUNDS):
-        slopes = _slopes(model, motion, force, point, outer)
+        slopes = _slopes(model, motion, point, outer)
         jacobian = np.column_stack([point.columns, slopes])
         step = _damped(jacobian, point.residuals, len(point.theta), damping)
         trial = _moved(model, motion, force, point, outer, step[len(point.theta) :])
@@ -158,7 +158,7 @@ def _lag_knob(motion: Motion, lag: Lag) -> Knob:
     return Knob(_LAG, (lag.value,), lag.value - limit, lag.value + limit, 0.02 / motion.chain.rate)
 
 
-def _slopes(model: Model, motion: Motion, force: Array, point: _Point, outer: list[Knob]) -> Array:
+def _slopes(model: Model, motion: Motion, point: _Point, outer: list[Knob]) -> Array:
     """Derivatives of the predicted force by each knob in its own scale, shape (n, len(outer))."""
     found = []
     for knob in outer:
@@ -181,7 +181,8 @@ def _damped(jacobian: Array, residuals: Array, linear: int, damping: float) -> A
     gram = jacobian.T @ jacobian / np.outer(scale, scale)
     gram[np.arange(linear, len(scale)), np.arange(linear, len(scale))] += damping
     vector = jacobian.T @ residuals / scale
-    return np.linalg.lstsq(gram, vector, rcond=1e-13)[0] / scale
+    step: Array = np.linalg.lstsq(gram, vector, rcond=1e-13)[0] / scale
+    return step
 
 
 def _moved(
@@ -202,7 +203,7 @@ def _moved(
 def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag) -> Fit:
     knob = _lag_knob(motion, lag)
     outer = [*model.knobs, knob]
-    slopes = _slopes(model, motion, force, point, outer)
+    slopes = _slopes(model, motion, point, outer)
     for i, own in enumerate(model.knobs):
         if own.logarithmic:
             slopes[:, i] /= point.knobs[own.name]
@@ -242,7 +243,8 @@ def _attenuation(model: Model, motion: Motion, jacobian: Array, theta: Array) ->
     scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
     scale[scale == 0] = 1.0
     gram = jacobian.T @ jacobian / np.outer(scale, scale)
-    return np.linalg.lstsq(gram, shift / scale, rcond=1e-12)[0] / scale
+    pulled: Array = np.linalg.lstsq(gram, shift / scale, rcond=1e-12)[0] / scale
+    return pulled
 
 
 def _with_lag(jacobian: Array, fixed: Array, motion: Motion, noise: Noise, lag: Lag, pulled: Array) -> Array:

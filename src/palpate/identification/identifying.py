@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.identification.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.choosing import Choice, Question, choose
 from palpate.identification.codes import Code, Warn
-from palpate.identification.contacts import Contacts, find_contacts
+from palpate.identification.contacts import ONSET, Contacts, find_contacts
 from palpate.identification.filters import Chain, block_means, white_noise
 from palpate.identification.fitting import Fit, Lag, fit
 from palpate.identification.lagging import closing_lag, unknown_lag
@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
 _MOST_SAMPLES = 2_000_000
+_OVERSAMPLED = 32.0
+_LONG = 0.05
 _SHOWN = 20_000
 _FOLLOWS = 0.1
 
@@ -63,11 +65,12 @@ def identify(
         InputError: the record or an argument is wrong, in one line.
     """
     _check(tolerance, calibration, lag, lag_std, series_stiffness, series_std, cutoff)
-    channels = _thinned(channels_of(record))
+    channels = channels_of(record)
+    channels = _thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
     warnings = channels.warnings
     if series_stiffness is not None:
         channels.position = channels.position - channels.force / series_stiffness
-    chain, contacts = _contacts(channels, bonded, cutoff)
+    channels, chain, contacts = _contacts(channels, bonded, cutoff)
     warnings += contacts.warnings
     terms = Terms(
         tolerance, calibration, (series_stiffness, series_std) if series_stiffness else None,
@@ -101,7 +104,11 @@ def _check(
 ) -> None:
     if not 0 < tolerance <= 1:
         raise InputError(f"the tolerance must be in (0, 1], got {tolerance:g}; 0.25 means 25 %")
-    for name, value in (("calibration", calibration), ("lag's std", lag_std), ("series stiffness' std", series_std)):
+    for name, value in (
+        ("calibration", calibration),
+        ("lag's std", lag_std),
+        ("series stiffness' std", series_std),
+    ):
         if not (np.isfinite(value) and value >= 0):
             raise InputError(f"the {name} must be 0 or more, got {value:g}")
     if lag is not None and not np.isfinite(lag):
@@ -111,9 +118,8 @@ def _check(
             raise InputError(f"the {name} must be above 0, got {positive:g}")
 
 
-def _thinned(channels: Channels) -> Channels:
-    """Average neighbouring samples of a very long log, in the same way on both channels."""
-    size = -(-len(channels.position) // _MOST_SAMPLES)
+def _thinned(channels: Channels, size: int) -> Channels:
+    """Average `size` neighbouring samples, in the same way on both channels."""
     if size < 2:
         return channels
     position, force = block_means(channels.position, size), block_means(channels.force, size)
@@ -123,7 +129,9 @@ def _thinned(channels: Channels) -> Channels:
     return Channels(start, dt, position, force, valid, min(channels.rate, 1 / dt), channels.warnings)
 
 
-def _contacts(channels: Channels, bonded: bool | None, cutoff: float | None) -> tuple[Chain, Contacts]:
+def _contacts(
+    channels: Channels, bonded: bool | None, cutoff: float | None
+) -> tuple[Channels, Chain, Contacts]:
     """Find the contacts with the widest filter, choose the filter from them, and find them again with it."""
     highest = FASTEST * channels.rate
     if cutoff is not None and cutoff > 2 * highest:
@@ -132,16 +140,23 @@ def _contacts(channels: Channels, bonded: bool | None, cutoff: float | None) -> 
         )
     chain = Chain(cutoff or highest, channels.dt)
     contacts = find_contacts(channels, chain, bonded)
-    if cutoff is not None or not contacts.spans:
-        return chain, contacts
-    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
-    inside = slice(begin, end)
-    chosen = choose_cutoff(channels.position[inside], channels.force[inside], channels.dt, channels.rate)
+    if not contacts.spans:
+        return channels, chain, contacts
+    chosen = cutoff or _chosen_cutoff(channels, contacts)
     if chosen > 0.9 * highest:
-        return chain, contacts
-    narrow = Chain(chosen, channels.dt)
-    again = find_contacts(channels, narrow, bonded)
-    return (narrow, again) if again.spans else (chain, contacts)
+        return channels, chain, contacts
+    fewer = _thinned(channels, int(1 / (_OVERSAMPLED * chosen * channels.dt)))
+    narrow = Chain(chosen, fewer.dt)
+    again = find_contacts(fewer, narrow, bonded)
+    return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
+
+
+def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
+    """From the longest contact with what is before and after it, so that its rise and fall are in the picture."""
+    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
+    margin = (end - begin) // 2
+    around = slice(max(begin - margin, 0), end + margin)
+    return choose_cutoff(channels.position[around], channels.force[around], channels.dt, channels.rate)
 
 
 def _question(
@@ -149,18 +164,19 @@ def _question(
 ) -> Question:
     position = contacts.position_sign * channels.position
     force = chain(contacts.force_sign * channels.force)
-    quick = Chain(FASTEST / channels.dt, channels.dt)(contacts.force_sign * channels.force)
-    rows, spans = _rows(channels, chain, contacts, quick)
+    rows, spans = _rows(channels, chain, contacts)
     filtered = chain(position)
     if contacts.bonded:
         position = position - filtered[rows].mean()
         penetration = position
     else:
         position = position - _origin(filtered, rows, contacts)
-        penetration = np.maximum(position, 0.0)
+        penetration = np.maximum(position - _surface(position[rows], contacts), 0.0)
     motion = Motion(chain, position, penetration, rows, contacts.bonded, white_noise(position))
     known = unknown_lag(motion, channels.rate) if lag is None else Lag(lag, lag_std)
-    return Question(motion, force[rows], spans, known, tolerance, _free_noise(force, channels, chain, contacts))
+    return Question(
+        motion, force[rows], spans, known, tolerance, _free_noise(force, channels, chain, contacts)
+    )
 
 
 def _origin(filtered: Array, rows: NDArray[np.intp], contacts: Contacts) -> float:
@@ -169,21 +185,25 @@ def _origin(filtered: Array, rows: NDArray[np.intp], contacts: Contacts) -> floa
     return float(np.mean(onsets)) if onsets else float(filtered[rows].min())
 
 
-def _rows(
-    channels: Channels, chain: Chain, contacts: Contacts, quick: Array
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _surface(position: Array, contacts: Contacts) -> float:
+    """Where the force would begin if it grew evenly from the onset to the peak; the origin, if no onset is in the log."""
+    if contacts.spans[0][0] == 0:
+        return 0.0
+    return -ONSET / (1 - ONSET) * max(float(position.max()), 0.0)
+
+
+def _rows(channels: Channels, chain: Chain, contacts: Contacts) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Samples in contact whose filter has forgotten what was before, and the number of each one's contact.
 
-    The end is that of the quickly filtered force, less half the delay of that: a slow filter shows contact for a while
-    after the probe has gone, but what it shows then is no contact any more.
+    The end is that of the raw force: a filter shows contact for a while after the probe has gone, but what it shows
+    then is no contact any more.
     """
-    settling = int(np.ceil((chain.settling - chain.delay) / chain.dt))
     usable = _settled(channels.valid, int(np.ceil(chain.settling / chain.dt)))
     step = max(int(1 / (8 * chain.cutoff * chain.dt)), 1)
     rows, spans = [], []
     for number, (begin, end) in enumerate(contacts.spans):
-        last = end if contacts.bonded else max(_left(quick, contacts, begin, end), begin + (end - begin) // 2)
-        own = np.arange(begin + min(settling, (end - begin) // 4), last, step)
+        last = end if contacts.bonded else _left(channels, contacts, begin, end)
+        own = np.arange(begin + _settling(chain, end - begin), last, step)
         own = own[usable[own]]
         rows.append(own)
         spans.append(np.full(len(own), number))
@@ -193,10 +213,24 @@ def _rows(
     return found, np.concatenate(spans)
 
 
-def _left(quick: Array, contacts: Contacts, begin: int, end: int) -> int:
-    above = np.flatnonzero(quick[begin:end] > contacts.threshold)
-    delay = int(5 / (4 * np.pi * FASTEST))
-    return begin + int(above[-1]) + 1 - delay if len(above) else end
+def _settling(chain: Chain, length: int) -> int:
+    """Samples to leave out after a touch, which the filter's own delay has already eaten some of.
+
+    Until a disturbance has decayed to 1 %, or to nothing where that costs little of the contact.
+    """
+    thorough = int(np.ceil((chain.thorough_settling - chain.delay) / chain.dt))
+    if thorough < _LONG * length:
+        return thorough
+    return min(int(np.ceil((chain.settling - chain.delay) / chain.dt)), length // 4)
+
+
+def _left(channels: Channels, contacts: Contacts, begin: int, end: int) -> int:
+    """The sample after the last one in contact by the raw force, at least half of the filtered contact."""
+    force = contacts.force_sign * channels.force[begin:end]
+    clear = max(contacts.threshold, contacts.resting + 4 * white_noise(channels.force))
+    above = np.flatnonzero(force > clear)
+    middle = begin + (end - begin) // 2
+    return max(begin + int(above[-1]) + 1, middle) if len(above) else end
 
 
 def _too_few(count: int, channels: Channels) -> str:
@@ -211,7 +245,8 @@ def _settled(valid: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
         return valid
     bad = np.r_[0, np.cumsum(~valid)]
     index = np.arange(len(valid))
-    return bad[index + 1] - bad[np.maximum(index - memory, 0)] == 0
+    settled: NDArray[np.bool_] = bad[index + 1] - bad[np.maximum(index - memory, 0)] == 0
+    return settled
 
 
 def _free_noise(force: Array, channels: Channels, chain: Chain, contacts: Contacts) -> float | None:
@@ -325,7 +360,9 @@ def _with_mass(parameters: dict[str, Parameter], choice: Choice, terms: Terms) -
         reason = f"{choice.candidate.fit.model.name} has no mass"
     else:
         half = mass.t * mass.std("M")
-        reason = f"the log does not show a mass (95 %: {mass['M'] - half:.3g} to {mass['M'] + half:.3g} {unit})"
+        reason = (
+            f"the log does not show a mass (95 %: {mass['M'] - half:.3g} to {mass['M'] + half:.3g} {unit})"
+        )
     return parameters | {"M": Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)}
 
 
@@ -341,7 +378,9 @@ def _doubtful_units(parameters: dict[str, Parameter], terms: Terms) -> list[Warn
     warnings = []
     stiffness = parameters["K"].value if "K" in parameters else None
     if stiffness is not None and parameters["K"].unit == "N/m" and not _SOFTEST <= stiffness <= _STIFFEST:
-        text = f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: is a unit off, as by a factor of 1000?"
+        text = (
+            f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: is a unit off, as by a factor of 1000?"
+        )
         warnings.append(Warn(Code.UNIT_GUESS, text))
     if stiffness is not None and terms.series and stiffness > terms.series[0] / 3:
         text = f"K = {stiffness:.3g} against {terms.series[0]:.3g} N/m in series with it: K rests on that calibration"
@@ -354,7 +393,7 @@ def _lag_said(question: Question, choice: Choice) -> tuple[float, float] | None:
     if question.lag.known:
         told = question.lag.value != 0 or question.lag.std > 0
         return (question.lag.value, question.lag.std) if told else None
-    told = not choice.rejected and fitted.std("lag") < 0.5 * question.lag.std
+    told = not choice.rejected and fitted.r2 > _FOLLOWS and fitted.std("lag") < 0.5 * question.lag.std
     return (fitted.lag, fitted.std("lag")) if told else None
 
 
@@ -371,10 +410,19 @@ def _nothing(channels: Channels, chain: Chain, terms: Terms, model: str) -> Iden
     reason = "there is no contact in this log"
     units = impedance_units(terms.force_unit, terms.position_unit)
     parameters = {
-        name: Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason) for name, unit in units.items()
+        name: Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)
+        for name, unit in units.items()
     }
     return Identification(
-        model, parameters, (), None, float("nan"), float("nan"), 0, tuple(channels.warnings), cutoff=chain.cutoff
+        model,
+        parameters,
+        (),
+        None,
+        float("nan"),
+        float("nan"),
+        0,
+        tuple(channels.warnings),
+        cutoff=chain.cutoff,
     )
 
 

@@ -1,7 +1,8 @@
 """What a log says about the lag between its channels, when nobody has calibrated it.
 
 If the force is read T later than the position, a fit without T finds B - K T for the damping and M - B T + K T^2 / 2
-for the mass. So a lag is told from damping only by what happens at higher frequencies; on slow or narrow motion it is not.
+for the mass. So a lag is told from damping only by what happens at higher frequencies; slow or narrow motion
+does not show it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 _LONGEST = 0.25
 _SHARE = 1 / 50
 _WALK = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
-_WALK_UP_TO = 20_000
+_WALK_UP_TO = 50_000
 
 
 def unknown_lag(motion: Motion, rate: float) -> Lag:
@@ -42,14 +43,14 @@ def freed(fixed: Fit, motion: Motion, force: Array, lag: Lag) -> Fit:
 
 def _start(fixed: Fit, motion: Motion, force: Array, lag: Lag) -> Lag:
     """Where to look for the lag: the misfit may have several valleys, so a coarse walk comes first."""
-    if len(force) > _WALK_UP_TO:
+    if len(motion.position) > _WALK_UP_TO:
         return lag
     steps = [lag.value + share * lag.std for share in _WALK]
     fits = [profile(fixed, motion, force, step) for step in steps]
     return Lag(steps[int(np.argmin(fits))], lag.std, known=False)
 
 
-def _elastic(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+def _elastic(motion: Motion, _knobs: dict[str, float], lag: float) -> list[Array]:
     """f = a curve of x alone: what is left of a passive contact when loading and unloading coincide."""
     powers = [motion.power(n, lag) for n in (2, 3)]
     return [motion.moved(0, lag), *powers, motion.ones]
@@ -58,7 +59,7 @@ def _elastic(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]
 ELASTIC = Model("elastic", ("K", "K2", "K3", "offset"), _elastic)
 
 
-def closing_lag(motion: Motion, force: Array, start: float, spans: Array) -> tuple[float, float]:
+def closing_lag(motion: Motion, force: Array, start: float, spans: NDArray[np.intp]) -> tuple[float, float]:
     """The lag that makes loading and unloading coincide, and its standard deviation [s].
 
     A passive contact gives back less than it takes, so the true lag is this one or longer. The deviation is that over
@@ -70,7 +71,9 @@ def closing_lag(motion: Motion, force: Array, start: float, spans: Array) -> tup
         start: first guess, -B/K of a fit without a lag [s].
         spans: number of the contact that each row belongs to, shape (n,).
     """
-    whole = fit(ELASTIC, motion, force, Lag(start, max(abs(start), 2 * motion.chain.dt), False), free_lag=True)
+    whole = fit(
+        ELASTIC, motion, force, Lag(start, max(abs(start), 2 * motion.chain.dt), False), free_lag=True
+    )
     lags = []
     for number in np.unique(spans):
         inside = spans == number

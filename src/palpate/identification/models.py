@@ -98,12 +98,12 @@ class Model:
         return {name: k for name, k in (("K", 0), ("B", 1), ("M", 2)) if name in self.linear}
 
 
-def _kelvin_voigt(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+def _kelvin_voigt(motion: Motion, _knobs: dict[str, float], lag: float) -> list[Array]:
     """f = K x + B v."""
     return [motion.moved(0, lag), motion.moved(1, lag), motion.ones]
 
 
-def _kelvin_voigt_mass(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+def _kelvin_voigt_mass(motion: Motion, _knobs: dict[str, float], lag: float) -> list[Array]:
     """f = K x + B v + M a."""
     return [motion.moved(0, lag), motion.moved(1, lag), motion.moved(2, lag), motion.ones]
 

@@ -32,7 +32,9 @@ class Disagreement:
     spread: float
 
 
-def compare_parts(fitted: Fit, motion: Motion, force: Array, spans: Array, tolerance: float) -> list[Disagreement]:
+def compare_parts(
+    fitted: Fit, motion: Motion, force: Array, spans: NDArray[np.intp], tolerance: float
+) -> list[Disagreement]:
     """Fit each part of the log by itself and name the parameters on which the parts disagree.
 
     They disagree where the values differ by more than the noise allows and by more than the tolerance: a misfit that
@@ -57,18 +59,20 @@ def compare_parts(fitted: Fit, motion: Motion, force: Array, spans: Array, toler
     return list(found.values())
 
 
-def _partitions(motion: Motion, spans: Array, lag: float) -> list[dict[str, NDArray[np.bool_]]]:
+def _partitions(motion: Motion, spans: NDArray[np.intp], lag: float) -> list[dict[str, NDArray[np.bool_]]]:
     """Ways to cut a log in parts: loading and unloading, contact by contact, thirds of the time."""
     partitions = []
     if not motion.bonded:
         partitions.append(_ways(motion, lag))
     numbers, sizes = np.unique(spans, return_counts=True)
-    if 1 < len(numbers) and not motion.bonded:
+    if len(numbers) > 1 and not motion.bonded:
         largest = np.sort(numbers[np.argsort(sizes)[::-1][:_MOST_CONTACTS]])
         partitions.append({f"contact {int(i) + 1}": spans == i for i in largest})
     if motion.bonded:
         thirds = np.arange(len(spans)) * 3 // len(spans)
-        partitions.append({f"{word} third": thirds == i for i, word in enumerate(("first", "second", "last"))})
+        partitions.append(
+            {f"{word} third": thirds == i for i, word in enumerate(("first", "second", "last"))}
+        )
     return [{k: v for k, v in parts.items() if v.sum() >= 30} for parts in partitions]
 
 

@@ -39,8 +39,10 @@ def solve(columns: Array, target: Array) -> Array:
     gram = columns.T @ columns / np.outer(scale, scale)
     vector = (columns.T @ target) / scale
     if np.linalg.cond(gram) > 1e10:
-        return np.linalg.lstsq(columns / scale, target, rcond=1e-12)[0] / scale
-    return np.linalg.solve(gram, vector) / scale
+        theta: Array = np.linalg.lstsq(columns / scale, target, rcond=1e-12)[0] / scale
+        return theta
+    theta = np.linalg.solve(gram, vector) / scale
+    return theta
 
 
 def noise_of(residuals: Array, place: NDArray[np.intp], parameters: int) -> Noise:
@@ -104,7 +106,8 @@ def quantile(effective: float, parameters: int, level: float = 0.975) -> float:
 def _closed_up(place: NDArray[np.intp]) -> NDArray[np.intp]:
     """Rows counted in steps of the finest spacing between them, so that a thinned grid has no holes."""
     step = int(np.gcd.reduce(np.diff(place)))
-    return (place - place[0]) // max(step, 1)
+    closed: NDArray[np.intp] = (place - place[0]) // max(step, 1)
+    return closed
 
 
 def _spread(values: Array, place: NDArray[np.intp]) -> Array:

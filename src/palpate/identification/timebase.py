@@ -44,7 +44,8 @@ class Channels:
 
     @property
     def time(self) -> Array:
-        return self.start + np.arange(len(self.position)) * self.dt
+        time: Array = self.start + np.arange(len(self.position), dtype=np.float64) * self.dt
+        return time
 
 
 def channels_of(record: Record) -> Channels:
@@ -60,7 +61,9 @@ def channels_of(record: Record) -> Channels:
     twice = int((step == 0).sum())
     if twice:
         row = int(np.flatnonzero(step == 0)[0]) + 2
-        text = f"{twice} rows repeat the time of the row before (first in row {row}); the first of each is kept"
+        text = (
+            f"{twice} rows repeat the time of the row before (first in row {row}); the first of each is kept"
+        )
         warnings.append(Warn(Code.IRREGULAR_TIME, text))
         keep = np.r_[True, step > 0]
         time, position, force = time[keep], position[keep], force[keep]
@@ -84,7 +87,9 @@ def channels_of(record: Record) -> Channels:
 
 def _check(time: Array, position: Array, force: Array) -> None:
     if len(time) < _FEWEST:
-        raise InputError(f"the log has {len(time)} rows with a time of their own; at least {_FEWEST} are needed")
+        raise InputError(
+            f"the log has {len(time)} rows with a time of their own; at least {_FEWEST} are needed"
+        )
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         row = int(back[0]) + 2
@@ -95,7 +100,9 @@ def _check(time: Array, position: Array, force: Array) -> None:
         if len(seen) < _FEWEST:
             raise InputError(f"the {name} has {len(seen)} readings; at least {_FEWEST} are needed")
         if np.ptp(seen) == 0:
-            raise InputError(f"the {name} is {seen[0]:.6g} in every row; is it the right column, did anything move?")
+            raise InputError(
+                f"the {name} is {seen[0]:.6g} in every row; is it the right column, did anything move?"
+            )
 
 
 def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool]:
@@ -118,19 +125,22 @@ def _usable(name: str, values: Array, dt: float, warnings: list[Warn]) -> Mask:
     usable = np.isfinite(values)
     if not usable.all() and not any(w.code is Code.MISSING_SAMPLES for w in warnings):
         count = int((~usable).sum())
-        text = f"{count} of {len(values)} rows have no {name} (first: row {int(np.argmin(usable)) + 1}); they are bridged"
+        first = int(np.argmin(usable)) + 1
+        text = f"{count} of {len(values)} rows have no {name} (first: row {first}); they are bridged"
         warnings.append(Warn(Code.MISSING_SAMPLES, text))
     rows = np.flatnonzero(usable)
     fresh = fresh_rows(values[rows])
     if fresh is not None:
         every = len(fresh) / max(int(fresh.sum()), 1)
-        text = f"the {name} is fresh in one of {every:.3g} rows (every {every * dt:.4g} s); only fresh readings are used"
+        text = f"the {name} is fresh in one of {every:.3g} rows, every {every * dt:.4g} s; the others are left out"
         warnings.append(Warn(Code.HELD_SAMPLES, text))
         usable[rows[~fresh]] = False
     return usable
 
 
-def _leave_saturated(both: Mask, use_force: Mask, position: Array, force: Array, warnings: list[Warn]) -> None:
+def _leave_saturated(
+    both: Mask, use_force: Mask, position: Array, force: Array, warnings: list[Warn]
+) -> None:
     rows = np.flatnonzero(both)
     stuck = _saturated(force[rows], position[rows])
     if not stuck.any():

@@ -70,12 +70,16 @@ _LAGS = "the force lags the position, and a lag T counts as a damping of -K T: c
 
 
 def _refused(name: str, value: float, unit: str, terms: Terms, warnings: list[Warn]) -> Parameter:
-    what = f"the fit gives {value:.3g} {_shown(unit)}, below zero: no passive surface does that".replace("  ", " ")
+    what = f"the fit gives {value:.3g} {_shown(unit)}, below zero: no passive surface does that".replace(
+        "  ", " "
+    )
     if name == "K":
         warnings.append(Warn(Code.NEGATIVE_STIFFNESS, f"K: {what}; a channel's sign or column may be wrong"))
     elif not terms.lags:
         warnings.append(Warn(Code.FORCE_LAGS_POSITION, f"{name}: {what}; {_LAGS}"))
-    return Parameter(None, None, None, unit, Verdict.REJECTED, f"{what}; {_LAGS if name != 'K' else 'check the signs'}")
+    return Parameter(
+        None, None, None, unit, Verdict.REJECTED, f"{what}; {_LAGS if name != 'K' else 'check the signs'}"
+    )
 
 
 def _of_rejected(name: str, choice: Choice, value: float, std: float, half: float, unit: str) -> Parameter:
@@ -107,11 +111,15 @@ def _why_not(
         known = f"{fitted.std('lag') * 1e3:.2g} ms"
         text = f"{name} cannot be told from a lag of the force, which is known to {known} only ({bounds})"
         if not any(w.code is Code.LAG_DAMPING_CONFOUNDED for w in warnings):
-            warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, f"{text}; calibrate the lag and give it with --lag"))
+            warnings.append(
+                Warn(Code.LAG_DAMPING_CONFOUNDED, f"{text}; calibrate the lag and give it with --lag")
+            )
         return text
     pulled = abs(float(fitted.attenuation[fitted.names.index(name)]))
     if fitted.t * pulled > 0.7 * half:
-        return f"noise of the position may have pulled it by {pulled:.2g} ({bounds}); filter lower with --cutoff"
+        return (
+            f"noise of the position may have pulled it by {pulled:.2g} ({bounds}); filter lower with --cutoff"
+        )
     limit = f"wider than {terms.tolerance:.0%}" if half < abs(value) else "zero is within it"
     return f"the log does not show it above the noise ({bounds}; {limit})"
 
@@ -145,7 +153,9 @@ def unit_of(name: str, fitted: Fit, terms: Terms) -> str:
 
 
 def _percent(half: float, value: float) -> str:
-    return f"{half / abs(value):.2g}".replace("inf", "?") if value == 0 else f"{100 * half / abs(value):.2g} %"
+    return (
+        f"{half / abs(value):.2g}".replace("inf", "?") if value == 0 else f"{100 * half / abs(value):.2g} %"
+    )
 
 
 def _shown(unit: str) -> str:

@@ -79,7 +79,9 @@ def _first_lines(path: Path) -> tuple[int, list[str]]:
             rest = (line.rstrip("\r\n") for line in file)
             return skip, [first.rstrip("\r\n"), *(line for line in islice(rest, _LOOK) if line.strip())]
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 text ({error.reason} at byte {error.start}); convert it") from None
+        raise InputError(
+            f"{path} is not UTF-8 text ({error.reason} at byte {error.start}); convert it"
+        ) from None
 
 
 def _guess(lines: list[str]) -> str:

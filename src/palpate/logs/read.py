@@ -38,13 +38,14 @@ def read_log(
     Args:
         path: CSV with or without a header, in any usual dialect, or Parquet.
         rate: rows per second [1/s], for a log without a column of time.
-        start, end: keep the rows from `start` to before `end`, in seconds from the first row.
+        start: leave out the rows before it, in seconds from the first row [s].
+        end: leave out the rows from it on, likewise [s].
         missing: values that mean "no reading"; they become NaN, as empty cells do. A plain one is found by itself.
         delimiter: between two cells of a CSV file; found when None.
         columns: by the name that the record gives it, a column's name or number with its unit: `NAME:UNIT`.
 
     Returns:
-        A record whose `meta` holds `source`, `start_s` (the first row's own time), and in `notes` what had to be assumed.
+        A record whose `meta` holds `source`, `start_s` (the first row's own time) and `notes` (what was assumed).
 
     Raises:
         InputError: whatever is wrong with the file or with these arguments, in one line.
@@ -104,7 +105,9 @@ def _check_quantity(role: str, name: str, symbol: str) -> None:
     }
     found = unit(symbol).quantity
     if found not in allowed.get(role, {found}):
-        raise InputError(f"{symbol!r} of {name}:{symbol} is a unit of {found}; {role} needs one of {_QUANTITY[role]}")
+        raise InputError(
+            f"{symbol!r} of {name}:{symbol} is a unit of {found}; {role} needs one of {_QUANTITY[role]}"
+        )
 
 
 def _missing(role: str, values: NDArray[np.float64], name: str, given: bool) -> list[dict[str, Any]]:
@@ -118,7 +121,9 @@ def _missing(role: str, values: NDArray[np.float64], name: str, given: bool) -> 
         share = f"{count} of {len(values)} rows ({count / len(values):.1%}) of {name!r}"
         why = f"hold {sentinel:g}, taken as no reading" if sentinel is not None else "hold no reading"
         row = int(np.flatnonzero(np.isnan(values))[0]) + 1
-        notes.append({"code": "missing-samples", "text": f"{share} {why} (the first is row {row}); they are bridged"})
+        notes.append(
+            {"code": "missing-samples", "text": f"{share} {why} (the first is row {row}); they are bridged"}
+        )
     if count == len(values):
         raise InputError(f"column {name!r} ({role}) holds no reading at all")
     return notes
@@ -131,7 +136,9 @@ def _from_zero(arrays: dict[str, NDArray[np.float64]], rate: float | None, path:
         raise InputError(f"{path} holds a header and no rows; give a log with a row for each sample")
     if "time" not in arrays:
         if rate is None:
-            raise InputError("a log needs its time: name the column with --time, or give the rows per second with --rate")
+            raise InputError(
+                "a log needs its time: name its column with --time, or give rows per second with --rate"
+            )
         if not (np.isfinite(rate) and rate > 0):
             raise InputError(f"the rate must be above 0 rows a second, got {rate:g}")
         arrays["time"] = np.arange(n) / rate
@@ -156,5 +163,7 @@ def _cut(
     keep = (time >= (-np.inf if start is None else start)) & (time < (np.inf if end is None else end))
     if not keep.any():
         span = f"{time.min():.6g} to {time.max():.6g} s"
-        raise InputError(f"no row of {path} lies between --start {start} and --end {end}; the log spans {span}")
+        raise InputError(
+            f"no row of {path} lies between --start {start} and --end {end}; the log spans {span}"
+        )
     return {name: values[keep] for name, values in arrays.items()}

@@ -6,6 +6,7 @@ import json
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,8 +40,8 @@ def write_record(record: Record, path: str | Path) -> Path:
     os.close(handle)
     try:
         frame.write_parquet(draft, metadata=about)
-        os.chmod(draft, 0o666 & ~_umask())
-        os.replace(draft, path)
+        Path(draft).chmod(0o666 & ~_umask())
+        Path(draft).replace(path)
     finally:
         Path(draft).unlink(missing_ok=True)
     return path
@@ -60,10 +61,10 @@ def read_record(path: str | Path) -> Record:
         raise InputError(f"{path} carries no units of palpate; read it with read_log and name its columns")
     frame = polars.read_parquet(path)
     columns = {name: frame[name].to_numpy().astype(float, copy=False) for name in frame.columns}
-    return Record(columns, about["units"], about["meta"])
+    return Record(columns, dict(about["units"]), about["meta"])
 
 
-def stored_about(path: Path) -> dict[str, dict[str, object]] | None:
+def stored_about(path: Path) -> dict[str, dict[str, Any]] | None:
     """Units and metadata that palpate left in a Parquet file; None where there are none.
 
     Raises:

@@ -48,7 +48,7 @@ class Table:
         import polars
 
         about = stored_about(self.path) or {"units": {}, "meta": {}}
-        self.units, self.meta = dict(about["units"]), dict(about["meta"])  # type: ignore[arg-type]
+        self.units, self.meta = dict(about["units"]), dict(about["meta"])
         return list(polars.read_parquet_schema(self.path))
 
     def resolve(self, name: str) -> int:
@@ -60,7 +60,9 @@ class Table:
         places = [i for i, own in enumerate(self.names) if own == name]
         if len(places) > 1:
             numbers = ", ".join(map(str, places))
-            raise InputError(f"{self.path} has {len(places)} columns named {name!r}; name one by number: {numbers}")
+            raise InputError(
+                f"{self.path} has {len(places)} columns named {name!r}; name one by number: {numbers}"
+            )
         if places:
             return places[0]
         if name.isdigit():
@@ -99,7 +101,9 @@ class Table:
         try:
             if self.parquet:
                 lazy = polars.scan_parquet(self.path)
-                picks = [polars.col(self.names[i]).cast(number, strict=False).alias(str(i)) for i in set(places)]
+                picks = [
+                    polars.col(self.names[i]).cast(number, strict=False).alias(str(i)) for i in set(places)
+                ]
             else:
                 lazy = self._text()
                 picks = [self._cell(i).cast(number, strict=False).alias(str(i)) for i in set(places)]
@@ -144,8 +148,15 @@ class Table:
         cell = polars.col(self.names[place]).cast(polars.String) if self.parquet else self._cell(place)
         value = cell.cast(polars.Float64, strict=False)
         words = [word.lower() for word in ("", *missing)]
-        wrong = cell.is_not_null() & ~cell.str.to_lowercase().is_in(words) & ~value.is_finite().fill_null(False)
-        found = lazy.select(cell.alias("cell"), wrong.alias("wrong")).with_row_index("row").filter("wrong").head(1)
+        wrong = (
+            cell.is_not_null() & ~cell.str.to_lowercase().is_in(words) & ~value.is_finite().fill_null(False)
+        )
+        found = (
+            lazy.select(cell.alias("cell"), wrong.alias("wrong"))
+            .with_row_index("row")
+            .filter("wrong")
+            .head(1)
+        )
         for row, text, _ in found.collect().rows():
             raise InputError(self._bad_cell(place, int(row), text))
 

@@ -1,4 +1,4 @@
-"""The figure of an identification: the force with its fit, what is left over, and the loop of force against position."""
+"""The figure of an identification: the force with its fit, what is left, and force against position."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def write_figure(found: Identification, path: Path, title: str) -> Path:
     os.close(handle)
     try:
         figure.savefig(draft, format="png", dpi=110, metadata={"Software": SIGNATURE})
-        os.chmod(draft, 0o644)
-        os.replace(draft, path)
+        Path(draft).chmod(0o644)
+        Path(draft).replace(path)
     finally:
         Path(draft).unlink(missing_ok=True)
     return path
@@ -108,5 +108,5 @@ def _loop(axes: Any, traces: Traces) -> None:
 def _broken(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lines that are not drawn across the time between two contacts."""
     step = np.diff(time)
-    gaps = np.flatnonzero(step > 3 * np.median(step)) + 1 if len(step) else []
+    gaps: np.ndarray | list[int] = np.flatnonzero(step > 3 * np.median(step)) + 1 if len(step) else []
     return np.insert(time, gaps, np.nan), np.insert(values, gaps, np.nan)

@@ -44,7 +44,8 @@ def _contacts(found: Identification) -> str:
 
 
 def _fit(found: Identification) -> str:
-    text = f"{found.model}: R2 {found.r2:.4f}, rms misfit {found.rmse:.3g}, {found.n} samples, filters {found.cutoff:.3g} Hz"
+    text = f"{found.model}: R2 {found.r2:.4f}, rms misfit {found.rmse:.3g}, {found.n} samples"
+    text += f", filters {found.cutoff:.3g} Hz"
     if found.lag:
         text += f", lag {1e3 * found.lag[0]:.3g} ms (std {1e3 * found.lag[1]:.2g} ms)"
     return text
@@ -56,7 +57,9 @@ def _table(found: Identification) -> Table:
         table.add_column(title, justify="right" if title in ("value",) else "left", no_wrap=True)
     for name, p in found.parameters.items():
         style = _STYLES[p.verdict]
-        table.add_row(name, _value(p), _interval(p), "" if p.unit == "1" else p.unit, Text(str(p.verdict), style=style))
+        table.add_row(
+            name, _value(p), _interval(p), "" if p.unit == "1" else p.unit, Text(str(p.verdict), style=style)
+        )
     return table
 
 

@@ -19,7 +19,9 @@ def check_ours(path: Path) -> None:
     if path.is_dir():
         raise InputError(f"{path} is a folder; name a file with --figure")
     if path.exists() and f"Software\x00{SIGNATURE}".encode() not in _head(path):
-        raise InputError(f"{path} is there and palpate did not write it; move it, or name another with --figure")
+        raise InputError(
+            f"{path} is there and palpate did not write it; move it, or name another with --figure"
+        )
 
 
 def _head(path: Path) -> bytes:
