@@ -69,11 +69,13 @@ class Bench:
             or "interrupted" by the keyboard, with the rows so far; ``meta["why"]`` says when and what, in a sentence.
 
         Raises:
-            InputError: a duration that is not positive.
+            InputError: a duration or a press of less than a tick.
         """
         tick = self.loop.tick
         if not duration >= tick:
             raise InputError(f"duration must be at least one tick ({tick} s), got {duration}")
+        if press is not None and not press >= tick:
+            raise InputError(f"press must be at least one tick ({tick} s), got {press}")
         total = round(duration / tick)
         rows, ending = _Run(self.loop, seed, compiled, waiting, Watchman(self.losses)).rows(
             start_at(self.loop, self.q), total, None if press is None else round(press / tick), progress
@@ -105,16 +107,17 @@ class _Run:
             except KeyboardInterrupt:
                 end = Ending(INTERRUPTED, f"interrupted at {done * self.loop.tick:.3f} s")
                 break
-            keep, end = self.watchman.judge(out, self.loop.controller.trouble(state.controller))
-            out = out[:keep]
-            chunks.append(out)
             if first is None and (out[:, 1] == CONTACT).any():
                 first = done + int(np.argmax(out[:, 1] == CONTACT))
                 stop = total if press is None else min(total, first + press)
-            done += len(out)
+            # What comes after the stop is no part of the run, whatever it holds.
+            out = out[: stop - done]
+            keep, end = self.watchman.judge(out, self.loop.controller.trouble(state.controller))
+            chunks.append(out[:keep])
+            done += keep
             if progress is not None:
                 progress(done * self.loop.tick, "approach" if first is None else "contact")
-        rows = np.concatenate(chunks)[:stop] if chunks else np.empty((0, len(COLUMNS)))
+        rows = np.concatenate(chunks) if chunks else np.empty((0, len(COLUMNS)))
         if end is None:
             end = Ending(NO_CONTACT, "no surface was felt") if first is None else Ending(DONE, "as asked for")
         return rows, end

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from palpate._jit import law, part
+from palpate._jit import part
 from palpate._vector import Vec3, solve
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import Surface
