@@ -22,7 +22,7 @@ LATE = 0.5
 """Seconds at the end over which answers, force and displacement are averaged [s]."""
 FOAM = rls.nearer(changed(load("foam-rls"), {"run.press": PRESS, "surface.stiffness": 5450.0}))
 """Its K is chosen so that f/x comes out near the thesis' 6.7 kN/m."""
-RUBBER = rls.nearer(changed(load("rubber-rls"), {"run.press": PRESS, "surface.stiffness": 48500.0}))
+RUBBER = rls.nearer(changed(load("rubber-rls"), {"run.press": PRESS, "surface.stiffness": 49200.0}))
 """A rubber of its own: f/x is 62 kN/m in this run of the thesis and 44 in the one for least squares."""
 RELAXING = rls.nearer(changed(load("foam-viscoelastic"), {"run.press": PRESS}))
 STIFFENING = {
@@ -76,7 +76,9 @@ def press_of(record: Record, surface: str) -> Press:
     return Press(surface, inputs, first["force_measured"], float(ratio), squares)
 
 
-def presses(runs: Runs, experiment: Experiment, surface: str, seeds: Sequence[int] | None = None) -> list[Press]:
+def presses(
+    runs: Runs, experiment: Experiment, surface: str, seeds: Sequence[int] | None = None
+) -> list[Press]:
     """One press a noise seed."""
     cases = [(experiment, seed) for seed in (runs.seeds if seeds is None else seeds)]
     return runs.over(cases, lambda record: press_of(record, surface))
@@ -142,7 +144,7 @@ def answer(press: Press, choice: Choice, start: int) -> Answer:
     """Lets one network learn from one press."""
     probe, answers = learned(press, choice, start)
     K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
-    settled = [rls.settled_after(answers[:, i], end=len(answers) * TICK) for i in range(3)]
+    settled_K, settled_B, settled_M = (rls.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T)
     asked = probe.probe()
     return Answer(
         K,
@@ -150,7 +152,9 @@ def answer(press: Press, choice: Choice, start: int) -> Answer:
         M,
         press.ratio,
         float(press.squares[-1, 1]),
-        *settled,
+        settled_K,
+        settled_B,
+        settled_M,
         error_gone(answers[:, 3]),
         asked.force_at_zero,
         tangent(probe, press.rest),
@@ -181,13 +185,17 @@ def error_gone(error: Array) -> float:
     return float("inf") if large[-1] == len(error) - 1 else float((large[-1] + 1) * TICK)
 
 
-def answers(runs: Runs, some: Sequence[Press], choice: Choice, starts: Sequence[int] = STARTS) -> list[Answer]:
+def answers(
+    runs: Runs, some: Sequence[Press], choice: Choice, starts: Sequence[int] = STARTS
+) -> list[Answer]:
     """Every start on every press."""
     cases = [(press, choice, start) for press in some for start in starts]
     return runs.map(lambda case: answer(*case), cases)
 
 
-def swept(runs: Runs, some: Sequence[Press], choices: Sequence[Choice] = tuple(SWEEP)) -> dict[Choice, list[Answer]]:
+def swept(
+    runs: Runs, some: Sequence[Press], choices: Sequence[Choice] = tuple(SWEEP)
+) -> dict[Choice, list[Answer]]:
     """For each choice as many answers as there are presses, each of them with a start of its own."""
     cases = [(press, choice, start) for choice in choices for start, press in enumerate(some)]
     found = iter(runs.map(lambda case: answer(*case), cases))
@@ -219,4 +227,3 @@ def varied_presses(runs: Runs, experiment: Experiment, surface: str) -> Mapping[
     cases = conditions(experiment)
     made = iter(runs.over([(e, s) for e in cases.values() for s in seeds], lambda r: press_of(r, surface)))
     return {name: [next(made) for _ in seeds] for name in cases}
-

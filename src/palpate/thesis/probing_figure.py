@@ -14,7 +14,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis import probing, rls_drawing
 from palpate.thesis.probing import AMPLITUDES, STARTS, WEIGHTS, Answer, Choice, Press
-from palpate.thesis.probing_claims import Grounds, Part, share
+from palpate.thesis.probing_claims import SMALL, Grounds, Part, share
 from palpate.thesis.rls import Array
 from palpate.thesis.runs import Runs
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN_STARTS = 5
+CALM = 60
+"""Milliseconds after which curves set the scale of a panel."""
 NAMES = {"foam": "plain foam", "rubber": "rubber"}
 
 
@@ -57,26 +59,27 @@ def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[Pre
     )
 
 
-def plot(data: Data, parts: Sequence[Part], thesis: tuple[float, float]) -> Figure:
+def plot(data: Data, parts: Sequence[Part], band: float) -> Figure:
     """Six panels as in the thesis; (g), (h) where in the sweep each part holds; (i) under conditions; (j) all answers.
 
     Args:
         data: of `run`.
         parts: of the claim.
-        thesis: K over f/x and M that the thesis has, for (j); M as its word "small".
+        band: of K over f/x around 1 in which the claim holds.
     """
     drawing, axes = rls_drawing.grid(5)
     name = NAMES[data.grounds.surface]
     rls_drawing.six(axes[:6], {name: _record(data)}, "probe", (0.0, probing.PRESS))
     _others(axes[1:6:2], data, rls_drawing.COLORS[name])
+    rls_drawing.calm_limits(axes[4], 1e-3 * data.press.force[CALM:] / data.press.inputs[CALM:, 0])
     for axis, thresholds, letter in zip(axes[6:8], (True, False), "gh", strict=True):
         _map(axis, data.grounds.swept, parts, thresholds=thresholds)
-        kind = "thresholds that learn" if thresholds else "thresholds fixed at zero"
-        rls_drawing.titled(axis, letter, f"Share of runs in which each part holds: {kind}")
+        kind = "learn" if thresholds else "stay at zero"
+        rls_drawing.titled(axis, letter, f"Where each part holds; thresholds {kind}")
     _conditions(axes[8], data.grounds, parts)
-    rls_drawing.titled(axes[8], "i", "The same as chosen, under varied conditions")
-    _cloud(axes[9], data.grounds, thesis)
-    rls_drawing.titled(axes[9], "j", "All answers: $M_e$ over $K_e$")
+    rls_drawing.titled(axes[8], "i", "As chosen, under varied conditions")
+    _cloud(axes[9], data.grounds, band)
+    rls_drawing.titled(axes[9], "j", "All answers; red: where the claim would hold")
     return drawing
 
 
@@ -105,14 +108,20 @@ def _others(axes: list[Axes], data: Data, color: str) -> None:
             axis.plot(t, other, color=color, linewidth=0.8, alpha=0.35)
         squares = scale * data.press.squares[:, "MBK".index(key)]
         axis.plot(t, squares, color=style.GREY, linewidth=1.0, linestyle="--")
-        rls_drawing.calm_limits(axis, *(c[30:] for c in curves), squares[200:], margin=0.1)
-    axes[2].plot(t, 1e-3 * np.full(len(t), data.press.ratio), color=style.ORANGE, linewidth=1.0, linestyle=":")
+        rls_drawing.calm_limits(axis, *(c[CALM:] for c in curves), squares[200:], margin=0.1)
+    axes[2].plot(
+        t, 1e-3 * np.full(len(t), data.press.ratio), color=style.ORANGE, linewidth=1.0, linestyle=":"
+    )
     lines = ("network, five starts", "", "", "", "", "least squares", "f/x at the end")
     handles = [line for line, label in zip(axes[2].lines, lines, strict=True) if label]
-    axes[2].legend(handles, [label for label in lines if label], fontsize=7, frameon=False, ncols=3, loc="lower right")
+    axes[2].legend(
+        handles, [label for label in lines if label], fontsize=7, frameon=False, ncols=3, loc="lower right"
+    )
 
 
-def _map(axis: Axes, swept: Mapping[Choice, Sequence[Answer]], parts: Sequence[Part], *, thresholds: bool) -> None:
+def _map(
+    axis: Axes, swept: Mapping[Choice, Sequence[Answer]], parts: Sequence[Part], *, thresholds: bool
+) -> None:
     shares = np.array(
         [
             [share(swept[Choice(a, w, thresholds)], part) for a in AMPLITUDES for w in WEIGHTS]
@@ -125,7 +134,9 @@ def _map(axis: Axes, swept: Mapping[Choice, Sequence[Answer]], parts: Sequence[P
         axis.axvline(i * n - 0.5, color=style.INK, linewidth=0.6)
     middles = [i * n + (n - 1) / 2 for i in range(len(AMPLITUDES))]
     axis.set_xticks(middles, [f"{a:g}" for a in AMPLITUDES])
-    axis.set_xlabel(f"output amplitude [N]; within each, weights {WEIGHTS[0]:g} to {WEIGHTS[-1]:g}", fontsize=8)
+    axis.set_xlabel(
+        f"output amplitude [N]; within each, weights {WEIGHTS[0]:g} to {WEIGHTS[-1]:g}", fontsize=8
+    )
 
 
 def _conditions(axis: Axes, grounds: Grounds, parts: Sequence[Part]) -> None:
@@ -145,17 +156,27 @@ def _shares(axis: Axes, shares: Array, rows: Sequence[str]) -> None:
     axis.tick_params(length=0)
 
 
-def _cloud(axis: Axes, grounds: Grounds, thesis: tuple[float, float]) -> None:
+def _cloud(axis: Axes, grounds: Grounds, band: float) -> None:
+    from matplotlib.patches import Rectangle
+
     fixed = [a for choice, some in grounds.swept.items() if not choice.thresholds for a in some]
     learning = [a for choice, some in grounds.swept.items() if choice.thresholds for a in some]
     for some, color, label in (
-        (learning, style.BLUE, "thresholds learn, swept"),
-        (fixed, style.ORANGE, "fixed, swept"),
+        (learning, style.BLUE, "swept, thresholds learn"),
+        (fixed, style.ORANGE, "swept, thresholds at zero"),
         (grounds.nominal, style.INK, "as chosen"),
     ):
-        axis.plot([a.over for a in some], [a.M for a in some], ".", color=color, markersize=3, label=label, alpha=0.7)
+        axis.plot(
+            [a.over for a in some],
+            [a.M for a in some],
+            ".",
+            color=color,
+            markersize=3,
+            label=label,
+            alpha=0.7,
+        )
     axis.axvline(grounds.perfect, color=style.GREY, linewidth=0.9, linestyle="--")
-    axis.plot(*thesis, "*", color=style.RED, markersize=11, label="the thesis")
+    axis.add_patch(Rectangle((1.0 - band, 0.0), 2.0 * band, SMALL, fill=False, edgecolor=style.RED, zorder=3))
     axis.set(xlim=(0.5, 2.5), xlabel="$K_e$ over f/x (dashed: a network without error)", ylabel="$M_e$ [kg]")
     axis.set_yscale("symlog", linthresh=0.1)
-    axis.legend(fontsize=7, frameon=False, ncols=2, loc="lower left")
+    axis.legend(fontsize=7, frameon=False, loc="center right")

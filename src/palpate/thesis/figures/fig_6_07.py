@@ -35,4 +35,4 @@ def check(data: probing_figure.Data) -> Sequence[Claim]:
 
 def plot(data: probing_figure.Data) -> Figure:
     """The six panels, and where the claims hold."""
-    return probing_figure.plot(data, probing_claims.FOAM, (6.6 / 6.7, 0.1))
+    return probing_figure.plot(data, probing_claims.FOAM, probing_claims.FOAM_BAND)

@@ -33,4 +33,4 @@ def check(data: probing_figure.Data) -> Sequence[Claim]:
 
 def plot(data: probing_figure.Data) -> Figure:
     """The six panels, and where the claims hold."""
-    return probing_figure.plot(data, probing_claims.RUBBER, (56 / 62, 0.1))
+    return probing_figure.plot(data, probing_claims.RUBBER, probing_claims.RUBBER_BAND)
