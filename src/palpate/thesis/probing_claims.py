@@ -19,8 +19,8 @@ TIME = (0.3, 0.9)
 SMALL = 1.0
 """What a small mass is below [kg]."""
 FOAM_BAND, RUBBER_BAND = 0.06, 0.15
-"""How far K may be from f/x, as a share of it: "almost same" is said of less than 6 % in sec. 6.1; on rubber the thesis'
-own are 10 % apart."""
+"""How far K may be from f/x, as a share of it: "almost same" is said of less than 6 % in sec. 6.1; on rubber the
+thesis' own are 10 % apart."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +147,7 @@ def claims(grounds: Grounds, parts: Sequence[Part], id_: str, source: str) -> li
 def _claim(grounds: Grounds, part: Part, id_: str, source: str, parts: Sequence[Part]) -> Claim:
     values = [part.value(a) for a in grounds.nominal]
     good = sum(map(part.holds, grounds.nominal))
+    measured = f"{told(values, part.unit, grounds.starts)}{_figures(part, grounds)}; holds in {good} of {len(values)}"
     note = " ".join(
         [_why(part, grounds), where(grounds, part), under(grounds, part), _jointly(grounds, part, parts)]
     )
@@ -155,7 +156,7 @@ def _claim(grounds: Grounds, part: Part, id_: str, source: str, parts: Sequence[
         source=source,
         claim=part.claim,
         thesis=part.thesis,
-        measured=f"{told(values, part.unit, grounds.starts)}{_figures(part, grounds)}; holds in {good} of {len(values)}",
+        measured=measured,
         tolerance=f"{part.tolerance}; in 9 of 10 runs",
         verdict=decided(enough(grounds.nominal, part)),
         note=note.strip(),
@@ -255,19 +256,21 @@ def _why_time(part: Part, grounds: Grounds) -> str:
     times = [part.value(a) for a in grounds.nominal]
     early, late = sum(t < TIME[0] for t in times), sum(t > TIME[1] for t in times)
     return (
-        f"{text} {part.suffix[-1]}_e is early in {early} and late in {late} of {len(times)} runs. That it settles says only "
-        f"that learning has stopped moving it: in steady contact no sample tells what the force would be if the tip moved."
+        f"{text} {part.suffix[-1]}_e is early in {early} and late in {late} of {len(times)} runs. That it settles says "
+        f"only that learning has stopped moving it: in steady contact no sample tells what the force would be if the "
+        f"tip moved."
     )
 
 
 def _why_stiffness(part: Part, grounds: Grounds) -> str:
     x = SETTINGS[grounds.surface].values[0]
     fixed = [float(np.median([a.over for a in s])) for c, s in grounds.swept.items() if not c.thresholds]
+    at_zero = float(np.median([a.at_zero for a in grounds.nominal]))
     return (
         f"Displacement counts from where the force is 5 N already, so that even a network without any error would say "
         f"{grounds.perfect:.2f} times f/x at the probe of {1e3 * x:g} mm. This one adds to it: a threshold that learns "
         f"takes up part of the force as a constant. With nothing pressed the network says "
-        f"{float(np.median([a.at_zero for a in grounds.nominal])):.3g} N, and the probe divides that by its displacement. With thresholds "
+        f"{at_zero:.3g} N, and the probe divides that by its displacement. With thresholds "
         f"fixed at zero the medians go from {min(fixed):.2f} to {max(fixed):.2f}: least where the amplitude is so "
         f"large and the weights so small that the network is a straight line through zero, which answers f/x wherever "
         f"it is asked. {_by_surface(grounds)}The surface's stiffness was chosen for the thesis' f/x."
@@ -285,8 +288,8 @@ def _why_damping(part: Part, grounds: Grounds) -> str:
     values = [a.B for a in grounds.nominal]
     return (
         f"B_e goes from {min(values):.3g} to {max(values):.3g} N s/m. {_by_start(values, grounds)} The tip moves for a "
-        f"tenth of a second, and its error there can be removed through any of 21 weights and thresholds: one push does "
-        f"not settle how the force is shared out between displacement, velocity and the thresholds."
+        f"tenth of a second, and its error there can be removed through any of 21 weights and thresholds: one push "
+        f"does not settle how the force is shared out between displacement, velocity and the thresholds."
     )
 
 
@@ -295,17 +298,15 @@ def _why_mass(part: Part, grounds: Grounds) -> str:
     by_start = values.reshape(-1, grounds.starts)
     firm = int(np.sum(np.all(by_start > 0, axis=0) | np.all(by_start < 0, axis=0)))
     return (
-        f"M_e is positive in {int(np.sum(values > 0))} of {values.size} runs; for {firm} of {grounds.starts} starts its "
-        f"sign is the same with every noise seed. {_by_start(values, grounds)} It is no property of the surface, and a "
-        f"positive value says no more than a negative one would."
+        f"M_e is positive in {int(np.sum(values > 0))} of {values.size} runs; for {firm} of {grounds.starts} starts "
+        f"its sign is the same with every noise seed. {_by_start(values, grounds)} It is no property of the surface, "
+        f"and a positive value says no more than a negative one would."
     )
 
 
 def _by_start(values: Sequence[float] | NDArray[np.float64], grounds: Grounds) -> str:
-    return (
-        f"The initial weights make {share_of_starts(values, grounds.starts):.0%} of its variance, the noise and what it "
-        f"does to the press the rest."
-    )
+    part = share_of_starts(values, grounds.starts)
+    return f"Initial weights make {'over 99%' if part > 0.99 else f'{part:.0%}'} of its variance, noise the rest."
 
 
 def share_of_starts(values: Sequence[float] | NDArray[np.float64], starts: int) -> float:
@@ -315,9 +316,7 @@ def share_of_starts(values: Sequence[float] | NDArray[np.float64], starts: int) 
 
 
 def _why_error(part: Part, grounds: Grounds) -> str:
-    times = {
-        a: s for a, s in ((c.amplitude, s) for c, s in grounds.swept.items() if c == Choice(c.amplitude))
-    }
+    times = {c.amplitude: some for c, some in grounds.swept.items() if c == Choice(c.amplitude)}
     told_ = ", ".join(f"{np.median([x.error_gone for x in s]):.2g} s at {a:g} N" for a, s in times.items())
     return (
         f"The error does become almost zero; when, follows from the output amplitude and the initial weights, which "

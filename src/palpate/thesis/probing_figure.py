@@ -1,4 +1,4 @@
-"""The figures of the neural identifier on one surface, 6.7 and 6.9: the thesis' six panels, and where its claims hold."""
+"""The neural identifier on one surface, figures 6.7 and 6.9: the thesis' six panels, and where its claims hold."""
 
 from __future__ import annotations
 
@@ -114,8 +114,9 @@ def _others(axes: list[Axes], data: Data, color: str) -> None:
     )
     lines = ("network, five starts", "", "", "", "", "least squares", "f/x at the end")
     handles = [line for line, label in zip(axes[2].lines, lines, strict=True) if label]
+    labels = [label for label in lines if label]
     axes[2].legend(
-        handles, [label for label in lines if label], fontsize=7, frameon=False, ncols=3, loc="lower right"
+        handles, labels, fontsize=7, frameon=False, ncols=3, loc="center right", bbox_to_anchor=(1.0, 0.4)
     )
 
 
@@ -179,4 +180,4 @@ def _cloud(axis: Axes, grounds: Grounds, band: float) -> None:
     axis.add_patch(Rectangle((1.0 - band, 0.0), 2.0 * band, SMALL, fill=False, edgecolor=style.RED, zorder=3))
     axis.set(xlim=(0.5, 2.5), xlabel="$K_e$ over f/x (dashed: a network without error)", ylabel="$M_e$ [kg]")
     axis.set_yscale("symlog", linthresh=0.1)
-    axis.legend(fontsize=7, frameon=False, loc="center right")
+    axis.legend(fontsize=7, frameon=False, loc="center right", markerscale=3)

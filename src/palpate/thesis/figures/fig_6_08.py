@@ -73,17 +73,10 @@ def _times(axis: Axes, data: Data, *, thresholds: bool) -> None:
     swept = data.shown.grounds.swept
     for weights, color in zip(WEIGHTS, colors, strict=True):
         found = [[a.error_gone for a in swept[Choice(a, weights, thresholds)]] for a in AMPLITUDES]
-        axis.plot(
-            AMPLITUDES,
-            np.median(found, axis=1),
-            "o-",
-            color=color,
-            markersize=3.5,
-            linewidth=1.0,
-            label=f"{weights:g}",
-        )
+        middle = np.median(found, axis=1)
+        axis.plot(AMPLITUDES, middle, "o-", color=color, markersize=3.5, linewidth=1.0, label=f"{weights:g}")
     axis.axhspan(*probing_claims.TIME, color=style.RED, alpha=0.12, linewidth=0)
     axis.set(xscale="log", yscale="log", xlabel="output amplitude [N]", ylabel="time [s]")
-    axis.set_xticks(AMPLITUDES, [f"{a:g}" for a in AMPLITUDES])
+    axis.set_xticks(AMPLITUDES, [f"{a:g}" for a in AMPLITUDES], fontsize=7.5)
     axis.minorticks_off()
     axis.legend(fontsize=7, frameon=False, title="weights to", title_fontsize=7, ncols=2)

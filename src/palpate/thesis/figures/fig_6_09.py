@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 NUMBER = "6.9"
 TITLE = "Neural identifier on rubber: the first four seconds"
 CAPTION = (
-    "As figure 6.7, on a rubber of its own (f/x 62 kN/m here, 44 in figure 6.5), asked at 0.2 mm, 10 mm/s, 0.5 m/s². The "
-    "thesis: about 0.6 s, K 56 beside f/x 62 kN/m, B smaller than that of least squares, M small and positive."
+    "As figure 6.7, on a rubber of its own (f/x 62 kN/m here, 44 in figure 6.5), asked at 0.2 mm, 10 mm/s, 0.5 m/s². "
+    "The thesis: about 0.6 s, K 56 beside f/x 62 kN/m, B smaller than that of least squares, M small and positive."
 )
 PARAMETERS = probing.RUBBER
 
