@@ -1,0 +1,63 @@
+"""Figure 6.13: the neural controller with a small learning rate, at first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from palpate.bench import changed
+from palpate.thesis.claims import Claim, decided
+from palpate.thesis.force_panels import following_panel, force_panel, panels
+from palpate.thesis.force_tracking import ENOUGH, FOAM, FOLLOWS, Tracked, Tracking, stops_holding, told, tracked
+from palpate.thesis.runs import Runs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NUMBER = "6.13"
+TITLE = "Neural controller with a small learning rate, at first"
+CAPTION = (
+    "The first ten seconds on foam with a learning rate of 1e-5, a fifth of that before. The thesis says that the force "
+    "cannot follow immediately."
+)
+SLOW = {"controller.learning_rate": 1e-5}
+PARAMETERS = changed(FOAM, {**SLOW, "run.press": 10.0})
+WINDOW = (0.0, 10.0)
+
+
+def run(runs: Runs) -> Tracked:
+    """Ten seconds from the first touch on, drawn and judged."""
+    return tracked(runs, PARAMETERS, WINDOW, WINDOW)
+
+
+def check(data: Tracked) -> Sequence[Claim]:
+    """The force must not follow in the first ten seconds."""
+    return [
+        Claim(
+            id="NNC-SLOW.first",
+            source="fig. 6.13, sec. 6.3",
+            claim="With a learning rate of 1e-5 the force cannot follow at first.",
+            thesis="cannot follow immediately",
+            measured=told(data.nominal),
+            tolerance=f"the contrary of following from 0 to 10 s, in 9 of 10 runs. Following is, {FOLLOWS}",
+            verdict=decided(sum(map(_late, data.nominal)) >= ENOUGH * len(data.nominal)),
+            note=(
+                "The network starts as an integrator whose gain is proportional to the learning rate: K_i = 1 per second "
+                "here, a time constant of (1 + K_fp)/K_i = 1.25 s, half the length of an interval. A step is over before "
+                "what friction withholds is learned. How much friction there is decides how much is missing. That the "
+                f"force does not follow {stops_holding(data.varied, _late)[3:]}"
+            ),
+        )
+    ]
+
+
+def plot(data: Tracked) -> Figure:
+    """The beginning, and the runs."""
+    drawing, ((force,), (dots,)) = panels([3.2, 2.0])
+    force_panel(force, data.shown)
+    following_panel(dots, data.varied)
+    return drawing
+
+
+def _late(one: Tracking) -> bool:
+    return not one.follows
