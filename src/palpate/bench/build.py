@@ -6,6 +6,7 @@ import msgspec
 
 from palpate._vector import Mat3, Vec3, diagonal
 from palpate.bench.bench import Bench
+from palpate.bench.checking import check, matched_delay
 from palpate.bench.conditioning import Conditioning
 from palpate.bench.controller_tables import controller_of
 from palpate.bench.estimators import Estimators
@@ -41,9 +42,10 @@ def build(experiment: Experiment) -> Bench:
     """The bench of an experiment.
 
     Raises:
-        InputError: a start pose out of reach, a wall that the arm already stands in, a filter above half the rate.
+        InputError: a start pose out of reach, a wall that the arm already stands in, numbers that do not go together.
     """
     e = experiment
+    check(e)
     arm = Arm3(limits=Vec3(*e.robot.torque_limits), rotor=Vec3(*e.robot.rotor_inertia))
     q = _start(arm, e)
     rate, tick = float(e.run.rate), 1.0 / e.run.rate
@@ -61,7 +63,7 @@ def build(experiment: Experiment) -> Bench:
         approach=ResolvedAcceleration(_all(e.approach.kp), _all(e.approach.kv)),
         controller=controller_of(e.controller, tick, e.wall.x),
         compensation=Coulomb(Vec3(*e.compensation.level), Vec3(*e.compensation.blend)),
-        estimators=_estimators(e, rate, force.lag),
+        estimators=_estimators(e, rate, matched_delay(e, force)),
         tick=tick,
         steps=e.run.steps,
     )
@@ -75,11 +77,11 @@ def _all(value: float) -> Vec3:
 
 def _start(arm: Arm3, e: Experiment) -> Vec3:
     pose = Vec3(*(float(v) for v in e.robot.start))
-    if e.robot.elbow == 0:
-        raise InputError("elbow must be 1 or -1, got 0 in [robot]")
     beyond = arm.beyond_reach(pose)
     if beyond > 0.0:
-        raise InputError(f"start {tuple(pose)} in [robot] is out of reach by {1e3 * beyond:.1f} mm")
+        raise InputError(
+            f"start in [robot] is out of reach by {1e3 * beyond:.1f} mm, got {list(pose)}; move it"
+        )
     if pose.x > e.wall.x:
         raise InputError(
             f"the wall at x = {e.wall.x} m in [wall] lies behind the arm's start at x = {pose.x} m in [robot]; "
@@ -122,7 +124,7 @@ def _schedule(e: Experiment) -> ForceSchedule:
     return ForceSchedule(*map(float, (f.first, second, f.period, f.amplitude, f.frequency, f.restart)))
 
 
-def _estimators(e: Experiment, rate: float, lag: float) -> Estimators:
+def _estimators(e: Experiment, rate: float, late: float) -> Estimators:
     i, s = e.identification, e.force_sensor
     P: Mat3 = diagonal(_all(i.covariance))
     forgetting = float(i.forgetting)
@@ -131,7 +133,7 @@ def _estimators(e: Experiment, rate: float, lag: float) -> Estimators:
     front = Matched(
         sensor.second,
         sensor.first,
-        delay(lag - sensor.lag, rate),  # computing, holding, and what the filter's model at this rate lacks
+        delay(late, rate),  # computing, holding, and what the filter's model at this rate lacks
         state_variable(i.cutoff, rate),
     )
     matched = LeastSquares(_all(0.0), P, forgetting)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -70,9 +72,9 @@ def _run(name: str, source: str, seed: int, folder: Path, fresh: Path, as_json: 
 
     console = Console(stderr=as_json)
     experiment = parse(source, name)
-    record = _record(console, experiment, seed)
-    command = f"palpate run {name} --seed {seed}"
-    record.meta["command"] = command
+    command = f"palpate run {shlex.quote(name)} --seed {seed}"
+    record = _record(console, name, experiment, seed)
+    record = replace(record, meta={**record.meta, "command": command})
     summary = {"experiment": Path(name).stem, "command": command, **summarise(record)}
     write_record(record, fresh / "record.parquet")
     (fresh / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n")
@@ -85,13 +87,16 @@ def _run(name: str, source: str, seed: int, folder: Path, fresh: Path, as_json: 
     return summary
 
 
-def _record(console: Console, experiment: Any, seed: int) -> Record:
+def _record(console: Console, name: str, experiment: Any, seed: int) -> Record:
     from rich.progress import BarColumn, Progress, TextColumn
 
     from palpate.bench import build
     from palpate.cli._waiting import COMPILING
 
-    bench = build(experiment)
+    try:
+        bench = build(experiment)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
     with Progress(*columns, console=console, transient=True) as progress:
         bar = progress.add_task("starting", total=None, time="")
