@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
 from palpate.bench.controller_tables import ControllerTable, HybridController
+from palpate.bench.explaining import explained, not_finite
 from palpate.bench.part_table import NotNegative, NotNegativeTriple, Part, Positive, PositiveTriple, Triple
 from palpate.errors import InputError, unknown
 
@@ -34,7 +34,7 @@ class Robot(Part):
 
     start: Triple = (0.454, 0.0, 0.0)
     """Pose at the start: x [m], y [m], phi [rad]."""
-    elbow: Annotated[int, Meta(ge=-1, le=1)] = 1
+    elbow: Literal[1, -1] = 1
     torque_limits: PositiveTriple = (16.0, 2.5, 0.6)
     rotor_inertia: NotNegativeTriple = (0.084, 0.009, 2.8e-5)
     """[kg m^2]; in the plant, not in the controller's model."""
@@ -202,9 +202,7 @@ def load(name: str) -> Experiment:
 def parse(text: str, where: str) -> Experiment:
     """An experiment from TOML; `where` names the text in errors."""
     try:
-        return msgspec.toml.decode(text, type=Experiment)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {_explained(str(error))}") from error
+        return _converted(msgspec.toml.decode(text), where)
     except msgspec.DecodeError as error:
         raise InputError(f"{where}: not TOML: {error}") from error
 
@@ -220,30 +218,17 @@ def changed(experiment: Experiment, changes: Mapping[str, Any]) -> Experiment:
         *outer, key = path.split(".")
         table = tables
         for name in outer:
-            table = table[name]
+            table = table.setdefault(name, {})
         table[key] = msgspec.to_builtins(value)
+    return _converted(tables, ", ".join(changes))
+
+
+def _converted(tables: dict[str, Any], where: str) -> Experiment:
+    bad = not_finite(tables)
+    if bad is not None:
+        raise InputError(f"{where}: {bad}")
     try:
         return msgspec.convert(tables, Experiment)
     except msgspec.ValidationError as error:
-        raise InputError(f"{', '.join(changes)}: {_explained(str(error))}") from error
+        raise InputError(f"{where}: {explained(str(error), tables, Experiment)}") from error
 
-
-def _explained(message: str) -> str:
-    """msgspec's message in the words of the file: the table's name for a path, and the nearest key."""
-    what, _, path = message.partition(" - at `$")
-    table = path.strip("`.")
-    place = f" in [{table}]" if table else ""
-    found = re.match(r"Object contains unknown field `(.+)`", what)
-    if found is None:
-        return f"{what}{place}"
-    return f"{unknown('key', found.group(1), _keys(table))}{place}"
-
-
-def _keys(table: str) -> list[str]:
-    """The keys of a table of the file; "" is the file itself."""
-    kinds: list[Any] = [Experiment]
-    for name in filter(None, table.split(".")):
-        fields = {f.encode_name: f.type for kind in kinds for f in msgspec.structs.fields(kind)}
-        kind = fields[name]
-        kinds = list(getattr(kind, "__args__", (kind,)))
-    return sorted({f.encode_name for kind in kinds for f in msgspec.structs.fields(kind)})
