@@ -187,3 +187,16 @@ def test_a_rate_too_large_ends_the_run_and_says_why(quick):
     assert "learns no more; lower the learning rate, 0.1" in record.meta["why"]
     watched = build(replaced(fast, run=replaced(fast.run, losses=0))).run(5.0, seed=1)
     assert watched.meta["end"] == "done"
+
+
+def test_left_to_learn_on_foam_that_relaxes_it_loses_the_contact():
+    """Measured: after 30.3 s of contact at 5e-5, after 18 to 20 s at twice that; its hidden weights have grown."""
+    e = load("foam-neural-minutes")
+    when = {}
+    for rate in (5e-5, 1e-4):
+        record = build(replaced(e, controller=replaced(e.controller, learning_rate=rate))).run(60.0, seed=2)
+        assert record.meta["end"] == "lost contact"
+        pressing = record["phase"] == 1.0
+        when[rate] = float(pressing.sum()) * 1e-3
+        assert record["adapted1"][pressing][-1] > 5.0 * record["adapted1"][pressing][0]
+    assert 10.0 < when[1e-4] < when[5e-5] < 60.0

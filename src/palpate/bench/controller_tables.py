@@ -44,7 +44,7 @@ class NeuralController(Part, tag="neural", tag_field="kind"):
     kp: NotNegative = 400.0
     kv: NotNegative = 80.0
     kf: NotNegative = 0.25
-    learning_rate: Positive = 5e-5
+    learning_rate: Annotated[float, Meta(gt=0, le=1e300)] = 5e-5
     """5e-5 in the thesis' text, 1e-4 in its listing."""
     layers: tuple[Size, ...] = (12,)
     """Neurons of each hidden layer."""
@@ -128,7 +128,7 @@ class SelfTuningController(Part, tag="self-tuning", tag_field="kind"):
     scale: NotNegative = 0.3
     """The weights are drawn evenly from -scale ... scale."""
     inputs: PositiveTriple = (10.0, 5.0, 100.0)
-    """What the network's inputs are divided by: force error [N], its integral [N s], force rate [N/s]."""
+    """What the network's inputs are divided by: force error [N], the integral's share [N], force rate [N/s]."""
     dead_zone: NotNegative = 1.0
     """Force error that is not learned from [N]."""
     smoothing: Positive = 0.01

@@ -17,6 +17,8 @@ from palpate.errors import InputError, unknown
 
 
 class Run(Part):
+    """How long it goes on, and how finely."""
+
     press: Positive = 6.0
     """Seconds of contact after which the run ends."""
     duration: Annotated[float, Meta(gt=0, le=3600)] = 60.0
@@ -52,12 +54,16 @@ class Friction(Part):
 
 
 class KelvinVoigtSurface(Part, tag="kelvin-voigt", tag_field="kind"):
+    """Mass, damper and spring: f = M a + B v + K x."""
+
     stiffness: Positive
     damping: NotNegative
     mass: NotNegative
 
 
 class StandardLinearSolidSurface(Part, tag="standard-linear-solid", tag_field="kind"):
+    """A spring and damper beside a spring that relaxes: foam under load."""
+
     stiffness: Positive
     damping: NotNegative
     mass: NotNegative
@@ -66,6 +72,8 @@ class StandardLinearSolidSurface(Part, tag="standard-linear-solid", tag_field="k
 
 
 class HuntCrossleySurface(Part, tag="hunt-crossley", tag_field="kind"):
+    """A spring that stiffens and damping that grows with depth: f = K x^n + B x^n v."""
+
     stiffness: Positive
     damping: NotNegative
     exponent: Annotated[float, Meta(ge=1)]
@@ -82,10 +90,14 @@ class Wall(Part):
 
 
 class Encoders(Part):
+    """Of the joints: counts a turn."""
+
     counts: PositiveTriple = (614400.0, 409600.0, 2000.0)
 
 
 class ForceSensor(Part):
+    """Its noise and its chain: low-pass [Hz], sampling [Hz], bits over a full scale [N]."""
+
     noise: NotNegative = 0.6
     """Standard deviation of a sample [N]."""
     cutoff: Positive = 120.0
@@ -97,12 +109,16 @@ class ForceSensor(Part):
 
 
 class Filters(Part):
+    """The controller's own low-passes [Hz]."""
+
     motion: Positive = 35.0
     """Of Cartesian velocity and acceleration, and of joint 3 [Hz]."""
     force: Positive = 120.0
 
 
 class ApproachTable(Part):
+    """How the arm looks for the surface: a hold [s], then steps of x [m] each period [s]; the gains of the position."""
+
     hold: NotNegative = 5.0
     first: float = 0.456
     step: float = 0.001
@@ -117,6 +133,8 @@ class ApproachTable(Part):
 
 
 class DesiredForce(Part):
+    """Steps between two forces [N] each period [s], and a sine [N], [Hz] whose clock may restart [s]."""
+
     first: float = 20.0
     second: float | None = None
     """Of every other interval; as the first when left out."""
@@ -134,6 +152,8 @@ class Compensation(Part):
 
 
 class Identification(Part):
+    """The recursive least squares that watches."""
+
     forgetting: Annotated[float, Meta(gt=0, le=1)] = 1.0
     initial: Triple = (0.0, 0.0, 2e5)
     """M, B, K of the thesis' estimators at the start; the matched one starts from nothing."""
@@ -231,4 +251,3 @@ def _converted(tables: dict[str, Any], where: str) -> Experiment:
         return msgspec.convert(tables, Experiment)
     except msgspec.ValidationError as error:
         raise InputError(f"{where}: {explained(str(error), tables, Experiment)}") from error
-

@@ -66,6 +66,8 @@ class LoopState(NamedTuple):
 
 @part
 class Command(NamedTuple):
+    """A torque before and after what limits it."""
+
     wanted: Vec3  # torque that the control law asks for [N m]
     applied: Vec3  # torque after limits and converter [N m]
 

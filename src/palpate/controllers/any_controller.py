@@ -59,12 +59,14 @@ class AnyController(NamedTuple):
         return torque, (first, second)
 
     def rest(self, state, sense):
+        """As the one that acts; the other's state stays."""
         first, second = state
         if self.chosen == 1:
             return self.first.rest(first, sense), second
         return first, self.second.rest(second, sense)
 
     def report(self, state):
+        """Of the one that acts."""
         if self.chosen == 1:
             return self.first.report(state[0])
         return self.second.report(state[1])
