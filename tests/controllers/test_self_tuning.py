@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from controllers.ideal_arm import ARM, START, task
 from palpate._vector import ZERO3, Vec3
-from palpate.controllers.self_tuning import SelfTuning
+from palpate.controllers.self_tuning import SelfTuning, owed
 from palpate.networks import network, random_layers
 from palpate.signals.types import Sense
 
@@ -41,10 +41,10 @@ def test_a_network_of_zeros_leaves_a_plain_pid():
     error, rate, integral = 20.0 - forces, 0.0, 0.0
     before, expected = 0.0, []
     for f, e in zip(forces, error, strict=True):
-        integral += TICK * e
+        integral += TICK * 5.0 * e
         rate += (f - before - TICK * rate) / 0.01
         before = f
-        expected.append(0.25 * e + 5.0 * integral - 0.004 * rate)
+        expected.append(0.25 * e + integral - 0.004 * rate)
     assert commands == pytest.approx(expected, rel=1e-6)
 
 
@@ -56,25 +56,64 @@ def test_the_gains_stay_between_nothing_and_twice_their_middle(forces, rate):
     assert (gains <= 2.0 * np.array(MIDDLE)).all()
 
 
+def closed(kf, ki, kd, ticks):
+    """Force errors when the force answers the command at once, less a friction of 5 N, and the gains are constant."""
+    zeros = [np.zeros((4, 4)), np.zeros((3, 5))]
+    controller = SelfTuning(
+        *GAINS, Vec3(kf, ki, kd), Vec3(10.0, 5.0, 100.0), 0.0, 0.01, TICK, network(zeros, (kf, ki, kd), 1e-300)
+    )
+    state, integral, rate, f, errors = controller.start(), 0.0, 0.0, 0.0, []
+    for _ in range(ticks):
+        # f = 20 + kf (20 - f) + integral - kd rate - 5, solved for f: the command that the controller will give
+        before = integral - kd * (rate - (f + TICK * rate) / 0.01) - 5.0
+        f_before, f = f, (20.0 + 20.0 * kf + TICK * ki * 20.0 + before) / (1.0 + kf + TICK * ki + kd / 0.01)
+        rate += (f - f_before - TICK * rate) / 0.01
+        integral += TICK * ki * (20.0 - f)
+        (command,), states = feel(controller, [f], state)
+        state = states[-1]
+        assert command == pytest.approx(f - 15.0, abs=1e-9)
+        errors.append(20.0 - f)
+    return np.array(errors), state
+
+
+@pytest.mark.parametrize("ticks", [20, 200, 600])
+def test_it_knows_what_the_force_owes_to_the_integral_gain(ticks):
+    """Against finite differences of the whole closed loop."""
+    kf, ki, h = 0.25, 5.0, 1e-5
+    _, state = closed(kf, ki, 1e-9, ticks)
+    more, less = closed(kf, ki + h, 1e-9, ticks)[0], closed(kf, ki - h, 1e-9, ticks)[0]
+    assert state.by_ki.x == pytest.approx(-(more[-1] - less[-1]) / (2 * h), rel=0.02)
+
+
+def test_it_knows_what_the_force_owes_to_the_proportional_gain():
+    kf, ki, h, ticks = 0.25, 5.0, 1e-5, 300
+    errors, _ = closed(kf, ki, 1e-9, ticks)
+    _, before = closed(kf, ki, 1e-9, ticks - 1)
+    more, less = closed(kf + h, ki, 1e-9, ticks)[0], closed(kf - h, ki, 1e-9, ticks)[0]
+    by_kf = owed(errors[-1], before.by_ki.x, kf, ki)
+    assert by_kf == pytest.approx(-(more[-1] - less[-1]) / (2 * h), rel=0.02)
+
+
 def test_learning_goes_down_the_gradient_of_the_squared_error():
-    """With df/du = 1: dE/dw = -e du_f/dw. By finite differences, for every weight."""
-    rate, h = 1e-9, 1e-6
-    layers = [np.array(a) for a in random_layers((3, 4, 3), 1, 0.5)]
-    controller = tuner(layers, rate)
+    """dE/dw = -e sum(df/dgain dgain/dw). dgain/dw by finite differences, for every weight."""
+    rate, h, force = 1e-9, 1e-6, 7.0
+    controller = tuner(random_layers((3, 4, 3), 1, 0.5), rate)
     _, states = feel(controller, [5.0])
-    state, force = states[-1], 7.0
+    state = states[-1]
     before = state.network.weights.copy()
     _, after = feel(controller, [force], state)
     change = (after[-1].network.weights - before) / rate
+    e, (kf, ki, _) = 20.0 - force, after[-1].gains
+    by_kf, by_kd = owed(e, state.by_ki.x, kf, ki), owed(-after[-1].rate.x, state.by_kd.x, kf, ki)
+    debts = np.array([by_kf, after[-1].by_ki.x, by_kd])
 
-    def command(weights):
+    def gains(weights):
         state.network.weights[:] = weights
-        return feel(controller, [force], state)[0][0]
+        return np.array(feel(controller, [force], state)[1][0].gains)
 
-    for i in range(before.size):
-        step = h * np.eye(before.size)[i]
-        slope = (command(before + step) - command(before - step)) / (2 * h)
-        assert change[i] == pytest.approx((20.0 - force) * slope, rel=1e-4, abs=1e-6)
+    for step in h * np.eye(before.size):
+        slope = (gains(before + step) - gains(before - step)) / (2 * h)
+        assert change @ step / h == pytest.approx(e * (debts @ slope), rel=1e-4, abs=1e-6)
 
 
 def test_it_does_not_learn_from_an_error_inside_the_dead_zone():

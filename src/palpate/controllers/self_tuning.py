@@ -15,30 +15,36 @@ INPUTS, OUTPUTS = 3, 3
 @part
 class SelfTuningState(NamedTuple):
     network: NetworkState
-    integral: Vec3  # of the force error [N s], shape (m,)
+    integral: Vec3  # force command that the integral gain has gathered [N], shape (m,)
     rate: Vec3  # smoothed rate of the measured force [N/s], shape (m,)
     f: Vec3  # measured force of the tick before [N], shape (m,)
+    by_ki: Vec3  # what the force owes to ki: df/d(ki) [N s], shape (m,)
+    by_kd: Vec3  # the integral of what it owes to kd, likewise
     gains: Vec3  # in use: kf [1], ki [1/s], kd [s]
 
 
 @law
-def tune(network, memory, lacking, proportional, integral, derivative):
-    """One step of learning down the squared force error, the force taken to answer the force command one to one.
+def owed(x, integral, kf, ki):
+    """df/d(gain) of the gain that multiplies x, the loop closed and the surface giving way at once.
 
-    d(u_f)/d(gain) is what the gain multiplies, so each output lacks the error times that.
+    There f = f_d + u_f, so that what a gain adds to u_f, kf and ki take back: x s/((1 + kf) s + ki).
+
+    Args:
+        x: what the gain multiplies.
+        integral: of the result up to now.
+        kf: force gain [1].
+        ki: integral gain [1/s].
     """
-    network.want(memory, 0, lacking @ proportional)
-    network.want(memory, 1, lacking @ integral)
-    network.want(memory, 2, lacking @ derivative)
-    network.learn(memory)
+    return (x - ki * integral) / (1.0 + kf)
 
 
 @controller
 class SelfTuning(NamedTuple):
     """`Hybrid` with a PID on the force, its three gains the output of a network that sees the force error.
 
-    Each gain stays between 0 and twice its middle value. The network learns while the force error exceeds the dead
-    zone: the gradient for the proportional gain is the error squared, so that from noise alone it would grow for ever.
+    Each gain stays between 0 and twice its middle value. Every tick the network learns down the squared force error,
+    as far as that exceeds the dead zone: below is noise, which teaches nothing. It knows no lag of arm or sensor, so
+    that more kf always looks better to it: the loop has to be stable at twice the middle gains.
 
     When to use it: where one set of gains must do on surfaces unlike each other and the loop may be slow at first.
     A plain PI of the right gains is better on any one surface.
@@ -47,7 +53,7 @@ class SelfTuning(NamedTuple):
         kp: position gain K_pp [1/s^2], shape (m,).
         kv: velocity gain K_pv [1/s], shape (m,).
         middle: of the gains: kf [1], ki [1/s], kd [s].
-        scale: what the network's inputs are divided by: force error [N], its integral [N s], force rate [N/s].
+        scale: what the network's inputs are divided by: force error [N], the integral's share [N], force rate [N/s].
         dead_zone: force error that is not learned from [N].
         smoothing: time constant of the force rate [s].
         tick: time between steps [s].
@@ -64,34 +70,41 @@ class SelfTuning(NamedTuple):
     network: Network
 
     def start(self):
-        nothing = 0.0 * self.kp
-        return SelfTuningState(self.network.start(), nothing, nothing, nothing, 1.0 * self.middle)
+        no = 0.0 * self.kp
+        return SelfTuningState(self.network.start(), no, no, no, no, no, 1.0 * self.middle)
 
     def step(self, state, sense, task, model):
         net, memory = self.network, state.network
         error = task.s * (task.f - sense.f)
-        integral = state.integral + self.tick * error
         rate = state.rate + (sense.f - state.f - self.tick * state.rate) / self.smoothing
         slowing = -(task.s * rate)
-        see(memory.signals, task.s @ error, task.s @ integral, task.s @ slowing, self.scale)
+        see(memory.signals, task.s @ error, task.s @ state.integral, task.s @ slowing, self.scale)
         net.forward(memory)
         kf = self.middle[0] + net.output(memory, 0)
         ki = self.middle[1] + net.output(memory, 1)
         kd = self.middle[2] + net.output(memory, 2)
-        tune(net, memory, error - clip(error, self.dead_zone), error, integral, slowing)
+        by_kf, by_kd = owed(error, state.by_ki, kf, ki), owed(slowing, state.by_kd, kf, ki)
+        by_ki = state.by_ki + self.tick * by_kf
+        lacking = error - clip(error, self.dead_zone)
+        net.want(memory, 0, lacking @ by_kf)
+        net.want(memory, 1, lacking @ by_ki)
+        net.want(memory, 2, lacking @ by_kd)
+        net.learn(memory)
+        integral = state.integral + self.tick * ki * error
         u_x = position_command(self.kp, self.kv, sense.x, sense.xd, task.x, task.xd, task.xdd)
-        u_f = kf * error + ki * integral + kd * slowing
+        u_f = kf * error + integral + kd * slowing
         torque = hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f)
-        return torque, SelfTuningState(memory, integral, rate, sense.f, Vec3(kf, ki, kd))
+        owing = state.by_kd + self.tick * by_kd
+        return torque, SelfTuningState(memory, integral, rate, sense.f, by_ki, owing, Vec3(kf, ki, kd))
 
     def rest(self, state, sense):
         """What was learned stays."""
-        nothing = 0.0 * self.kp
-        return SelfTuningState(state.network, nothing, nothing, sense.f, state.gains)
+        no = 0.0 * self.kp
+        return SelfTuningState(state.network, no, no, sense.f, no, no, state.gains)
 
     def report(self, state):
         """The integral's share of the force command; the gains kf, ki, kd."""
-        return state.gains[1] * state.integral, state.gains
+        return state.integral, state.gains
 
 
 @law
