@@ -121,10 +121,9 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"without friction along the surface the RMS of y is at least {SHARE:.0%} smaller",
             verdict=decided(bool(taken >= SHARE)),
             note=(
-                "On our bench sticking is not what keeps y off: a tip that slides freely is as far away, only that it "
-                "changes sides with every step of the force, and it is the friction of the joints that holds it there. "
-                "That is no proof against the thesis' reason on its own arm: with less friction in the joints the foam "
-                "would be what holds."
+                "In part. Without friction along the surface the tip lies off by about as much after each step, but it "
+                "moves with the steps from one side to the other, where a sticking tip stays; that is the difference found "
+                "here. What keeps it from zero is in both cases the friction of the joints."
             ),
         ),
     ]
