@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.identification.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.choosing import Choice, Question, choose
 from palpate.identification.codes import Code, Warn
-from palpate.identification.contacts import ONSET, Contacts, find_contacts
+from palpate.identification.contacts import Contacts, find_contacts
 from palpate.identification.filters import Chain, block_means, white_noise
 from palpate.identification.fitting import Fit, Lag, fit
 from palpate.identification.lagging import closing_lag, unknown_lag
@@ -168,11 +168,9 @@ def _question(
     filtered = chain(position)
     if contacts.bonded:
         position = position - filtered[rows].mean()
-        penetration = position
     else:
         position = position - _origin(filtered, rows, contacts)
-        penetration = np.maximum(position - _surface(position[rows], contacts), 0.0)
-    motion = Motion(chain, position, penetration, rows, contacts.bonded, white_noise(position))
+    motion = Motion(chain, position, rows, contacts.bonded, white_noise(position))
     known = unknown_lag(motion, channels.rate) if lag is None else Lag(lag, lag_std)
     return Question(
         motion, force[rows], spans, known, tolerance, _free_noise(force, channels, chain, contacts)
@@ -183,13 +181,6 @@ def _origin(filtered: Array, rows: NDArray[np.intp], contacts: Contacts) -> floa
     """Where the surface is: the position at the onset; the least in contact, if no onset is in the log."""
     onsets = [filtered[begin] for begin, _ in contacts.spans if begin > 0]
     return float(np.mean(onsets)) if onsets else float(filtered[rows].min())
-
-
-def _surface(position: Array, contacts: Contacts) -> float:
-    """Where the force would begin if it grew evenly from the onset to the peak; the origin, if no onset is in the log."""
-    if contacts.spans[0][0] == 0:
-        return 0.0
-    return -ONSET / (1 - ONSET) * max(float(position.max()), 0.0)
 
 
 def _rows(channels: Channels, chain: Chain, contacts: Contacts) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -203,7 +194,7 @@ def _rows(channels: Channels, chain: Chain, contacts: Contacts) -> tuple[NDArray
     rows, spans = [], []
     for number, (begin, end) in enumerate(contacts.spans):
         last = end if contacts.bonded else _left(channels, contacts, begin, end)
-        own = np.arange(begin + _settling(chain, end - begin), last, step)
+        own = np.arange(begin + _settling(chain, begin, end - begin), last, step)
         own = own[usable[own]]
         rows.append(own)
         spans.append(np.full(len(own), number))
@@ -213,15 +204,17 @@ def _rows(channels: Channels, chain: Chain, contacts: Contacts) -> tuple[NDArray
     return found, np.concatenate(spans)
 
 
-def _settling(chain: Chain, length: int) -> int:
+def _settling(chain: Chain, begin: int, length: int) -> int:
     """Samples to leave out after a touch, which the filter's own delay has already eaten some of.
 
-    Until a disturbance has decayed to 1 %, or to nothing where that costs little of the contact.
+    Until a disturbance has decayed to 1 %, or to nothing where that costs little of the contact. At the first sample
+    of a log there has been no delay: the filter has yet to learn how the probe was moving.
     """
-    thorough = int(np.ceil((chain.thorough_settling - chain.delay) / chain.dt))
+    eaten = chain.delay if begin > 0 else 0.0
+    thorough = int(np.ceil((chain.thorough_settling - eaten) / chain.dt))
     if thorough < _LONG * length:
         return thorough
-    return min(int(np.ceil((chain.settling - chain.delay) / chain.dt)), length // 4)
+    return min(int(np.ceil((chain.settling - eaten) / chain.dt)), length // 4)
 
 
 def _left(channels: Channels, contacts: Contacts, begin: int, end: int) -> int:

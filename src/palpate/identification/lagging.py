@@ -79,7 +79,7 @@ def closing_lag(motion: Motion, force: Array, start: float, spans: NDArray[np.in
         inside = spans == number
         if inside.sum() < 60 or len(np.unique(spans)) < 3:
             continue
-        part = Motion(motion.chain, motion.position, motion.penetration, motion.rows[inside], motion.bonded)
+        part = Motion(motion.chain, motion.position, motion.rows[inside], motion.bonded)
         known = Lag(whole.lag, max(abs(whole.lag), 2 * motion.chain.dt), False)
         lags.append(fit(ELASTIC, part, force[inside], known, free_lag=True).lag)
     spread = float(np.std(lags, ddof=1)) if len(lags) >= 3 else 0.0

@@ -20,7 +20,6 @@ class Motion:
     Args:
         chain: the filter.
         position: raw, counted into the surface from `origin`, shape (n,).
-        penetration: max(position, 0) in contact and 0 outside, shape (n,); the position itself when bonded.
         rows: the samples that are fitted, shape (m,).
         bonded: whether the probe is fixed to the surface.
         noise: standard deviation of the position's own white noise; it makes every column of the regression uncertain.
@@ -28,7 +27,6 @@ class Motion:
 
     chain: Chain
     position: Array
-    penetration: Array
     rows: NDArray[np.intp]
     bonded: bool
     noise: float = 0.0
@@ -56,6 +54,7 @@ class Motion:
 
     @property
     def ones(self) -> Array:
+        """The column of the offset, shape (m,)."""
         return np.ones(len(self.rows))
 
 
@@ -121,7 +120,7 @@ def _with_curve(columns: Columns) -> Columns:
 
 def _standard_linear_solid(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
     """f = K x + B v + K1 y, where the spring K1 of the Maxwell branch is stretched by y: y' + y/tau = x'."""
-    d = motion.penetration
+    d = motion.position if motion.bonded else np.maximum(motion.position - knobs["x0"], 0.0)
     branch = d - d[0] - low_pass_once(d - d[0], knobs["tau"], motion.chain.dt)
     columns = [motion.filtered(d, k, lag) for k in (0, 1)]
     return [*columns, motion.filtered(branch, 0, lag), motion.ones]
@@ -151,14 +150,18 @@ def standard_linear_solid(motion: Motion) -> Model:
     shortest, longest = 2 / motion.chain.rate, len(motion.rows) * dt
     starts = tuple(np.geomspace(3 * shortest, longest / 3, 4))
     tau = Knob("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
-    return Model(
-        "standard-linear-solid", ("K", "B", "K1", "offset"), _standard_linear_solid, (tau,), ("K", "B", "K1")
-    )
+    knobs = (tau,) if motion.bonded else (tau, _touch(motion))
+    linear = ("K", "B", "K1", "offset")
+    return Model("standard-linear-solid", linear, _standard_linear_solid, knobs, ("K", "B", "K1"))
+
+
+def _touch(motion: Motion) -> Knob:
+    """Where the surface is, about the position at which the force was first seen."""
+    depth = float(np.max(motion.position)) or 1.0
+    return Knob("x0", (-0.02 * depth,), -1.0 * depth, 0.5 * depth, 1e-4 * depth)
 
 
 def hunt_crossley(motion: Motion) -> Model:
     """Hunt and Crossley's contact (1975): stiffness and damping both grow with d^n, so the force starts from zero."""
-    depth = float(np.max(motion.penetration)) or 1.0
     n = Knob("n", (1.5,), 0.5, 5.0, 1e-3)
-    x0 = Knob("x0", (-0.02 * depth,), -1.0 * depth, 0.5 * depth, 1e-4 * depth)
-    return Model("hunt-crossley", ("K", "B", "offset"), _hunt_crossley, (n, x0), ("K", "B"))
+    return Model("hunt-crossley", ("K", "B", "offset"), _hunt_crossley, (n, _touch(motion)), ("K", "B"))

@@ -44,6 +44,7 @@ class Channels:
 
     @property
     def time(self) -> Array:
+        """Of each sample [s], shape (n,)."""
         time: Array = self.start + np.arange(len(self.position), dtype=np.float64) * self.dt
         return time
 

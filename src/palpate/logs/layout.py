@@ -34,6 +34,7 @@ class Layout:
 
     @property
     def delimiter_name(self) -> str:
+        """What to call the delimiter in a sentence."""
         return _NAMES.get(self.delimiter, repr(self.delimiter))
 
     @property

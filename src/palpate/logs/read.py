@@ -160,7 +160,12 @@ def _cut(
     if start is None and end is None:
         return arrays
     time = arrays["time"]
-    keep = (time >= (-np.inf if start is None else start)) & (time < (np.inf if end is None else end))
+    slack = (
+        1e-3 * float(np.median(np.abs(np.diff(time)))) if len(time) > 1 else 0.0
+    )  # a row's time has rounding
+    keep = (time >= (-np.inf if start is None else start - slack)) & (
+        time < (np.inf if end is None else end - slack)
+    )
     if not keep.any():
         span = f"{time.min():.6g} to {time.max():.6g} s"
         raise InputError(

@@ -1,0 +1,177 @@
+"""The command as a user types it: on the measured logs, on logs made here, and on bad input."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from identification.synthetic_contacts import pressed
+from palpate.cli import main
+from palpate.identification.codes import Code
+
+SKIN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_mN:mN")
+FIELDS = {"value", "std", "ci95", "unit", "verdict", "reason"}
+
+
+def ask(capsys, *words):
+    """Run `palpate identify ... --json`; the exit code and the object."""
+    code = main(["identify", *map(str, words), "--json"])
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    return code, json.loads(printed.out)
+
+
+def codes(found):
+    return [warning["code"] for warning in found["warnings"]]
+
+
+@pytest.fixture
+def log(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    record = pressed()
+    table = np.column_stack([record["time"], record["position"] * 1e3, record["force"]])
+    path = tmp_path / "press.csv"
+    np.savetxt(path, table, delimiter=",", header="time_s,position_mm,force_N", comments="", fmt="%.7g")
+    return path
+
+
+OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
+
+
+@pytest.mark.parametrize(("load", "stiffness"), [(400, 195), (600, 258), (800, 290)])
+def test_skin(measured, capsys, load, stiffness):
+    code, found = ask(capsys, measured / f"skin_indentation/press_{load}mN.csv", *SKIN)
+    assert code == 0
+    assert found["model"] == "kelvin-voigt"
+    assert found["parameters"]["K"]["value"] == pytest.approx(stiffness, rel=0.05)
+    assert found["parameters"]["B"]["verdict"] != "identified"
+    assert found["parameters"]["B"]["value"] is None
+    assert "loading alone" in found["parameters"]["B"]["reason"]
+    assert "model-rejected" in codes(found)
+    assert found["fit"]["r2"] == pytest.approx(0.945, abs=0.01)
+    (contact,) = found["contacts"]
+    assert contact["start_s"] == pytest.approx(0.905, abs=0.01)
+    assert contact["end_s"] == pytest.approx(1.2, abs=0.01)
+
+
+@pytest.mark.parametrize("load", [20, 40])
+def test_light_presses_on_skin_claim_nothing(measured, capsys, load):
+    _, found = ask(capsys, measured / f"skin_indentation/press_{load}mN.csv", *SKIN)
+    assert all(p["verdict"] != "identified" for p in found["parameters"].values())
+
+
+def test_silverbox(measured, capsys):
+    columns = ("--time", "time_s", "--position", "position_V:1", "--force", "force_V:1")
+    code, found = ask(capsys, measured / "silverbox/schroeder_80mV.csv", *columns)
+    assert code == 0
+    own = found["parameters"]
+    assert {own[name]["verdict"] for name in "KBM"} == {"identified"}
+    assert {own[name]["unit"] for name in "KBM"} == {"1"}
+    k, b, m = (own[name]["value"] for name in "KBM")
+    assert np.sqrt(k / m) / (2 * np.pi) == pytest.approx(68.6, rel=0.02)
+    assert b / (2 * np.sqrt(k * m)) == pytest.approx(0.049, rel=0.1)
+
+
+def test_lattice(measured, capsys):
+    columns = ("--time", "0", "--position", "3:mm", "--force", "4:g")
+    code, found = ask(capsys, measured / "lattice_probe/probe_states.csv", *columns)
+    assert code == 0
+    assert {"force-lags-position", "missing-samples", "irregular-time", "position-sign-reversed"} <= set(
+        codes(found)
+    )
+    assert "-1" in next(w["text"] for w in found["warnings"] if w["code"] == "missing-samples")
+    assert found["parameters"]["B"]["verdict"] == "rejected"
+    assert found["parameters"]["B"]["value"] is None
+    assert found["parameters"]["K"]["value"] == pytest.approx(3300, rel=0.1)
+    assert found["lag_s"]["value"] == pytest.approx(0.5, abs=0.15)
+    assert found["lag_s"]["std"] > 0.02
+    assert len(found["contacts"]) == 10
+
+
+def test_the_contract_of_json(log, capsys):
+    code, found = ask(capsys, log, *OWN)
+    assert code == 0
+    assert set(found) == {"model", "parameters", "contacts", "lag_s", "fit", "warnings"}
+    assert set(found["fit"]) == {"r2", "rmse_N", "n"}
+    assert set(found["lag_s"]) == {"value", "std"}
+    for p in found["parameters"].values():
+        assert set(p) == FIELDS
+        assert p["reason"]
+        assert p["verdict"] in {"identified", "not identifiable", "rejected"}
+    assert found["parameters"]["K"]["unit"] == "N/m"
+    assert list(log.parent.iterdir()) == [log]
+
+
+def test_the_table_and_the_figure(log, capsys):
+    assert main(["identify", str(log), *OWN]) == 0
+    printed = capsys.readouterr().out
+    assert "N s/m" in printed
+    assert "identified" in printed
+    assert "figure: press.identify.png" in printed
+    picture = log.parent / "press.identify.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert main(["identify", str(log), *OWN]) == 0  # its own figure may be replaced
+    capsys.readouterr()
+
+
+def test_a_figure_of_somebody_else_is_not_written_over(log, capsys):
+    other = log.parent / "press.identify.png"
+    other.write_bytes(b"a holiday")
+    assert main(["identify", str(log), *OWN]) == 2
+    assert "palpate did not write it" in capsys.readouterr().err
+    assert other.read_bytes() == b"a holiday"
+
+
+def test_a_lag_with_its_std(log, capsys):
+    _, found = ask(capsys, log, *OWN, "--lag", "0.000:0.0005")
+    assert found["lag_s"] == {"value": 0.0, "std": 0.0005}
+    assert found["parameters"]["B"]["std"] > 2
+
+
+def test_a_rate_stands_for_the_time(log, capsys):
+    _, found = ask(capsys, log, "--rate", "1000", *OWN[2:])
+    assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
+
+
+def test_no_contact_is_an_answer_and_the_answer_is_no(log, capsys):
+    rows = np.loadtxt(log, delimiter=",", skiprows=1)
+    rows[:, 2] = np.random.default_rng(0).normal(0, 0.05, len(rows))
+    np.savetxt(log, rows, delimiter=",", header="time_s,position_mm,force_N", comments="", fmt="%.7g")
+    code, found = ask(capsys, log, *OWN)
+    assert code == 1
+    assert "no-contact" in codes(found)
+    assert all(p["value"] is None for p in found["parameters"].values())
+
+
+WRONG = {
+    "unknown column": ([*OWN[:-1], "f:N"], "unknown column 'f'.*position_mm"),
+    "unknown unit": ([*OWN[:-1], "force_N:stone"], "unknown unit 'stone'"),
+    "no columns": ([], "name the columns of .*--time, --position, --force.*time_s"),
+    "unknown model": ([*OWN, "--model", "hooke"], "unknown model 'hooke'"),
+    "tolerance": ([*OWN, "--tolerance", "2"], r"tolerance must be in \(0, 1\]"),
+    "lag": ([*OWN, "--lag", "late"], "--lag needs VALUE or VALUE:STD"),
+    "figure kind": ([*OWN, "--figure", "a.pdf"], "PNG; name it a.png"),
+    "figure folder": ([*OWN, "--figure", "none/a.png"], "no folder none"),
+    "rate and time": ([*OWN, "--rate", "100"], "not both"),
+    "empty cut": ([*OWN, "--start", "99"], "no row of"),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_wrong_input_is_one_line_and_code_2(log, capsys, kind):
+    words, pattern = WRONG[kind]
+    assert main(["identify", str(log), *words]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert re.search(pattern, printed.err), printed.err
+    assert list(log.parent.iterdir()) == [log]
+
+
+def test_every_warning_is_in_the_guide(root):
+    guide = (root / "docs/identify.md").read_text()
+    missing = [code.word for code in Code if f"`{code.word}`" not in guide]
+    assert not missing

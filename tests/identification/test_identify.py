@@ -1,0 +1,277 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.synthetic_contacts import coloured, force_of, press_path, pressed, record, shaken
+from palpate.errors import InputError
+from palpate.identification import Verdict, identify
+from palpate.identification.filters import low_pass_once
+
+TIME = np.arange(6000) / 1000
+
+
+def noisy(force, std=0.03, seed=0):
+    return force + coloured(len(force), std, 0.9, np.random.default_rng(seed))
+
+
+def test_mass_damping_and_stiffness_of_a_shaken_contact():
+    found = identify(shaken(noise=0.05), lag=0.0)
+    assert found.model == "kelvin-voigt-mass"
+    for name, truth, share in (("K", 5000, 0.01), ("B", 40, 0.08), ("M", 0.5, 0.05)):
+        assert found.parameters[name].verdict is Verdict.IDENTIFIED
+        assert found.parameters[name].value == pytest.approx(truth, rel=share)
+    assert found.resonance[0] == pytest.approx(np.sqrt(5000 / 0.5) / (2 * np.pi), rel=0.03)
+
+
+def test_a_lag_that_is_calibrated_does_not_bias():
+    found = identify(shaken(lag=0.005, noise=0.05), lag=0.005, lag_std=1e-4)
+    assert found.parameters["B"].value == pytest.approx(40, rel=0.08)
+    assert found.parameters["M"].value == pytest.approx(0.5, rel=0.05)
+    assert found.lag == (0.005, 1e-4)
+
+
+def test_a_lag_that_the_log_can_tell_is_found():
+    found = identify(shaken(lag=0.005, noise=0.05))
+    assert found.lag[0] == pytest.approx(0.005, abs=5 * found.lag[1] + 1e-5)
+    assert found.lag[1] < 1e-3
+    assert found.parameters["B"].value == pytest.approx(40, rel=0.1)
+
+
+def test_the_lags_own_uncertainty_is_in_the_interval():
+    sure, unsure = (identify(pressed(), lag=0.0, lag_std=std).parameters["B"] for std in (0.0, 4e-4))
+    expected = np.hypot(sure.std, 5000 * 4e-4)  # a lag T counts as K T
+    assert unsure.std == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9, 0.99])
+def test_intervals_cover_the_truth_under_coloured_noise(pole):
+    truth = {"K": 5000.0, "B": 40.0, "M": 0.5}
+    inside = dict.fromkeys(truth, 0)
+    runs = 100
+    for seed in range(1000, 1000 + runs):
+        found = identify(
+            shaken(seed=seed, pole=pole, n=2500), model="kelvin-voigt-mass", lag=0.0, tolerance=1.0
+        )
+        for name, value in truth.items():
+            p = found.parameters[name]
+            inside[name] += p.ci95 is None or p.ci95[0] <= value <= p.ci95[1]
+    assert min(inside.values()) >= 0.87 * runs, inside
+
+
+def test_intervals_of_presses_cover_the_truth_without_a_known_lag():
+    inside = 0
+    for seed in range(40):
+        found = identify(pressed(seed=seed), model="kelvin-voigt")
+        p = found.parameters["B"]
+        inside += p.ci95 is None or p.ci95[0] <= 40 <= p.ci95[1]
+    assert inside >= 34
+
+
+def test_estimates_are_unbiased_and_vary_as_claimed():
+    found = [identify(pressed(seed=seed), lag=0.0).parameters["K"] for seed in range(30)]
+    values = np.array([p.value for p in found])
+    claimed = np.mean([p.std for p in found])
+    assert abs(values.mean() - 5000) < 4 * claimed / np.sqrt(30)
+    assert values.std() == pytest.approx(claimed, rel=0.4)
+
+
+def test_a_standard_linear_solid_is_recognised():
+    x = press_path(TIME, 0.06)
+    d = np.maximum(x, 0)
+    v = np.gradient(x, 1e-3)
+    branch = d - low_pass_once(d, 0.23, 1e-3)
+    force = np.where(x > 0, np.maximum(5600 * d + 13 * v + 6900 * branch, 0), 0)
+    found = identify(record(TIME, x, noisy(force)), lag=0.0)
+    assert found.model == "standard-linear-solid"
+    for name, truth in (("K", 5600), ("K1", 6900), ("tau", 0.23)):
+        assert found.parameters[name].verdict is Verdict.IDENTIFIED
+        assert found.parameters[name].value == pytest.approx(truth, rel=0.03)
+
+
+def test_a_hunt_crossley_contact_is_recognised():
+    x = press_path(TIME, 0.06)
+    force = force_of(x, lambda d, v: 3e6 * d**1.5 * (1 + 1.5 * v), 1e-3)
+    found = identify(record(TIME, x, noisy(force)))
+    assert found.model == "hunt-crossley"
+    assert found.parameters["n"].value == pytest.approx(1.5, abs=0.02)
+    assert found.parameters["B"].value / found.parameters["K"].value == pytest.approx(1.5, rel=0.03)
+    assert found.parameters["K"].unit == "N/m^1.5"
+
+
+def test_a_slow_press_shows_no_damping_and_no_mass():
+    ramp = np.clip((TIME - 1) / 2, 0, 1) - np.clip(TIME - 4.5, 0, 1)
+    x = -1e-3 + 3e-3 * ramp
+    found = identify(record(TIME, x, noisy(np.maximum(5000 * x, 0))))
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+    for name in ("B", "M"):
+        assert found.parameters[name].value is None
+        assert found.parameters[name].verdict is Verdict.NOT_IDENTIFIABLE
+
+
+def test_one_sine_cannot_tell_a_lag_from_damping_unless_it_is_calibrated():
+    omega = 2 * np.pi
+    x = 2e-3 + 1e-3 * np.sin(omega * TIME)
+    log = record(TIME, x, noisy(5000 * x + 40e-3 * omega * np.cos(omega * TIME)))
+    found = identify(log)
+    assert found.parameters["B"].verdict is Verdict.NOT_IDENTIFIABLE
+    assert "lag-damping-confounded" in found.codes
+    known = identify(log, lag=0.0, lag_std=1e-4)
+    assert known.parameters["B"].value == pytest.approx(40, rel=0.1)
+
+
+def test_a_large_lag_gives_no_negative_damping():
+    found = identify(pressed(lag=0.02))
+    assert "force-lags-position" in found.codes
+    assert found.parameters["B"].verdict is Verdict.REJECTED
+    assert found.parameters["B"].value is None
+    assert found.lag[0] == pytest.approx(0.02, abs=2e-3)
+
+
+def test_noise_of_the_position_is_not_taken_for_a_small_mass():
+    p = identify(shaken(position_noise=2e-5), lag=0.0).parameters["M"]
+    assert p.verdict is not Verdict.IDENTIFIED
+    assert p.ci95 is None or p.ci95[0] <= 0.5 <= p.ci95[1]
+
+
+def test_the_tolerance_decides():
+    loose, tight = (identify(pressed(), lag=0.0, tolerance=t).parameters["B"] for t in (0.25, 0.005))
+    assert loose.verdict is Verdict.IDENTIFIED
+    assert tight.verdict is Verdict.NOT_IDENTIFIABLE
+
+
+def test_calibration_is_in_the_interval():
+    p = identify(pressed(), lag=0.0, calibration=0.05).parameters["K"]
+    assert p.std == pytest.approx(0.05 * p.value, rel=0.05)
+
+
+def test_a_stiffness_in_series_is_taken_out():
+    log = pressed(b=5.0, noise=0.01)
+    soft = record(log["time"], log["position"] + log["force"] / 8000, log["force"])
+    found = identify(soft, lag=0.0, series_stiffness=8000.0, series_std=100.0)
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.01)
+    assert found.parameters["K"].std == pytest.approx(100 * (5 / 8) ** 2, rel=0.2)
+    assert "series-compliance" in found.codes
+
+
+@pytest.mark.parametrize(("force", "position"), [(-1, 1), (1, -1), (-1, -1)])
+def test_reversed_signs_are_found_and_said(force, position):
+    log = pressed()
+    found = identify(record(log["time"], position * log["position"], force * log["force"]))
+    assert ("force-sign-reversed" in found.codes) == (force < 0)
+    assert ("position-sign-reversed" in found.codes) == (position < 0)
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+
+
+def test_an_offset_of_the_force_does_no_harm():
+    log = pressed()
+    for offset in (-3.0, 2.0):
+        found = identify(record(log["time"], log["position"], log["force"] + offset))
+        assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+
+
+def test_a_position_that_is_refreshed_slowly():
+    log = pressed()
+    held = np.repeat(log["position"][::8], 8)[: len(log)]
+    found = identify(record(log["time"], held, log["force"]))
+    assert "held-samples" in found.codes
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+    assert abs(found.lag[0]) < 2e-3  # holding for 8 ms would look like 4 ms
+
+
+def test_a_force_at_the_end_of_its_range_is_left_out():
+    log = pressed()
+    found = identify(record(log["time"], log["position"], np.minimum(log["force"], 12.0)))
+    assert "saturated" in found.codes
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.03)
+
+
+def test_jitter_and_repeated_times():
+    log = pressed()
+    rng = np.random.default_rng(0)
+    time = log["time"] + rng.uniform(0, 4e-4, len(log))
+    x = np.interp(time, log["time"], log["position"])
+    f = np.interp(time, log["time"], log["force"])
+    found = identify(record(np.repeat(time, 2), np.repeat(x, 2), np.repeat(f, 2)))
+    assert found.codes.count("irregular-time") == 2
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+
+
+def test_units_off_by_a_thousand_are_suspected():
+    log = pressed()
+    found = identify(record(log["time"], log["position"] * 1e6, log["force"]))
+    assert "unit-guess" in found.codes
+
+
+def test_ten_rows_a_second():
+    log = pressed()
+    found = identify(record(log["time"][::100], log["position"][::100], log["force"][::100]))
+    assert "low-rate" in found.codes
+    assert found.parameters["B"].verdict is not Verdict.IDENTIFIED
+
+
+def test_no_contact():
+    log = pressed()
+    found = identify(
+        record(log["time"], log["position"], coloured(len(log), 0.05, 0.9, np.random.default_rng(0)))
+    )
+    assert "no-contact" in found.codes
+    assert not found.found
+
+
+def test_contact_at_the_first_sample():
+    log = pressed()
+    part = record(log["time"][:1500], log["position"][700:2200], log["force"][700:2200])
+    found = identify(part)
+    assert "contact-at-start" in found.codes
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+
+
+def change(log, name, values):
+    return record(**{"time": log["time"], "position": log["position"], "force": log["force"], name: values})
+
+
+WRONG = {
+    "one sample": (lambda log: record(*(log[c][:1] for c in ("time", "position", "force"))), "1 rows"),
+    "constant position": (
+        lambda log: change(log, "position", np.ones(len(log))),
+        "position is 1 in every row",
+    ),
+    "constant force": (lambda log: change(log, "force", np.zeros(len(log))), "force is 0 in every row"),
+    "backwards": (
+        lambda log: change(log, "time", np.r_[log["time"][:99], log["time"][:-99]]),
+        "backwards at row 100",
+    ),
+    "all missing": (lambda log: change(log, "force", np.full(len(log), np.nan)), "force has 0 readings"),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_wrong_records(kind):
+    make, words = WRONG[kind]
+    with pytest.raises(InputError, match=words) as caught:
+        identify(make(pressed()))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"tolerance": 0.0}, r"tolerance must be in \(0, 1\]"),
+        ({"model": "maxwell"}, "unknown model 'maxwell'"),
+        ({"cutoff": 1e6}, "cut-off must be at most"),
+        ({"lag": float("nan")}, "lag must be"),
+        ({"lag": 0.0, "lag_std": -1.0}, "lag's std must be"),
+        ({"series_stiffness": 0.0}, "series stiffness must be above 0"),
+    ],
+)
+def test_wrong_arguments(arguments, words):
+    with pytest.raises(InputError, match=words):
+        identify(pressed(), **arguments)
+
+
+@pytest.mark.parametrize(
+    "model", ["kelvin-voigt", "kelvin-voigt-mass", "standard-linear-solid", "hunt-crossley"]
+)
+def test_a_model_that_is_asked_for_is_held_to(model):
+    assert identify(pressed(), model=model).model == model

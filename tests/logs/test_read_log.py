@@ -1,0 +1,192 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.errors import InputError
+from palpate.logs import read_log, read_record, write_record
+from palpate.records import Record
+
+COLUMNS = {"time": "t", "position": "x:mm", "force": "f:mN"}
+
+
+def write(path, rows, header="t,x,f", delimiter=","):
+    lines = [header.replace(",", delimiter)] if header else []
+    lines += [delimiter.join(str(cell) for cell in row) for row in rows]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def rows(n=30):
+    return [(round(0.01 * k, 3), k + 0.5, 10 * k) for k in range(n)]
+
+
+def test_units_become_si_and_time_starts_at_zero(tmp_path):
+    log = write(tmp_path / "a.csv", [(1743486221.5 + t, x, f) for t, x, f in rows()])
+    record = read_log(log, **COLUMNS)
+    assert record.units == {"time": "s", "position": "m", "force": "N"}
+    np.testing.assert_allclose(record["position"], 1e-3 * (np.arange(30) + 0.5))
+    np.testing.assert_allclose(record["force"], 1e-2 * np.arange(30))
+    np.testing.assert_allclose(record["time"], 0.01 * np.arange(30), atol=1e-6)
+    assert record.meta["start_s"] == pytest.approx(1743486221.5)
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", "|", " "])
+def test_the_delimiter_is_found(tmp_path, delimiter):
+    log = write(tmp_path / "a.csv", rows(), delimiter=delimiter)
+    np.testing.assert_allclose(read_log(log, **COLUMNS)["force"], 1e-2 * np.arange(30))
+
+
+def test_columns_aligned_with_several_spaces(tmp_path):
+    log = tmp_path / "a.txt"
+    log.write_text("".join(f"{t:8.3f}   {x:9.4f}  {f:7d}\n" for t, x, f in rows()))
+    np.testing.assert_allclose(
+        read_log(log, time="0", position="1:mm", force="2:mN")["force"], 1e-2 * np.arange(30)
+    )
+
+
+def test_decimal_commas(tmp_path):
+    log = tmp_path / "a.csv"
+    log.write_text("t;x;f\n" + "".join(f"{t:.3f};{x:.2f};{f}\n".replace(".", ",") for t, x, f in rows()))
+    np.testing.assert_allclose(read_log(log, **COLUMNS)["position"], 1e-3 * (np.arange(30) + 0.5))
+
+
+def test_columns_by_number_without_a_header_and_with_comments(tmp_path):
+    log = write(tmp_path / "a.csv", rows(), header="# made by hand")
+    record = read_log(log, time="0", position="1:mm", force="2:mN")
+    assert len(record) == 30
+
+
+def test_parquet_keeps_units_and_meta(tmp_path):
+    record = Record({"time": np.arange(5.0), "f": np.ones(5)}, {"time": "s", "f": "N"}, {"seed": 3})
+    path = write_record(record, tmp_path / "r.parquet")
+    back = read_record(path)
+    assert back.units == record.units
+    assert back.meta == record.meta
+    np.testing.assert_array_equal(back["f"], record["f"])
+    assert read_log(path, time="time", force="f").units["force"] == "N"
+    assert [p.name for p in tmp_path.iterdir()] == ["r.parquet"]
+
+
+def test_nothing_half_written_is_left(tmp_path):
+    record = Record({"f": np.ones(5)}, {"f": "N"}, {"bad": float("nan")})
+    with pytest.raises(ValueError, match="JSON"):
+        write_record(record, tmp_path / "r.parquet")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_rate_stands_for_the_time(tmp_path):
+    log = write(tmp_path / "a.csv", rows())
+    np.testing.assert_allclose(
+        read_log(log, rate=200.0, position="x:mm", force="f")["time"], np.arange(30) / 200
+    )
+
+
+def test_the_cut_is_in_seconds_from_the_first_row(tmp_path):
+    log = write(tmp_path / "a.csv", [(t + 100, x, f) for t, x, f in rows()])
+    assert len(read_log(log, start=0.1, end=0.2, **COLUMNS)) == 10
+    with pytest.raises(InputError, match="no row"):
+        read_log(log, start=5.0, **COLUMNS)
+
+
+def test_a_sentinel_is_found_and_named(tmp_path):
+    log = write(
+        tmp_path / "a.csv", [(t, x, -1 if k % 2 else 200 + 10 * k) for k, (t, x, _) in enumerate(rows(60))]
+    )
+    record = read_log(log, time="t", position="x:mm", force="f:g")
+    assert np.isnan(record["force"]).sum() == 30
+    (note,) = record.meta["notes"]
+    assert note["code"] == "missing-samples"
+    assert "-1" in note["text"]
+    assert "row 2" in note["text"]
+
+
+def test_minus_one_among_negative_forces_is_a_force(tmp_path):
+    log = write(tmp_path / "a.csv", [(t, x, [-2, -1, 0, 1][k % 4]) for k, (t, x, _) in enumerate(rows(60))])
+    assert np.isfinite(read_log(log, **COLUMNS)["force"]).all()
+
+
+def test_missing_values_that_are_said(tmp_path):
+    cells = [(t, x, "NA" if k == 3 else 77 if k == 5 else f) for k, (t, x, f) in enumerate(rows())]
+    record = read_log(write(tmp_path / "a.csv", cells), missing=["NA", 77], **COLUMNS)
+    assert list(np.flatnonzero(np.isnan(record["force"]))) == [3, 5]
+
+
+def test_a_unit_in_the_name_is_taken_and_said(tmp_path):
+    log = write(tmp_path / "a.csv", rows(), header="t,x_mm,f_mN")
+    record = read_log(log, time="t", position="x_mm", force="f_mN")
+    assert record["force"][1] == pytest.approx(0.01)
+    assert {note["code"] for note in record.meta["notes"]} == {"unit-guess"}
+
+
+@pytest.mark.parametrize("cell", ["nan", "inf", "-inf", "oops", "1.2.3"])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_cell_that_is_no_number_is_named_with_its_row(tmp_path, cell, place):
+    cells = [list(row) for row in rows()]
+    cells[17][place] = cell
+    with pytest.raises(InputError, match=rf"row 18 \(line 19\) holds '{cell}'"):
+        read_log(write(tmp_path / "a.csv", cells), **COLUMNS)
+
+
+def test_an_empty_cell_is_no_reading(tmp_path):
+    cells = [list(row) for row in rows()]
+    cells[17][2] = ""
+    record = read_log(write(tmp_path / "a.csv", cells), **COLUMNS)
+    assert np.isnan(record["force"][17])
+    assert record.meta["notes"][0]["code"] == "missing-samples"
+
+
+def binary(path):
+    path.write_bytes(bytes(range(256)) * 10)
+
+
+WRONG_FILES = {
+    "missing": (lambda path: None, "there is no file"),
+    "folder": (lambda path: path.mkdir(), "is a folder"),
+    "empty": (lambda path: path.write_text(""), "is empty"),
+    "only comments": (lambda path: path.write_text("# nothing\n\n"), "is empty"),
+    "header only": (lambda path: path.write_text("t,x,f\n"), "no rows"),
+    "binary": (binary, "not text"),
+    "latin": (lambda path: path.write_bytes("t,x,f\n0,1,µ".encode("latin-1")), "UTF-8"),
+    "half a Parquet": (lambda path: path.write_bytes(b"PAR1" + b"x" * 100), "Parquet"),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG_FILES)
+def test_wrong_files(tmp_path, kind):
+    make, words = WRONG_FILES[kind]
+    path = tmp_path / "log.csv"
+    make(path)
+    with pytest.raises(InputError, match=words) as caught:
+        read_log(path, **COLUMNS)
+    assert "\n" not in str(caught.value)
+
+
+WRONG_SPECS = {
+    "unknown column": ({"force": "g:mN"}, r"unknown column 'g'.*f.*t.*x"),
+    "unknown unit": ({"force": "f:parsec"}, r"unknown unit 'parsec'.*mN"),
+    "wrong quantity": ({"force": "f:mm"}, "unit of length; force needs"),
+    "number too large": ({"force": "7"}, "columns are 0 to 2"),
+    "no time": ({"time": None}, "--time.*--rate"),
+}
+
+
+@pytest.mark.parametrize("kind", WRONG_SPECS)
+def test_wrong_specs(tmp_path, kind):
+    change, words = WRONG_SPECS[kind]
+    specs = {name: spec for name, spec in {**COLUMNS, **change}.items() if spec}
+    with pytest.raises(InputError, match=words):
+        read_log(write(tmp_path / "a.csv", rows()), **specs)
+
+
+def test_a_wrong_delimiter_is_suspected(tmp_path):
+    log = write(tmp_path / "a.csv", rows())
+    with pytest.raises(InputError, match="is the delimiter right"):
+        read_log(log, delimiter=";", **COLUMNS)
+
+
+def test_a_column_that_is_there_twice_must_be_named_by_number(tmp_path):
+    log = write(tmp_path / "a.csv", rows(), header="t,f,f")
+    with pytest.raises(InputError, match=r"2 columns named 'f'.*1, 2"):
+        read_log(log, time="t", position="f:mm", force="f:mN")
+    assert len(read_log(log, time="t", position="1:mm", force="2:mN")) == 30
