@@ -9,6 +9,14 @@ from palpate.bench import Bench, build, load
 from palpate.bench.experiment import Experiment
 
 FOAM = {"kind": "kelvin-voigt", "stiffness": 5200.0, "damping": 200.0, "mass": 0.10}
+VISCOELASTIC = {
+    "kind": "standard-linear-solid",
+    "stiffness": 5600.0,
+    "damping": 13.0,
+    "mass": 0.02,
+    "branch_stiffness": 6900.0,
+    "branch_time": 0.23,
+}
 RUBBER = {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}
 STEPS = {"first": 20.0, "second": 10.0, "period": 2.5}
 surfaces = pytest.mark.parametrize("surface", [FOAM, RUBBER], ids=["foam", "rubber"])
@@ -19,7 +27,9 @@ def pressed(controller, press=8.0, seed=1, friction=1.0, **tables):
     tables = {"title": "a test", "surface": FOAM, "controller": controller, **tables}
     bench = build(msgspec.convert(tables, Experiment))
     plant = bench.loop.plant
-    bench = Bench(bench.loop._replace(plant=plant._replace(friction=plant.friction.scaled(friction))), bench.q)
+    bench = Bench(
+        bench.loop._replace(plant=plant._replace(friction=plant.friction.scaled(friction))), bench.q
+    )
     record = bench.run(60.0, seed, press=press)
     first = int(np.argmax(record.columns["phase"] == 1))
     columns = {name: column[first:] for name, column in record.columns.items()}
@@ -67,7 +77,8 @@ def test_the_neural_controller_is_the_pi_of_its_own_gain(surface):
 
 def test_a_wider_bandwidth_follows_better():
     narrow, wide = (
-        pressed({"kind": "proportional-integral", "bandwidth": b}, press=10.0, force=STEPS) for b in (0.5, 2.0)
+        pressed({"kind": "proportional-integral", "bandwidth": b}, press=10.0, force=STEPS)
+        for b in (0.5, 2.0)
     )
     assert rms(wide, 2.5) < 0.7 * rms(narrow, 2.5)
 
@@ -108,6 +119,17 @@ def test_the_decoupled_law_as_printed_hammers_and_loses_the_surface():
     assert (corrected["phase"] == 1).all()
 
 
+def test_with_the_gain_set_right_it_still_needs_the_surface_to_damp_it():
+    """The printed law at the corrected one's loop gain: steady on foam of 200 N s/m, not on foam of 13 N s/m."""
+    for surface, k in ((FOAM, 5200.0), (VISCOELASTIC, 7000.0)):
+        tables = {"press": 8.0, "surface": surface, "force": STEPS}
+        printed = {"kind": "decoupled-hybrid", "stiffness": k, "form": "printed", "kf": 3000.0 / k**2}
+        shaken = pressed(printed, **tables)["force"][-500:].std()
+        calm = pressed({"kind": "decoupled-hybrid", "stiffness": k}, **tables)["force"][-500:].std()
+        assert calm < 0.3
+        assert shaken < 0.3 if surface is FOAM else shaken > 20 * calm
+
+
 @surfaces
 def test_the_original_hybrid_control_presses_where_its_posture_is_stable(surface):
     c = pressed({"kind": "raibert-craig"}, surface=surface)
@@ -128,7 +150,14 @@ def test_self_tuning_improves_on_the_gains_it_starts_from(surface):
 
 @pytest.mark.parametrize(
     "name",
-    ["foam-pi", "foam-impedance", "foam-decoupled", "foam-decoupled-printed", "foam-raibert-craig", "foam-self-tuning"],
+    [
+        "foam-pi",
+        "foam-impedance",
+        "foam-decoupled",
+        "foam-decoupled-printed",
+        "foam-raibert-craig",
+        "foam-self-tuning",
+    ],
 )
 def test_the_experiments_that_come_along_can_be_built(name):
     assert build(load(name)).loop.tick == 0.001

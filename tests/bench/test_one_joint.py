@@ -71,6 +71,12 @@ def test_to_first_order_it_is_an_integral_controller(surface):
     assert rms(untaught) > 3 * rms(neural)
 
 
+def test_the_angle_is_what_the_rates_add_up_to():
+    c = one_joint(FOAM, DirectIntegral(1.4e-3), STEPS).run(2.0).columns
+    assert np.trapezoid(c["rate"], c["t"]) == pytest.approx(c["angle"][-1], rel=1e-3)
+    assert c["penetration"] == pytest.approx(0.113 * c["angle"])
+
+
 def test_the_torque_stays_within_the_motor():
     record = one_joint(FOAM, direct_neural(), ForceSchedule(40.0, 40.0, 2.5, 0.0, 0.5, 0.0)).run(5.0)
     assert np.abs(record.columns["torque"]).max() == 2.5
