@@ -76,6 +76,14 @@ def press_of(record: Record, surface: str) -> Press:
     return Press(surface, inputs, first["force_measured"], float(ratio), squares)
 
 
+def cut(press: Press, seconds: float) -> Press:
+    """The first seconds of a press; f/x is that of its own end."""
+    n, late = round(seconds / TICK), round(LATE / TICK)
+    inputs, force = press.inputs[:n], press.force[:n]
+    ratio = float(force[-late:].mean() / inputs[-late:, 0].mean())
+    return Press(press.surface, inputs, force, ratio, press.squares[:n])
+
+
 def presses(
     runs: Runs, experiment: Experiment, surface: str, seeds: Sequence[int] | None = None
 ) -> list[Press]:
