@@ -17,7 +17,7 @@ class Perceptron:
     """A network with one hidden layer or more, sigmoids 2/(1 + e^-u) - 1 and an amplitude for each output.
 
     When to use it: as a term that learns in a control loop, or as a black-box model of a few signals; a `forward`
-    and a `learn` take about a microsecond each. Both are compiled in the constructor.
+    and a `learn` take some three microseconds each. Both are compiled in the constructor.
 
     Args:
         hidden: weights of the hidden layer, shape (n_hidden, n_in + 1), thresholds in column 0.
