@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter, Token
 
 from palpate.cli._folder import fresh_folder
 from palpate.errors import InputError
@@ -18,14 +19,20 @@ if TYPE_CHECKING:
 
     from palpate.records import Record
 
-NAME_WIDTH = 20
+
+def _seed(_: Any, tokens: Sequence[Token]) -> int:
+    """The conversion of cyclopts would round 1.5 without a word."""
+    (token,) = tokens
+    if not token.value.isdecimal():
+        raise InputError("it must be a whole number, 0 or above")
+    return int(token.value)
 
 
 def run(
     name: str | None = None,
     /,
     *,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
+    seed: Annotated[int, Parameter(converter=_seed)] = 0,
     out: Path | None = None,
     force: bool = False,
     list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
@@ -46,8 +53,9 @@ def run(
     from palpate.bench import experiment as experiments
 
     if list_:
+        width = 2 + max(map(len, experiments.names()))
         for known in experiments.names():
-            print(f"{known:<{NAME_WIDTH}}{experiments.load(known).title}")  # noqa: T201
+            print(f"{known:<{width}}{experiments.load(known).title}")  # noqa: T201
         return 0
     if name is None:
         raise InputError("run what? Name an experiment (palpate run --list shows them) or a TOML file")
@@ -98,7 +106,9 @@ def _record(console: Console, name: str, experiment: Any, seed: int) -> Record:
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
-    with Progress(*columns, console=console, transient=True) as progress:
+    # Without a terminal there is nobody to watch it, and it would leave an empty line.
+    watched = console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=not watched) as progress:
         bar = progress.add_task("starting", total=None, time="")
 
         def waiting() -> None:

@@ -1,0 +1,333 @@
+"""`palpate run`: what it writes, what it prints, and what it refuses."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import palpate.logs
+from palpate.bench import bench as running
+from palpate.bench import names, source
+from palpate.bench.row import COLUMNS
+from palpate.cli import main
+from palpate.logs import read_record
+
+# Contact after some 150 ms.
+NEAR = """
+[robot]
+start = [0.4635, 0.0, 0.0]
+"""
+FILES = {
+    "record.parquet",
+    "summary.json",
+    "report.html",
+    "approach.png",
+    "force.png",
+    "identification.png",
+    "torque.png",
+}
+
+
+def text_of(**lines):
+    """The text of foam-hybrid, near the wall; each keyword replaces the line of that key."""
+    text = source("foam-hybrid") + NEAR
+    lines = {"press": 0.3, "hold": 0.05, "first": 0.470, "step": 0.002, "period": 0.1} | lines
+    for key, value in lines.items():
+        pattern = re.compile(rf"^{key} = [^#\n]*", re.MULTILINE)
+        assert pattern.search(text), key
+        text = pattern.sub(f"{key} = {value} ", text, count=1)
+    return text
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """A quick experiment in a file, in an empty folder that is the working one."""
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "mine.toml"
+    file.write_text(text_of(), encoding="utf-8")
+    return file
+
+
+def refused(capsys, *words):
+    """Runs and is refused: the one line on standard error."""
+    assert main(["run", *map(str, words)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("palpate: ")
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def nothing_but(folder, *names):
+    assert {path.name for path in folder.iterdir()} == set(names)
+
+
+class References(HTMLParser):
+    """Whatever a page would fetch."""
+
+    def __init__(self):
+        super().__init__()
+        self.found = []
+
+    def handle_starttag(self, tag, attrs):
+        self.found += [v for k, v in attrs if k in {"src", "href", "srcset", "data", "action"}]
+
+
+def test_a_run_leaves_a_folder_of_results(mine, capsys):
+    assert main(["run", "mine.toml", "--seed", "3", "--out", "results"]) == 0
+    shown = capsys.readouterr().out
+    folder = mine.parent / "results"
+    nothing_but(folder, *FILES)
+    nothing_but(mine.parent, "mine.toml", "results")
+    assert str(folder.name) in shown
+    for words in ("settling", "overshoot", "K [N/m]", "B [N s/m]", "M [kg]", "truth", "5200"):
+        assert words in shown
+    record = read_record(folder / "record.parquet")
+    assert dict(record.units) == COLUMNS
+    assert record.meta["seed"] == 3
+    assert record.meta["command"] == "palpate run mine.toml --seed 3"
+    assert (record["phase"] == 1.0).sum() == 300
+    for png in folder.glob("*.png"):
+        assert png.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+
+
+def test_the_summary_agrees_with_the_record(mine, capsys):
+    assert main(["run", "mine.toml", "--out", "results", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    summary = json.loads((mine.parent / "results" / "summary.json").read_text())
+    assert printed == summary
+    record = read_record(mine.parent / "results" / "record.parquet")
+    pressing = record["phase"] == 1.0
+    assert summary["end"] == "done"
+    assert summary["contact_at_s"] == record["t"][np.argmax(pressing)]
+    assert summary["force"]["overshoot_N"] == pytest.approx(max(0.0, record["force"][pressing].max() - 20.0))
+    assert summary["identified"]["matched"]["K"] == record["K_matched"][-1]
+    assert summary["truth"]["B"] == {"value": 200.0, "unit": "N s/m"}
+
+
+def test_the_report_opens_without_a_network(mine):
+    assert main(["run", "mine.toml", "--out", "results"]) == 0
+    page = (mine.parent / "results" / "report.html").read_text(encoding="utf-8")
+    references = References()
+    references.feed(page)
+    assert len(references.found) == 4
+    assert all(r.startswith("data:image/png;base64,") for r in references.found)
+    assert "://" not in page
+    assert "stiffness = 5200.0" in page, "the experiment's file"
+    assert "palpate run mine.toml --seed 0" in page
+
+
+def test_what_is_in_the_file_cannot_break_the_page(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    evil = text_of(title='"</title><script>alert(1)</script>"', about='"<b>&"')
+    (tmp_path / "evil name.toml").write_text(evil, encoding="utf-8")
+    assert main(["run", "evil name.toml", "--out", "results"]) == 0
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+    assert "palpate run &#39;evil name.toml&#39; --seed 0" in page
+
+
+def test_the_same_seed_writes_the_same_record(mine):
+    for out, seed in (("a", 5), ("b", 5), ("c", 6)):
+        assert main(["run", "mine.toml", "--seed", str(seed), "--out", out]) == 0
+    a, b, c = (read_record(mine.parent / out / "record.parquet") for out in "abc")
+    for name in COLUMNS:
+        np.testing.assert_array_equal(a[name], b[name])
+    assert not np.array_equal(a["force_sampled"][:300], c["force_sampled"][:300])
+
+
+def test_left_out_the_folder_is_named_after_experiment_and_seed(mine):
+    assert main(["run", "mine.toml", "--seed", "7"]) == 0
+    assert (mine.parent / "runs" / "mine-7" / "report.html").is_file()
+
+
+def test_no_contact_is_an_answer_and_exit_code_1(mine, capsys):
+    mine.write_text(text_of(x=0.5) + "\n", encoding="utf-8")
+    mine.write_text(mine.read_text().replace("press = 0.3", "press = 0.3\nduration = 0.5"), encoding="utf-8")
+    assert main(["run", "mine.toml", "--out", "results"]) == 1
+    assert "no surface" in capsys.readouterr().out
+    nothing_but(mine.parent / "results", *(FILES - {"force.png", "identification.png"}))
+    summary = json.loads((mine.parent / "results" / "summary.json").read_text())
+    assert summary["end"] == "no contact"
+    assert summary["force"] is None
+
+
+def test_an_interrupted_run_is_saved_and_exits_130(mine, monkeypatch):
+    class Interrupting:
+        def __init__(self, march):
+            self.march, self.calls = march, 0
+
+        def run(self, *arguments):
+            self.calls += 1
+            if self.calls > 2:
+                raise KeyboardInterrupt
+            return self.march.run(*arguments)
+
+    monkeypatch.setattr(running, "CHUNK", 100)
+    monkeypatch.setattr(running, "compiled_march", Interrupting(running.compiled_march))
+    assert main(["run", "mine.toml", "--out", "results"]) == 130
+    summary = json.loads((mine.parent / "results" / "summary.json").read_text())
+    assert summary["end"] == "interrupted"
+    assert len(read_record(mine.parent / "results" / "record.parquet")) == 200
+
+
+def test_interrupted_at_once_there_is_still_a_folder(mine, monkeypatch):
+    class Interrupting:
+        def run(self, *arguments):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(running, "compiled_march", Interrupting())
+    assert main(["run", "mine.toml", "--out", "results"]) == 130
+    assert len(read_record(mine.parent / "results" / "record.parquet")) == 0
+
+
+def test_the_list_is_a_name_a_line_and_what_it_does(capsys):
+    assert main(["run", "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == names()
+    assert all(len(line.split()) > 2 for line in lines)
+
+
+@pytest.mark.parametrize("name", names())
+def test_print_shows_a_file_that_can_be_run(name, capsys):
+    assert main(["run", name, "--print"]) == 0
+    assert capsys.readouterr().out == source(name)
+
+
+def test_without_a_name_it_says_what_to_do(capsys):
+    assert "palpate run --list" in refused(capsys)
+
+
+def test_an_unknown_experiment_names_the_nearest(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "did you mean 'rubber-hybrid'" in refused(capsys, "rubber-hybird")
+    nothing_but(tmp_path)
+
+
+def test_a_missing_file(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "absent.toml: no such file" in refused(capsys, "absent.toml")
+    nothing_but(tmp_path)
+
+
+WRONG = {
+    "TOML": ("[run]", "[run", "not TOML"),
+    "key": ("stiffness", "stiffnes", "did you mean 'stiffness'"),
+    "value": ("stiffness = 5200.0", "stiffness = -52.0", "stiffness in [surface] must be a number above 0, got -52.0"),
+    "reach": ("start = [0.4635, 0.0, 0.0]", "start = [0.7, 0.0, 0.0]", "out of reach by 168.2 mm"),
+    "wall": ("x = 0.465", "x = 0.3", "behind the arm's start"),
+    "filter": ("[robot]", "[filters]\nmotion = 800.0\n[robot]", "below 500 Hz, half the rate"),
+    "friction": ("static = [3.6", "static = [0.6", "static in [friction] must be at least coulomb"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "told"), WRONG.values(), ids=WRONG)
+def test_a_wrong_experiment_is_refused_with_its_file_named(mine, capsys, old, new, told):
+    assert old in mine.read_text()
+    mine.write_text(mine.read_text().replace(old, new, 1), encoding="utf-8")
+    line = refused(capsys, "mine.toml", "--out", "results")
+    assert line.startswith("palpate: mine.toml: ")
+    assert told in line
+    nothing_but(mine.parent, "mine.toml")
+
+
+@pytest.mark.parametrize("seed", ["-1", "1.5", "many"])
+def test_a_seed_is_a_whole_number_from_zero_on(mine, capsys, seed):
+    assert "seed" in refused(capsys, "mine.toml", "--seed", seed).lower()
+    nothing_but(mine.parent, "mine.toml")
+
+
+def test_results_are_not_written_over(mine, capsys):
+    assert main(["run", "mine.toml", "--out", "results"]) == 0
+    before = (mine.parent / "results" / "record.parquet").read_bytes()
+    capsys.readouterr()
+    assert "--force" in refused(capsys, "mine.toml", "--seed", "9", "--out", "results")
+    assert (mine.parent / "results" / "record.parquet").read_bytes() == before
+    assert main(["run", "mine.toml", "--seed", "9", "--out", "results", "--force"]) == 0
+    assert (mine.parent / "results" / "record.parquet").read_bytes() != before
+    nothing_but(mine.parent, "mine.toml", "results")
+
+
+def test_force_does_not_replace_a_folder_that_is_not_its_own(mine, capsys):
+    (mine.parent / "thesis").mkdir()
+    (mine.parent / "thesis" / "chapter1.tex").write_text("years of work")
+    assert "chapter" not in refused(capsys, "mine.toml", "--out", "thesis", "--force")
+    nothing_but(mine.parent / "thesis", "chapter1.tex")
+
+
+def test_a_folder_under_a_file_cannot_be(mine, capsys):
+    assert "mine.toml" in refused(capsys, "mine.toml", "--out", "mine.toml/results")
+    nothing_but(mine.parent, "mine.toml")
+
+
+def test_a_folder_that_may_not_be_written(mine, capsys, monkeypatch):
+    (mine.parent / "closed").mkdir(mode=0o500)
+    if os.access(mine.parent / "closed", os.W_OK):  # the superuser may write anywhere
+        make = Path.mkdir
+
+        def mkdir(self, *arguments, **options):
+            if "closed" in self.parts[-2:-1]:
+                raise PermissionError(13, "Permission denied", str(self))
+            make(self, *arguments, **options)
+
+        monkeypatch.setattr(Path, "mkdir", mkdir)
+    assert "Permission denied" in refused(capsys, "mine.toml", "--out", "closed/results")
+    nothing_but(mine.parent / "closed")
+
+
+def test_a_full_disk_leaves_nothing(mine, capsys, monkeypatch):
+    def full(record, path):
+        path.write_bytes(b"half a rec")
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(palpate.logs, "write_record", full)
+    assert "No space left" in refused(capsys, "mine.toml", "--out", "results")
+    nothing_but(mine.parent, "mine.toml")
+
+
+@pytest.mark.slow
+def test_the_first_run_says_what_it_waits_for_and_the_second_does_not(mine):
+    """Of a package and a cache of its own: the first empty, the second not changed by whoever works on it."""
+    package = shutil.copytree(
+        Path(palpate.__file__).parent,
+        mine.parent / "src" / "palpate",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(package.parent),
+        "NUMBA_CACHE_DIR": str(mine.parent / "cache"),
+        "MPLBACKEND": "Agg",
+    }
+
+    def run(out):
+        command = [sys.executable, "-m", "palpate", "run", "mine.toml", "--out", out]
+        return subprocess.run(
+            command, capture_output=True, text=True, env=environment, timeout=600, check=False
+        )
+
+    first, second = run("first"), run("second")
+    assert first.returncode == second.returncode == 0, first.stderr + second.stderr
+    assert "compiling the loop" in first.stdout + first.stderr
+    assert "compiling" not in second.stdout + second.stderr
+    one, other = (read_record(mine.parent / out / "record.parquet") for out in ("first", "second"))
+    for name in COLUMNS:
+        np.testing.assert_array_equal(one[name], other[name])
+
+
+def test_a_warm_run_compiles_nothing():
+    code = (
+        "from palpate.bench import build, load\nfrom palpate.bench.tick import compiled_march\n"
+        "build(load('foam-hybrid')).run(0.01)\nprint(compiled_march.from_cache)"
+    )
+    for _ in range(2):
+        ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "True"
