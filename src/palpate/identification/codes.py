@@ -51,6 +51,9 @@ class Code(Enum):
         """The stable word that scripts may rely on, such as `force-lags-position`."""
         return self.name.lower().replace("_", "-")
 
+    def __str__(self) -> str:
+        return self.word
+
 
 @dataclass(frozen=True)
 class Warn:

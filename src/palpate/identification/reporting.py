@@ -1,0 +1,165 @@
+"""From the model chosen to the Identification that a user gets."""
+
+from __future__ import annotations
+
+from palpate.identification.choosing import Choice, Question
+from palpate.identification.codes import Code, Warn
+from palpate.identification.contacts import Contacts
+from palpate.identification.filters import Chain
+from palpate.identification.models import KELVIN_VOIGT_MASS
+from palpate.identification.result import Comparison, Identification, Parameter, Traces, Verdict
+from palpate.identification.timebase import Channels
+from palpate.identification.verdicts import Terms, unit_of, verdicts
+from palpate.units import impedance_units
+
+_SOFTEST, _STIFFEST = 1.0, 1e8
+_SHOWN = 20_000
+
+
+def report(
+    channels: Channels,
+    contacts: Contacts,
+    question: Question,
+    choice: Choice,
+    terms: Terms,
+    model: str | None,
+) -> Identification:
+    """Pass the verdicts, and say everything there is to know; warnings are collected in the channels' list."""
+    fitted = choice.candidate.fit
+    warnings = channels.warnings
+    if choice.rejected:
+        seen = "; ".join(choice.candidate.against[:3]) or "its parameters make no sense"
+        text = f"{fitted.model.name} does not describe this log: {seen}{_instead(choice)}"
+        warnings.append(Warn(Code.MODEL_REJECTED, text))
+    parameters = verdicts(choice, question.lag, terms, warnings)
+    if model is None and "M" not in parameters:
+        parameters = _with_mass(parameters, choice, terms)
+    warnings += _curved(choice) + _doubtful_units(parameters, terms)
+    traces = _traces(channels, contacts, question, choice, terms)
+    return Identification(
+        model=fitted.model.name,
+        parameters=parameters,
+        contacts=tuple(_clock(channels, question, span) for span in contacts.spans),
+        lag=_lag_said(question, choice),
+        r2=fitted.r2,
+        rmse=fitted.rmse,
+        n=len(question.force),
+        warnings=tuple(warnings),
+        comparison=tuple(
+            Comparison(_label(c.fit.names, c.fit.model.name), c.fit.r2, c.fit.rmse, "; ".join(c.against))
+            for c in choice.others
+        ),
+        cutoff=question.motion.chain.cutoff,
+        traces=traces,
+    )
+
+
+def _label(names: tuple[str, ...], model: str) -> str:
+    return f"{model}, curved spring" if "K3" in names else model
+
+
+def _instead(choice: Choice) -> str:
+    closest = min(choice.others, key=lambda c: c.fit.rmse)
+    if closest.fit.model is choice.candidate.fit.model:
+        return ""
+    name = _label(closest.fit.names, closest.fit.model.name)
+    blame = f", but {closest.against[0]}" if closest.against else ""
+    return f"; closest is {name} (R2 {closest.fit.r2:.4f}{blame})"
+
+
+def _with_mass(parameters: dict[str, Parameter], choice: Choice, terms: Terms) -> dict[str, Parameter]:
+    """Say about the mass what the model with a mass found."""
+    mass = next((c.fit for c in choice.others if c.fit.model is KELVIN_VOIGT_MASS), None)
+    if mass is None:
+        return parameters
+    unit = unit_of("M", mass, terms)
+    if choice.candidate.fit.model.name != "kelvin-voigt" or choice.rejected:
+        reason = f"{choice.candidate.fit.model.name} has no mass"
+    else:
+        half = mass.t * mass.std("M")
+        reason = (
+            f"the log does not show a mass (95 %: {mass['M'] - half:.3g} to {mass['M'] + half:.3g} {unit})"
+        )
+    return parameters | {"M": Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)}
+
+
+def _curved(choice: Choice) -> list[Warn]:
+    fitted = choice.candidate.fit
+    if "K3" not in fitted.names:
+        return []
+    text = "the stiffness changes with the position (K2 x^2 + K3 x^3); K is its value at the mean position"
+    return [Warn(Code.NONLINEAR_STIFFNESS, text)]
+
+
+def _doubtful_units(parameters: dict[str, Parameter], terms: Terms) -> list[Warn]:
+    warnings = []
+    stiffness = parameters["K"].value if "K" in parameters else None
+    if stiffness is not None and parameters["K"].unit == "N/m" and not _SOFTEST <= stiffness <= _STIFFEST:
+        text = (
+            f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: is a unit off, as by a factor of 1000?"
+        )
+        warnings.append(Warn(Code.UNIT_GUESS, text))
+    if stiffness is not None and terms.series and stiffness > terms.series[0] / 3:
+        text = f"K = {stiffness:.3g} against {terms.series[0]:.3g} N/m in series with it: K rests on that calibration"
+        warnings.append(Warn(Code.SERIES_COMPLIANCE, text))
+    return warnings
+
+
+def _lag_said(question: Question, choice: Choice) -> tuple[float, float] | None:
+    fitted = choice.candidate.fit
+    if question.lag.known:
+        told = question.lag.value != 0 or question.lag.std > 0
+        return (question.lag.value, question.lag.std) if told else None
+    told = not choice.rejected and fitted.std("lag") < 0.5 * question.lag.std
+    return (fitted.lag, fitted.std("lag")) if told else None
+
+
+def _clock(channels: Channels, question: Question, span: tuple[int, int]) -> tuple[float, float]:
+    """Times of a contact on the log's own clock: the filter's delay is taken off."""
+    delay = question.motion.chain.delay if not question.motion.bonded else 0.0
+    begin, end = (channels.start + i * channels.dt - delay for i in span)
+    return max(float(begin), channels.start), float(end)
+
+
+def nothing(channels: Channels, chain: Chain, terms: Terms, model: str) -> Identification:
+    """There is no contact: every parameter without a number."""
+    reason = "there is no contact in this log"
+    units = impedance_units(terms.force_unit, terms.position_unit)
+    parameters = {
+        name: Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)
+        for name, unit in units.items()
+    }
+    return Identification(
+        model,
+        parameters,
+        (),
+        None,
+        float("nan"),
+        float("nan"),
+        0,
+        tuple(channels.warnings),
+        cutoff=chain.cutoff,
+    )
+
+
+def _traces(
+    channels: Channels, contacts: Contacts, question: Question, choice: Choice, terms: Terms
+) -> Traces:
+    chain = question.motion.chain
+    fitted = choice.candidate.fit
+    step = max(len(channels.position) // _SHOWN, 1)
+    fit_step = max(len(question.force) // _SHOWN, 1)
+    time = channels.time - chain.delay
+    position = chain(question.motion.position)
+    rows = question.motion.rows[::fit_step]
+    return Traces(
+        time=time[::step],
+        position=position[::step],
+        force=chain(contacts.force_sign * channels.force)[::step],
+        fitted_time=time[rows],
+        fitted_position=question.motion.moved(0, fitted.lag)[::fit_step],
+        fitted_force=question.force[::fit_step],
+        predicted=fitted.predicted[::fit_step],
+        position_unit=terms.position_unit,
+        force_unit=terms.force_unit,
+    )
