@@ -33,7 +33,7 @@ class Toggle:
     """One change against the networks as chosen."""
 
     choice: Choice = CHOSEN
-    displacement: float = 1.0  # of the probe, in multiples of the thesis'
+    displacement: float | None = 1.0  # of the probe, in multiples of the thesis'; None: where the press rests
     duration: float = probing.PRESS  # of contact [s]
 
 
@@ -49,6 +49,7 @@ TOGGLES = {
     "rate 1e-3": Toggle(Choice(rate=1e-3)),
     "inputs not scaled": Toggle(Choice(scale=(1.0, 1.0, 1.0))),
     "probe at half": Toggle(displacement=0.5),
+    "probe where it rests": Toggle(displacement=None),
     "probe at twice": Toggle(displacement=2.0),
     "1 s of contact": Toggle(duration=1.0),
     "20 s of contact": Toggle(duration=LONG),
@@ -112,7 +113,7 @@ def _surface(runs: Runs, name: str) -> Surface:
         long=whole[0],
         stiffness=stiffness,
         perfect=float((switch / x + stiffness) / np.median([press.ratio for press in some])),
-        toggled={t: [next(looked) for _ in range(FEW * len(probing.STARTS))] for t in TOGGLES},
+        toggled={t: [next(looked) for _ in range(len(whole) * len(probing.STARTS))] for t in TOGGLES},
         nominal=probing.answers(runs, some, Choice(), MANY_STARTS),
         before=np.array([Choice().probe(name, start).probe().mass for start in MANY_STARTS]),
         far=far,
@@ -126,7 +127,8 @@ def look(toggle: Toggle, press: Press, start: int) -> Looked:
     """Lets a network learn for as long as the toggle says, and asks it."""
     seen = probing.cut(press, toggle.duration)
     probe, _ = probing.learned(seen, toggle.choice, start)
-    asked = probe.probe(displacement=toggle.displacement * probe.values[0])
+    at = seen.rest if toggle.displacement is None else toggle.displacement * probe.values[0]
+    asked = probe.probe(displacement=at)
     slope = probing.tangent(probe, seen.rest)
     return Looked(asked.stiffness / seen.ratio, slope / seen.ratio, bool(asked.warnings))
 

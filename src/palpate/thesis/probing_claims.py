@@ -312,7 +312,8 @@ def _by_start(values: Sequence[float] | NDArray[np.float64], grounds: Grounds) -
 def share_of_starts(values: Sequence[float] | NDArray[np.float64], starts: int) -> float:
     """Which part of the variance lies between starts; the rest lies between noise seeds of one start."""
     by_start = np.reshape(np.asarray(values, dtype=float), (-1, starts))
-    return float(np.var(by_start.mean(axis=0)) / np.var(by_start))
+    total = float(np.var(by_start))
+    return float(np.var(by_start.mean(axis=0))) / total if total > 0.0 else 0.0
 
 
 def _why_error(part: Part, grounds: Grounds) -> str:

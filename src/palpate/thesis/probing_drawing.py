@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 SHOWN_STARTS = STARTS[:6]
 TITLES = (
     "Force as the network knows it, at rest, foam",
-    "What that makes of K, by the probe's displacement",
-    "K by probing, and slope at rest, over f/x: foam",
+    "K from that, by the probe's displacement",
+    "K by probing, slope at rest, over f/x: foam",
     "The same: rubber",
-    "M of each start before and after learning: foam",
+    "M of each start: foam",
     "The same: rubber",
     "K over f/x as contact lasts, foam: five starts",
     "K over f/x, varied conditions",
@@ -89,7 +89,7 @@ def _known(force: Axes, stiffness: Axes, surface: Surface, kinds: Mapping[str, t
     for axis in (force, stiffness):
         axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.GREY, alpha=0.12, linewidth=0)
         axis.axvline(asked, color=style.RED, linewidth=0.9, linestyle=":")
-        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="displacement [mm]; grey: learned; dotted: asked")
+        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; grey: learned; dotted: asked")
     force.set(ylim=(-2.0, 40.0), ylabel="force [N]")
     stiffness.set(ylim=(0.0, 3.0), ylabel="K over f/x")
     force.legend(fontsize=7, frameon=False, ncols=2, loc="lower right")
@@ -108,7 +108,7 @@ def _toggles(axis: Axes, surface: Surface, *, named: bool) -> None:
     axis.axvline(surface.stiffness / surface.press.ratio, color=style.ORANGE, linewidth=0.9, linestyle="--")
     axis.set_yticks(range(len(names)), names if named else [""] * len(names), fontsize=8)
     axis.set(xlim=(-0.6, 3.0), ylim=(len(names) - 0.5, -0.5))
-    axis.set_xlabel("blue: K (red: warned); orange: slope; dashed: a network without error", fontsize=8)
+    axis.set_xlabel("blue: K (red: warned); orange: slope; dashed: no error", fontsize=8)
 
 
 def _strip(axis: Axes, values: Sequence[float], y: float, color: str) -> None:
