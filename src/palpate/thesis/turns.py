@@ -1,0 +1,145 @@
+"""Runs in whose middle something changes: the surface, where it is, or the pose that the arm is to take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate._vector import Vec3
+from palpate.bench import Experiment, build
+from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import CONTACT
+from palpate.bench.tick import Loop, LoopState, compiled_march, start_at
+from palpate.environments import KelvinVoigt, join
+from palpate.records import Record
+
+LOOK = 100
+"""Ticks between two looks for the first contact."""
+
+Change = Callable[[Loop, LoopState], tuple[Loop, LoopState]]
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Something that changes between two ticks.
+
+    Args:
+        at: when, since the first contact [s]; a tenth of a second at least.
+        change: the loop and its state as they go on; types stay as they are, so that nothing is compiled anew.
+    """
+
+    at: float
+    change: Change
+
+
+def run_with(
+    experiment: Experiment, seed: int, turns: Sequence[Turn], waiting: Callable[[], None] | None = None
+) -> Record:
+    """Runs like `Bench.run`, from the same random numbers, for `press` seconds of contact, through the turns.
+
+    Args:
+        experiment: any; it runs on after losses of contact.
+        seed: of the noise.
+        turns: in the order of their times.
+        waiting: called when the loop has to be compiled first.
+
+    Returns:
+        All rows up to the end, or up to the first number that is none; ``meta["turns"]`` holds the times [s].
+    """
+    bench = build(experiment)
+    march = _March(bench.loop, start_at(bench.loop, bench.q), np.random.default_rng(seed), waiting)
+    total = round(experiment.run.duration / bench.loop.tick)
+    while march.k < total and march.fine and not march.touched:
+        march.on(LOOK)
+    begun = march.begun
+    for turn in turns:
+        march.on(begun + round(turn.at / bench.loop.tick) - march.k)
+        march.loop, march.state = turn.change(march.loop, march.state)
+    march.on(begun + round(experiment.run.press / bench.loop.tick) - march.k)
+    rows = np.concatenate(march.rows)
+    finite = np.isfinite(rows).all(axis=1)
+    rows = rows if finite.all() else rows[: int(np.argmin(finite))]
+    columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
+    times = [(begun * bench.loop.tick) + turn.at for turn in turns]
+    return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "turns": times})
+
+
+@dataclass
+class _March:
+    loop: Loop
+    state: LoopState
+    generator: np.random.Generator
+    waiting: Callable[[], None] | None
+    k: int = 0
+
+    def __post_init__(self) -> None:
+        self.rows: list[np.ndarray] = []
+
+    @property
+    def begun(self) -> int:
+        """The tick of the first contact, if it lies among the last rows; else the next tick."""
+        return self.k - LOOK + int(np.argmax(self.rows[-1][:, 1] == CONTACT)) if self.touched else self.k
+
+    @property
+    def touched(self) -> bool:
+        return bool(self.rows) and bool((self.rows[-1][:, 1] == CONTACT).any())
+
+    @property
+    def fine(self) -> bool:
+        return not self.rows or bool(np.isfinite(self.rows[-1]).all())
+
+    def on(self, ticks: int) -> None:
+        """So many ticks further; none once a number is none."""
+        if ticks <= 0 or not self.fine:
+            return
+        out = np.empty((ticks, len(COLUMNS)))
+        noise = self.generator.standard_normal(ticks)
+        self.state = compiled_march.run(self.waiting, self.loop, self.state, self.k, noise, out)
+        self.rows.append(out)
+        self.k += ticks
+
+
+def other_surface(surface: KelvinVoigt) -> Change:
+    """The surface becomes another one under the tip, at the depth at which its spring carries the force of before."""
+
+    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
+        tip = loop.plant.arm.pose(state.plant.q).x
+        deep = state.felt.normal / surface.stiffness
+        plant = loop.plant._replace(surface=join(surface), wall=tip - deep)
+        touched = state.plant.surface._replace(deflection=deep, internal=0.0)
+        return loop._replace(plant=plant), state._replace(plant=state.plant._replace(surface=touched))
+
+    return change
+
+
+def surface_back(by: float) -> Change:
+    """The surface is drawn back by so much [m], out of reach of the tip if that is more than the tip's depth."""
+
+    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
+        return loop._replace(plant=loop.plant._replace(wall=loop.plant.wall + by)), state
+
+    return change
+
+
+def desired_pose(by: Vec3) -> Change:
+    """The desired pose jumps by so much [m, m, rad], seen from the arm.
+
+    A task has one pose, so the arm is put down that much on the other side of it, at the rate it had, and so is what
+    the controller remembers of the tick before: from there on, the error goes as after a jump of the desired pose.
+    """
+
+    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
+        arm, q = loop.plant.arm, state.plant.q
+        there = arm.inverse(arm.pose(q) - by, 1.0 if q.y >= 0.0 else -1.0)
+        past, by_q = state.conditioning, there - q
+        settled = loop.conditioning.motion.start_at(by_q.z)
+        past = past._replace(
+            q=past.q + by_q,
+            x=past.x - by,
+            angle=type(past.angle)(past.angle.s1 + settled.s1, past.angle.s2 + settled.s2),
+        )
+        return loop, state._replace(plant=state.plant._replace(q=there), conditioning=past)
+
+    return change
