@@ -25,6 +25,7 @@ def summarise(record: Record) -> dict[str, Any]:
     t = record["t"]
     summary: dict[str, Any] = {
         "end": record.meta["end"],
+        "why": record.meta["why"],
         "seed": record.meta["seed"],
         "duration_s": float(t[-1]) if len(t) else 0.0,
         "contact_at_s": float(t[np.argmax(pressing)]) if pressing.any() else None,

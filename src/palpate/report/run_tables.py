@@ -19,13 +19,10 @@ def tables(summary: dict[str, Any]) -> list[Table]:
 
 def notes(summary: dict[str, Any]) -> list[str]:
     """What a reader must not miss."""
-    texts = {
-        "no contact": "The arm met no surface: move the wall, or give the run more time ([run] duration).",
-        "diverged": f"The run diverged and was ended at {summary['duration_s']:.3f} s; the record holds it up to there.",
-        "interrupted": f"The run was interrupted at {summary['duration_s']:.1f} s.",
-    }
-    found = [texts[summary["end"]]] if summary["end"] in texts else []
-    if summary["contacts_lost"]:
+    advice = {"no contact": "; move the wall, or give the run more time ([run] duration)"}
+    end = summary["end"]
+    found = [] if end == "done" else [f"{end}: {summary['why']}{advice.get(end, '')}."]
+    if summary["contacts_lost"] and end != "lost contact":
         found.append(f"Contact was lost {summary['contacts_lost']} times.")
     worst, share = max(summary["saturated"].items(), key=lambda item: item[1])
     if share > 0.01:
