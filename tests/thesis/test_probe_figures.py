@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from palpate.thesis import probing, probing_causes, probing_claims
+from palpate.thesis import probing, probing_causes, probing_claims, probing_notes
 from palpate.thesis.explanations import e4_probe
 from palpate.thesis.figures import fig_6_06, fig_6_07, fig_6_08, fig_6_09
 from palpate.thesis.probing import Answer, Choice, Press
@@ -38,8 +38,8 @@ def spring(offset: float = 0.0) -> Press:
     return Press("foam", np.column_stack([x, v, 0.0 * t]), force, ratio, np.ones((len(t), 3)))
 
 
-def grounds(nominal: list[Answer], swept: dict | None = None) -> probing_claims.Grounds:
-    return probing_claims.Grounds(
+def grounds(nominal: list[Answer], swept: dict | None = None) -> probing_notes.Grounds:
+    return probing_notes.Grounds(
         surface="foam",
         nominal=nominal,
         swept=swept or {Choice(): nominal, Choice(thresholds=False): nominal},
@@ -143,8 +143,8 @@ def test_a_note_names_the_part_of_the_sweep_that_agrees():
 
 def test_variance_is_shared_out_between_starts_and_noise():
     start, seed = np.meshgrid(np.arange(5.0), np.arange(4.0))
-    assert probing_claims.share_of_starts(start.ravel(), 5) == pytest.approx(1.0)
-    assert probing_claims.share_of_starts(seed.ravel(), 5) == pytest.approx(0.0)
+    assert probing_notes.share_of_starts(start.ravel(), 5) == pytest.approx(1.0)
+    assert probing_notes.share_of_starts(seed.ravel(), 5) == pytest.approx(0.0)
 
 
 def test_a_rate_is_slower_only_if_every_smaller_one_takes_longer():

@@ -14,7 +14,8 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis import probing, rls_drawing
 from palpate.thesis.probing import AMPLITUDES, STARTS, WEIGHTS, Answer, Choice, Press
-from palpate.thesis.probing_claims import SMALL, Grounds, Part, share
+from palpate.thesis.probing_claims import SMALL, Part, share
+from palpate.thesis.probing_notes import Grounds
 from palpate.thesis.rls import Array
 from palpate.thesis.runs import Runs
 

@@ -13,7 +13,8 @@ from palpate.thesis import probing_causes as causes
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.probing import Choice
 from palpate.thesis.probing_causes import PARAMETERS, STRAIGHT, Data, Surface
-from palpate.thesis.probing_claims import ENOUGH, share_of_starts
+from palpate.thesis.probing_claims import ENOUGH
+from palpate.thesis.probing_notes import share_of_starts
 from palpate.thesis.rls import Array
 from palpate.thesis.runs import Runs
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.report import style
-from palpate.thesis import probing, probing_claims, probing_figure, rls_drawing
+from palpate.thesis import probing, probing_claims, probing_figure, probing_notes, rls_drawing
 from palpate.thesis.claims import Claim
 from palpate.thesis.probing import AMPLITUDES, WEIGHTS, Choice
 from palpate.thesis.rls import Array
@@ -75,7 +75,7 @@ def _times(axis: Axes, data: Data, *, thresholds: bool) -> None:
         found = [[a.error_gone for a in swept[Choice(a, weights, thresholds)]] for a in AMPLITUDES]
         middle = np.median(found, axis=1)
         axis.plot(AMPLITUDES, middle, "o-", color=color, markersize=3.5, linewidth=1.0, label=f"{weights:g}")
-    axis.axhspan(*probing_claims.TIME, color=style.RED, alpha=0.12, linewidth=0)
+    axis.axhspan(*probing_notes.TIME, color=style.RED, alpha=0.12, linewidth=0)
     axis.set(xscale="log", yscale="log", xlabel="output amplitude [N]", ylabel="time [s]")
     axis.set_xticks(AMPLITUDES, [f"{a:g}" for a in AMPLITUDES], fontsize=7.5)
     axis.minorticks_off()
