@@ -13,9 +13,7 @@ from palpate.controllers import (
     RaibertCraig,
     ResolvedAcceleration,
     SelfTuning,
-    join,
 )
-from palpate.controllers.any_controller import members
 from palpate.networks import network, random_layers
 from palpate.robots.arm3 import ArmModel
 from palpate.signals.types import Sense, Task
@@ -119,12 +117,3 @@ def test_seven_joints_accelerate_as_the_six_directions_were_told(name):
         free = task.xdd + (600.0 * (task.xd - sense.xd) + 2000.0 * (task.x - sense.x) - sense.f) / 5.0
     first = 0 if name == "resolved acceleration" else 1  # in direction 0 the force is controlled
     assert xdd[first:] == pytest.approx(free[first:])
-
-
-@pytest.mark.parametrize("one", members(), ids=lambda one: type(one).__name__)
-def test_joined_with_the_others_it_is_itself(one):
-    values = [by_value(v) for v in inputs(3, 3, 2)]
-    alone, among = np.empty((5, 3)), np.empty((5, 3))
-    walk(one, *values, alone)
-    walk(join(one), *values, among)
-    assert np.array_equal(alone, among)
