@@ -65,7 +65,7 @@ def _by_start(press: Record) -> dict[tuple[str, str], Array]:
     stiffness = rls.ratio(press, (rls.FIRST - 1.0, rls.FIRST))
 
     def settled(k0: float, shape: tuple[float, ...], p: float) -> list[float]:
-        theta = rls.trajectory(phi, force, (0.0, 0.0, k0), p * np.asarray(shape))
+        theta = rls.trajectory(phi, force, (0.0, 0.0, k0), [p * share for share in shape])
         if abs(theta[-1, 2] / stiffness - 1.0) > BAND:
             return [np.inf] * 3
         return [rls.settled_after(theta[:, i]) for i in range(3)]
@@ -103,7 +103,7 @@ def _why(data: Data, surface: str, key: str, limit: float) -> str:
         jump, later = _drift(data.shown[surface], limit)
         return (
             f"M_e is moved by the noise for seconds: after {limit:g} s it still changes by {later:.2g} kg. On a graph "
-            f"that has to show its first excursion of {jump:.2g} kg this looks settled, which may be what was meant. "
+            f"that has to show its first excursion of {jump:.0f} kg this looks settled, which may be what was meant. "
             f"{swept}"
         )
     relaxing = [name for name in data.found if name != surface]

@@ -33,22 +33,22 @@ QUANTILES = (10.0, 50.0, 90.0)
 class Data:
     shown: dict[str, Record]  # one press of each surface
     found: dict[str, list[Found]]  # over the seeds
-    varied: dict[str, dict[str, list[Found]]]  # of each surface
+    varied: dict[str, dict[str, list[Found]]]  # of the first surface, or of each
     ratios: dict[
         str, Array
     ]  # of the first surface: quantiles of K, B, M from single samples, shape (seeds, 3)
     truth: dict[str, float]  # M, B, K of the first surface
 
 
-def run(runs: Runs, surfaces: Mapping[str, Experiment]) -> Data:
-    """One press a seed on each surface, and conditions varied."""
+def run(runs: Runs, surfaces: Mapping[str, Experiment], *, vary: int) -> Data:
+    """One press a seed on each surface, and conditions varied on the first `vary` of them."""
     first = next(iter(surfaces.values()))
     each = runs.over_seeds(first, lambda record: by_ratios(rls.contact(record)))
     surface = first.surface
     return Data(
         shown={name: rls.contact(runs.one(e)) for name, e in surfaces.items()},
         found={name: runs.over_seeds(e, rls.found) for name, e in surfaces.items()},
-        varied={name: rls.swept(runs, rls.conditions(e)) for name, e in surfaces.items()},
+        varied={name: rls.swept(runs, rls.conditions(e)) for name, e in list(surfaces.items())[:vary]},
         ratios={key: np.array([one[key] for one in each]) for key in "KBM"},
         truth={"M": surface.mass, "B": surface.damping, "K": surface.stiffness},
     )

@@ -80,7 +80,7 @@ def run(runs: Runs) -> Data:
     varied = {
         name: {
             condition: runs.over([(e, seed) for seed in few], _press)
-            for condition, e in rls.conditions(rls.nearer(one)).items()
+            for condition, e in rls.conditions(one).items()
         }
         for name, one in plain.items()
     }
@@ -143,8 +143,8 @@ def _sum(data: Data) -> str:
     filter_alone = data.middle("rubber", "alone")[list(CAUSES).index("acceleration"), 0]
     return (
         "A small mass is no difficulty while the signals are right. Added in the order of the figure: "
-        f"{'; '.join(parts)}. The order matters, since causes act on each other: the filter on the acceleration alone "
-        f"gives {filter_alone:.2f} kg on rubber, next to nothing, and much once displacement counts from the 5 N point. "
+        f"{'; '.join(parts)}. The order matters, since causes act on each other: the filter on the acceleration, "
+        f"which alone gives {filter_alone:.2f} kg on rubber, does much once displacement counts from the 5 N point. "
         "That offset by itself makes the mass too large; without the force's lag the same chain would give "
         f"{without['plain foam']:.2f} kg on foam and {without['rubber']:.2f} kg on rubber. In one sense the thesis is "
         "right: the faults shift M by so much whatever it is, and a mass of some kilograms would have stayed positive. "
@@ -154,21 +154,18 @@ def _sum(data: Data) -> str:
 
 def _signs(data: Data) -> str:
     """Under which conditions the signs are others."""
-    only = list(CHAINS).index("only the force's lag")
-    full = list(CHAINS).index("as in the thesis")
-    parts = []
-    for what, at in (
-        ("the lag alone does not make the mass negative", only),
-        ("the whole chain does not", full),
-    ):
+    told = []
+    for what, chain in (("The lag alone", "only the force's lag"), ("The whole chain", "as in the thesis")):
+        at = list(CHAINS).index(chain)
         where = [
-            f"{surface}, {condition}"
+            f"{surface} with {condition}"
             for surface, by in data.varied.items()
             for condition, some in by.items()
             if np.median([p.chains[at, 0] for p in some]) >= 0.0
         ]
-        parts.append(f"{what}: {'; '.join(where) if where else 'nowhere'}")
-    return f"Where it stops, among friction, pose, mass and damping varied: {'. '.join(parts)}."
+        told.append(f"{what} makes the mass negative under {'all' if not where else 'all but these'} of them")
+        told[-1] += f": {', '.join(where)}." if where else "."
+    return f"Friction, pose, mass and damping were varied. {' '.join(told)}"
 
 
 def _lag(data: Data) -> Claim:

@@ -32,8 +32,8 @@ CAPTION = (
     "switch, by threshold; the thesis chose 5 N because of the noise, its listing has 0.8 N."
 )
 PARAMETERS = {
-    "foam": changed(load("foam-hybrid"), {"run.press": 4.0}),
-    "rubber": changed(load("rubber-hybrid"), {"run.press": 4.0}),
+    "foam": rls.nearer(changed(load("foam-hybrid"), {"run.press": 4.0})),
+    "rubber": rls.nearer(changed(load("rubber-hybrid"), {"run.press": 4.0})),
 }
 THRESHOLDS = (0.8, 1.2, 1.6, 2.0, 3.0, 5.0)
 CHOSEN = 5.0
@@ -68,9 +68,9 @@ class Data:
 def run(runs: Runs) -> Data:
     """One run a seed on each surface; thresholds and conditions varied on foam."""
     few = list(runs.seeds)[: rls.SWEPT_SEEDS]
-    foam = rls.nearer(PARAMETERS["foam"])
+    foam = PARAMETERS["foam"]
     thresholds = {
-        f: changed(foam, {"approach.switch": f, "run.press": 2.0, "run.duration": 20.0}) for f in THRESHOLDS
+        f: changed(foam, {"approach.switch": f, "run.press": 0.5, "run.duration": 20.0}) for f in THRESHOLDS
     }
     varied = {name: [(e, s) for s in few] for name, e in rls.conditions(foam).items()}
     return Data(
@@ -139,7 +139,8 @@ def _false(some: Sequence[Switch]) -> float:
 
 
 def _threshold(data: Data) -> Claim:
-    early = [f for f, some in data.by_threshold.items() if _false(some) > 0.0]
+    early = max((f for f, some in data.by_threshold.items() if _false(some) > 0.0), default=0.0)
+    enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
     chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
     return Claim(
         id="F4.2.threshold",
@@ -153,8 +154,9 @@ def _threshold(data: Data) -> Claim:
         tolerance="no run is switched in the air at 5 N",
         verdict=decided(_false(chosen) == 0.0),
         note=(
-            f"Noise alone switches at thresholds up to {max(early, default=0.0):g} N on this bench, so that 0.8 N, "
-            "which the listing has, cannot have run with this noise. 5 N is more than is needed: 3 N would do. What it "
+            f"Noise alone switches at thresholds up to {early:g} N on this bench, so that 0.8 N, "
+            "which the listing has, cannot have run with this noise. 5 N is more than is needed: "
+            f"{enough:g} N would do. What it "
             "costs: all displacements count from the 5 N point, and every K_e comes out a quarter too high."
         ),
     )

@@ -75,9 +75,9 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """One press a seed on both foams; one on each of the others."""
-    cases = [(rls.nearer(e), runs.seeds[0]) for e in PARAMETERS.values()]
+    cases = [(e, runs.seeds[0]) for e in PARAMETERS.values()]
     return Data(
-        later=rls_later.run(runs, rls.FOAMS),
+        later=rls_later.run(runs, rls.FOAMS, vary=1),
         foams=dict(zip(PARAMETERS, runs.over(cases, rls.found), strict=True)),
     )
 
@@ -174,11 +174,10 @@ def plot(data: Data) -> Figure:
         curves = [scale * p[f"{key}_raw"][rls.between(p, 0.1, rls.FIRST)] for p in shown.values()]
         rls_drawing.calm_limits(axis, np.zeros(1), *curves)
         axis.axhline(0.0, color=style.GREY, linewidth=0.9)
-    grid = axes[6].get_gridspec()
     for axis in axes[6:]:
         axis.remove()
-    _signs(drawing.add_subplot(grid[3:, 0]), data)
-    _table(drawing.add_subplot(grid[3:, 1]), data)
+    _signs(drawing.add_subplot(5, 2, (7, 9)), data)
+    _table(drawing.add_subplot(5, 2, (8, 10)), data)
     return drawing
 
 
