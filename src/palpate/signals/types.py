@@ -65,3 +65,8 @@ class Estimate:
 def verdict(value: float, std: float, tolerance: float = 0.25) -> str:
     """Whether a number may be trusted: "identified" if its 95 % half-width is at most `tolerance` of it."""
     return "identified" if 1.96 * std <= tolerance * abs(value) else "not identifiable"
+
+
+def passive_verdict(value: float, std: float, tolerance: float = 0.25) -> str:
+    """The same for a mass, damping or stiffness, which no passive surface has below zero: then "rejected"."""
+    return "rejected" if value + 1.96 * std < 0.0 else verdict(value, std, tolerance)
