@@ -139,8 +139,13 @@ def ratio_claim(data: Data, id_: str) -> Claim:
     )
 
 
-def plot(data: Data) -> Figure:
-    """The thesis' six panels in the later slot; under them K against f/x by condition, and the ratios."""
+def plot(data: Data, near: float) -> Figure:
+    """The thesis' six panels in the later slot; under them K against f/x by condition, and the ratios.
+
+    Args:
+        data: of the figure.
+        near: share of f/x by which K may differ.
+    """
     drawing, axes = rls_drawing.grid(4)
     rls_drawing.six(axes, data.shown, "thesis", rls.SLOT)
     axes[5].set_ylim(*axes[4].get_ylim())
@@ -152,12 +157,12 @@ def plot(data: Data) -> Figure:
         curves = [press[f"{key}_thesis"][rls.between(press, *rls.SLOT)] for press in data.shown.values()]
         rls_drawing.calm_limits(axis, np.zeros(1), *curves)
         axis.axhline(0.0, color=style.GREY, linewidth=0.9)
-    _gaps(axes[6], data)
+    _gaps(axes[6], data, near)
     _ratios(axes[7], data)
     return drawing
 
 
-def _gaps(axis: Axes, data: Data) -> None:
+def _gaps(axis: Axes, data: Data, near: float) -> None:
     rls_drawing.titled(axis, "g", "$K_e$ against f/x, under varied conditions")
     groups = {
         name: {
@@ -167,9 +172,9 @@ def _gaps(axis: Axes, data: Data) -> None:
         for name in data.found
     }
     rls_drawing.dots(axis, groups, rls_drawing.COLORS)
-    for limit in (-6.0, 6.0):
+    for limit in (-100.0 * near, 100.0 * near):
         axis.axvline(limit, color=style.RED, linewidth=0.9, linestyle=":")
-    axis.set_xlabel("difference [%]; dotted: the thesis' 6 %")
+    axis.set_xlabel(f"difference [%]; dotted: {100.0 * near:g} %")
 
 
 def _ratios(axis: Axes, data: Data) -> None:

@@ -93,4 +93,4 @@ def _inertia(data: rls_later.Data) -> Claim:
 
 def plot(data: rls_later.Data) -> Figure:
     """The six panels, the differences, and the ratios."""
-    return rls_later.plot(data)
+    return rls_later.plot(data, APART)
