@@ -117,7 +117,7 @@ def _others(axes: list[Axes], data: Data, color: str) -> None:
     handles = [line for line, label in zip(axes[2].lines, lines, strict=True) if label]
     labels = [label for label in lines if label]
     axes[2].legend(
-        handles, labels, fontsize=7, frameon=False, ncols=3, loc="center right", bbox_to_anchor=(1.0, 0.4)
+        handles, labels, fontsize=7, frameon=False, ncols=3, loc="center right", bbox_to_anchor=(1.0, 0.33)
     )
 
 
