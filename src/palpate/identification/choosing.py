@@ -141,7 +141,7 @@ def _candidate(fitted: Fit, fits: list[Fit], best: float, question: Question) ->
     if best**2 < _MUCH_BETTER * fitted.rmse**2 and 1 - fitted.r2 > _NEGLIGIBLE:
         winner = min((f for f in fits if f.rmse == best), key=lambda f: len(f.names))
         label = winner.model.name + (" with a curved spring" if "K3" in winner.names else "")
-        against.append(f"{label} leaves {best**2 / fitted.rmse**2:.0%} of its squared misfit")
+        against.append(f"{label} fits with {best**2 / fitted.rmse**2:.0%} of the squared misfit")
     against += _not_noise(fitted, question)
     parts = compare_parts(fitted, question.motion, question.force, question.spans, question.tolerance)
     against += [_said(part) for part in parts]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from palpate.identification.result import Identification, Traces
 
+_MANY = 10_000
 _MEASURED, _FITTED, _TOUCH = "#4477aa", "#cc3311", "#ddaa33"
 
 
@@ -65,7 +66,7 @@ def _title(found: Identification, title: str) -> str:
             continue
         unit = "" if p.unit == "1" else f" {p.unit}"
         half = (p.ci95[1] - p.ci95[0]) / 2 if p.ci95 else 0.0
-        number = f"{p.value:.4g} ± {half:.2g}{unit}" if p.value is not None else "no number"
+        number = f"{p.value:.4g} ± {half:.3g}{unit}" if p.value is not None else "no number"
         parts.append(f"{name} {number} ({p.verdict})")
     return f"{title}: {found.model}, R² {found.r2:.4f}\n" + ",  ".join(parts)
 
@@ -98,8 +99,11 @@ def _loop(axes: Any, traces: Traces) -> None:
     _, position = _broken(traces.fitted_time, scale * traces.fitted_position)
     _, measured = _broken(traces.fitted_time, traces.fitted_force)
     _, predicted = _broken(traces.fitted_time, traces.predicted)
-    axes.plot(position, measured, color=_MEASURED, lw=1.0, label="measured")
-    axes.plot(position, predicted, color=_FITTED, lw=1.0, label="fit")
+    # Lines between thinned samples would cross where no motion was, so many samples are dots.
+    many = len(position) > _MANY
+    style = {"ls": "", "marker": ".", "ms": 1.5, "mew": 0} if many else {"lw": 1.0}
+    axes.plot(position, measured, color=_MEASURED, label="measured", **style)
+    axes.plot(position, predicted, color=_FITTED, label="fit", **style)
     axes.set_xlabel(_unit("position from touch", unit))
     axes.set_ylabel(_unit("force", traces.force_unit))
     axes.legend(loc="best", frameon=False, fontsize=8)
