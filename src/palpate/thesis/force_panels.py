@@ -94,3 +94,8 @@ def following_panel(axis: Axes, found: Mapping[str, Sequence[Tracking]]) -> None
         label="RMS error [N]",
         title="outside the steps, each dot a run: green follows, red does not; dashed: the limit",
     )
+
+
+def legend_inside(axis: Axes, **options: object) -> None:
+    """The legend in a corner of the panel, where panels stand side by side."""
+    axis.legend(fontsize=8, frameon=True, framealpha=0.85, edgecolor="none", handlelength=1.4, **options)
