@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from palpate.thesis.study import Study
 
 COLORS = {"reproduced": "green", "differs": "red", "not checkable": "bright_black"}
-WIDTH = 24
 
 
 def thesis(
@@ -41,8 +40,10 @@ def thesis(
     from palpate.thesis.study import studies, study
 
     if list_:
-        for known in studies():
-            print(f"{known.NUMBER:<{WIDTH}}{known.TITLE}")  # noqa: T201
+        everything = studies()
+        width = 2 + max(len(known.NUMBER) for known in everything)
+        for known in everything:
+            print(f"{known.NUMBER:<{width}}{known.TITLE}")  # noqa: T201
         return 0
     chosen = studies() if figure is None else [study(figure)]
     folder = out if out is not None else Path("runs") / ("thesis" if figure is None else f"thesis-{figure}")
