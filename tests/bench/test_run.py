@@ -1,5 +1,7 @@
 """A run: the same numbers compiled and stepped, the same numbers from the same seed, and every way to end."""
 
+from typing import NamedTuple
+
 import msgspec
 import numpy as np
 import pytest
@@ -8,7 +10,9 @@ from hypothesis import strategies as st
 
 from bench.quick import DURATION, PRESS, changed, quick
 from palpate.bench import bench as running
-from palpate.bench import build, load, names
+from palpate.bench import build, load, names, part
+from palpate.environments import KelvinVoigt, SurfaceState
+from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 
 
@@ -177,6 +181,63 @@ def test_the_record_carries_what_made_it(foam):
     assert record.meta["truth"]["K"] == {"value": 5200.0, "unit": "N/m"}
     again = msgspec.convert(record.meta["experiment"], type=type(load("foam-hybrid")))
     assert again == quick("foam-hybrid")
+
+
+@part
+class Rigid(NamedTuple):
+    """A user's surface: a spring and a damper, without a mass and without a truth to tell."""
+
+    stiffness: float
+    damping: float
+    mass: float = 0.0
+
+    def start(self):
+        return UNTOUCHED
+
+    def force(self, state, p, v):
+        return self.stiffness * p + self.damping * v
+
+    def relax(self, state, p, v, dt):
+        return SurfaceState(p, v, 0.0, 1.0)
+
+    def free(self, state, dt):
+        return SurfaceState(0.0, 0.0, 0.0, 0.0)
+
+    def stored(self, state):
+        return 0.0
+
+
+def test_a_surface_of_ones_own_is_pressed(foam):
+    bench = foam.with_surface(Rigid(10_000.0, 300.0))
+    record = press(bench, compiled=False)
+    assert record.meta["truth"] == {}
+    touching = record["touching"] == 1.0
+    assert touching.any()
+    assert foam.meta["truth"]["K"]["value"] == 5200.0, "the other bench stays as it was"
+    stiff = foam.with_surface(KelvinVoigt(10_000.0, 300.0, 0.0))
+    assert stiff.meta["truth"]["K"] == {"value": 10_000.0, "unit": "N/m"}
+    same(record, press(stiff, compiled=False))
+
+
+@part
+class Limp(NamedTuple):
+    """A user's controller with start and step only: no torque at all."""
+
+    gain: float
+
+    def start(self):
+        return 0.0
+
+    def step(self, state, sense, task, model):
+        return self.gain * task.x, state + 1.0
+
+
+def test_a_controller_of_ones_own_is_obeyed_in_contact(foam):
+    record = press(foam.with_controller(Limp(0.0)), compiled=False)
+    pressing = record["phase"] == 1.0
+    assert pressing.any()
+    for i in (1, 2, 3):
+        assert not record[f"torque{i}"][pressing].any()
 
 
 gains = st.floats(0.0, 1e4)

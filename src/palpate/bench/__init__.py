@@ -4,6 +4,8 @@ from palpate.bench import build, load
 record = build(load("foam-hybrid")).run(duration=60.0, seed=1, press=8.0)
 """
 
+from palpate._jit import law, part
+from palpate._vector import Vec3
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
 from palpate.bench.experiment import Experiment, changed, load, names, source
@@ -14,11 +16,14 @@ __all__ = [
     "Bench",
     "Experiment",
     "Loop",
+    "Vec3",
     "build",
     "changed",
+    "law",
     "load",
     "march",
     "names",
+    "part",
     "source",
     "start_at",
     "summarise",

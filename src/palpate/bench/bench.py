@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,20 @@ class Bench:
 
     def __post_init__(self) -> None:
         controller(type(self.loop.controller))  # a user's own may have only start and step
+
+    def with_surface(self, surface: Any) -> Bench:
+        """The same bench before another surface, one of `palpate.environments` or a part of your own.
+
+        Its ``truth()``, {name: (value, unit)}, becomes the record's; left out, nothing is known of it.
+        """
+        plant = self.loop.plant._replace(surface=surface)
+        truth = surface.truth() if hasattr(surface, "truth") else {}
+        told = {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
+        return replace(self, loop=self.loop._replace(plant=plant), meta={**self.meta, "truth": told})
+
+    def with_controller(self, controller: Any) -> Bench:
+        """The same bench with another controller in contact: a part with ``start()`` and ``step``."""
+        return replace(self, loop=self.loop._replace(controller=controller))
 
     def run(
         self,

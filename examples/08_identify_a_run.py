@@ -1,0 +1,30 @@
+"""A run of the bench through the identification for logs: does it find what it cannot know?
+
+The identification gets what a real log would hold, measured position and force; the truth stays behind.
+"""
+
+import palpate
+from palpate.bench import build, changed, load
+from palpate.records import Record
+
+experiment = changed(
+    load("foam-hybrid"),
+    {
+        "force.first": 10.0,
+        "force.second": 20.0,
+        "force.period": 1.0,
+        "force.amplitude": 2.0,
+        "force.frequency": 2.0,
+    },
+)
+bench = build(experiment)
+run = bench.run(experiment.run.duration, seed=3, press=5.0)
+columns = {"time": run["t"], "position": run["x_measured"], "force": run["force_measured"]}
+found = palpate.identify(Record(columns, {"time": "s", "position": "m", "force": "N"}))
+
+late = bench.loop.force.lag + bench.loop.conditioning.force.lag
+print(f"{found.model}; force late by {1e3 * found.lag[0]:.2f} ms, the instruments say {1e3 * late:.2f} ms")
+for name, parameter in found.parameters.items():
+    truth = bench.meta["truth"][name]["value"]
+    value = "no number" if parameter.value is None else f"{parameter.value:.4g}"
+    print(f"{name}: {value} {parameter.unit}, in truth {truth:g}: {parameter.verdict}")
