@@ -57,15 +57,16 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment], *, vary: int) -> Data:
 def by_ratios(press: Record) -> dict[str, Array]:
     """Quantiles of what single samples give, by the three ratios of sec. 5.1, each with what the one before found.
 
-    K = f/x where all rests; B = (f - K x)/v while the surface moves; M = (f - K x - B v)/a. A ratio needs its
-    denominator: samples in which the encoders show no motion are left out.
+    K = f/x where all rests; B = (f - K x)/v while the surface moves, of the half of the samples with the smaller
+    acceleration, for the thesis asks for none; M = (f - K x - B v)/a. A ratio needs its denominator: samples in which
+    the encoders show no motion are left out.
     """
     rest, moving = rls.between(press, *rls.SLOT), rls.between(press, 0.0, MOVING)
     f, x = press["force_measured"], press["displacement"]
     v, a = press["vx_raw"][moving], press["ax_measured"][moving]
     stiffness = f[rest] / x[rest]
     left = f[moving] - np.median(stiffness) * x[moving]
-    seen = np.abs(v) > LEAST_VELOCITY
+    seen = (np.abs(v) > LEAST_VELOCITY) & (np.abs(a) <= np.median(np.abs(a)))
     damping = left[seen] / v[seen]
     left = left - np.median(damping) * v
     seen = np.abs(a) > LEAST_ACCELERATION
