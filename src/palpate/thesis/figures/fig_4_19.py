@@ -39,8 +39,8 @@ TITLE = "Decoupled hybrid control, as printed and corrected"
 CAPTION = (
     "The force steps between 10 and 20 N; in between, at the dotted lines, the desired y jumps by 5 mm. Left the bench "
     "as chosen, right with hardly any friction, in the joints or along the wall. The thesis says that (4.19) with the "
-    "identified stiffness decouples force and position. As printed it loses the surface; put right, it keeps the force "
-    "steps out of the angle. What couples the two on the left is friction, which no law here knows."
+    "identified stiffness decouples force and position. As printed it loses the surface; put right, it takes the "
+    "spikes out of the angle (right). What couples the two on the left is friction, which no law here knows."
 )
 PARAMETERS = changed(
     load("foam-decoupled"), {**SHORT, "run.press": 7.5, "force.first": 10.0, "force.second": 20.0}
@@ -169,8 +169,8 @@ def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
         note=(
             "The spike that (4.13) gives the angle at each step is gone, as the right half of the figure shows; there the "
             f"corrected law leaves {spread([100 * p.angle for p in free], '%', 2)}, most of it a limit cycle of the wrist's "
-            "encoder that both laws have. With friction as chosen, something else turns the tip: when the force falls, the "
-            "wall holds the tip less and it slides, whatever the law. The law has no integral either, so what friction holds "
+            "encoder that both laws have. With friction as chosen the wrist's own friction holds the angle anywhere "
+            "within a degree or two; a step shakes it loose and it settles elsewhere, whatever the law. The law has no integral either, so what friction holds "
             f"back of the force stays. The threshold of one half is ours. {stops_holding(data.varied, _angle_kept)}"
         ),
         **same,

@@ -1,0 +1,112 @@
+"""The force loop of (4.13), linear and in one direction: a tip of some mass on a spring and a damper, friction left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.signals.filters import butterworth2
+
+Array = NDArray[np.float64]
+TICK = 1e-3
+"""[s]"""
+
+
+@dataclass(frozen=True)
+class ForceLoop:
+    """What decides whether it is stable, the surface's stiffness aside.
+
+    Args:
+        kf: K_fp.
+        ki: K_fi [per sample].
+        damping: B_e of the surface [N s/m].
+        tip: mass along the force [kg].
+        mass: M_e of the surface [kg].
+        cutoff: of the sensor's analog low-pass, of third order [Hz].
+        late: how long the sensor computes and holds [s].
+        smoothing: cut-off of the controller's own filter [Hz].
+    """
+
+    kf: float
+    ki: float
+    damping: float
+    tip: float
+    mass: float = 0.05
+    cutoff: float = 120.0
+    late: float = 1.5 / 480.0
+    smoothing: float = 120.0
+
+    def radius(self, stiffness: Array) -> Array:
+        """Spectral radius of one tick on surfaces of these stiffnesses [N/m], shape (n,); above 1 it is unstable."""
+        return np.asarray(np.abs(np.linalg.eigvals(self._ticks(np.atleast_1d(stiffness)))).max(axis=-1))
+
+    def limit(self, low: float = 1e3, high: float = 3e6) -> float:
+        """The stiffness from which it is unstable [N/m]; NaN if it is so at `low`, infinite if not below `high`."""
+        for _ in range(2):
+            grid = np.geomspace(low, high, 40)
+            unstable = self.radius(grid) > 1.0 + 1e-9
+            first = int(np.argmax(unstable))
+            if not unstable[first]:
+                return float("inf")
+            if first == 0:
+                return float("nan")
+            low, high = float(grid[first - 1]), float(grid[first])
+        return float(np.sqrt(low * high))
+
+    def _ticks(self, stiffness: Array) -> Array:
+        """What one tick does to the state: tip and analog filter, a line of readings, the filter, the integral."""
+        A, b, c = self._held(stiffness)
+        n, line = 5, int(self.late / TICK) + 1
+        share = self.late / TICK + 1 - line
+        s1, s2, total = n + line, n + line + 1, n + line + 2
+        one = np.eye(total + 1)
+        past = [np.pad(c, (0, total + 1 - n)), *one[n : n + line]]
+        smooth = butterworth2(self.smoothing, 1.0 / TICK)
+        reading = (1.0 - share) * past[line - 1] + share * past[line]
+        measured = smooth.b0 * reading + one[s1]
+        F = np.zeros((len(stiffness), total + 1, total + 1))
+        F[:, :n, :n] = A
+        F[:, n : n + line] = past[:line]
+        F[:, s1] = smooth.b1 * reading - smooth.a1 * measured + one[s2]
+        F[:, s2] = smooth.b2 * reading - smooth.a2 * measured
+        F[:, total] = one[total] - self.ki * measured
+        F[:, :n] += b[:, :, None] * (F[:, total] - self.kf * measured)[:, None, :]
+        return F
+
+    def _held(self, stiffness: Array) -> tuple[Array, Array, Array]:
+        """Tip and analog filter over one tick of constant force: x' = A x + b u for each stiffness, reading c x."""
+        Af, Bf, Cf = _analog(self.cutoff)
+        whole = self.tip + self.mass
+        A = np.zeros((len(stiffness), 6, 6))
+        A[:, 0, 1] = 1.0
+        A[:, 1, 0], A[:, 1, 1], A[:, 1, 5] = -stiffness / whole, -self.damping / whole, 1.0 / whole
+        A[:, 2:5, 2:5] = Af
+        A[:, 2:5, 0], A[:, 2:5, 1] = stiffness[:, None] * Bf, self.damping * Bf
+        step = _exponential(TICK * A)
+        return step[:, :5, :5], step[:, :5, 5], np.concatenate([[0.0, 0.0], Cf])
+
+
+@cache
+def _analog(cutoff: float) -> tuple[Array, Array, Array]:
+    """The sensor's low-pass in state space."""
+    from scipy.signal import butter, tf2ss
+
+    A, B, C, _ = tf2ss(*butter(3, 1.0, analog=True))
+    w = 2.0 * np.pi * cutoff
+    return w * A, w * B[:, 0], C[0]
+
+
+def _exponential(A: Array) -> Array:
+    """exp of each matrix, by Taylor's series and squaring; scipy's takes its time over many small ones."""
+    halvings = 12
+    small = A / 2.0**halvings
+    total = term = np.broadcast_to(np.eye(A.shape[-1]), A.shape)
+    for order in range(1, 9):
+        term = term @ small / order
+        total = total + term
+    for _ in range(halvings):
+        total = total @ total
+    return total
