@@ -34,8 +34,11 @@ format: .venv/dev.stamp ## wrap the code, sort the imports, mend what ruff can m
 
 check: lint test ## everything that has to pass before a commit
 
-bench: .venv/run.stamp ## measure what one tick of the closed loop costs here
+bench: .venv/run.stamp ## measure what a tick, an update and a cold start cost here
 	$(BIN)/palpate speed
+	$(BIN)/python benchmarks/tick.py
+	$(BIN)/python benchmarks/least_squares.py
+	$(BIN)/python benchmarks/cold_start.py
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean
