@@ -1,0 +1,255 @@
+"""Measuring the thesis: what is done stays done, what is wrong is one line, and no claim is forgotten."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import palpate.thesis
+from palpate.errors import InputError
+from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.measuring import STATE, measure
+from palpate.thesis.runs import Runs
+from palpate.thesis.study import studies, study
+
+FIELDS = ["id", "source", "claim", "thesis", "measured", "tolerance", "verdict", "note"]
+VERDICTS = {"reproduced", "differs", "not checkable"}
+CLAIMS = (
+    *("F3.5", "F3.7", "F4.2", "F4.4", "RLS-S1", "RLS-S2", "RLS-S3", "RLS-R1", "RLS-R2"),
+    *("NN-ETA", "NN-S", "NN-R", "HYB", "NNC-S1", "NNC-S2", "NNC-SLOW", "NNC-Y", "NNC-R1", "NNC-R2"),
+    *("DEC", "IMP", "YY", "FUK", "FUT"),
+)
+"""Every claim of the thesis that has a row."""
+SEEDS = range(10)
+
+
+def toy(number: str, done: list[str], fails: type[BaseException] | None = None) -> SimpleNamespace:
+    """A study that says in `done` that it ran."""
+
+    def run(runs: Runs) -> float:
+        done.append(number)
+        if fails is not None:
+            raise fails
+        return float(len(runs.seeds))
+
+    def check(data: float) -> list[Claim]:
+        return [
+            Claim(
+                f"T{number}",
+                "here",
+                "<it> holds & is told",
+                "1",
+                f"{data}",
+                "any",
+                decided(data > 0),
+                "a note",
+            )
+        ]
+
+    def plot(_: float):
+        from palpate.report import style
+
+        drawing, (axis,) = style.figure(1)
+        axis.plot([0.0, 1.0], [0.0, 1.0])
+        return drawing
+
+    return SimpleNamespace(
+        NUMBER=number, TITLE=f"Toy {number}", CAPTION="seen", PARAMETERS=None, run=run, check=check, plot=plot
+    )
+
+
+def measured(numbers: list, folder: Path, **options):
+    options = {"command": "palpate thesis", **options}
+    return measure(numbers, Runs(options.pop("seeds", SEEDS)), folder, **options)
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def one_line(ran: subprocess.CompletedProcess) -> str:
+    assert ran.returncode == 2, ran.stderr
+    assert ran.stderr.startswith("palpate: ")
+    assert ran.stderr.count("\n") == 1
+    assert "Traceback" not in ran.stderr
+    return ran.stderr
+
+
+def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
+    folder = tmp_path / "runs" / "thesis"
+    done = measured([toy("1.1", []), toy("1.2", [])], folder)
+    assert [d.number for d in done] == ["1.1", "1.2"]
+    assert names(folder) == {"claims.json", "index.html", STATE, "1.1.png", "1.2.png"}
+    claims = json.loads((folder / "claims.json").read_text("utf-8"))
+    assert [list(claim) for claim in claims] == [FIELDS, FIELDS]
+    assert [claim["id"] for claim in claims] == ["T1.1", "T1.2"]
+    assert {claim["verdict"] for claim in claims} <= VERDICTS
+    page = (folder / "index.html").read_text("utf-8")
+    assert "&lt;it&gt; holds &amp; is told" in page
+    assert page.count("data:image/png;base64,") == 2
+    assert "http" not in re.sub(r"http://www\.w3\.org\S*", "", page), "the page opens without a network"
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_what_is_done_is_kept_and_not_done_again(tmp_path, error):
+    folder, done = tmp_path / "thesis", []
+    with pytest.raises(error):
+        measured([toy("1.1", done), toy("1.2", done, error), toy("1.3", done)], folder)
+    assert done == ["1.1", "1.2"]
+    assert [c["id"] for c in json.loads((folder / "claims.json").read_text())] == ["T1.1"]
+    assert "Unfinished" in (folder / "index.html").read_text("utf-8")
+    measured([toy("1.1", done), toy("1.2", done), toy("1.3", done)], folder)
+    assert done == ["1.1", "1.2", "1.2", "1.3"]
+    assert "Unfinished" not in (folder / "index.html").read_text("utf-8")
+    assert len(json.loads((folder / "claims.json").read_text())) == 3
+
+
+def test_other_seeds_or_figures_are_another_measurement(tmp_path):
+    folder, done = tmp_path / "thesis", []
+    with pytest.raises(KeyboardInterrupt):
+        measured([toy("1.1", done), toy("1.2", done, KeyboardInterrupt)], folder)
+    before = (folder / "claims.json").read_bytes()
+    with pytest.raises(InputError, match="--force"):
+        measured([toy("1.1", done), toy("1.2", done)], folder, seeds=range(12))
+    with pytest.raises(InputError, match="--force"):
+        measured([toy("1.1", done)], folder)
+    assert (folder / "claims.json").read_bytes() == before
+    assert done == ["1.1", "1.2"]
+
+
+def test_a_finished_measurement_is_replaced_only_by_force(tmp_path):
+    folder, done = tmp_path / "thesis", []
+    measured([toy("1.1", done)], folder)
+    with pytest.raises(InputError, match="--force"):
+        measured([toy("1.1", done)], folder)
+    measured([toy("1.1", done)], folder, force=True)
+    assert done == ["1.1", "1.1"]
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_folder_of_something_else_is_never_touched(tmp_path, force):
+    (tmp_path / "letters.txt").write_text("dear")
+    done = []
+    with pytest.raises(InputError, match="no measurement"):
+        measured([toy("1.1", done)], tmp_path, force=force)
+    assert names(tmp_path) == {"letters.txt"}
+    assert not done
+
+
+@pytest.mark.parametrize("content", ["", "{}", "[1, 2]", "\x00\xff"])
+def test_a_broken_state_is_no_measurement(tmp_path, content):
+    (tmp_path / STATE).write_text(content, encoding="latin-1")
+    with pytest.raises(InputError, match="another --out"):
+        measured([toy("1.1", [])], tmp_path)
+
+
+def test_a_file_in_the_place_is_refused(tmp_path):
+    (tmp_path / "thesis").touch()
+    with pytest.raises(InputError, match="not a folder"):
+        measured([toy("1.1", [])], tmp_path / "thesis")
+
+
+def test_an_empty_folder_is_taken(tmp_path):
+    measured([toy("1.1", [])], tmp_path)
+    assert "claims.json" in names(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("6.99", "6.9"), ("why-negativ-mass", "why-negative-mass"), ("x", "3.5")]
+)
+def test_an_unknown_figure_is_answered_with_the_nearest_and_the_list(program, tmp_path, name, said):
+    line = one_line(program("thesis", name, "--out", tmp_path / "t"))
+    assert said in line
+    assert all(s.NUMBER in line for s in studies())
+    assert not (tmp_path / "t").exists()
+
+
+@pytest.mark.parametrize("seeds", ["9", "0", "-1", "many", "1001"])
+def test_seeds_out_of_range_are_refused(program, tmp_path, seeds):
+    line = one_line(program("thesis", "3.7", "--seeds", seeds, "--out", tmp_path / "t"))
+    assert "seeds" in line.lower()
+
+
+def test_the_list_has_a_line_for_every_study(program):
+    ran = program("thesis", "--list")
+    assert ran.returncode == 0
+    listed = [line.split()[0] for line in ran.stdout.splitlines()]
+    assert listed == [s.NUMBER for s in studies()]
+
+
+def test_one_figure_is_measured_by_the_program(program, tmp_path):
+    folder = tmp_path / "t"
+    ran = program("thesis", "3.7", "--out", folder)
+    assert ran.returncode == 0, ran.stderr
+    assert names(folder) == {"claims.json", "index.html", STATE, "3.7.png"}
+    assert "217 Hz" in ran.stdout
+    assert "--force" in one_line(program("thesis", "3.7", "--out", folder))
+
+
+def test_a_place_that_cannot_be_is_one_line(program, tmp_path):
+    (tmp_path / "file").touch()
+    assert "file" in one_line(program("thesis", "3.7", "--out", tmp_path / "file" / "thesis"))
+
+
+@pytest.mark.skipif(not Path("/proc/version").exists(), reason="no /proc here")
+def test_a_place_that_may_not_be_written_is_one_line(program):
+    assert "/proc" in one_line(program("thesis", "3.7", "--out", "/proc/thesis"))
+
+
+def test_a_disk_that_is_full_is_one_line_and_can_be_gone_on_from(program, tmp_path):
+    resource = pytest.importorskip("resource")
+    folder = tmp_path / "t"
+    command = [sys.executable, "-m", "palpate", "thesis", "3.7", "--out", str(folder)]
+    ran = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)),
+    )
+    one_line(ran)
+    assert not {"claims.json", "index.html", "3.7.png"} & names(folder), "whole or not at all"
+    assert program("thesis", "3.7", "--out", folder).returncode == 0
+
+
+def test_every_study_offers_what_the_protocol_asks_for():
+    found = studies()
+    assert len({s.NUMBER for s in found}) == len(found)
+    for one in found:
+        assert study(one.NUMBER) is one
+        assert one.TITLE
+        assert one.CAPTION.endswith((".", ")"))
+        assert one.PARAMETERS is not None
+        assert all(callable(getattr(one, what)) for what in ("run", "check", "plot"))
+        assert "\n" not in one.TITLE
+
+
+def test_figures_come_in_the_thesis_order():
+    numbers = [tuple(map(int, s.NUMBER.split("."))) for s in studies() if re.fullmatch(r"\d+\.\d+", s.NUMBER)]
+    assert numbers == sorted(numbers)
+    assert {(3, 5), (3, 7), (4, 2), (4, 4), *((6, i) for i in range(1, 18))} <= set(numbers)
+
+
+@pytest.mark.parametrize("claim", CLAIMS)
+def test_no_claim_of_the_thesis_is_left_out(claim):
+    folder = Path(palpate.thesis.__file__).parent
+    literal = re.compile(rf'"{re.escape(claim)}(\.[\w-]+)?"')
+    assert any(literal.search(path.read_text("utf-8")) for path in folder.rglob("*.py"))
+
+
+def test_a_spread_is_median_range_and_seeds():
+    assert spread([1.0, 2.0, 4.0], "kg") == "2 kg (1 to 4, 3 seeds)"
+    assert spread([1.0, float("nan"), 3.0]) == "2 (1 to 3, 3 seeds, 1 without a value)"
+    assert spread([float("nan")] * 2) == "never (2 seeds)"
+
+
+def test_runs_keep_the_order_of_their_cases_and_pass_errors_on():
+    runs = Runs(SEEDS)
+    assert runs.map(lambda x: x * x, list(range(20))) == [x * x for x in range(20)]
+    assert runs.map(lambda x: x, []) == []
+    with pytest.raises(ZeroDivisionError):
+        runs.map(lambda x: 1 / (x - 5), list(range(10)))
