@@ -32,6 +32,14 @@ def panels(heights: Sequence[float], columns: int = 1, width: float = 9.0) -> tu
     return drawing, [list(row) for row in grid]
 
 
+def across(axis: Axes) -> Axes:
+    """The panel, stretched over its whole row."""
+    where = axis.get_subplotspec()
+    if where is not None:
+        axis.set_subplotspec(where.get_gridspec()[where.rowspan.start, :])
+    return axis
+
+
 def force_panel(axis: Axes, shown: Slot, title: str = "") -> None:
     """Desired and measured force, the true one paler, and where a motor is at its limit."""
     axis.plot(shown.t, shown.measured, color=style.BLUE, linewidth=0.7, label="measured")

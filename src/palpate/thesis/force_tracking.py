@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +24,15 @@ SHARE = 0.10
 ENOUGH = 0.9
 """Share of the seeds that a claim has to hold for."""
 FOLLOWS = (
-    f"in 9 of 10 runs: no loss of contact; RMS of the true force's error at most {LIMIT:g} N (10 % of the mean desired "
-    f"force) outside the first {SETTLE:g} s after each step; mean error in the last second of each interval at most "
-    f"{SHARE:.0%} of the desired force"
+    f"in 9 of 10 runs: no loss of contact; RMS of the true force's error at most {LIMIT:g} N (10 % of the "
+    f"mean desired force) outside the first {SETTLE:g} s after each step; mean error in the last second of "
+    f"each interval at most {SHARE:.0%} of the desired force"
 )
 VARIED_SEEDS = 3
 """Runs of each variation; the nominal case has all seeds."""
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3}
 """The last millimetres of the approach: the rest of it takes sixteen seconds and moves errors in contact by 4 %."""
@@ -107,7 +108,11 @@ def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
         ends = [(interval == i) & (late >= period - 1.0) for i in np.unique(interval)]
         off = [abs(error[e].mean()) / desired[e].mean() for e in ends if e.any()]
         return Tracking(
-            rms(error), rms(error[settled]), float(max(off)), float(record["saturated2"][inside].mean()), losses(record)
+            rms(error),
+            rms(error[settled]),
+            float(max(off)),
+            float(record["saturated2"][inside].mean()),
+            losses(record),
         )
 
     return measure
@@ -154,7 +159,13 @@ def slot(record: Record, start: float, end: float) -> Slot:
     names = ("force_desired", "force_measured", "force")
     desired, measured, true = (record[n][shown] for n in names)
     return Slot(
-        t[shown], desired, measured, true, limited[shown], record["y_measured"][shown], record["phi_measured"][shown]
+        t[shown],
+        desired,
+        measured,
+        true,
+        limited[shown],
+        record["y_measured"][shown],
+        record["phi_measured"][shown],
     )
 
 
@@ -218,20 +229,25 @@ class Tracked:
     varied: dict[str, list[Tracking]]
 
 
-def tracked(runs: Runs, experiment: Experiment, shown: tuple[float, float], judged: tuple[float, float]) -> Tracked:
+def tracked(
+    runs: Runs, experiment: Experiment, shown: tuple[float, float], judged: tuple[float, float]
+) -> Tracked:
     """Runs an experiment over the seeds and under its variations.
 
     Args:
         runs: of how many seeds.
         experiment: long enough for both windows.
-        shown, judged: from when to when after contact the force is drawn, and is measured [s].
+        shown: from when to when after contact the force is drawn [s].
+        judged: from when to when it is measured [s].
     """
     measure = tracking(*judged)
     nominal = runs.over_seeds(experiment, measure)
-    return Tracked(slot(runs.one(experiment), *shown), nominal, robustness(runs, experiment, nominal, measure))
+    return Tracked(
+        slot(runs.one(experiment), *shown), nominal, robustness(runs, experiment, nominal, measure)
+    )
 
 
-def stops_holding(found: Mapping[str, Sequence[Tracking]], holds: Callable[[Tracking], bool]) -> str:
+def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:
     """A sentence: under which variations a conclusion holds, and under which it does not."""
     broken, kept = [], []
     for name, runs in found.items():

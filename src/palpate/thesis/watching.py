@@ -1,4 +1,4 @@
-"""A long run of the neural controller, with its network's weights looked at once a second; a record keeps only sums of them."""
+"""A long run of the neural controller, with its network's weights looked at now and then."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from palpate.bench.tick import compiled_march, start_at
 from palpate.controllers.neural import NeuralState
 
 LOOK = 1000
-"""Ticks between two looks."""
+"""Ticks between two looks, unless others are asked for."""
 COLUMN = {name: i for i, name in enumerate(COLUMNS)}
 
 
@@ -34,6 +34,7 @@ def watch(
     duration: float,
     look: Callable[[Look], None],
     waiting: Callable[[], None] | None = None,
+    every: int = LOOK,
 ) -> float | None:
     """Runs like `Bench.run`, from the same random numbers, but keeps nothing and ends when contact is lost.
 
@@ -41,30 +42,38 @@ def watch(
         experiment: any; `look` is called in contact.
         seed: of the noise.
         duration: of contact [s].
-        look: called once a second of contact; must copy what it keeps of the weights.
+        look: called between ticks of contact. The weights that it sees are the controller's own: copy what is to be
+            kept, and write in them to see what they did.
         waiting: called when the loop has to be compiled first.
+        every: so many ticks.
 
     Returns:
         When contact was lost, since it was made [s]; None if it was not, NaN if it was never made.
     """
     bench = build(experiment)
-    loop, state = bench.loop, start_at(bench.loop, bench.q)
+    loop, state = bench.loop, start_at(bench.loop, bench.q)  # type: ignore[no-untyped-call]
     generator = np.random.default_rng(seed)
     begun, k = None, 0
-    rows = np.empty((LOOK, len(COLUMNS)))
+    rows = np.empty((every, len(COLUMNS)))
     phase = rows[:, COLUMN["phase"]]
     while k * loop.tick < experiment.run.duration + duration:
-        state = compiled_march.run(waiting, loop, state, k, generator.standard_normal(LOOK), rows)
+        state = compiled_march.run(waiting, loop, state, k, generator.standard_normal(every), rows)
         if begun is None and (phase == CONTACT).any():
             begun = k + int(np.argmax(phase == CONTACT))
-        k += LOOK
+        k += every
         if begun is None:
             continue
         gone = (phase == LOST) | ~np.isfinite(rows).all(axis=1)
         if gone.any():
-            return (k - LOOK + int(np.argmax(gone)) - begun) * loop.tick
+            return (k - every + int(np.argmax(gone)) - begun) * loop.tick
         neural = state.controller[0] if isinstance(state.controller, tuple) else None
-        look(Look((k - begun) * loop.tick, rows[phase == CONTACT], neural if type(neural) is NeuralState else None))
+        look(
+            Look(
+                (k - begun) * loop.tick,
+                rows[phase == CONTACT],
+                neural if type(neural) is NeuralState else None,
+            )
+        )
         if (k - begun) * loop.tick >= duration:
             return None
     return None if begun is not None else float("nan")

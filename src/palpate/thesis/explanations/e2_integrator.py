@@ -14,7 +14,17 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import PALE, limits, panels
-from palpate.thesis.force_tracking import FOAM, RUBBER, SINE, Slot, Tracking, since_contact, slot, tracking, variations
+from palpate.thesis.force_tracking import (
+    FOAM,
+    RUBBER,
+    SINE,
+    Slot,
+    Tracking,
+    since_contact,
+    slot,
+    tracking,
+    variations,
+)
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -24,10 +34,10 @@ if TYPE_CHECKING:
 NUMBER = "neural-is-an-integrator"
 TITLE = "Why it works: the neural controller is an integrator"
 CAPTION = (
-    "Above: true force under the neural controller and under a plain PI of the same integral gain, on the four "
-    "experiments of figures 6.11, 6.12, 6.16 and 6.17; red bars: a motor at its limit. Below, left: integral gain "
-    "measured from the network's command over the learning rate, and eta (A/2)²/Ts. Right: RMS error of the network over "
-    "that of the PI, as chosen and under variations."
+    "Above: true force under the neural controller and under a plain PI of the same integral gain, on the "
+    "four experiments of figures 6.11, 6.12, 6.16 and 6.17; red bars: a motor at its limit. Below, left: "
+    "integral gain measured from the network's command over the learning rate, and eta (A/2)²/Ts. Right: "
+    "RMS error of the network over that of the PI, as chosen and under variations."
 )
 AMPLITUDE, TICK, RATE = 20.0, 1e-3, 5e-5
 GAIN = RATE * (AMPLITUDE / 2) ** 2 / TICK
@@ -78,11 +88,15 @@ def check(data: Data) -> Sequence[Claim]:
     """Gains and errors have to agree within a tenth."""
     at = RATES.index(RATE)
     small = [i for i, rate in enumerate(RATES) if rate <= 1e-4]
-    share = {name: g / (np.array(RATES)[:, None] * (AMPLITUDE / 2) ** 2 / TICK) for name, g in data.gains.items()}
+    share = {
+        name: g / (np.array(RATES)[:, None] * (AMPLITUDE / 2) ** 2 / TICK) for name, g in data.gains.items()
+    }
     worst = max(float(np.max(np.abs(s[small] - 1.0))) for s in share.values())
     table = "; ".join(
-        f"{name} {_median(p.network_found):.2f} and {_median(p.pi_found):.2f} N" for name, p in data.pairs.items()
+        f"{name} {_median(p.network_found):.2f} and {_median(p.pi_found):.2f} N"
+        for name, p in data.pairs.items()
     )
+    seeds = len(next(iter(data.pairs.values())).pi_found)
     apart = max(abs(_median(p.network_found) / _median(p.pi_found) - 1.0) for p in data.pairs.values())
     return [
         Claim(
@@ -90,17 +104,20 @@ def check(data: Data) -> Sequence[Claim]:
             source="explanation of sec. 4.5",
             claim="The network's command is the integral of the force error, with K_i = eta (A/2)²/Ts.",
             thesis=f"not in the thesis; {GAIN:g} per second follows from its numbers",
-            measured="; ".join(f"{name} {spread(list(g[at]), 'per second')}" for name, g in data.gains.items())
+            measured="; ".join(
+                f"{name} {spread(list(g[at]), 'per second')}" for name, g in data.gains.items()
+            )
             + f" at eta 5e-5; up to 1e-4 at most {worst:.0%} from the formula",
             tolerance=f"a straight line fitted over the first {FITTED:g} s gives a gain within {SHARE:.0%} at every rate up to 1e-4",
             verdict=decided(worst <= SHARE),
             note=(
-                "Where the weights are small the output for the force is A s(w) with the slope A/2 in its threshold w. "
-                "Back-propagation moves the threshold each tick by eta e A/2, and so the output by eta e (A/2)²: the error "
-                "is summed, tick by tick, which is what an integral term does. The hidden neurons add next to nothing as "
-                "long as what they put out is small. The slope falls with the square of the output over A, which makes "
-                "the gain a little smaller when the command is large. From 5e-4 on the loop rings and the hidden weights "
-                "take part at once; there the line no longer holds."
+                "Where the weights are small the output for the force is A s(w) with the slope A/2 in its "
+                "threshold w. Back-propagation moves the threshold each tick by eta e A/2, and so the "
+                "output by eta e (A/2)²: the error is summed, tick by tick, which is what an integral term "
+                "does. The hidden neurons add next to nothing as long as what they put out is small. The "
+                "slope falls with the square of the output over A, which makes the gain a little smaller "
+                "when the command is large. From 5e-4 on the loop rings and the hidden weights take part at "
+                "once; there the line no longer holds."
             ),
         ),
         Claim(
@@ -108,16 +125,17 @@ def check(data: Data) -> Sequence[Claim]:
             source="explanation of figs. 6.11 to 6.17",
             claim="A plain PI with that K_i makes the same errors on all four experiments.",
             thesis="not in the thesis, which compares with no integral term",
-            measured=f"RMS of network and PI: {table}; at most {apart:.0%} apart ({len(next(iter(data.pairs.values())).pi_found)} seeds)",
+            measured=f"RMS of network and PI: {table}; at most {apart:.0%} apart ({seeds} seeds)",
             tolerance=f"the medians of the RMS error over 10 to 15 s, steps included, differ by at most {SHARE:.0%}",
             verdict=decided(apart <= SHARE),
             note=(
-                "So the experiments of sec. 6.3 show integral action, which the hybrid controller was denied, and not yet "
-                "what a network adds; the thesis' comparison with figure 6.10 cannot tell the two apart. What is the "
-                "network's own comes later, when its hidden weights have grown: at first it helps (fig. 6.14), then it "
-                f"may cost the contact (delayed-divergence). {_outliers(data)} Below one the network is the better: its "
-                "sigmoid bounds the command and flattens towards the bound, so that it winds up less than a plain sum when "
-                "a motor is at its limit or friction asks for much."
+                "So the experiments of sec. 6.3 show integral action, which the hybrid controller was "
+                "denied, and not yet what a network adds; the thesis' comparison with figure 6.10 cannot "
+                "tell the two apart. What is the network's own comes later, when its hidden weights have "
+                "grown: at first it helps (fig. 6.14), then it may cost the contact (delayed-divergence). "
+                f"{_outliers(data)} Below one the network is the better: its sigmoid bounds the command and "
+                "flattens towards the bound, so that it winds up less than a plain sum when a motor is at "
+                "its limit or friction asks for much."
             ),
         ),
     ]
@@ -141,14 +159,26 @@ def _overlay(axis: Axes, name: str, pair: Pair) -> None:
     axis.plot(pair.pi.t, pair.pi.true, color=style.BLUE, linewidth=1.0, label="PI")
     axis.plot(pair.pi.t, pair.pi.desired, color=style.ORANGE, linewidth=1.0, label="desired")
     limits(axis, pair.network)
-    axis.set_title(f"{name}: {_median(pair.network_found):.2f} and {_median(pair.pi_found):.2f} N", loc="left", fontsize=9.5)
+    axis.set_title(
+        f"{name}: {_median(pair.network_found):.2f} and {_median(pair.pi_found):.2f} N",
+        loc="left",
+        fontsize=9.5,
+    )
     axis.set(ylabel="force [N]", xlim=JUDGED)
 
 
 def _gain_panel(axis: Axes, gains: Mapping[str, NDArray[np.float64]]) -> None:
-    axis.plot(RATES, np.array(RATES) * (AMPLITUDE / 2) ** 2 / TICK, color=style.INK, linewidth=1, label="eta (A/2)²/Ts")
+    axis.plot(
+        RATES,
+        np.array(RATES) * (AMPLITUDE / 2) ** 2 / TICK,
+        color=style.INK,
+        linewidth=1,
+        label="eta (A/2)²/Ts",
+    )
     for (name, found), color, marker in zip(gains.items(), (style.BLUE, style.RED), "o^", strict=True):
-        axis.plot(RATES, np.median(found, axis=1), marker, color=color, markersize=6, fillstyle="none", label=name)
+        axis.plot(
+            RATES, np.median(found, axis=1), marker, color=color, markersize=6, fillstyle="none", label=name
+        )
     axis.axvline(RATE, color=style.GREY, linewidth=1, linestyle="--", label="the text's")
     axis.axvline(1e-4, color=style.GREY, linewidth=1, linestyle=":", label="the listing's")
     axis.set(xscale="log", yscale="log", xlabel="learning rate eta", ylabel="K_i [1/s]")
@@ -159,7 +189,11 @@ def _ratio_panel(axis: Axes, pairs: Mapping[str, Pair]) -> None:
     colors = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.VIOLET, style.GREY, style.INK)
     names = list(dict.fromkeys(name for p in pairs.values() for name in p.ratios))
     for i, name in enumerate(names):
-        at = [k + 0.11 * (i - len(names) / 2) for k, p in enumerate(pairs.values()) for _ in p.ratios.get(name, ())]
+        at = [
+            k + 0.11 * (i - len(names) / 2)
+            for k, p in enumerate(pairs.values())
+            for _ in p.ratios.get(name, ())
+        ]
         values = [v for p in pairs.values() for v in p.ratios.get(name, ())]
         axis.scatter(at, values, s=16, color=colors[i], linewidths=0, label=name.replace("\n", " "))
     axis.axhspan(1 - SHARE, 1 + SHARE, color="#eef3ee", zorder=0)
@@ -207,4 +241,6 @@ def _outliers(data: Data) -> str:
     ]
     if not far:
         return "It holds with half and double friction, at 0.40 m and 0.49 m, and on the other foam."
-    return f"The ratio leaves that tenth with: {', '.join(far)}; everywhere else that was tried it stays inside."
+    return (
+        f"The ratio leaves that tenth with: {', '.join(far)}; everywhere else that was tried it stays inside."
+    )

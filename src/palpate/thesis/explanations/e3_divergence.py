@@ -13,7 +13,7 @@ from palpate.bench import Experiment, changed
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided
 from palpate.thesis.explanations.e2_integrator import PI
-from palpate.thesis.force_panels import PALE, legend_inside, panels
+from palpate.thesis.force_panels import PALE, across, legend_inside, panels
 from palpate.thesis.force_tracking import FOAM, RELAXING_FOAM, RUBBER, SINE, moved, rougher, since_contact
 from palpate.thesis.runs import Runs
 from palpate.thesis.watching import Look, watch
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 NUMBER = "delayed-divergence"
 TITLE = "Why it fails later: the network learns an answer to its own torques"
 CAPTION = (
-    "Learning never stops. First row: size of the weights over the time in contact at the text's learning rate, on the "
-    "foam that relaxes until contact is lost (cross), and on the plain foam. Second row: the gain from the hybrid "
-    "controller's torques to the network's force; and the last moments before the loss, where that force goes along with "
-    "the velocity and drives the motion. Third row: time to the loss against the learning rate, with the plain PI "
-    "beside; and the growth of the force's output weights against the number of steps asked for. Last row: what "
-    "brings the loss forward, and what prevents it."
+    "Learning never stops. First row: size of the weights over the time in contact at the text's learning "
+    "rate, on the foam that relaxes until contact is lost (cross), and on the plain foam. Second row: the "
+    "gain from the hybrid controller's torques to the network's force; and the last moments before the "
+    "loss, where that force goes along with the velocity and drives the motion. Third row: time to the loss "
+    "against the learning rate, with the plain PI beside; and the growth of the force's output weights "
+    "against the number of steps asked for. Last row: what brings the loss forward, and what prevents it."
 )
 DURATION = 240.0
 """Seconds of contact that count as steady [s]."""
@@ -51,14 +51,31 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "K_fp = 0": {"controller.kf": 0.0},
     "K_pv halved": {"controller.kv": 40.0},
     "random weights": {"controller.weights": "random", "controller.weights_seed": 1},
-    "8 hidden neurons": {"controller.weights": "random", "controller.weights_seed": 1, "controller.layers": (8,)},
+    "8 hidden neurons": {
+        "controller.weights": "random",
+        "controller.weights_seed": 1,
+        "controller.layers": (8,),
+    },
     "friction half": rougher(FOAM, 0.5),
     "friction double": rougher(FOAM, 2.0),
     "wall at 0.40 m": moved(FOAM, 0.40),
     "wall at 0.49 m": moved(FOAM, 0.49),
     "PI, K_i = 5 per second": PI,
 }
-PARTS = ("hidden, from torques", "hidden, from poses", "hidden thresholds", "output of the force", "output thresholds")
+HELD: Mapping[str, slice] = {
+    "weights from poses held at zero": slice(1, 7),
+    "weights from motor 1's torque held at zero": slice(7, 8),
+    "weights from all torques held at zero": slice(7, 10),
+}
+"""Columns of the hidden weights that are set back to zero every `HOLD` ticks."""
+HOLD = 20
+PARTS = (
+    "hidden, from torques",
+    "hidden, from poses",
+    "hidden thresholds",
+    "output of the force",
+    "output thresholds",
+)
 Array = NDArray[np.float64]
 
 
@@ -100,6 +117,8 @@ def run(runs: Runs) -> Data:
         courses[name] = {r: found[i * len(seeds) : (i + 1) * len(seeds)] for i, r in enumerate(rates)}
     plain = {name: _losses(runs, changed(e, PI), 1) for name, e in PARAMETERS.items()}
     causes = {name: _losses(runs, changed(RELAXING, change), 1) for name, change in CAUSES.items()}
+    held = runs.map(lambda columns: _held(runs, columns), list(HELD.values()))
+    causes.update((name, [lost]) for name, lost in zip(HELD, held, strict=True))
     return Data(courses, plain, causes, _loss(runs, courses["foam that relaxes"][5e-5][0].lost))
 
 
@@ -120,14 +139,18 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"contact lost within {DURATION:g} s in every run from 5e-6 to 1e-4, and in none with the PI",
             verdict=decided(all(lost is not None for lost in times) and steady),
             note=(
-                "What grows are two layers at once: the hidden weights from the torques and the output weights of the "
-                "force; thresholds only carry the integral, and weights from the poses stay small. They feed each other: "
-                "after each step of the desired force the error and the hybrid controller's torques are both away from "
-                "their means, so that their product has one sign, step after step, and the network learns to answer torque "
-                "with force. A smaller rate leaves a longer error after each step, which makes up for much of it: a twentieth "
-                "of the rate takes only five times as long. With a constant force nothing of it happens, and without noise "
-                f"it happens just the same. {_negative_damping(data.loss)} The torques contain velocities through K_pv, so "
-                "that the answer to them comes in phase with the motion and drives it; half the K_pv doubles the time."
+                "What grows are two layers at once: the hidden weights from the torques and the output "
+                "weights of the force; thresholds only carry the integral, and weights from the poses stay "
+                "small. They feed each other: after each step of the desired force the error and the hybrid "
+                "controller's torques are both away from their means, so that their product has one sign, "
+                "step after step, and the network learns to answer torque with force. A smaller rate leaves "
+                "a longer error after each step, which makes up for much of it: a twentieth of the rate "
+                "takes only five times as long. With a constant force nothing of it happens, without noise "
+                "it happens just the same; with the weights from the torques held at zero, and all others "
+                f"learning, contact is {_kept(data.causes, 'weights from all torques held at zero')}. "
+                f"{_negative_damping(data.loss)} The torques contain velocities through K_pv, so that the "
+                "answer to them comes in phase with the motion and drives it; with half the K_pv it takes "
+                "longer."
             ),
         ),
         Claim(
@@ -139,11 +162,11 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"contact lost within {DURATION:g} s in every run on foam and on rubber",
             verdict=decided(gone == len(others)),
             note=(
-                "The weights grow there too, to about the same size. But foam with a damper of 200 N s/m and rubber with "
-                "480 N s/m take up what the network's answer feeds in, while the relaxing foam, with 13 N s/m and little "
-                "more from its slow branch, does not; give it 200 N s/m and it holds. What real styrofoam has decides "
-                f"whether the thesis' controller was on its way to losing it. Times of loss on the relaxing foam: "
-                f"{_told_causes(data.causes)}."
+                "The weights grow there too, to about the same size. But foam with a damper of 200 N s/m "
+                "and rubber with 480 N s/m take up what the network's answer feeds in, while the relaxing "
+                "foam, with 13 N s/m and little more from its slow branch, does not; give it 200 N s/m and "
+                "it holds. What real styrofoam has decides whether the thesis' controller was on its way to "
+                f"losing it. Times of loss on the relaxing foam: {_told_causes(data.causes)}."
             ),
         ),
     ]
@@ -151,17 +174,16 @@ def check(data: Data) -> Sequence[Claim]:
 
 def plot(data: Data) -> Figure:
     """Weights, gains, the loss, times, growth by steps, causes."""
-    drawing, grid = panels([2.2, 2.2, 2.2, 3.0], columns=2, width=11.0)
+    drawing, grid = panels([2.2, 2.2, 2.2, 3.5], columns=2, width=11.0)
     for axis, name in zip(grid[0], ("foam that relaxes", "foam"), strict=True):
         _weights_panel(axis, data.courses[name][5e-5][0], name)
-    legend_inside(grid[0][0], loc="upper left")
+    legend_inside(grid[0][1], loc="upper right", ncols=2)
     _gains_panel(grid[1][0], data.courses)
     _loss_panel(grid[1][1], data.loss)
     _times_panel(grid[2][0], data)
     _steps_panel(grid[2][1], data.courses["foam that relaxes"])
     grid[3][1].remove()
-    grid[3][0].set_subplotspec(grid[3][0].get_gridspec()[3, :])
-    _causes_panel(grid[3][0], data.causes)
+    _causes_panel(across(grid[3][0]), data.causes)
     return drawing
 
 
@@ -171,7 +193,7 @@ def _weights_panel(axis: Axes, course: Course, name: str) -> None:
         axis.plot(course.t, sizes, color=color, linewidth=1.2, label=part)
     if course.lost is not None:
         axis.axvline(course.lost, color=style.INK, linestyle="--", linewidth=1)
-    axis.set(xlabel="time since contact [s]", ylabel="size of the weights", ylim=(0.0, 0.8))
+    axis.set(xlabel="time since contact [s]", ylabel="size of the weights", ylim=(0.0, 1.05))
     axis.set_title(f"{name}, eta 5e-5", loc="left", fontsize=9.5)
 
 
@@ -180,7 +202,14 @@ def _gains_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[Cours
         course = found[5e-5][0]
         axis.plot(course.t, np.linalg.norm(course.gains, axis=1), color=color, linewidth=1.2, label=name)
         if course.lost is not None:
-            axis.plot(course.t[-1], np.linalg.norm(course.gains[-1]), "x", color=color, markersize=9, markeredgewidth=2)
+            axis.plot(
+                course.t[-1],
+                np.linalg.norm(course.gains[-1]),
+                "x",
+                color=color,
+                markersize=9,
+                markeredgewidth=2,
+            )
     axis.set(xlabel="time since contact [s]", ylabel="gain [N per N m]", ylim=(0.0, 2.9))
     axis.set_title("from the torques to the network's force, eta 5e-5", loc="left", fontsize=9.5)
     legend_inside(axis, loc="upper right", ncols=3)
@@ -206,13 +235,17 @@ def _times_panel(axis: Axes, data: Data) -> None:
             _mark_losses(axis, [rate * shift] * len(courses), [c.lost for c in courses], color)
         axis.plot([], [], "o", color=color, markersize=4, label=name)
     axis.plot([], [], "^", color=style.GREY, markersize=5, label=f"kept for {DURATION:g} s, as with PI")
-    axis.set(xscale="log", xlabel="learning rate eta", ylabel="contact lost after [s]", ylim=(0.0, DURATION * 1.08))
+    axis.set(
+        xscale="log", xlabel="learning rate eta", ylabel="contact lost after [s]", ylim=(0.0, DURATION * 1.08)
+    )
     legend_inside(axis, loc="center right", bbox_to_anchor=(1.0, 0.62))
 
 
 def _mark_losses(axis: Axes, at: Sequence[float], times: Sequence[float | None], color: str) -> None:
     for x, lost in zip(at, times, strict=True):
-        axis.plot(x, DURATION if lost is None else lost, "^" if lost is None else "o", color=color, markersize=5)
+        axis.plot(
+            x, DURATION if lost is None else lost, "^" if lost is None else "o", color=color, markersize=5
+        )
 
 
 def _steps_panel(axis: Axes, found: Mapping[float, Sequence[Course]]) -> None:
@@ -228,15 +261,17 @@ def _steps_panel(axis: Axes, found: Mapping[float, Sequence[Course]]) -> None:
 def _causes_panel(axis: Axes, causes: Mapping[str, Sequence[float | None]]) -> None:
     for i, (name, times) in enumerate(causes.items()):
         for lost in times:
-            kept = lost is None
-            color = style.GREEN if kept else style.RED
-            axis.plot(DURATION if kept else lost, i, ">" if kept else "o", color=color, markersize=6)
+            marker, color = (">", style.GREEN) if lost is None else ("o", style.RED)
+            axis.plot(DURATION if lost is None else lost, i, marker, color=color, markersize=6)
         last = max(DURATION if lost is None else lost for lost in times)
         side = "right" if last > 0.8 * DURATION else "left"
         axis.text(last + (-4 if side == "right" else 4), i, name, fontsize=8.5, va="center", ha=side)
     axis.set_yticks([])
     axis.invert_yaxis()
-    axis.set(xlim=(0.0, DURATION * 1.02), xlabel=f"contact lost after [s]; at the right edge: kept for {DURATION:g} s")
+    axis.set(
+        xlim=(0.0, DURATION * 1.02),
+        xlabel=f"contact lost after [s]; at the right edge: kept for {DURATION:g} s",
+    )
     axis.set_title("foam that relaxes, eta 5e-5, one thing changed at a time", loc="left", fontsize=9.5)
 
 
@@ -276,6 +311,16 @@ def _torque_gains(state: NeuralState) -> Array:
     return np.array(20.0 * 0.5 * (1.0 - out**2) * through @ hidden[:, 7:])
 
 
+def _held(runs: Runs, columns: slice) -> float | None:
+    """When contact is lost if some of the hidden weights are not allowed to grow [s]."""
+
+    def look(one: Look) -> None:
+        assert one.neural is not None
+        _layers(one.neural)[0][:, columns] = 0.0
+
+    return watch(RELAXING, runs.seeds[0], DURATION, look, runs.waiting, HOLD)
+
+
 def _losses(runs: Runs, experiment: Experiment, seeds: int) -> list[float | None]:
     return runs.map(
         lambda seed: watch(experiment, seed, DURATION, lambda _: None, runs.waiting), list(runs.seeds[:seeds])
@@ -298,11 +343,20 @@ def _table(found: Mapping[float, Sequence[Course]]) -> str:
     return ", ".join(f"{rate:g} after {_range([c.lost for c in courses])}" for rate, courses in found.items())
 
 
+def _kept(causes: Mapping[str, Sequence[float | None]], name: str) -> str:
+    lost = _range(causes[name])
+    return f"not kept beyond {lost}" if lost != "never" else f"kept for {DURATION:g} s"
+
+
 def _range(times: Sequence[float | None]) -> str:
     lost = [one for one in times if one is not None]
     if not lost:
         return "never"
-    text = f"{min(lost):.0f} s" if round(min(lost)) == round(max(lost)) else f"{min(lost):.0f} to {max(lost):.0f} s"
+    text = (
+        f"{min(lost):.0f} s"
+        if round(min(lost)) == round(max(lost))
+        else f"{min(lost):.0f} to {max(lost):.0f} s"
+    )
     return text if len(lost) == len(times) else f"{text} (in {len(lost)} of {len(times)} runs)"
 
 
@@ -316,6 +370,6 @@ def _negative_damping(loss: Loss | None) -> str:
         return ""
     slope = float(np.polyfit(loss.velocity, loss.force, 1)[0])
     return (
-        f"Before the loss the network's force goes along with the velocity, by {slope:.0f} N s/m over the last 0.4 s: "
-        "a negative damper."
+        f"Before the loss the network's force goes along with the velocity, by {slope:.0f} N s/m over the "
+        "last 0.4 s: a negative damper."
     )

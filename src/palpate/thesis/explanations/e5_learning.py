@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 NUMBER = "rate-layers-neurons"
 TITLE = "Left open by the thesis: learning rate, layers, neurons, stability"
 CAPTION = (
-    "Steps between 10 and 20 N, a dot a run, each from random weights of its own. Above: RMS error from 10 to 15 s, steps "
-    "included, against the learning rate, with the plain PI of the same integral gain as a line. Below: the same at the "
-    "text's rate for networks of other sizes, and when they lose the foam that relaxes."
+    "Steps between 10 and 20 N, a dot a run, each from random weights of its own. Above: RMS error from 10 "
+    "to 15 s, steps included, against the learning rate, with the plain PI of the same integral gain as a "
+    "line. Below: the same at the text's rate for networks of other sizes, and when they lose the foam that "
+    "relaxes."
 )
 RATES = (5e-6, 2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 5e-4, 1e-3)
 SIZES = ((1,), (2,), (4,), (12,), (30,), (60,), (12, 12), (12, 12, 12))
@@ -64,8 +65,10 @@ def run(runs: Runs) -> Data:
         pi[name] = dict(zip(RATES, runs.over(plain, measure), strict=True))
     sized = [(_sized(SURFACES["foam"], size, s), s) for size in SIZES for s in runs.seeds[:PER_SIZE]]
     errors = runs.over(sized, measure)
-    pressed = [(_sized(SURFACES["foam that relaxes"], size, s), s) for size in SIZES for s in runs.seeds[:PER_LOSS]]
-    lost = runs.map(lambda case: watch(*case, LONG, lambda _: None, runs.waiting), pressed)
+    pressed = [
+        (_sized(SURFACES["foam that relaxes"], size, s), s) for size in SIZES for s in runs.seeds[:PER_LOSS]
+    ]
+    lost = runs.map(lambda case: watch(case[0], case[1], LONG, lambda _: None, runs.waiting), pressed)
     return Data(
         network,
         pi,
@@ -80,7 +83,9 @@ def check(data: Data) -> Sequence[Claim]:
     errors = [_rms(found) for found in data.sizes.values()]
     losses = [lost for found in data.losses.values() for lost in found]
     times = [lost for lost in losses if lost is not None]
-    least = ", ".join(f"{name} {rate:g} ({_error(data.network[name][rate]):.2f} N)" for name, rate in best.items())
+    least = ", ".join(
+        f"{name} {rate:g} ({_error(data.network[name][rate]):.2f} N)" for name, rate in best.items()
+    )
     gone = f"{min(times):.0f} to {max(times):.0f} s" if times else "never"
     return [
         Claim(
@@ -89,23 +94,26 @@ def check(data: Data) -> Sequence[Claim]:
             claim="Which learning rate is best, how many layers and neurons are needed, and is the controller stable?",
             thesis="left to future work",
             measured=(
-                f"least RMS error with eta: {least}; 1 to 60 neurons in 1 to 3 layers: RMS {min(errors):.2f} to "
-                f"{max(errors):.2f} N at eta 5e-5, and the foam that relaxes lost after {gone} "
+                f"least RMS error with eta: {least}; 1 to 60 neurons in 1 to 3 layers: RMS {min(errors):.2f} "
+                f"to {max(errors):.2f} N at eta 5e-5, and the foam that relaxes lost after {gone} "
                 f"({len(times)} of {len(losses)} runs)"
             ),
             tolerance="none: a question",
             verdict="not checkable",
             note=(
-                "The rate sets the integral gain, so it has the optimum that an integral gain has: too small is late, too "
-                "large rings against the 8 ms lag of the force signal, and the plain PI of the same gain has its "
-                f"own optimum near it. {_rising(data)} The best rate here is not the text's: the listing's 1e-4, or twice it "
-                "on a damped surface. More neurons do better at first and lose the foam sooner, for one and the same "
-                "reason: they learn earlier to answer torque with force, the growth told under delayed-divergence. Two or "
-                "three hidden layers from small weights stay what they are at the start, the integrator of their output "
-                "thresholds, since a product of more small factors grows more slowly: steady, and no better than a PI. So the "
-                "answer that these runs give is none or many layers, which amounts to an integral term. A network that adds "
-                "something and lasts would need what the thesis' law lacks: a leak or a bound on the weights, no learning "
-                "while a motor is at its limit, or no torques among its inputs; that was not tried here."
+                "The rate sets the integral gain, so it has the optimum that an integral gain has: too "
+                "small is late, too large rings against the 8 ms lag of the force signal, and the plain PI "
+                f"of the same gain has its own optimum near it. {_rising(data)} The best rate here is not "
+                "the text's: the listing's 1e-4, or twice it on a damped surface. More neurons do better at "
+                "first and lose the foam sooner, for one and the same reason: they learn earlier to answer "
+                "torque with force, the growth told under delayed-divergence. Two or three hidden layers "
+                "from small weights stay what they are at the start, the integrator of their output "
+                "thresholds, since a product of more small factors grows more slowly: steady, and no better "
+                "than a PI. So the answer that these runs give is none or many layers, which amounts to an "
+                "integral term. A network that adds something and lasts would need what the thesis' law "
+                "lacks: no torques among its inputs, which delayed-divergence shows to be enough, a leak or "
+                "a bound on the weights, or no learning while a motor is at its limit; the last two were "
+                "not tried here."
             ),
         )
     ]
@@ -117,7 +125,13 @@ def plot(data: Data) -> Figure:
     for axis, names in zip(grid[0], (("foam", "rubber"), ("foam that relaxes",)), strict=True):
         for name, color in zip(names, (style.BLUE, style.GREEN), strict=False):
             _rates(axis, data, name, style.RED if name == "foam that relaxes" else color)
-        axis.set(xscale="log", xlabel="learning rate eta", ylabel="RMS error [N]", ylim=(0.0, 4.1), xlim=(4e-6, 1.3e-3))
+        axis.set(
+            xscale="log",
+            xlabel="learning rate eta",
+            ylabel="RMS error [N]",
+            ylim=(0.0, 4.1),
+            xlim=(4e-6, 1.3e-3),
+        )
         legend_inside(axis, loc="upper center", ncols=len(names), bbox_to_anchor=(0.42, 0.97))
     labels = ["-".join(map(str, size)) for size in SIZES]
     for i, found in enumerate(data.sizes.values()):
@@ -125,11 +139,12 @@ def plot(data: Data) -> Figure:
     grid[1][0].set(ylabel="RMS error, foam [N]", ylim=(0.0, 2.5))
     for i, times in enumerate(data.losses.values()):
         for lost in times:
-            kept = lost is None
-            marker, color = ("^", style.GREEN) if kept else ("o", style.RED)
-            grid[1][1].plot(i, LONG if kept else lost, marker, color=color, markersize=5)
+            marker, color = ("^", style.GREEN) if lost is None else ("o", style.RED)
+            grid[1][1].plot(i, LONG if lost is None else lost, marker, color=color, markersize=5)
     grid[1][1].set(ylabel="contact lost after [s]", ylim=(0.0, LONG * 1.08))
-    grid[1][1].set_title(f"foam that relaxes; at the upper edge: kept for {LONG:g} s", loc="left", fontsize=9.5)
+    grid[1][1].set_title(
+        f"foam that relaxes; at the upper edge: kept for {LONG:g} s", loc="left", fontsize=9.5
+    )
     for axis in grid[1]:
         axis.set_xticks(range(len(SIZES)), labels)
         axis.set_xlabel("neurons of each hidden layer")
@@ -176,5 +191,5 @@ def _rising(data: Data) -> str:
         network = [rate for rate, runs in found.items() if not all(one.kept for one in runs)]
         plain = [rate for rate, one in data.pi[name].items() if not one.kept]
         told = (f"{min(rates):g}" if rates else f"none up to {max(RATES):g}" for rates in (network, plain))
-        parts.append("{0}: {1} (PI: {2})".format(name, *told))
+        parts.append("{}: {} (PI: {})".format(name, *told))
     return f"Lowest rate tried at which contact is lost within 15 s: {'; '.join(parts)}."

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 NUMBER = "6.11"
 TITLE = "Neural controller on foam: steps between 10 and 20 N"
 CAPTION = (
-    "Four seconds of the force, some ten seconds after contact, with the hybrid controller of figure 6.10 and the "
-    "network at learning rate 5e-5. The thesis says that the force follows acceptably well. Below: the same over the "
-    "seeds and under what was varied."
+    "Four seconds of the force, some ten seconds after contact, with the hybrid controller of figure 6.10 "
+    "and the network at learning rate 5e-5. The thesis says that the force follows acceptably well. Below: "
+    "the same over the seeds and under what was varied."
 )
 PARAMETERS = changed(FOAM, {"run.press": 15.0})
 SHOWN, JUDGED = (9.5, 13.5), (10.0, 15.0)
@@ -42,11 +42,12 @@ def check(data: Tracked) -> Sequence[Claim]:
             tolerance=f"{FOLLOWS}, from 10 to 15 s",
             verdict=decided(following(data.nominal)),
             note=(
-                "The feed-forward of the desired force makes most of each step at once; what friction withholds the "
-                "network then learns, within about a quarter of a second, as an integral term would. The foam is a "
-                "spring, a damper and a mass, chosen because the thesis gives none; the foam that relaxes is among "
-                f"the variations. {stops_holding(data.varied, lambda one: one.follows)} With the wall at 0.40 m, "
-                "motor 2 reaches its limit below 20 N, which no controller can change. Minutes later the picture is "
+                "The feed-forward of the desired force makes most of each step at once; what friction "
+                "withholds the network then learns, within about a quarter of a second, as an integral term "
+                "would. The foam is a spring, a damper and a mass, chosen because the thesis gives none; "
+                "the foam that relaxes is among the variations. "
+                f"{stops_holding(data.varied, lambda one: one.follows)} With the wall at 0.40 m, motor 2 "
+                "reaches its limit below 20 N, which no controller can change. Minutes later the picture is "
                 "another one: see delayed-divergence."
             ),
         )

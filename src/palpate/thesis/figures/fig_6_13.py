@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
 from palpate.thesis.force_panels import following_panel, force_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, FOAM, FOLLOWS, Tracked, Tracking, stops_holding, told, tracked
+from palpate.thesis.force_tracking import (
+    ENOUGH,
+    FOAM,
+    FOLLOWS,
+    Tracked,
+    Tracking,
+    stops_holding,
+    told,
+    tracked,
+)
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -17,8 +26,8 @@ if TYPE_CHECKING:
 NUMBER = "6.13"
 TITLE = "Neural controller with a small learning rate, at first"
 CAPTION = (
-    "The first ten seconds on foam with a learning rate of 1e-5, a fifth of that before. The thesis says that the force "
-    "cannot follow immediately."
+    "The first ten seconds on foam with a learning rate of 1e-5, a fifth of that before. The thesis says "
+    "that the force cannot follow immediately."
 )
 SLOW = {"controller.learning_rate": 1e-5}
 PARAMETERS = changed(FOAM, {**SLOW, "run.press": 10.0})
@@ -42,10 +51,11 @@ def check(data: Tracked) -> Sequence[Claim]:
             tolerance=f"the contrary of following from 0 to 10 s, in 9 of 10 runs. Following is, {FOLLOWS}",
             verdict=decided(sum(map(_late, data.nominal)) >= ENOUGH * len(data.nominal)),
             note=(
-                "The network starts as an integrator whose gain is proportional to the learning rate: K_i = 1 per second "
-                "here, a time constant of (1 + K_fp)/K_i = 1.25 s, half the length of an interval. A step is over before "
-                "what friction withholds is learned. How much friction there is decides how much is missing. That the "
-                f"force does not follow {stops_holding(data.varied, _late)[3:]}"
+                "The network starts as an integrator whose gain is proportional to the learning rate: K_i = "
+                "1 per second here, a time constant of (1 + K_fp)/K_i = 1.25 s, half the length of an "
+                "interval. A step is over before what friction withholds is learned. How much friction "
+                "there is decides how much is missing. That the force does not follow "
+                f"{stops_holding(data.varied, _late)[3:]}"
             ),
         )
     ]

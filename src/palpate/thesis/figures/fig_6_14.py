@@ -40,9 +40,9 @@ if TYPE_CHECKING:
 NUMBER = "6.14"
 TITLE = "Neural controller with a small learning rate, three minutes later"
 CAPTION = (
-    "The run of figure 6.13 three minutes later. The thesis says that after a few minutes the force follows. Below: how "
-    "the error outside the steps goes on, by cycles of 5 s, beside that of the integral controller which the network is "
-    "at first; crosses: contact is lost."
+    "The run of figure 6.13 three minutes later. The thesis says that after a few minutes the force "
+    "follows. Below: how the error outside the steps goes on, by cycles of 5 s, beside that of the integral "
+    "controller which the network is at first; crosses: contact is lost."
 )
 PARAMETERS = changed(FOAM, {**SLOW, "run.press": 190.0, "run.duration": 300.0})
 SHOWN, JUDGED = (179.5, 185.5), (180.0, 190.0)
@@ -96,14 +96,16 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"{FOLLOWS}, from 180 to 190 s",
             verdict=decided(following(data.nominal)),
             note=(
-                "The thesis is right that something is learned here which no integral term learns: the PI that the "
-                f"network is at first stays where it was ({plain}), while the network's error halves within a minute. Its "
-                "hidden weights have grown, and through the torques among its inputs they answer a step of the desired "
-                f"force at once. From the second minute on {np.mean(late <= LIMIT):.0%} of the cycles keep the limit of "
-                "the RMS error. But now and then a step is answered too strongly and the force stays off to its end; one "
-                "such step falls between 180 and 190 s, and by limits set before looking that is not following; at "
-                f"another moment the verdict is another one. On the foam that relaxes the same run {other}: see "
-                "delayed-divergence. What the claim depends on most is the surface, of which the thesis says too little."
+                "The thesis is right that something is learned here which no integral term learns: the PI "
+                f"that the network is at first stays where it was ({plain}), while the network's error "
+                "halves within a minute. Its hidden weights have grown, and through the torques among its "
+                "inputs they answer a step of the desired force at once. From the second minute on "
+                f"{np.mean(late <= LIMIT):.0%} of the cycles keep the limit of the RMS error. But now and "
+                "then a step is answered too strongly and the force stays off to its end; one such step "
+                "falls between 180 and 190 s, and by limits set before looking that is not following; at "
+                f"another moment the verdict is another one. On the foam that relaxes the same run {other}: "
+                "see delayed-divergence. What the claim depends on most is the surface, of which the thesis "
+                "says too little."
             ),
         )
     ]
@@ -120,7 +122,12 @@ def plot(data: Data) -> Figure:
             if one.lost is not None and len(t):
                 course.plot(t[-1], one.error[-1], "x", color=color, markersize=9, markeredgewidth=2)
     course.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--", label="limit of following")
-    course.set(xlabel="time since contact [s]", ylabel="RMS error outside steps [N]", ylim=(0.0, None), xlim=(0.0, None))
+    course.set(
+        xlabel="time since contact [s]",
+        ylabel="RMS error outside steps [N]",
+        ylim=(0.0, None),
+        xlim=(0.0, None),
+    )
     style.legend(course)
     return drawing
 

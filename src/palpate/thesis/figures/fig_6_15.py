@@ -13,7 +13,17 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, FOAM, RUBBER, VARIED_SEEDS, Slot, rms, rougher, since_contact, slot
+from palpate.thesis.force_tracking import (
+    ENOUGH,
+    FOAM,
+    RUBBER,
+    VARIED_SEEDS,
+    Slot,
+    rms,
+    rougher,
+    since_contact,
+    slot,
+)
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -23,9 +33,10 @@ if TYPE_CHECKING:
 NUMBER = "6.15"
 TITLE = "Position along the surface and angle under the neural controller"
 CAPTION = (
-    "Desired force, measured force, measured y and measured angle on foam, from the first touch on; y and angle ought to "
-    "be zero. The thesis says that they are not, since the approach leaves errors and since the tip sticks to soft foam. "
-    "Below: the RMS of y in contact when one possible cause at a time is changed."
+    "Desired force, measured force, measured y and measured angle on foam, from the first touch on; y and "
+    "angle ought to be zero. The thesis says that they are not, since the approach leaves errors and since "
+    "the tip sticks to soft foam. Below: the RMS of y in contact when one possible cause at a time is "
+    "changed."
 )
 PARAMETERS = changed(load("foam-neural"), {"run.press": 15.0})
 SHOWN, JUDGED = (0.0, 15.0), (10.0, 15.0)
@@ -39,7 +50,12 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "friction\ndouble": rougher(FOAM, 2.0),
     "friction\ncompensated": {"compensation.level": FOAM.friction.coulomb},
     "rubber": {"surface": RUBBER.surface},
-    "kp 1600\nkv 160": {"controller.kp": 1600.0, "controller.kv": 160.0, "approach.kp": 1600.0, "approach.kv": 160.0},
+    "kp 1600\nkv 160": {
+        "controller.kp": 1600.0,
+        "controller.kv": 160.0,
+        "approach.kp": 1600.0,
+        "approach.kv": 160.0,
+    },
     "hybrid control\nalone": {"controller": {"kind": "hybrid", "kf": 0.25, "ki": 0.0}},
 }
 
@@ -85,18 +101,19 @@ def check(data: Data) -> Sequence[Claim]:
             thesis="not zero (a figure, lost)",
             measured=f"RMS of y {spread(y, 'mm')}, of the angle {spread(phi, 'degrees')}",
             tolerance=(
-                f"in 9 of 10 runs: the RMS over 10 to 15 s after contact is more than {1e3 * VISIBLE[0]:g} mm and more "
-                f"than {np.degrees(VISIBLE[1]):g} degrees"
+                f"in 9 of 10 runs: the RMS over 10 to 15 s after contact is more than {1e3 * VISIBLE[0]:g} "
+                f"mm and more than {np.degrees(VISIBLE[1]):g} degrees"
             ),
             verdict=decided(sum(map(_visible, nominal)) >= ENOUGH * len(nominal)),
             note=(
-                "Friction of the joints, and gains too soft to overcome it: an error of y by 3 mm asks motor 1 for about "
-                "the torque that its friction withholds, so it stays. With half the friction "
-                f"{1 - half:.0%} of the error of y goes. The network is told of both errors and could remove them as it does "
-                "the force's, but it counts in metres, radians and newtons with one learning rate: an error of 1 mm "
-                "moves its y force by eta (A/2)^2/Ts = 1.25 mN per second, and hybrid control alone leaves the same errors. "
-                "The amount follows from the chosen friction; the slow turning of the angle with the force comes from the "
-                "motion in x that each step needs."
+                "Friction of the joints, and gains too soft to overcome it: an error of y by 3 mm asks "
+                "motor 1 for about the torque that its friction withholds, so it stays. With half the "
+                f"friction {1 - half:.0%} of the error of y goes. The network is told of both errors and "
+                "could remove them as it does the force's, but it counts in metres, radians and newtons "
+                "with one learning rate: an error of 1 mm moves its y force by eta (A/2)^2/Ts = 1.25 mN per "
+                "second, and hybrid control alone leaves the same errors. The amount follows from the "
+                "chosen friction; the slow turning of the angle with the force comes from the motion in x "
+                "that each step needs."
             ),
         ),
         Claim(
@@ -108,8 +125,9 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"more than {1e3 * VISIBLE[0]:g} mm at the switch in 9 of 10 runs",
             verdict=decided(sum(abs(b) > 1e3 * VISIBLE[0] for b in before) >= ENOUGH * len(before)),
             note=(
-                "The whole error of y stands there already at the switch, and contact adds nothing to it; the cause is the "
-                "same on both sides of the switch: friction of the joints against the same position gains."
+                "The whole error of y stands there already at the switch, and contact adds nothing to it; "
+                "the cause is the same on both sides of the switch: friction of the joints against the same "
+                "position gains."
             ),
         ),
         Claim(
@@ -121,9 +139,10 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"without friction along the surface the RMS of y is at least {SHARE:.0%} smaller",
             verdict=decided(bool(taken >= SHARE)),
             note=(
-                "In part. Without friction along the surface the tip lies off by about as much after each step, but it "
-                "moves with the steps from one side to the other, where a sticking tip stays; that is the difference found "
-                "here. What keeps it from zero is in both cases the friction of the joints."
+                "In part. Without friction along the surface the tip lies off by about as much after each "
+                "step, but it moves with the steps from one side to the other, where a sticking tip stays; "
+                "that is the difference found here. What keeps it from zero is in both cases the friction "
+                "of the joints."
             ),
         ),
     ]

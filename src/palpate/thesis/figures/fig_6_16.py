@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 NUMBER = "6.16"
 TITLE = "Neural controller on rubber: steps between 10 and 20 N, same gains"
 CAPTION = (
-    "Four seconds of the force on rubber, some ten seconds after contact, with the gains and the learning rate that "
-    "were used on foam. The thesis says that the force follows pretty well."
+    "Four seconds of the force on rubber, some ten seconds after contact, with the gains and the learning "
+    "rate that were used on foam. The thesis says that the force follows pretty well."
 )
 PARAMETERS = changed(RUBBER, {"run.press": 15.0})
 SHOWN, JUDGED = (9.5, 13.5), (10.0, 15.0)
@@ -41,12 +41,12 @@ def check(data: Tracked) -> Sequence[Claim]:
             tolerance=f"{FOLLOWS}, from 10 to 15 s",
             verdict=decided(following(data.nominal)),
             note=(
-                "That the gains need no change is true, and owes little to the network: with the desired force fed "
-                "forward the loop's speed hardly depends on the surface's stiffness, and a PI of fixed gain does the "
-                "same (neural-is-an-integrator). On rubber less motion goes with the same force, so that friction, "
-                "which is elastic at first, withholds less of a step than on foam. "
-                f"{stops_holding(data.varied, lambda one: one.follows)} With the wall at 0.40 m motor 2 reaches its "
-                "limit below 20 N."
+                "That the gains need no change is true, and owes little to the network: with the desired "
+                "force fed forward the loop's speed hardly depends on the surface's stiffness, and a PI of "
+                "fixed gain does the same (neural-is-an-integrator). On rubber less motion goes with the "
+                "same force, so that friction, which is elastic at first, withholds less of a step than on "
+                f"foam. {stops_holding(data.varied, lambda one: one.follows)} With the wall at 0.40 m motor "
+                "2 reaches its limit below 20 N."
             ),
         )
     ]

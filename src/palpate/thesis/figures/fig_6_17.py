@@ -33,9 +33,10 @@ if TYPE_CHECKING:
 NUMBER = "6.17"
 TITLE = "Neural controller on rubber from the first touch: steps with 4 sin(πt) added"
 CAPTION = (
-    "The first ten seconds on rubber, network and all. The thesis says that the force follows well and that the "
-    "controller adapts in almost 5 s. The red bar at the lower edge: motor 2 at its limit, near the peaks of 24 N; the "
-    "sine starts anew every 5 s as in the listing. Below the runs: how far the force is from what it settles to."
+    "The first ten seconds on rubber, network and all. The thesis says that the force follows well and that "
+    "the controller adapts in almost 5 s. The red bar at the lower edge: motor 2 at its limit, near the "
+    "peaks of 24 N; the sine starts anew every 5 s as in the listing. Below the runs: how far the force is "
+    "from what it settles to."
 )
 PARAMETERS = changed(RUBBER, {**SINE, "run.press": 20.0})
 SHOWN, JUDGED = (0.0, 10.0), (0.0, 10.0)
@@ -58,7 +59,9 @@ def run(runs: Runs) -> Data:
     found = tracked(runs, PARAMETERS, SHOWN, JUDGED)
     away = runs.over_seeds(PARAMETERS, _away)
     times = [_adapted(one) for one in away]
-    return Data(found, np.arange(len(away[0])) * 1e-3 + SMOOTHED / 2, away[0], times)
+    return Data(
+        found, np.array(1e-3 * np.arange(len(away[0])) + SMOOTHED / 2, dtype=np.float64), away[0], times
+    )
 
 
 def check(data: Data) -> Sequence[Claim]:
@@ -76,10 +79,11 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"{FOLLOWS}, from 0 to 10 s",
             verdict=decided(following(found.nominal)),
             note=(
-                "The peaks of 24 N are more than motor 2 can press with at this pose: 2.5 N m are 23.7 N, less about "
-                "2.4 N of friction on the way up, so they are cut off whatever the controller, and the network learns on "
-                "against the limit, which makes it late on the way down. The limits of following were set before looking "
-                f"and the outcome lies close to them. {stops_holding(found.varied, lambda one: one.follows)}"
+                "The peaks of 24 N are more than motor 2 can press with at this pose: 2.5 N m are 23.7 N, "
+                "less about 2.4 N of friction on the way up, so they are cut off whatever the controller, "
+                "and the network learns on against the limit, which makes it late on the way down. The "
+                "limits of following were set before looking and the outcome lies close to them. "
+                f"{stops_holding(found.varied, lambda one: one.follows)}"
             ),
         ),
         Claim(
@@ -89,16 +93,18 @@ def check(data: Data) -> Sequence[Claim]:
             thesis="almost 5 s",
             measured=spread(data.adapted, "s"),
             tolerance=(
-                f"the force (mean over {SMOOTHED:g} s) comes within {LIMIT:g} N of what it does at the same place of "
-                "the settled cycles, from 10 to 20 s, and stays there, between 2.5 and 7.5 s after contact"
+                f"the force (mean over {SMOOTHED:g} s) comes within {LIMIT:g} N of what it does at the same "
+                "place of the settled cycles, from 10 to 20 s, and stays there, between 2.5 and 7.5 s after "
+                "contact"
             ),
             verdict=decided(2.5 <= middle <= 7.5),
             note=(
-                "As an upper bound the claim holds. But an integrator with K_i = 5 per second beside K_fp = 0.25 has a "
-                "time constant of a quarter of a second, and most of the force is fed forward: from the first touch on "
-                f"the force is what it will be in later cycles ({SMOOTHED:g} s is the least that can be told here). What "
-                "looked like adapting in 5 s may have been the first cycle of the reference, which is 5 s long, or a rate "
-                "smaller than the one printed: at 1e-5 it takes seconds (fig. 6.13)."
+                "As an upper bound the claim holds. But an integrator with K_i = 5 per second beside K_fp = "
+                "0.25 has a time constant of a quarter of a second, and most of the force is fed forward: "
+                f"from the first touch on the force is what it will be in later cycles ({SMOOTHED:g} s is "
+                "the least that can be told here). What looked like adapting in 5 s may have been the first "
+                "cycle of the reference, which is 5 s long, or a rate smaller than the one printed: at 1e-5 "
+                "it takes seconds (fig. 6.13)."
             ),
         ),
     ]
@@ -113,7 +119,9 @@ def plot(data: Data) -> Figure:
     away.plot(data.t[shown], data.away[shown])
     away.axhline(LIMIT, color="#222222", linewidth=1, linestyle="--")
     away.set(xlabel="time since contact [s]", ylabel="deviation [N]", xlim=SHOWN, ylim=(0.0, None))
-    away.set_title("from the settled cycles, mean over 0.25 s; dashed: what counts as adapted", loc="left", fontsize=9.5)
+    away.set_title(
+        "from the settled cycles, mean over 0.25 s; dashed: what counts as adapted", loc="left", fontsize=9.5
+    )
     return drawing
 
 
@@ -123,7 +131,10 @@ def _away(record: Record) -> NDArray[np.float64]:
     ticks = round(CYCLE * 1000)
     cycles = force[: len(force) // ticks * ticks].reshape(-1, ticks)
     away = (cycles - cycles[-2:].mean(axis=0)).ravel()
-    return np.abs(np.convolve(away, np.full(round(SMOOTHED * 1000), 1e-3 / SMOOTHED), "valid"))
+    smoothed: NDArray[np.float64] = np.abs(
+        np.convolve(away, np.full(round(SMOOTHED * 1000), 1e-3 / SMOOTHED), "valid")
+    )
+    return smoothed
 
 
 def _adapted(away: NDArray[np.float64]) -> float:
