@@ -1,5 +1,7 @@
 """The figures of least squares: what they measure against cases with known answers, and that each figure stands."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -266,7 +268,7 @@ def test_a_figure_stands(study, tmp_path):
     assert {id_: claims[id_].verdict for id_ in STUDIES[study]} == STUDIES[study]
     for claim in claims.values():
         assert all(claim.__dict__.values())
-        assert " nan" not in f" {claim.measured} {claim.note}"
+        assert not re.search(r"\b(nan|inf)\b", f"{claim.measured} {claim.note}")
     drawing = study.plot(data)
     assert style.save(drawing, tmp_path / "figure.png").stat().st_size > 10_000
-    assert all(axis.get_xlabel() for axis in drawing.axes[-1:])
+    assert drawing.axes[-1].get_xlabel()

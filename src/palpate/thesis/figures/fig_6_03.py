@@ -212,3 +212,4 @@ def _table(axis: Axes, data: Data) -> None:
     axis.set_yticks(np.arange(len(data.foams)) - 0.5, minor=True)
     axis.grid(which="minor", color="white", linewidth=1.0)
     axis.tick_params(length=0, which="both")
+    axis.set_xlabel("seen in figures 6.1 to 6.3", fontsize=8)
