@@ -1,12 +1,12 @@
 """The speed that is printed is the speed that was measured."""
 
 import json
-import time
+from itertools import count
 
 import pytest
 
-from palpate.bench import build, load
-from palpate.bench.speed import measure
+from palpate.bench import speed
+from palpate.bench.row import COLUMNS
 
 
 def test_json_is_one_object_that_agrees_with_itself(program):
@@ -19,14 +19,28 @@ def test_json_is_one_object_that_agrees_with_itself(program):
     assert found["times_real_time"] * found["ns_per_tick"] == pytest.approx(1e6, rel=1e-9)
 
 
-def test_a_tick_costs_what_a_stopwatch_says():
-    bench = build(load("foam-hybrid"))
-    bench.run(0.01)
-    start = time.perf_counter()
-    ticks = len(bench.run(15.0))
-    by_hand = (time.perf_counter() - start) / ticks
-    # A busy machine slows either of the two; the best of several is the smaller one.
-    assert 0.2 * by_hand < measure()["ns_per_tick"] * 1e-9 < 2 * by_hand
+def test_the_figures_follow_from_a_clock_and_the_ticks_that_were_run(monkeypatch):
+    """A clock that goes on by a second each time it is looked at; every tick is counted."""
+    marched = []
+
+    class Compiled:
+        def run(self, waiting, loop, state, k, noise, out):
+            assert out.shape == (len(noise), len(COLUMNS))
+            marched.append(len(noise))
+            return state
+
+    clock = count()
+    monkeypatch.setattr(speed.time, "perf_counter", lambda: float(next(clock)))
+    monkeypatch.setattr(speed, "compiled_march", Compiled())
+    monkeypatch.setattr(speed.os, "sched_getaffinity", lambda _: {0}, raising=False)
+    found = speed.measure()
+    a_run = speed.TICKS * speed.CHUNKS
+    # One to warm up, some alone, some side by side.
+    assert sum(marched) == (1 + 2 * speed.REPEATS) * a_run
+    assert found["ns_per_tick"] == pytest.approx(1e9 / a_run)
+    assert found["cores"] == 1
+    # Side by side the clock is looked at twice in each run, and once before and after all.
+    assert found["ticks_per_s"] == pytest.approx(speed.REPEATS * a_run / (2 * speed.REPEATS + 1))
 
 
 def test_people_get_a_table(program):

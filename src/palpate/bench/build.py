@@ -51,6 +51,7 @@ def build(experiment: Experiment) -> Bench:
     rate, tick = float(e.run.rate), 1.0 / e.run.rate
     force = _force_input(e)
     loop = Loop(
+        start=_vector(e.robot.start),
         plant=_plant(arm, e),
         encoder=Encoder(Vec3(*e.encoders.counts), q),
         force=force,
@@ -75,8 +76,12 @@ def _all(value: float) -> Vec3:
     return Vec3(float(value), float(value), float(value))
 
 
+def _vector(values: tuple[float, float, float]) -> Vec3:
+    return Vec3(*map(float, values))
+
+
 def _start(arm: Arm3, e: Experiment) -> Vec3:
-    pose = Vec3(*(float(v) for v in e.robot.start))
+    pose = _vector(e.robot.start)
     beyond = arm.beyond_reach(pose)
     if beyond > 0.0:
         raise InputError(

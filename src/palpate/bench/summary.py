@@ -40,8 +40,8 @@ def summarise(record: Record) -> dict[str, Any]:
         last = pressing & (t > t[pressing][-1] - WINDOW)
         summary["force"] = _force(record, pressing, last)
         summary["tip"] = {
-            "y_error_mm": 1e3 * float(np.mean(record["y"][last])),
-            "phi_error_deg": float(np.degrees(np.mean(record["phi"][last]))),
+            "y_error_mm": 1e3 * float(np.mean((record["y"] - record["y_desired"])[last])),
+            "phi_error_deg": float(np.degrees(np.mean((record["phi"] - record["phi_desired"])[last]))),
         }
         summary["identified"] = _identified(record, last)
     return summary
@@ -56,10 +56,13 @@ def _force(record: Record, pressing: NDArray[np.bool_], last: NDArray[np.bool_])
     error = record["force"] - record["force_desired"]
     desired = record["force_desired"][pressing]
     steady = slice(0, _first_change(desired))
+    stepped = steady.stop > 1 or len(desired) == 1  # of a sine there is neither settling nor overshoot
     since, force = record["t"][pressing][steady] - record["t"][pressing][0], record["force"][pressing][steady]
     target = float(desired[0])
     outside = np.abs(force - target) > BAND * abs(target)
-    settled = None if outside[-1] else float(since[np.max(np.nonzero(outside)[0], initial=-1) + 1])
+    settled = (
+        None if outside[-1] or not stepped else float(since[np.max(np.nonzero(outside)[0], initial=-1) + 1])
+    )
     return {
         "desired_N": float(desired[-1]),
         "mean_N": float(np.mean(record["force"][last])),
@@ -68,7 +71,7 @@ def _force(record: Record, pressing: NDArray[np.bool_], last: NDArray[np.bool_])
         "measured_std_N": float(np.std(record["force_measured"][last])),
         "rms_error_N": float(np.sqrt(np.mean(error[pressing] ** 2))),
         "settling_s": settled,
-        "overshoot_N": max(0.0, float(np.max(force)) - target),
+        "overshoot_N": max(0.0, float(np.max(force)) - target) if stepped else None,
     }
 
 

@@ -24,6 +24,7 @@ class Loop(NamedTuple):
     """Everything that a tick needs, by value.
 
     Args:
+        start: pose at the start [m, m, rad]; y and phi are held.
         plant: arm, friction and surface.
         encoder, force, output: the instruments: joint angles, force, torque.
         conditioning: the controller's signals.
@@ -37,6 +38,7 @@ class Loop(NamedTuple):
         steps: of the plant between ticks.
     """
 
+    start: Vec3
     plant: Plant
     encoder: Encoder
     force: ForceInput
@@ -96,7 +98,7 @@ def think(loop, state, signals, sequence):
     arm = loop.conditioning.arm
     model = arm.model(sense.q, sense.qd)
     desired = loop.schedule.force(sequence.since) if pressing else 0.0
-    at = Vec3(sequence.x_d, 0.0, 0.0)
+    at = Vec3(sequence.x_d, loop.start.y, loop.start.z)
     approach, controller = state.approach, state.controller
     if pressing:
         task = Task(at, ZERO3, ZERO3, desired * ALONG_X, ALONG_X)
@@ -147,7 +149,7 @@ def write(loop, state, k, signals, sequence, command, desired, estimators, insid
     at = put(out, at, sense.x)
     at = put(out, at, sense.xd)
     at = put(out, at, Vec3(signals.velocity, signals.acceleration, signals.smooth_acceleration))
-    at = put(out, at, Vec3(sequence.x_d, 0.0, 0.0))
+    at = put(out, at, Vec3(sequence.x_d, loop.start.y, loop.start.z))
     at = put(out, at, Vec3(felt.normal, felt.tangential, signals.force))
     out[at], out[at + 1] = sense.f.x, desired
     at = put(out, at + 2, command.applied)

@@ -32,7 +32,8 @@ def notes(summary: dict[str, Any]) -> list[str]:
 
 def _force(summary: dict[str, Any]) -> Table:
     f, tip = summary["force"], summary["tip"]
-    settling = "not within the run" if f["settling_s"] is None else f"{f['settling_s']:.3f} s"
+    never = NONE if f["overshoot_N"] is None else "not within the run"
+    settling = never if f["settling_s"] is None else f"{f['settling_s']:.3f} s"
     return Table(
         "Force",
         ("", "value"),
@@ -42,7 +43,7 @@ def _force(summary: dict[str, Any]) -> Table:
             ("error, last second", f"{f['error_N']:+.3f} ± {f['std_N']:.3f} N"),
             ("error since contact, RMS", f"{f['rms_error_N']:.3f} N"),
             ("settling to 5 %", settling),
-            ("overshoot", f"{f['overshoot_N']:.2f} N"),
+            ("overshoot", NONE if f["overshoot_N"] is None else f"{f['overshoot_N']:.2f} N"),
             ("noise of the measured force", f"{f['measured_std_N']:.3f} N"),
             ("tip off in y", f"{tip['y_error_mm']:+.2f} mm"),
             ("tip off in angle", f"{tip['phi_error_deg']:+.2f}°"),

@@ -1,0 +1,59 @@
+"""The figures of a run: files, captions, and what is drawn."""
+
+import numpy as np
+import pytest
+
+from bench.quick import quick
+from palpate.bench import build
+from palpate.records import Record
+from palpate.report import run_figures
+
+
+@pytest.fixture(scope="module")
+def record():
+    return build(quick("foam-hybrid")).run(1.5, press=0.4)
+
+
+def pixels(path):
+    from matplotlib.image import imread
+
+    return imread(path)
+
+
+def test_every_figure_is_a_picture_with_a_caption(record, tmp_path):
+    captions = run_figures.draw(record, tmp_path)
+    assert list(captions) == ["approach.png", "force.png", "identification.png", "torque.png"]
+    assert {path.name for path in tmp_path.iterdir()} == set(captions), "no half-written file is left"
+    for name, caption in captions.items():
+        assert caption.endswith(".")
+        picture = pixels(tmp_path / name)
+        assert picture.shape[1] > 800
+        assert picture[..., :3].std() > 0.05, "something is drawn"
+
+
+def test_without_contact_there_is_nothing_to_show_of_it(record, tmp_path):
+    air = Record({**record.columns, "phase": np.zeros(len(record))}, record.units, record.meta)
+    assert list(run_figures.draw(air, tmp_path)) == ["approach.png", "torque.png"]
+
+
+def test_the_same_record_gives_the_same_picture(record, tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    for folder in "ab":
+        run_figures.draw(record, tmp_path / folder)
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
+
+
+def test_a_surface_that_knows_no_mass_or_stiffness_is_drawn_too(record, tmp_path):
+    untold = Record(record.columns, record.units, {**record.meta, "truth": {}})
+    assert "identification.png" in run_figures.draw(untold, tmp_path)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 250])
+def test_a_short_record_is_drawn(record, tmp_path, rows):
+    """An interrupted run has whatever it has."""
+    short = Record(
+        {name: column[:rows] for name, column in record.columns.items()}, record.units, record.meta
+    )
+    assert run_figures.draw(short, tmp_path)

@@ -1,0 +1,90 @@
+"""A run's tables: figures with as many digits as they carry, and notes on what must not be missed."""
+
+import numpy as np
+import pytest
+
+from bench.quick import quick
+from palpate.bench import build, summarise
+from palpate.report.run_tables import _interval, _number, notes, tables
+
+
+@pytest.fixture(scope="module")
+def summary():
+    return summarise(build(quick("foam-hybrid")).run(1.5, press=0.3))
+
+
+def cells(table):
+    return {row[0]: row[1:] for row in table.rows}
+
+
+def test_every_row_fits_its_head(summary):
+    for table in tables(summary):
+        assert table.title
+        assert all(len(row) == len(table.head) for row in table.rows)
+        assert all(isinstance(cell, str) for row in table.rows for cell in row)
+
+
+def test_the_tables_say_what_the_summary_says(summary):
+    force, identified = tables(summary)
+    assert cells(force)["desired at the end"] == ("20.00 N",)
+    assert cells(force)["contact at"] == (f"{summary['contact_at_s']:.3f} s",)
+    stiffness = dict(zip(identified.head[1:], cells(identified)["K [N/m]"], strict=True))
+    assert stiffness["truth"] == "5200"
+    assert stiffness["verdict"] == summary["identified"]["matched_verdict"]["K"]
+    assert float(stiffness["thesis"]) == pytest.approx(summary["identified"]["thesis"]["K"], rel=1e-3)
+
+
+def test_without_contact_there_is_no_table(summary):
+    assert tables({**summary, "force": None}) == []
+
+
+def test_what_has_no_truth_and_no_settling_has_a_dash(summary):
+    force = {**summary["force"], "settling_s": None, "overshoot_N": None}
+    changed, identified = tables({**summary, "force": force, "truth": {}})
+    assert cells(changed)["overshoot"] == cells(changed)["settling to 5 %"] == ("-",)
+    assert cells(identified)["K [N/m]"][-1] == "-"
+    never = tables({**summary, "force": {**summary["force"], "settling_s": None}})[0]
+    assert cells(never)["settling to 5 %"] == ("not within the run",)
+
+
+NOTED = {
+    "no contact": ({"end": "no contact", "why": "no surface was felt"}, "move the wall"),
+    "diverged": ({"end": "diverged", "why": "torque2 is not a finite number"}, "torque2"),
+    "interrupted": ({"end": "interrupted", "why": "interrupted at 3.0 s"}, "3.0 s"),
+    "losses": ({"contacts_lost": 2}, "lost 2 times"),
+    "saturation": ({"saturated": {"joint1": 0.0, "joint2": 0.5, "joint3": 0.0}}, "joint2 .* 50.0 %"),
+}
+
+
+@pytest.mark.parametrize(("changes", "told"), NOTED.values(), ids=NOTED)
+def test_what_must_not_be_missed_is_noted(summary, changes, told):
+    import re
+
+    quiet = {**summary, "saturated": dict.fromkeys(summary["saturated"], 0.0)}
+    assert notes(quiet) == []
+    (note,) = notes({**quiet, **changes})
+    assert re.search(told, note)
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "text"),
+    [
+        (5195.28, 15.4, "5195 ± 15"),
+        (5195.28, 1.54, "5195.3 ± 1.5"),
+        (0.0251, 0.282, "0.03 ± 0.28"),
+        (5195.28, 1540.0, "5195 ± 1540"),
+        (-0.0004, 0.00012, "-0.00040 ± 0.00012"),
+        (5195.28, 0.0, "5195 ± ?"),
+        (5195.28, np.nan, "5195 ± ?"),
+    ],
+)
+def test_an_interval_has_two_digits_of_its_half_width(value, half, text):
+    assert _interval(value, half) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, "-"), (5195.28, "5195"), (0.034512, "0.03451"), (43897.2, "43897"), (2e5, "200000")],
+)
+def test_a_number_has_four_digits_where_they_mean_something(value, text):
+    assert _number(value) == text
