@@ -173,6 +173,7 @@ class Found:
 
     @property
     def apart_raw(self) -> float:
+        """The same of K from raw signals."""
         return self.K_raw / self.ratio - 1.0
 
 

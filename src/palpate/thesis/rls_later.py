@@ -31,6 +31,8 @@ QUANTILES = (10.0, 50.0, 90.0)
 
 @dataclass(frozen=True)
 class Data:
+    """What a figure of the later slot shows and is judged by."""
+
     shown: dict[str, Record]  # one press of each surface
     found: dict[str, list[Found]]  # over the seeds
     varied: dict[str, dict[str, list[Found]]]  # of the first surface, or of each

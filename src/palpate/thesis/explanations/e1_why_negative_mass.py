@@ -64,6 +64,8 @@ class Press:
 
 @dataclass(frozen=True)
 class Data:
+    """Presses on each surface, as chosen and varied."""
+
     presses: dict[str, list[Press]]
     varied: dict[str, dict[str, list[Press]]]
     truth: dict[str, tuple[float, float, float]]  # M, B, K

@@ -47,6 +47,8 @@ PHYSICS = 20000.0
 
 @dataclass(frozen=True)
 class Data:
+    """Spectra, their differences, and tones."""
+
     frequency: Array  # [Hz]
     plain: Array  # spectrum of the first seed, unfiltered [N^2/Hz]
     filtered: Array

@@ -35,6 +35,8 @@ FREQUENCY = np.geomspace(10.0, 2000.0, 400)
 
 @dataclass(frozen=True)
 class Data:
+    """The gain and what is read from it."""
+
     gain: Array  # [dB]
     low: Array  # least and most over the components' tolerances
     high: Array

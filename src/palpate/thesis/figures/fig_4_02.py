@@ -59,6 +59,8 @@ class Switch:
 
 @dataclass(frozen=True)
 class Data:
+    """The force around the switch, and what became of each run."""
+
     shown: dict[str, tuple[Array, Array]]  # time from the switch [s], measured force [N]
     switches: dict[str, list[Switch]]  # at 5 N, over the seeds
     by_threshold: dict[float, list[Switch]]  # on foam

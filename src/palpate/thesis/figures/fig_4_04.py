@@ -32,6 +32,8 @@ STEADY = 2.0
 
 @dataclass(frozen=True)
 class Data:
+    """Steady force, and its noise over the seeds."""
+
     t: NDArray[np.float64]
     sampled: NDArray[np.float64]
     filtered: NDArray[np.float64]

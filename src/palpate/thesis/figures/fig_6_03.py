@@ -64,6 +64,8 @@ SHOWS: dict[str, Callable[[Found], bool]] = {
 
 @dataclass(frozen=True)
 class Data:
+    """The press of figure 6.2 from raw signals, and what each foam shows."""
+
     later: rls_later.Data
     foams: dict[str, Found]
 
