@@ -200,20 +200,31 @@ def test_a_place_that_may_not_be_written_is_one_line(program):
     assert "/proc" in one_line(program("thesis", "3.7", "--out", "/proc/thesis"))
 
 
-def test_a_disk_that_is_full_is_one_line_and_can_be_gone_on_from(program, tmp_path):
+def cramped(folder: Path, most: int) -> subprocess.CompletedProcess:
+    """`palpate thesis 3.7` where no file can grow beyond so many bytes."""
     resource = pytest.importorskip("resource")
-    folder = tmp_path / "t"
-    command = [sys.executable, "-m", "palpate", "thesis", "3.7", "--out", str(folder)]
-    ran = subprocess.run(
-        command,
+    return subprocess.run(
+        [sys.executable, "-m", "palpate", "thesis", "3.7", "--out", str(folder)],
         capture_output=True,
         text=True,
         check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
     )
-    one_line(ran)
-    assert not {"claims.json", "index.html", "3.7.png"} & names(folder), "whole or not at all"
-    assert program("thesis", "3.7", "--out", folder).returncode == 0
+
+
+def test_a_disk_that_is_full_is_one_line_and_can_be_gone_on_from(program, tmp_path):
+    one_line(cramped(tmp_path / "t", 2000))
+    assert not {"claims.json", "index.html", "3.7.png"} & names(tmp_path / "t")
+    assert program("thesis", "3.7", "--out", tmp_path / "t").returncode == 0
+
+
+def test_a_disk_that_is_full_leaves_no_half_page(program, tmp_path):
+    program("thesis", "3.7", "--out", tmp_path / "whole")
+    page = (tmp_path / "whole" / "index.html").stat().st_size
+    assert page > (tmp_path / "whole" / "3.7.png").stat().st_size
+    one_line(cramped(tmp_path / "t", page - 1000))
+    assert "3.7.png" in names(tmp_path / "t")
+    assert "index.html" not in names(tmp_path / "t")
 
 
 def test_every_study_offers_what_the_protocol_asks_for():
