@@ -11,6 +11,8 @@ from palpate.signals.types import Sense
 
 @part
 class Signals(NamedTuple):
+    """What a tick makes of the sensors, for controllers and estimators."""
+
     sense: Sense  # what controllers see
     velocity: float  # of x, first difference, unfiltered [m/s]
     acceleration: float  # of x, second difference, unfiltered [m/s^2]

@@ -45,7 +45,8 @@ COLUMNS = {
     "memory_fx": "N",  # the force command that the controller has gathered or learned
     "memory_fy": "N",
     "memory_moment": "N m",
-    **{f"adapted{i}": "1" for i in (1, 2, 3)},  # what an adaptive controller reports of itself; zero for others
+    # What an adaptive controller reports of itself; zero for others.
+    **{f"adapted{i}": "1" for i in (1, 2, 3)},
 }
 
 

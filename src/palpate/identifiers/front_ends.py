@@ -72,8 +72,9 @@ class CentringState(NamedTuple):
 
 @part
 class Centring(NamedTuple):
-    """Takes the offset out of a linear fit, exactly: recursive least squares on what comes out equals least squares
-    with an intercept (Welford's update; the scale sqrt(w/(w+1)) makes the two sums of squares equal).
+    """Takes the offset out of a linear fit: what comes out is fitted as with an intercept, exactly.
+
+    Welford's update; the scale sqrt(w/(w+1)) makes the two sums of squares equal.
 
     Args:
         forgetting: the same as the estimator's.

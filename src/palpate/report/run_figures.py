@@ -57,7 +57,7 @@ def _approach(record: Record, path: Path) -> str:
 
 def _force(record: Record, path: Path) -> str:
     drawing, (axis,) = style.figure(1, height=3.4)
-    t, since, shown = _around_contact(record)
+    _, since, shown = _around_contact(record)
     axis.plot(
         since, record["force_measured"][shown], color="#a9c8e4", linewidth=0.7, label="measured, filtered"
     )

@@ -57,7 +57,7 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     def verdicts(self, tolerance: float = 0.25) -> dict[str, str]:
-        """ "identified" or "not identifiable" by parameter, see `verdict`."""
+        """By parameter, "identified" or "not identifiable": see `verdict`."""
         pairs = zip(self.names, self.theta, self.std, strict=True)
         return {name: verdict(float(value), float(std), tolerance) for name, value, std in pairs}
 
