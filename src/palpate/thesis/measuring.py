@@ -60,6 +60,7 @@ def measure(
         InputError: the folder holds anything else, and `force` is off.
     """
     state = _state(studies, runs, folder, command, force)
+    _write(state, folder)  # from now on the folder is known for what it is
     for study in studies:
         if study.NUMBER in state.done:
             continue
@@ -119,5 +120,9 @@ def _json(value: Any) -> bytes:
 
 def _replace(path: Path, content: bytes) -> None:
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    part.write_bytes(content)
-    part.replace(path)
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
