@@ -77,3 +77,25 @@ def watch(
         if (k - begun) * loop.tick >= duration:
             return None
     return None if begun is not None else float("nan")
+
+
+POSES, TORQUE1, TORQUES = slice(1, 7), slice(7, 8), slice(7, 10)
+"""Columns of the hidden weights of the 9-12-3 network: from both poses, from motor 1's torque, from all torques."""
+HOLD = 20
+"""Ticks after which weights that are held are set back."""
+
+
+def layers(state: NeuralState) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weights of the hidden and of the output layer of the 9-12-3 network, shapes (12, 10) and (3, 13); views."""
+    w = state.network.weights
+    return w[:120].reshape(12, 10), w[120:].reshape(3, 13)
+
+
+def hold(columns: slice) -> Callable[[Look], None]:
+    """A look that sets these columns of the hidden weights to zero, so that they cannot grow."""
+
+    def look(one: Look) -> None:
+        if one.neural is not None:
+            layers(one.neural)[0][:, columns] = 0.0
+
+    return look

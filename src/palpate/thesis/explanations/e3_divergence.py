@@ -16,7 +16,7 @@ from palpate.thesis.explanations.e2_integrator import PI
 from palpate.thesis.force_panels import PALE, across, legend_inside, panels
 from palpate.thesis.force_tracking import FOAM, RELAXING_FOAM, RUBBER, SINE, moved, rougher, since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.watching import Look, watch
+from palpate.thesis.watching import HOLD, POSES, TORQUE1, TORQUES, Look, hold, layers, watch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +28,7 @@ NUMBER = "delayed-divergence"
 TITLE = "Why it fails later: the network learns an answer to its own torques"
 CAPTION = (
     "Learning never stops. First row: size of the weights over the time in contact at the text's learning "
-    "rate, on the foam that relaxes until contact is lost (cross), and on the plain foam. Second row: the "
+    "rate, on the foam that relaxes until contact is lost (dashed), and on the plain foam. Second row: the "
     "gain from the hybrid controller's torques to the network's force; and the last moments before the "
     "loss, where that force goes along with the velocity and drives the motion. Third row: time to the loss "
     "against the learning rate, with the plain PI beside; and the growth of the force's output weights "
@@ -63,12 +63,11 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "PI, K_i = 5 per second": PI,
 }
 HELD: Mapping[str, slice] = {
-    "weights from poses held at zero": slice(1, 7),
-    "weights from motor 1's torque held at zero": slice(7, 8),
-    "weights from all torques held at zero": slice(7, 10),
+    "weights from poses held at zero": POSES,
+    "weights from motor 1's torque held at zero": TORQUE1,
+    "weights from all torques held at zero": TORQUES,
 }
-"""Columns of the hidden weights that are set back to zero every `HOLD` ticks."""
-HOLD = 20
+"""Hidden weights that are not allowed to grow."""
 PARTS = (
     "hidden, from torques",
     "hidden, from poses",
@@ -117,7 +116,10 @@ def run(runs: Runs) -> Data:
         courses[name] = {r: found[i * len(seeds) : (i + 1) * len(seeds)] for i, r in enumerate(rates)}
     plain = {name: _losses(runs, changed(e, PI), 1) for name, e in PARAMETERS.items()}
     causes = {name: _losses(runs, changed(RELAXING, change), 1) for name, change in CAUSES.items()}
-    held = runs.map(lambda columns: _held(runs, columns), list(HELD.values()))
+    held = runs.map(
+        lambda columns: watch(RELAXING, runs.seeds[0], DURATION, hold(columns), runs.waiting, HOLD),
+        list(HELD.values()),
+    )
     causes.update((name, [lost]) for name, lost in zip(HELD, held, strict=True))
     return Data(courses, plain, causes, _loss(runs, courses["foam that relaxes"][5e-5][0].lost))
 
@@ -290,35 +292,19 @@ def _course(runs: Runs, experiment: Experiment, seed: int) -> Course:
     return Course(np.array(t), np.array(sizes), np.array(gains), lost)
 
 
-def _layers(state: NeuralState) -> tuple[Array, Array]:
-    """Weights of the hidden and of the output layer of the 9-12-3 network, shapes (12, 10) and (3, 13)."""
-    w = state.network.weights
-    return w[:120].reshape(12, 10), w[120:].reshape(3, 13)
-
-
 def _sizes(state: NeuralState) -> Array:
     """Root of the sum of squares of each of `PARTS`, shape (5,)."""
-    hidden, output = _layers(state)
+    hidden, output = layers(state)
     parts = (hidden[:, 7:], hidden[:, 1:7], hidden[:, 0], output[0, 1:], output[:, 0])
     return np.array([np.sqrt(np.sum(part**2)) for part in parts])
 
 
 def _torque_gains(state: NeuralState) -> Array:
     """Change of the network's force for a change of each torque among its inputs [N per N m], shape (3,)."""
-    hidden, output = _layers(state)
+    hidden, output = layers(state)
     inside, out = state.network.signals[9:21], state.network.signals[21]
     through = output[0, 1:] * 0.5 * (1.0 - inside**2)
     return np.array(20.0 * 0.5 * (1.0 - out**2) * through @ hidden[:, 7:])
-
-
-def _held(runs: Runs, columns: slice) -> float | None:
-    """When contact is lost if some of the hidden weights are not allowed to grow [s]."""
-
-    def look(one: Look) -> None:
-        assert one.neural is not None
-        _layers(one.neural)[0][:, columns] = 0.0
-
-    return watch(RELAXING, runs.seeds[0], DURATION, look, runs.waiting, HOLD)
 
 
 def _losses(runs: Runs, experiment: Experiment, seeds: int) -> list[float | None]:

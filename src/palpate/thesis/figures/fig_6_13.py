@@ -11,7 +11,7 @@ from palpate.thesis.force_panels import following_panel, force_panel, panels
 from palpate.thesis.force_tracking import (
     ENOUGH,
     FOAM,
-    FOLLOWS,
+    FOLLOWING,
     Tracked,
     Tracking,
     stops_holding,
@@ -48,7 +48,7 @@ def check(data: Tracked) -> Sequence[Claim]:
             claim="With a learning rate of 1e-5 the force cannot follow at first.",
             thesis="cannot follow immediately",
             measured=told(data.nominal),
-            tolerance=f"the contrary of following from 0 to 10 s, in 9 of 10 runs. Following is, {FOLLOWS}",
+            tolerance=f"in 9 of 10 runs it does not follow from 0 to 10 s; following: {FOLLOWING}",
             verdict=decided(sum(map(_late, data.nominal)) >= ENOUGH * len(data.nominal)),
             note=(
                 "The network starts as an integrator whose gain is proportional to the learning rate: K_i = "

@@ -135,7 +135,7 @@ def check(data: Data) -> Sequence[Claim]:
             source=source,
             claim="The other reason: on soft foam the tip sticks, which keeps it from being positioned.",
             thesis="a major reason",
-            measured=f"RMS of y without sticking {spread(free, 'mm')}, {abs(taken):.0%} {'less' if taken > 0 else 'more'}",
+            measured=f"RMS of y without sticking {spread(free, 'mm')}, smaller by {taken:.0%}",
             tolerance=f"without friction along the surface the RMS of y is at least {SHARE:.0%} smaller",
             verdict=decided(bool(taken >= SHARE)),
             note=(
