@@ -169,7 +169,7 @@ def _is_integral(data: Data) -> Claim:
             "learning rate times what the network's own sensitivities add up to. Where the integral does not match, the "
             "network's other terms show: it sees the desired force, so once trained a step of it changes the torque at "
             "once, which an integral cannot do, and its gain changes with what it has learned. The same in three joints: "
-            "see neural-integrator."
+            "see neural-is-an-integrator."
         ),
     )
 

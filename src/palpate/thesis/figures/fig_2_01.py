@@ -1,0 +1,291 @@
+"""Figure 2.1: Raibert and Craig's hybrid controller, without dynamics, beside the one with dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._vector import Vec3
+from palpate.bench import Experiment, changed, load
+from palpate.controllers import RaibertCraig
+from palpate.controllers.raibert_craig import growth_rate
+from palpate.records import Record
+from palpate.report import style
+from palpate.robots.arm3 import Arm3
+from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.force_panels import dots_panel, panels
+from palpate.thesis.force_tracking import (
+    ENOUGH,
+    RELAXING_FOAM,
+    SHORT,
+    VARIED_SEEDS,
+    losses,
+    moved,
+    rougher,
+    since_contact,
+    stops_holding,
+)
+from palpate.thesis.runs import Runs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+NUMBER = "2.1"
+TITLE = "The original hybrid controller, and the one with dynamics"
+CAPTION = (
+    "The thesis' figure is the block diagram of Raibert and Craig's controller, of which the text says that it has some "
+    "problems and leaves out the robot's dynamics. Above: steps of force on foam under it and under (4.13), with equal "
+    "force gains. Lower left: how fast the original's position loop grows by itself over the arm's workspace (angle 0, "
+    "elbow to the left); (4.13) grows nowhere. Lower right: how far steps of force turn the tip, original over (4.13)."
+)
+PARAMETERS = changed(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
+DYNAMIC = {"controller": {"kind": "proportional-integral", "kp": 400.0, "kv": 80.0, "kf": 1.0, "ki": 3.0}}
+"""(4.13) with the thesis' gains on foam; the original's force gains are these, its joints' 400 and 80 times their inertia."""
+RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
+STEPS = (2.5, 5.0, 7.5)
+WORSE = 1.5
+"""Least ratio of the original's overshoot, and of its angle's stray, to those with dynamics."""
+GROWS = 1.0
+"""Growth that counts as unstable [1/s]."""
+XS, YS = np.linspace(0.10, 0.53, 65), np.linspace(-0.35, 0.35, 51)
+LAWS = ("without dynamics", "with dynamics")
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pressed:
+    overshoot: float  # over the size of the step, mean over the steps
+    phi: float  # largest stray within a second of a step, mean over the steps [deg]
+    lost: int
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both laws in the same world."""
+
+    original: Pressed
+    dynamic: Pressed
+
+    @property
+    def phi(self) -> float:
+        return self.original.phi / self.dynamic.phi
+
+    @property
+    def worse(self) -> bool:
+        """Whether the original is worse in both, by enough."""
+        more = self.original.overshoot > 0.0 and self.original.overshoot >= WORSE * self.dynamic.overshoot
+        return self.original.lost > 0 or (more and self.phi >= WORSE)
+
+
+@dataclass(frozen=True)
+class Trace:
+    t: Array
+    force: Array
+    desired: Array
+    phi: Array  # [deg]
+
+
+@dataclass(frozen=True)
+class Data:
+    traces: dict[str, Trace]
+    varied: dict[str, list[Pair]]
+    growth: Array  # of the original over the workspace, shape (y, x) [1/s]; NaN out of reach
+    any_gain: Array  # the same with a tenth and ten times the gains: the least of the three
+
+
+def run(runs: Runs) -> Data:
+    """Both laws in each world; the original's growth at each posture."""
+    worlds = {name: changed(PARAMETERS, changes) for name, changes in _changes().items()}
+    named = [
+        (n, (e, s)) for n, e in worlds.items() for s in (runs.seeds if n == "foam" else runs.seeds[:VARIED_SEEDS])
+    ]
+    original = runs.over([case for _, case in named], _measured)
+    dynamic = runs.over([(changed(e, DYNAMIC), s) for _, (e, s) in named], _measured)
+    varied: dict[str, list[Pair]] = {}
+    for (name, _), a, b in zip(named, original, dynamic, strict=True):
+        varied.setdefault(name, []).append(Pair(a, b))
+    traces = {LAWS[0]: _trace(runs.one(PARAMETERS)), LAWS[1]: _trace(runs.one(changed(PARAMETERS, DYNAMIC)))}
+    growth = _growth(1.0, np.ones((len(YS), len(XS)), dtype=bool))
+    others = [_growth(gain, growth > GROWS) for gain in (0.1, 10.0)]
+    return Data(traces, varied, growth, np.fmin.reduce([growth, *others]))
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """Problems of the original, and what leaving out the dynamics does."""
+    return [_problems(data), _dynamics(data)]
+
+
+def _problems(data: Data) -> Claim:
+    reach = np.isfinite(data.growth)
+    share = float((data.growth[reach] > GROWS).mean())
+    always = float((data.any_gain[reach] > GROWS).mean())
+    line = data.growth[np.argmin(np.abs(YS))]
+    return Claim(
+        id="RC.PROBLEMS",
+        source="fig. 2.1, sec. 2.1",
+        claim="The original hybrid controller has some problems.",
+        thesis="some problems, two papers cited; not said which",
+        measured=(
+            f"its position loop is unstable in {share:.1%} of the {reach.sum()} postures on a grid over the workspace, in "
+            f"{always:.1%} with a tenth and with ten times the gains as well; fastest {np.nanmax(data.growth):.3g} per second"
+        ),
+        tolerance=f"there is a reachable posture at which it grows by more than {GROWS:g} per second, whatever the gain",
+        verdict=decided(always > 0.0),
+        note=(
+            "Errors are selected at the tip and carried to the joints by J^-1, and each joint then pulls by itself: where "
+            "inertia couples the joints against the selection, the position loop feeds itself. An and Hollerbach called it "
+            "kinematic instability; that this is the problem the thesis means is our reading. It lies where the arm is "
+            "nearly stretched. On the line y = 0, where the experiments are, "
+            + ("it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too")
+            + ". Linear, at rest, at angle 0, without friction, which would hide a slow growth; the force loop is left out."
+        ),
+    )
+
+
+def _lost(data: Data) -> str:
+    """Where contact was lost, in words."""
+    told = [
+        f"{name} ({sum(p.original.lost > 0 for p in v)} of {len(v)} runs of the original, "
+        f"{sum(p.dynamic.lost > 0 for p in v)} of (4.13))"
+        for name, v in ((n.replace(chr(10), " "), v) for n, v in data.varied.items())
+        if any(p.original.lost or p.dynamic.lost for p in v)
+    ]
+    return f"Contact was lost with {', '.join(told)}." if told else "Contact was never lost."
+
+
+def _dynamics(data: Data) -> Claim:
+    foam = data.varied["foam"]
+    return Claim(
+        id="RC.DYNAMICS",
+        source="fig. 2.1, sec. 2.1",
+        claim="Leaving out the robot's dynamics makes the original worse than (4.13).",
+        thesis="does not include the dynamics; therefore developed further",
+        measured=(
+            f"overshoot {spread([100 * p.original.overshoot for p in foam], '%', 2)} of the step against "
+            f"{spread([100 * p.dynamic.overshoot for p in foam], '%', 2)}; the angle strays by "
+            f"{spread([p.original.phi for p in foam], 'degrees', 2)} against {spread([p.dynamic.phi for p in foam], 'degrees', 2)}"
+        ),
+        tolerance=(
+            f"in 9 of 10 runs on foam both the force's overshoot and the angle's stray after steps of 10 N are at least "
+            f"{WORSE:g} times those under (4.13) with equal force gains"
+        ),
+        verdict=decided(sum(p.worse for p in foam) >= ENOUGH * len(foam)),
+        note=(
+            "The thesis shows no comparison. The force overshoots as expected: without the inertia's couplings, the joints' "
+            "pull for y and angle acts on x as well. But the angle strays less than under (4.13), not more: with friction as "
+            "chosen both laws leave it where the wrist's friction holds it, and the joint servos lean on the wrist harder. At "
+            "speeds this low dynamics count for little. Where a run lost contact the original counts as worse. Its gains are "
+            "400 and 80 times each joint's own inertia where the arm starts: another choice gives another result. "
+            f"{_lost(data)} {stops_holding(data.varied, lambda p: p.worse)}"
+        ),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """Force and angle over time, the map, and the runs."""
+    drawing, grid = panels([2.5, 1.7, 3.0], 2, 11.0)
+    for row, name in zip(grid[:2], ("force", "phi"), strict=True):
+        _over_time(_wide(drawing, row), data, name)
+    _map_panel(drawing, grid[2][0], data)
+    dots_panel(
+        grid[2][1],
+        data.varied,
+        lambda p: 100 * p.phi,
+        lambda p: p.worse,
+        limit=100 * WORSE,
+        label="ratio [%]",
+        title="stray of the angle; green: worse in this and in overshoot",
+    )
+    return drawing
+
+
+def _wide(drawing: Figure, row: Sequence[Axes]) -> Axes:
+    spec = row[0].get_gridspec()
+    at = row[0].get_subplotspec().rowspan.start
+    for axis in row:
+        axis.remove()
+    axis = drawing.add_subplot(spec[at, :])
+    axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+    return axis
+
+
+def _over_time(axis: Axes, data: Data, name: str) -> None:
+    for (law, trace), color in zip(data.traces.items(), (style.RED, style.BLUE), strict=True):
+        axis.plot(trace.t, getattr(trace, name), color=color, linewidth=1.1, label=law)
+    axis.set_xlim(0.0, PARAMETERS.run.press)
+    if name == "force":
+        first = next(iter(data.traces.values()))
+        axis.plot(first.t, first.desired, color=style.ORANGE, linewidth=1.2, label="desired")
+        axis.set_ylabel("true force [N]")
+        style.legend(axis)
+    else:
+        axis.set(ylabel="angle [°]", xlabel="time since contact [s]")
+
+
+def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
+    shown = np.where(np.isfinite(data.growth), np.clip(data.growth, 0.0, 20.0), np.nan)
+    mesh = axis.pcolormesh(XS, YS, shown, cmap="OrRd", vmin=0.0, vmax=20.0, shading="nearest")
+    drawing.colorbar(mesh, ax=axis, pad=0.02, label="[1/s], up to 20 and more")
+    axis.plot([0.40, 0.49], [0.0, 0.0], color=style.BLUE, linewidth=2.5)
+    axis.annotate("experiments", (0.40, 0.0), (0, 6), textcoords="offset points", fontsize=8.5, color=style.BLUE)
+    axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axis.set_title("growth of the original", loc="left", fontsize=9.5)
+
+
+def _changes() -> dict[str, Mapping[str, Any]]:
+    return {
+        "foam": {},
+        "rubber": RUBBER,
+        "relaxing\nfoam": RELAXING_FOAM,
+        "friction\nhalf": rougher(PARAMETERS, 0.5),
+        "friction\ndouble": rougher(PARAMETERS, 2.0),
+        "wall at\n0.40 m": moved(PARAMETERS, 0.40),
+        "wall at\n0.49 m": moved(PARAMETERS, 0.49),
+    }
+
+
+def _growth(gain: float, where: NDArray[np.bool_]) -> Array:
+    """Of the original's position loop, its stiffness times `gain`, over YS and XS [1/s]; NaN elsewhere."""
+    arm, into = Arm3(), Vec3(1.0, 0.0, 0.0)
+    table: Any = PARAMETERS.controller
+    stiffness, damping = (
+        k * Vec3(*map(float, v)) for k, v in ((gain, table.stiffness), (np.sqrt(gain), table.damping))
+    )
+    law = RaibertCraig(stiffness, damping, 0.0 * damping, table.kf, table.ki, table.feed_forward, 1e-3)
+    found = np.full((len(YS), len(XS)), np.nan)
+    for i, y in enumerate(YS):
+        for j, x in enumerate(XS):
+            pose = Vec3(float(x), float(y), 0.0)
+            q = arm.inverse(pose, 1.0)
+            if where[i, j] and arm.beyond_reach(pose) <= 0.0 and abs(np.sin(q.y)) > 0.02:
+                found[i, j] = growth_rate(law, arm.model(q, 0.0 * q), into)
+    return found
+
+
+def _measured(record: Record) -> Pressed:
+    t, force, phi = since_contact(record), record["force"], record["phi"]
+    over, strays = [], []
+    for at in STEPS:
+        after = (t >= at) & (t < at + 1.0)
+        before = (t >= at - 0.1) & (t < at - 5e-7)
+        if not after.any():
+            return Pressed(np.nan, np.nan, losses(record))
+        desired, was = record["force_desired"][after][0], record["force_desired"][before][0]
+        beyond = (force[after] - desired) * np.sign(desired - was)
+        over.append(max(0.0, float(beyond.max())) / abs(desired - was))
+        strays.append(float(np.abs(phi[after] - phi[before].mean()).max()))
+    return Pressed(float(np.mean(over)), float(np.degrees(np.mean(strays))), losses(record))
+
+
+def _trace(record: Record) -> Trace:
+    t = since_contact(record)
+    shown = t >= 0.0
+    return Trace(t[shown], record["force"][shown], record["force_desired"][shown], np.degrees(record["phi"][shown]))
