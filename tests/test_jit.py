@@ -225,3 +225,54 @@ def test_a_user_kernel_goes_stale_with_its_own_file(workshop):
     for number, expected in ((1.0, (2.0, False)), (1.0, (2.0, True)), (5.0, (6.0, False))):
         (workshop.user / "own.py").write_text(OWN.format(number=number))
         assert workshop.run("own.py") == expected
+
+
+STRANGER = """
+from palpate._vector import Vec3
+from palpate.entry import entry
+
+try:
+    entry(Vec3(1.0, 2.0, 3.0), 5.0)
+except Exception as error:
+    assert "step" in str(error), error  # no part that has it: the cache was read, the compiler asked
+print(1.0, False)
+"""
+
+SCRIPT = """
+from typing import NamedTuple
+
+from palpate._jit import part
+from palpate.entry import entry
+
+@part
+class Here(NamedTuple):
+    gain: float
+
+    def step(self, x):
+        return self.gain * x
+
+print(entry(Here(3.0), 5.0), entry.from_cache)
+"""
+
+
+def test_the_cache_can_be_read_where_a_users_part_is_not(workshop):
+    """What was compiled for a part of one project must not stand in the way of another."""
+    workshop.run()
+    (workshop.user / "mine.py").rename(workshop.user / "elsewhere.txt")
+    try:
+        (workshop.user / "stranger.py").write_text(STRANGER)
+        assert workshop.run("stranger.py") == (1.0, False)
+    finally:
+        (workshop.user / "elsewhere.txt").rename(workshop.user / "mine.py")
+    assert workshop.run()[1]
+
+
+def test_a_part_of_a_script_leaves_nothing_in_the_cache(workshop):
+    """It would be another class at each run, and the cache would grow for ever."""
+    workshop.run()
+    cache = workshop.package / "__pycache__"
+    before = {path.name: path.stat().st_size for path in cache.iterdir()}
+    (workshop.user / "script.py").write_text(SCRIPT)
+    for _ in range(2):
+        assert workshop.run("script.py")[1] is False
+    assert {path.name: path.stat().st_size for path in cache.iterdir()} == before

@@ -122,12 +122,16 @@ def _imported(text: str) -> list[Path]:
 
 
 def _stamp_of(function: Callable[..., Any], types_of_arguments: tuple[Any, ...]) -> str | None:
-    """A hash of all that a kernel given such arguments may depend on; None where there is no file to ask.
+    """A hash of all that a kernel given such arguments may depend on; None where it cannot be kept.
 
     A kernel of the package that is given only the package's parts depends on its own file, theirs, and what those
-    import. With something of the user's among them it may call any law and part registered from outside.
+    import. With something of the user's among them it may call any law and part registered from outside. Without a
+    file there is nothing to ask; and a class of a script is another class the next time that the script runs.
     """
-    things = {function, *_classes(types_of_arguments)}
+    classes = set(_classes(types_of_arguments))
+    if any(cls.__module__ == "__main__" for cls in classes):
+        return None
+    things = {function, *classes}
     if any(_PACKAGE not in _home_of(x).parents for x in things):
         things |= {*_foreign_laws, *_parts}
     files = {_home_of(x) for x in things}
@@ -149,6 +153,11 @@ def _classes(numba_types: Any) -> Any:
             yield from _classes(members)
 
 
+def _text_of(numba_types: Any) -> str:
+    classes = (f"{cls.__module__}.{cls.__qualname__}" for cls in _classes(numba_types))
+    return "; ".join([*map(str, numba_types), *classes])
+
+
 def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
     import numba
     from numba.core import caching
@@ -159,7 +168,9 @@ def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
             self._cache_file._source_stamp = sources_stamp(_home_of(py_func))
 
         def _index_key(self, sig: Any, codegen: Any) -> Any:
-            return (*super()._index_key(sig, codegen), _stamp_of(function, sig))
+            # The types as text: an index that holds a user's class cannot be read where that class is not.
+            _, *machine_and_code = super()._index_key(sig, codegen)
+            return (_text_of(sig), *machine_and_code, _stamp_of(function, sig))
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             known = _stamp_of(function, sig) is not None
