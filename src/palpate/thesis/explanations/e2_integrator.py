@@ -77,6 +77,8 @@ class Pair:
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     pairs: dict[str, Pair]
     gains: dict[str, NDArray[np.float64]]  # by surface: (rates, seeds) [1/s]
 

@@ -7,19 +7,28 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed
-from palpate.report import style
 from palpate.thesis.claims import Claim, decided
+from palpate.thesis.divergence_drawing import (
+    DURATION,
+    Array,
+    Course,
+    Loss,
+    causes_panel,
+    gains_panel,
+    loss_panel,
+    steps_panel,
+    times_panel,
+    weights_panel,
+)
 from palpate.thesis.explanations.e2_integrator import PI
-from palpate.thesis.force_panels import PALE, across, legend_inside, panels
+from palpate.thesis.force_panels import across, legend_inside, panels
 from palpate.thesis.force_tracking import FOAM, RELAXING_FOAM, RUBBER, SINE, moved, rougher, since_contact
 from palpate.thesis.runs import Runs
 from palpate.thesis.watching import HOLD, POSES, TORQUE1, TORQUES, Look, hold, layers, watch
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from palpate.controllers.neural import NeuralState
@@ -34,8 +43,6 @@ CAPTION = (
     "against the learning rate, with the plain PI beside; and the growth of the force's output weights "
     "against the number of steps asked for. Last row: what brings the loss forward, and what prevents it."
 )
-DURATION = 240.0
-"""Seconds of contact that count as steady [s]."""
 RELAXING = changed(FOAM, RELAXING_FOAM)
 PARAMETERS: Mapping[str, Experiment] = {"foam that relaxes": RELAXING, "foam": FOAM, "rubber": RUBBER}
 RATES = (1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
@@ -68,38 +75,12 @@ HELD: Mapping[str, slice] = {
     "weights from all torques held at zero": TORQUES,
 }
 """Hidden weights that are not allowed to grow."""
-PARTS = (
-    "hidden, from torques",
-    "hidden, from poses",
-    "hidden thresholds",
-    "output of the force",
-    "output thresholds",
-)
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Course:
-    """A long run: once a second the sizes of the weights, and the gains from the torques to the force."""
-
-    t: Array  # (n,) [s]
-    sizes: Array  # (n, 5), in the order of `PARTS`
-    gains: Array  # (n, 3) [N per N m]
-    lost: float | None  # when contact was lost [s]
-
-
-@dataclass(frozen=True)
-class Loss:
-    """The last moments before a loss."""
-
-    t: Array  # before the loss [s]
-    force: Array  # the network's [N]
-    velocity: Array  # of the tip along x [m/s]
-    true: Array  # contact force [N]
 
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     courses: dict[str, dict[float, list[Course]]]  # by surface and learning rate
     pi: dict[str, list[float | None]]  # times of loss under the PI, by surface
     causes: dict[str, list[float | None]]  # times of loss
@@ -178,103 +159,15 @@ def plot(data: Data) -> Figure:
     """Weights, gains, the loss, times, growth by steps, causes."""
     drawing, grid = panels([2.2, 2.2, 2.2, 3.5], columns=2, width=11.0)
     for axis, name in zip(grid[0], ("foam that relaxes", "foam"), strict=True):
-        _weights_panel(axis, data.courses[name][5e-5][0], name)
+        weights_panel(axis, data.courses[name][5e-5][0], name)
     legend_inside(grid[0][1], loc="upper right", ncols=2)
-    _gains_panel(grid[1][0], data.courses)
-    _loss_panel(grid[1][1], data.loss)
-    _times_panel(grid[2][0], data)
-    _steps_panel(grid[2][1], data.courses["foam that relaxes"])
+    gains_panel(grid[1][0], data.courses)
+    loss_panel(grid[1][1], data.loss)
+    times_panel(grid[2][0], data.courses)
+    steps_panel(grid[2][1], data.courses["foam that relaxes"])
     grid[3][1].remove()
-    _causes_panel(across(grid[3][0]), data.causes)
+    causes_panel(across(grid[3][0]), data.causes)
     return drawing
-
-
-def _weights_panel(axis: Axes, course: Course, name: str) -> None:
-    colors = (style.RED, style.VIOLET, style.GREY, style.BLUE, style.GREEN)
-    for sizes, part, color in zip(course.sizes.T, PARTS, colors, strict=True):
-        axis.plot(course.t, sizes, color=color, linewidth=1.2, label=part)
-    if course.lost is not None:
-        axis.axvline(course.lost, color=style.INK, linestyle="--", linewidth=1)
-    axis.set(xlabel="time since contact [s]", ylabel="size of the weights", ylim=(0.0, 1.05))
-    axis.set_title(f"{name}, eta 5e-5", loc="left", fontsize=9.5)
-
-
-def _gains_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[Course]]]) -> None:
-    for (name, found), color in zip(courses.items(), (style.RED, style.BLUE, style.GREEN), strict=True):
-        course = found[5e-5][0]
-        axis.plot(course.t, np.linalg.norm(course.gains, axis=1), color=color, linewidth=1.2, label=name)
-        if course.lost is not None:
-            axis.plot(
-                course.t[-1],
-                np.linalg.norm(course.gains[-1]),
-                "x",
-                color=color,
-                markersize=9,
-                markeredgewidth=2,
-            )
-    axis.set(xlabel="time since contact [s]", ylabel="gain [N per N m]", ylim=(0.0, 2.9))
-    axis.set_title("from the torques to the network's force, eta 5e-5", loc="left", fontsize=9.5)
-    legend_inside(axis, loc="upper right", ncols=3)
-
-
-def _loss_panel(axis: Axes, loss: Loss | None) -> None:
-    if loss is None:
-        axis.set_axis_off()
-        return
-    axis.plot(loss.t, loss.force, color=style.RED, linewidth=1.4, label="network's force")
-    axis.plot(loss.t, loss.true, color=PALE, linewidth=1.4, label="contact force")
-    axis.plot(loss.t, 200 * loss.velocity, color=style.INK, linewidth=1.1, label="velocity along x")
-    axis.set(xlabel="time before the loss [s]", ylabel="[N], [5 mm/s]", xlim=(loss.t[0], 0.0))
-    axis.set_title("the loss: foam that relaxes, eta 5e-5", loc="left", fontsize=9.5)
-    legend_inside(axis, loc="upper left")
-
-
-def _times_panel(axis: Axes, data: Data) -> None:
-    for (name, found), color, shift in zip(
-        data.courses.items(), (style.RED, style.BLUE, style.GREEN), (1.0, 0.94, 1.06), strict=True
-    ):
-        for rate, courses in found.items():
-            _mark_losses(axis, [rate * shift] * len(courses), [c.lost for c in courses], color)
-        axis.plot([], [], "o", color=color, markersize=4, label=name)
-    axis.plot([], [], "^", color=style.GREY, markersize=5, label=f"kept for {DURATION:g} s, as with PI")
-    axis.set(
-        xscale="log", xlabel="learning rate eta", ylabel="contact lost after [s]", ylim=(0.0, DURATION * 1.08)
-    )
-    legend_inside(axis, loc="center right", bbox_to_anchor=(1.0, 0.62))
-
-
-def _mark_losses(axis: Axes, at: Sequence[float], times: Sequence[float | None], color: str) -> None:
-    for x, lost in zip(at, times, strict=True):
-        axis.plot(
-            x, DURATION if lost is None else lost, "^" if lost is None else "o", color=color, markersize=5
-        )
-
-
-def _steps_panel(axis: Axes, found: Mapping[float, Sequence[Course]]) -> None:
-    colors = ("#08306b", "#1f6fb4", "#4f9bd0", "#8fc1e0", "#bcd9ea")
-    for (rate, courses), color in zip(found.items(), colors, strict=True):
-        one = courses[0]
-        axis.plot(one.t / 2.5, one.sizes[:, 3], color=color, linewidth=1.5, label=f"{rate:g}")
-    axis.set(xlabel="steps of the desired force", ylabel="force's output weights", yscale="log")
-    axis.set_title("growth by steps, foam that relaxes", loc="left", fontsize=9.5)
-    legend_inside(axis, loc="lower right", title="eta", title_fontsize=8)
-
-
-def _causes_panel(axis: Axes, causes: Mapping[str, Sequence[float | None]]) -> None:
-    for i, (name, times) in enumerate(causes.items()):
-        for lost in times:
-            marker, color = (">", style.GREEN) if lost is None else ("o", style.RED)
-            axis.plot(DURATION if lost is None else lost, i, marker, color=color, markersize=6)
-        last = max(DURATION if lost is None else lost for lost in times)
-        side = "right" if last > 0.8 * DURATION else "left"
-        axis.text(last + (-4 if side == "right" else 4), i, name, fontsize=8.5, va="center", ha=side)
-    axis.set_yticks([])
-    axis.invert_yaxis()
-    axis.set(
-        xlim=(0.0, DURATION * 1.02),
-        xlabel=f"contact lost after [s]; at the right edge: kept for {DURATION:g} s",
-    )
-    axis.set_title("foam that relaxes, eta 5e-5, one thing changed at a time", loc="left", fontsize=9.5)
 
 
 def _course(runs: Runs, experiment: Experiment, seed: int) -> Course:

@@ -46,6 +46,8 @@ GONE = 3.8
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     network: dict[str, dict[float, list[Tracking]]]  # by surface and rate
     pi: dict[str, dict[float, Tracking]]
     sizes: dict[tuple[int, ...], list[Tracking]]  # on foam

@@ -51,6 +51,8 @@ class Ends:
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     shown: Slot
     nominal: list[Ends]
     varied: dict[str, list[Ends]]

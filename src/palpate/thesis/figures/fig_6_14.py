@@ -63,6 +63,8 @@ class Course:
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     shown: Slot
     nominal: list[Tracking]
     courses: dict[str, list[Course]]

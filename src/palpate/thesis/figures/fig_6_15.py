@@ -71,6 +71,8 @@ class Errors:
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     shown: Slot
     varied: dict[str, list[Errors]]  # by cause; the first as chosen
 

@@ -48,6 +48,8 @@ SMOOTHED = 0.25
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     tracked: Tracked
     t: NDArray[np.float64]
     away: NDArray[np.float64]  # of the first seed: from the settled cycle, smoothed [N]
