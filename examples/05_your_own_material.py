@@ -1,7 +1,7 @@
 """A material of your own on the bench: a cushion that grows stiffer the deeper it is pressed.
 
-A part is a NamedTuple of numbers with methods of plain arithmetic. It runs as it stands, and compiled: the first run
-of a new part takes some ten seconds for that, the next ones come from the cache.
+A part is a NamedTuple of numbers with methods of plain arithmetic. It runs as it stands, and compiled, which takes
+some ten seconds: once and for all for a part in a module that you import, at each run for one in a script like this.
 """
 
 from typing import NamedTuple
