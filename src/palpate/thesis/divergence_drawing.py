@@ -39,6 +39,8 @@ class Course:
 
 @dataclass(frozen=True)
 class Loss:
+    """What went on in the last moments before contact was lost."""
+
     t: Array  # before the loss [s]
     force: Array  # the network's [N]
     velocity: Array  # of the tip along x [m/s]
