@@ -60,7 +60,7 @@ def measure(
         InputError: the folder holds anything else, and `force` is off.
     """
     state = _state(studies, runs, folder, command, force)
-    _write(state, folder)  # from now on the folder is known for what it is
+    _replace(folder / STATE, _json(state))  # from now on the folder is known for what it is
     for study in studies:
         if study.NUMBER in state.done:
             continue
