@@ -200,6 +200,21 @@ def test_the_stated_interval_covers_the_truth_as_often_as_it_says(pole):
     assert np.all(covered > 0.89), covered
 
 
+def test_the_interval_holds_with_forgetting_too():
+    """Old scores fade with the square of the forgetting factor, as their noise does."""
+    rng = np.random.default_rng(8)
+    z = []
+    for _ in range(300):
+        phi = rng.standard_normal((3000, 3))
+        estimator = RecursiveLeastSquares(np.zeros(3), 1e6 * np.eye(3), 0.998)
+        estimator.update_many(phi, rng.standard_normal(3000))
+        estimate = estimator.estimate()
+        z.append(estimate.theta / estimate.std)
+    # The cautious part knows no fading and is twice too wide: two blocks of it beside some three.
+    spread = np.std(z)
+    assert 0.75 < spread < 1.05, spread
+
+
 def test_little_data_make_a_wide_interval():
     """A moment's data under coloured noise must not look precise."""
     rng = np.random.default_rng(5)
