@@ -1,4 +1,4 @@
-"""The force loop of (4.13), linear and in one direction: a tip of some mass on a spring and a damper, friction left out."""
+"""The force loop of (4.13), linear, in one direction, without friction: a tip on a spring and a damper."""
 
 from __future__ import annotations
 

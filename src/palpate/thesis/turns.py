@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def run_with(
         All rows up to the end, or up to the first number that is none; ``meta["turns"]`` holds the times [s].
     """
     bench = build(experiment)
-    march = _March(bench.loop, start_at(bench.loop, bench.q), np.random.default_rng(seed), waiting)
+    march = _March(bench.loop, start_at(bench.loop, bench.q), np.random.default_rng(seed), waiting)  # type: ignore[no-untyped-call]
     total = round(experiment.run.duration / bench.loop.tick)
     while march.k < total and march.fine and not march.touched:
         march.on(LOOK)
@@ -105,7 +106,8 @@ def other_surface(surface: KelvinVoigt) -> Change:
     """The surface becomes another one under the tip, at the depth at which its spring carries the force of before."""
 
     def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
-        tip = loop.plant.arm.pose(state.plant.q).x
+        arm: Any = loop.plant.arm
+        tip = arm.pose(state.plant.q).x
         deep = state.felt.normal / surface.stiffness
         plant = loop.plant._replace(surface=join(surface), wall=tip - deep)
         touched = state.plant.surface._replace(deflection=deep, internal=0.0)
@@ -131,10 +133,12 @@ def desired_pose(by: Vec3) -> Change:
     """
 
     def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
-        arm, q = loop.plant.arm, state.plant.q
+        arm: Any = loop.plant.arm
+        motion: Any = loop.conditioning.motion
+        q = state.plant.q
         there = arm.inverse(arm.pose(q) - by, 1.0 if q.y >= 0.0 else -1.0)
         past, by_q = state.conditioning, there - q
-        settled = loop.conditioning.motion.start_at(by_q.z)
+        settled = motion.start_at(by_q.z)
         past = past._replace(
             q=past.q + by_q,
             x=past.x - by,

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
-from palpate.bench.sequence import CONTACT, LOST
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
@@ -20,7 +19,6 @@ from palpate.thesis.force_panels import dots_panel, panels
 from palpate.thesis.force_tracking import (
     ENOUGH,
     RELAXING_FOAM,
-    SHARE,
     SHORT,
     VARIED_SEEDS,
     losses,
@@ -29,8 +27,9 @@ from palpate.thesis.force_tracking import (
     since_contact,
     stops_holding,
 )
+from palpate.thesis.regain import Regain, Trace, drawn_back, found_again, regain_panel, regained, trace_of
 from palpate.thesis.runs import Runs
-from palpate.thesis.turns import Turn, run_with, surface_back
+from palpate.thesis.wide_panel import wide_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,10 +38,11 @@ if TYPE_CHECKING:
 NUMBER = "friction-compensation"
 TITLE = "Friction compensation, and contact lost and found again"
 CAPTION = (
-    "The laws of chapter 4 add F_c sgn(q'). Above: 20 N on foam without integral, as the listing compensates (not at all), "
-    "with its blend of 0.002 rad/s made to act, and with one of 0.05. Middle: force error and shaking against the blend; "
-    "grey: what one encoder count a tick amounts to for motors 1 and 2. Below: the error with the blend of 0.05 over the one "
-    "without. Last: the surface is drawn back by 5 mm; the arm waits, looks for it and presses again."
+    "The laws of chapter 4 add F_c sgn(q'). Above: 20 N on foam without integral, as the listing compensates "
+    "(not at all), with its blend of 0.002 rad/s made to act, and with one of 0.05. Middle: force error and "
+    "shaking against the blend; grey: what one encoder count a tick amounts to for motors 1 and 2. Below: "
+    "the error with the blend of 0.05 over the one without. Last: the surface is drawn back by 5 mm; the arm "
+    "waits, looks for it and presses again."
 )
 LEVEL = (3.0, 0.25, 0.03)
 """What is compensated [N m]: the Coulomb levels of the bench; the listing's own are doubtful, see the errata."""
@@ -54,11 +54,6 @@ BLENDS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2)
 RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 HALF, SHAKES = 0.5, 5.0
 """Largest share of the error that is left where compensation works; least ratio of shaking that is called a hammer."""
-LOSS = changed(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
-GONE, BACK, FOUND = 2.5, 0.005, 10.0
-"""When the surface goes [s after contact], how far [m], and within what time it has to be felt again [s]."""
-AGAIN, PEAK = 3.0, 1.25
-"""Seconds from regain to the desired force; largest force on the way, over the desired one."""
 
 Array = NDArray[np.float64]
 
@@ -85,25 +80,6 @@ class Ratio:
 
 
 @dataclass(frozen=True)
-class Regain:
-    took: float  # from loss to contact [s]; infinite if never
-    off: float  # of the force, `AGAIN` seconds later, as a share of the desired one
-    peak: float  # largest true force after the loss, over the desired one
-    times: int  # losses
-
-    @property
-    def well(self) -> bool:
-        return self.times == 1 and self.took <= FOUND and self.off <= SHARE and self.peak <= PEAK
-
-
-@dataclass(frozen=True)
-class Trace:
-    t: Array
-    signal: Array
-    phase: Array
-
-
-@dataclass(frozen=True)
 class Data:
     traces: dict[str, Trace]
     plain: list[Held]
@@ -123,17 +99,17 @@ def run(runs: Runs) -> Data:
     swept = runs.over(cases, _held)
     sweep = [swept[i * len(few) : (i + 1) * len(few)] for i in range(len(BLENDS))]
     traces = {
-        "as printed: never acts": _trace(runs.one(PLAIN)),
-        "blend 0.002 rad/s, acting": _trace(runs.one(_blended(PARAMETERS, PRINTED_BLEND))),
-        "blend 0.05 rad/s": _trace(runs.one(PARAMETERS)),
+        "as printed: never acts": trace_of(runs.one(PLAIN)),
+        "blend 0.002 rad/s, acting": trace_of(runs.one(_blended(PARAMETERS, PRINTED_BLEND))),
+        "blend 0.05 rad/s": trace_of(runs.one(PARAMETERS)),
     }
-    regains = runs.map(lambda seed: _regain(_drawn_back(seed)), list(runs.seeds))
-    return Data(traces, plain, hammer, sweep, _ratios(runs), regains, _trace(_drawn_back(runs.seeds[0])))
+    regains = runs.map(lambda seed: regained(drawn_back(seed)), list(runs.seeds))
+    return Data(traces, plain, hammer, sweep, _ratios(runs), regains, trace_of(drawn_back(runs.seeds[0])))
 
 
 def check(data: Data) -> Sequence[Claim]:
     """The listing's rule; a blend that acts; the blend of the listing, acting; loss and regain."""
-    return [_never(data), _acting(data), _hammer(data), _found_again(data)]
+    return [_never(data), _acting(data), _hammer(data), found_again(data.regains)]
 
 
 def _never(data: Data) -> Claim:
@@ -144,13 +120,17 @@ def _never(data: Data) -> Claim:
         claim="The controllers compensate the Coulomb friction of the joints.",
         thesis="F_c sgn(q') is part of every torque law; the listing blends it through 0.002 rad/s",
         measured=f"largest share of the Coulomb level that the listing's rule applies: {spread(factors)}",
-        tolerance="in 9 of 10 runs the listing's rule, fed with the encoders' rates, reaches 90 % of the level at some tick",
+        tolerance=(
+            "in 9 of 10 runs the listing's rule, fed with the encoders' rates, reaches 90 % of the level at "
+            "some tick"
+        ),
         verdict=decided(sum(f >= 0.9 for f in factors) >= ENOUGH * len(factors)),
         note=(
-            "The listing's factor is the speed over 0.002 rad/s up to that speed, and above it whatever it was before. One "
-            "encoder count in a millisecond is 0.010 rad/s for motor 1 and 0.015 for motor 2: a rate is either zero, which "
-            "makes the factor zero, or beyond the blend, which leaves it zero. It holds for any friction, pose and surface, "
-            "since it is arithmetic. As the text has it, sgn(q') without a blend, it would act: see FRICTION.HAMMER."
+            "The listing's factor is the speed over 0.002 rad/s up to that speed, and above it whatever it "
+            "was before. One encoder count in a millisecond is 0.010 rad/s for motor 1 and 0.015 for motor "
+            "2: a rate is either zero, which makes the factor zero, or beyond the blend, which leaves it "
+            "zero. It holds for any friction, pose and surface, since it is arithmetic. As the text has it, "
+            "sgn(q') without a blend, it would act: see FRICTION.HAMMER."
         ),
     )
 
@@ -162,20 +142,26 @@ def _acting(data: Data) -> Claim:
     return Claim(
         id="FRICTION.BLEND",
         source="eq. 4.13; ours",
-        claim="A compensation whose blend spans several velocity quanta takes away the better part of the force error.",
+        claim=(
+            "A compensation whose blend spans several velocity quanta takes away the better part of the "
+            "force error."
+        ),
         thesis="not tried; 'it is difficult to compensate friction perfectly' (sec. 4.5)",
         measured=(
             f"force error {spread([100 * r.error for r in nominal], '%', 2)} of that without, which is "
             f"{spread([h.error for h in data.plain], 'N')}"
         ),
-        tolerance=f"in 9 of 10 runs with a blend of 0.05 rad/s: contact kept and at most {HALF:.0%} of the error",
+        tolerance=(
+            f"in 9 of 10 runs with a blend of 0.05 rad/s: contact kept and at most {HALF:.0%} of the error"
+        ),
         verdict=decided(sum(r.helps for r in nominal) >= ENOUGH * len(nominal)),
         note=(
-            "Levels known exactly, which nobody has: they are the bench's own. How much is left depends on how the last "
-            "motion ended, since a Coulomb law knows the direction of motion and nothing of friction at rest; of the blends "
-            f"tried {best:g} rad/s left least. With friction half or double, the compensation stays as it is. On the foam that "
-            "relaxes, which damps little, the compensated arm bounces off three times and the run ends (no dot): what it "
-            "takes away had also been damping. With the wall at 0.40 m motor 2 is at its limit. "
+            "Levels known exactly, which nobody has: they are the bench's own. How much is left depends on "
+            "how the last motion ended, since a Coulomb law knows the direction of motion and nothing of "
+            f"friction at rest; of the blends tried {best:g} rad/s left least. With friction half or double, "
+            "the compensation stays as it is. On the foam that relaxes, which damps little, the compensated "
+            "arm bounces off three times and the run ends (no dot): what it takes away had also been "
+            "damping. With the wall at 0.40 m motor 2 is at its limit. "
             f"{stops_holding(data.varied, lambda r: r.helps)}"
         ),
     )
@@ -190,41 +176,21 @@ def _hammer(data: Data) -> Claim:
         claim="Made to act, the listing's blend of 0.002 rad/s shakes the arm.",
         thesis="not said in the thesis",
         measured=(
-            f"true force in the last second shakes by {spread([h.shaking for h in data.printed_blend], 'N', 2)} against "
-            f"{spread(still, 'N', 2)}; error {spread([h.error for h in data.printed_blend], 'N', 2)}"
-        ),
-        tolerance=f"in 9 of 10 runs the force's standard deviation is at least {SHAKES:g} times that without compensation",
-        verdict=decided(sum(s >= SHAKES for s in shares) >= ENOUGH * len(shares)),
-        note=(
-            "Below one velocity quantum the blend is a relay: the encoder's last bit switches the whole Coulomb torque, a "
-            "thousand times a second at worst. That shakes the arm loose, as a dither does, and so leaves little force error, "
-            "at the price of the shaking and of the motors. A real motor's current loop and a real joint's flexibility would "
-            "change the shaking; neither is on the bench."
-        ),
-    )
-
-
-def _found_again(data: Data) -> Claim:
-    found = data.regains
-    return Claim(
-        id="REGAIN",
-        source="ch. 4; ours",
-        claim="Contact that is lost is found again by the approach, and the force comes back.",
-        thesis="position control until 5 N are felt; nothing is said of a loss",
-        measured=(
-            f"felt again after {spread([r.took for r in found], 's')}, off by {spread([100 * r.off for r in found], '%', 2)} "
-            f"{AGAIN:g} s later, largest force {spread([r.peak for r in found])} of the desired one"
+            "true force in the last second shakes by "
+            f"{spread([h.shaking for h in data.printed_blend], 'N', 2)} against {spread(still, 'N', 2)}; "
+            f"error {spread([h.error for h in data.printed_blend], 'N', 2)}"
         ),
         tolerance=(
-            f"in 9 of 10 runs: one loss; contact within {FOUND:g} s; within {SHARE:.0%} of 20 N {AGAIN:g} s later; never more "
-            f"than {PEAK:g} times 20 N"
+            f"in 9 of 10 runs the force's standard deviation is at least {SHAKES:g} times that without "
+            "compensation"
         ),
-        verdict=decided(sum(r.well for r in found) >= ENOUGH * len(found)),
+        verdict=decided(sum(s >= SHAKES for s in shares) >= ENOUGH * len(shares)),
         note=(
-            "What is done at a loss is ours: below zero measured force the arm holds for a second, then approaches "
-            "anew, a millimetre a second, with the 5 N switch as at first. The time is that for the distance, and for the "
-            "millimetres by which friction keeps position control behind. A gap smaller than about the surface's depth is no loss: the "
-            "force loop simply follows. Foam, friction as chosen, one gap; the integral starts anew at each contact."
+            "Below one velocity quantum the blend is a relay: the encoder's last bit switches the whole "
+            "Coulomb torque, a thousand times a second at worst. That shakes the arm loose, as a dither "
+            "does, and so leaves little force error, at the price of the shaking and of the motors. A real "
+            "motor's current loop and a real joint's flexibility would change the shaking; neither is on the "
+            "bench."
         ),
     )
 
@@ -232,11 +198,16 @@ def _found_again(data: Data) -> Claim:
 def plot(data: Data) -> Figure:
     """The press, the blends, the worlds, the loss."""
     drawing, grid = panels([2.3, 2.4, 1.9, 2.2], 2, 11.0)
-    wide = [_wide(drawing, grid[i]) for i in (0, 2, 3)]
+    wide = [wide_panel(drawing, grid[i]) for i in (0, 2, 3)]
     for (name, one), color in zip(data.traces.items(), (style.GREY, style.RED, style.BLUE), strict=True):
         wide[0].plot(one.t, one.signal, color=color, linewidth=1.0, label=name)
     wide[0].axhline(20.0, color=style.ORANGE, linewidth=1.2)
-    wide[0].set(xlabel="time since contact [s]", ylabel="true force [N]", xlim=(0.0, PLAIN.run.press), ylim=(14.0, 23.0))
+    wide[0].set(
+        xlabel="time since contact [s]",
+        ylabel="true force [N]",
+        xlim=(0.0, PLAIN.run.press),
+        ylim=(14.0, 23.0),
+    )
     style.legend(wide[0])
     _blend_panel(grid[1][0], data, lambda h: h.error, "force error [N]")
     _blend_panel(grid[1][1], data, lambda h: h.shaking, "shaking of the force [N]")
@@ -249,20 +220,8 @@ def plot(data: Data) -> Figure:
         label="error left [%]",
         title="with a blend of 0.05 rad/s over without; each dot a run; dashed: half",
     )
-    _regain_panel(wide[2], data.regain)
+    regain_panel(wide[2], data.regain)
     return drawing
-
-
-def _wide(drawing: Figure, row: Sequence[Axes]) -> Axes:
-    spec = row[0].get_gridspec()
-    at = row[0].get_subplotspec().rowspan.start
-    for axis in row:
-        axis.remove()
-    axis = drawing.add_subplot(spec[at, :])
-    axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
-    axis.set_axisbelow(True)
-    axis.spines[["top", "right"]].set_visible(False)
-    return axis
 
 
 def _blend_panel(axis: Axes, data: Data, value: Callable[[Held], float], label: str) -> None:
@@ -270,19 +229,16 @@ def _blend_panel(axis: Axes, data: Data, value: Callable[[Held], float], label: 
         axis.plot([blend] * len(found), [value(h) for h in found], "o", color=style.BLUE, markersize=4)
     axis.axhline(np.median([value(h) for h in data.plain]), color=style.GREY, linewidth=1.2, label="without")
     for i, quantum in enumerate(_quanta()[:2]):
-        axis.axvline(quantum, color=style.GREY, linewidth=0.9, linestyle=":", label="one count a tick" if i == 0 else None)
+        axis.axvline(
+            quantum,
+            color=style.GREY,
+            linewidth=0.9,
+            linestyle=":",
+            label="one count a tick" if i == 0 else None,
+        )
     axis.set_xscale("log")
     axis.set_ylim(bottom=0.0)
     axis.set(xlabel="blend [rad/s]", ylabel=label)
-    style.legend(axis)
-
-
-def _regain_panel(axis: Axes, one: Trace) -> None:
-    axis.plot(one.t, one.signal, color=style.BLUE, linewidth=1.1, label="true force")
-    away = (one.phase != CONTACT).astype(float)
-    shade = {"transform": axis.get_xaxis_transform(), "color": "#eeeeee", "linewidth": 0}
-    axis.fill_between(one.t, 0.0, 1.0, where=away > 0, label="lost, waiting, looking", **shade)
-    axis.set(xlabel="time since contact [s]", ylabel="true force [N]", xlim=(0.0, LOSS.run.press), ylim=(-0.5, 24.0))
     style.legend(axis)
 
 
@@ -310,7 +266,9 @@ def _worlds() -> dict[str, Mapping[str, Any]]:
 
 def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
     named = [
-        (n, c, s) for n, c in _worlds().items() for s in (runs.seeds if n == "foam" else runs.seeds[:VARIED_SEEDS])
+        (n, c, s)
+        for n, c in _worlds().items()
+        for s in (runs.seeds if n == "foam" else runs.seeds[:VARIED_SEEDS])
     ]
     without = runs.over([(changed(PLAIN, c), s) for _, c, s in named], _held)
     found = runs.over([(changed(PARAMETERS, c), s) for _, c, s in named], lambda r: (_held(r), losses(r)))
@@ -339,27 +297,3 @@ def _listing_factor(record: Record) -> float:
         inside = speed[speed <= PRINTED_BLEND]  # elsewhere the factor stays what it was
         largest = max(largest, float(inside.max(initial=0.0)) / PRINTED_BLEND)
     return largest
-
-
-def _drawn_back(seed: int) -> Record:
-    return run_with(LOSS, seed, [Turn(GONE, surface_back(BACK))])
-
-
-def _regain(record: Record) -> Regain:
-    t, phase, force = since_contact(record), record["phase"], record["force"]
-    lost = np.flatnonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT)) + 1
-    if not len(lost):
-        return Regain(np.inf, np.inf, np.inf, 0)
-    after = np.flatnonzero((phase == CONTACT) & (t > t[lost[0]]))
-    if not len(after):
-        return Regain(np.inf, np.inf, np.inf, len(lost))
-    regained = t[after[0]]
-    late = (t >= regained + AGAIN - 0.1) & (t < regained + AGAIN + 0.1)
-    off = abs(float(force[late].mean()) / 20.0 - 1.0) if late.any() else np.inf
-    return Regain(float(regained - t[lost[0]]), off, float(force[lost[0] :].max()) / 20.0, len(lost))
-
-
-def _trace(record: Record) -> Trace:
-    t = since_contact(record)
-    shown = t >= 0.0
-    return Trace(t[shown], record["force"][shown], record["phase"][shown])

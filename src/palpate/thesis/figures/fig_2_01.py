@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate._vector import Vec3
-from palpate.bench import Experiment, changed, load
+from palpate.bench import changed, load
 from palpate.controllers import RaibertCraig
 from palpate.controllers.raibert_craig import growth_rate
 from palpate.records import Record
@@ -30,6 +30,7 @@ from palpate.thesis.force_tracking import (
     stops_holding,
 )
 from palpate.thesis.runs import Runs
+from palpate.thesis.wide_panel import wide_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,14 +39,15 @@ if TYPE_CHECKING:
 NUMBER = "2.1"
 TITLE = "The original hybrid controller, and the one with dynamics"
 CAPTION = (
-    "The thesis' figure is the block diagram of Raibert and Craig's controller, of which the text says that it has some "
-    "problems and leaves out the robot's dynamics. Above: steps of force on foam under it and under (4.13), with equal "
-    "force gains. Lower left: how fast the original's position loop grows by itself over the arm's workspace (angle 0, "
-    "elbow to the left); (4.13) grows nowhere. Lower right: how far steps of force turn the tip, original over (4.13)."
+    "The thesis' figure is the block diagram of Raibert and Craig's controller, of which the text says that "
+    "it has some problems and leaves out the robot's dynamics. Above: steps of force on foam under it and "
+    "under (4.13), with equal force gains. Lower left: how fast the original's position loop grows by itself "
+    "over the arm's workspace (angle 0, elbow to the left); (4.13) grows nowhere. Lower right: how far steps "
+    "of force turn the tip, original over (4.13)."
 )
 PARAMETERS = changed(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
 DYNAMIC = {"controller": {"kind": "proportional-integral", "kp": 400.0, "kv": 80.0, "kf": 1.0, "ki": 3.0}}
-"""(4.13) with the thesis' gains on foam; the original's force gains are these, its joints' 400 and 80 times their inertia."""
+"""(4.13) with the thesis' gains on foam; the original: the same for the force, 400 and 80 inertias for its joints."""
 RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 STEPS = (2.5, 5.0, 7.5)
 WORSE = 1.5
@@ -103,7 +105,9 @@ def run(runs: Runs) -> Data:
     """Both laws in each world; the original's growth at each posture."""
     worlds = {name: changed(PARAMETERS, changes) for name, changes in _changes().items()}
     named = [
-        (n, (e, s)) for n, e in worlds.items() for s in (runs.seeds if n == "foam" else runs.seeds[:VARIED_SEEDS])
+        (n, (e, s))
+        for n, e in worlds.items()
+        for s in (runs.seeds if n == "foam" else runs.seeds[:VARIED_SEEDS])
     ]
     original = runs.over([case for _, case in named], _measured)
     dynamic = runs.over([(changed(e, DYNAMIC), s) for _, (e, s) in named], _measured)
@@ -132,18 +136,24 @@ def _problems(data: Data) -> Claim:
         claim="The original hybrid controller has some problems.",
         thesis="some problems, two papers cited; not said which",
         measured=(
-            f"its position loop is unstable in {share:.1%} of the {reach.sum()} postures on a grid over the workspace, in "
-            f"{always:.1%} with a tenth and with ten times the gains as well; fastest {np.nanmax(data.growth):.3g} per second"
+            f"its position loop is unstable in {share:.1%} of the {reach.sum()} postures on a grid over the "
+            f"workspace, in {always:.1%} with a tenth and with ten times the gains as well; fastest "
+            f"{np.nanmax(data.growth):.3g} per second"
         ),
-        tolerance=f"there is a reachable posture at which it grows by more than {GROWS:g} per second, whatever the gain",
+        tolerance=(
+            f"there is a reachable posture at which it grows by more than {GROWS:g} per second, whatever the "
+            "gain"
+        ),
         verdict=decided(always > 0.0),
         note=(
-            "Errors are selected at the tip and carried to the joints by J^-1, and each joint then pulls by itself: where "
-            "inertia couples the joints against the selection, the position loop feeds itself. An and Hollerbach called it "
-            "kinematic instability; that this is the problem the thesis means is our reading. It lies where the arm is "
-            "nearly stretched. On the line y = 0, where the experiments are, "
+            "Errors are selected at the tip and carried to the joints by J^-1, and each joint then pulls by "
+            "itself: where inertia couples the joints against the selection, the position loop feeds itself. "
+            "An and Hollerbach called it kinematic instability; that this is the problem the thesis means is "
+            "our reading. It lies where the arm is nearly stretched. On the line y = 0, where the "
+            "experiments are, "
             + ("it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too")
-            + ". Linear, at rest, at angle 0, without friction, which would hide a slow growth; the force loop is left out."
+            + ". Linear, at rest, at angle 0, without friction, which would hide a slow growth; the force loop is left "
+            "out."
         ),
     )
 
@@ -169,20 +179,23 @@ def _dynamics(data: Data) -> Claim:
         measured=(
             f"overshoot {spread([100 * p.original.overshoot for p in foam], '%', 2)} of the step against "
             f"{spread([100 * p.dynamic.overshoot for p in foam], '%', 2)}; the angle strays by "
-            f"{spread([p.original.phi for p in foam], 'degrees', 2)} against {spread([p.dynamic.phi for p in foam], 'degrees', 2)}"
+            f"{spread([p.original.phi for p in foam], 'degrees', 2)} against "
+            f"{spread([p.dynamic.phi for p in foam], 'degrees', 2)}"
         ),
         tolerance=(
-            f"in 9 of 10 runs on foam both the force's overshoot and the angle's stray after steps of 10 N are at least "
-            f"{WORSE:g} times those under (4.13) with equal force gains"
+            "in 9 of 10 runs on foam both the force's overshoot and the angle's stray after steps of 10 N "
+            f"are at least {WORSE:g} times those under (4.13) with equal force gains"
         ),
         verdict=decided(sum(p.worse for p in foam) >= ENOUGH * len(foam)),
         note=(
-            "The thesis shows no comparison. The force overshoots as expected: without the inertia's couplings, the joints' "
-            "pull for y and angle acts on x as well. But the angle strays less than under (4.13), not more: the wrist's friction "
-            "holds the angle, and against it the original pulls with 1.7 N m/rad at the wrist, (4.13) with 0.4, and the wrong "
-            "way, counting on its model of the inertia to make up for it. At speeds this low dynamics count for little. Where a run lost contact the original counts as worse. Its gains are "
-            "400 and 80 times each joint's own inertia where the arm starts: another choice gives another result. "
-            f"{_lost(data)} {stops_holding(data.varied, lambda p: p.worse)}"
+            "The thesis shows no comparison. The force overshoots as expected: without the inertia's "
+            "couplings, the joints' pull for y and angle acts on x as well. But the angle strays less than "
+            "under (4.13), not more: the wrist's friction holds the angle, and against it the original pulls "
+            "with 1.7 N m/rad at the wrist, (4.13) with 0.4, and the wrong way, counting on its model of the "
+            "inertia to make up for it. At speeds this low dynamics count for little. Where a run lost "
+            "contact the original counts as worse. Its gains are 400 and 80 times each joint's own inertia "
+            f"where the arm starts: another choice gives another result. {_lost(data)} "
+            f"{stops_holding(data.varied, lambda p: p.worse)}"
         ),
     )
 
@@ -191,7 +204,7 @@ def plot(data: Data) -> Figure:
     """Force and angle over time, the map, and the runs."""
     drawing, grid = panels([2.5, 1.7, 3.0], 2, 11.0)
     for row, name in zip(grid[:2], ("force", "phi"), strict=True):
-        _over_time(_wide(drawing, row), data, name)
+        _over_time(wide_panel(drawing, row), data, name)
     _map_panel(drawing, grid[2][0], data)
     dots_panel(
         grid[2][1],
@@ -203,18 +216,6 @@ def plot(data: Data) -> Figure:
         title="stray of the angle; green: worse in this and in overshoot",
     )
     return drawing
-
-
-def _wide(drawing: Figure, row: Sequence[Axes]) -> Axes:
-    spec = row[0].get_gridspec()
-    at = row[0].get_subplotspec().rowspan.start
-    for axis in row:
-        axis.remove()
-    axis = drawing.add_subplot(spec[at, :])
-    axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
-    axis.set_axisbelow(True)
-    axis.spines[["top", "right"]].set_visible(False)
-    return axis
 
 
 def _over_time(axis: Axes, data: Data, name: str) -> None:
@@ -235,7 +236,9 @@ def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
     mesh = axis.pcolormesh(XS, YS, shown, cmap="OrRd", vmin=0.0, vmax=20.0, shading="nearest")
     drawing.colorbar(mesh, ax=axis, pad=0.02, label="[1/s], up to 20 and more")
     axis.plot([0.40, 0.49], [0.0, 0.0], color=style.BLUE, linewidth=2.5)
-    axis.annotate("experiments", (0.40, 0.0), (-22, -14), textcoords="offset points", fontsize=8.5, color=style.BLUE)
+    axis.annotate(
+        "experiments", (0.40, 0.0), (-22, -14), textcoords="offset points", fontsize=8.5, color=style.BLUE
+    )
     axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axis.set_title("growth of the original", loc="left", fontsize=9.5)
 
@@ -254,7 +257,8 @@ def _changes() -> dict[str, Mapping[str, Any]]:
 
 def _growth(gain: float, where: NDArray[np.bool_]) -> Array:
     """Of the original's position loop, its stiffness times `gain`, over YS and XS [1/s]; NaN elsewhere."""
-    arm, into = Arm3(), Vec3(1.0, 0.0, 0.0)
+    arm: Any = Arm3()
+    into = Vec3(1.0, 0.0, 0.0)
     table: Any = PARAMETERS.controller
     stiffness, damping = (
         k * Vec3(*map(float, v)) for k, v in ((gain, table.stiffness), (np.sqrt(gain), table.damping))
@@ -288,4 +292,6 @@ def _measured(record: Record) -> Pressed:
 def _trace(record: Record) -> Trace:
     t = since_contact(record)
     shown = t >= 0.0
-    return Trace(t[shown], record["force"][shown], record["force_desired"][shown], np.degrees(record["phi"][shown]))
+    return Trace(
+        t[shown], record["force"][shown], record["force_desired"][shown], np.degrees(record["phi"][shown])
+    )

@@ -39,10 +39,10 @@ if TYPE_CHECKING:
 NUMBER = "2.2"
 TITLE = "Impedance control: the mass, damper and spring asked for, and those found"
 CAPTION = (
-    "The thesis' figure is a drawing of a mass, a damper and a spring. Here the arm is told to be 5 kg, 600 N s/m and "
-    "2000 N/m (2.3), and the depth to which it is drawn into the foam jumps each second. Above: the true force, and that of "
-    "the target impedance itself on the same foam, with friction as chosen and with hardly any. Below: spring, damper and "
-    "mass found from true position and force, over the target's."
+    "The thesis' figure is a drawing of a mass, a damper and a spring. Here the arm is told to be 5 kg, 600 "
+    "N s/m and 2000 N/m (2.3), and the depth to which it is drawn into the foam jumps each second. Above: "
+    "the true force, and that of the target impedance itself on the same foam, with friction as chosen and "
+    "with hardly any. Below: spring, damper and mass found from true position and force, over the target's."
 )
 DEPTHS = (0.0090, 0.0050, 0.0080, 0.0040, 0.0095, 0.0060, 0.0085, 0.0045)
 """Of the desired x beyond the wall [m], a second each; within what motor 2 can press on rubber."""
@@ -95,13 +95,19 @@ class Data:
 def run(runs: Runs) -> Data:
     """Jumps of the desired depth on foam and rubber, and under what is varied."""
     worlds = _worlds()
-    named = [(n, e, s) for n, e in worlds.items() for s in (runs.seeds if n in _ALL else runs.seeds[:VARIED_SEEDS])]
+    named = [
+        (n, e, s) for n, e in worlds.items() for s in (runs.seeds if n in _ALL else runs.seeds[:VARIED_SEEDS])
+    ]
     found = runs.map(lambda case: _found(_record(*case[1:])), named)
     varied: dict[str, list[Found]] = {}
     for (name, _, _), one in zip(named, found, strict=True):
         varied.setdefault(name, []).append(one)
     rough, free = (_record(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
-    traces = {"with friction": _trace(rough), "hardly any friction": _trace(free), "target impedance": _ideal()}
+    traces = {
+        "with friction": _trace(rough),
+        "hardly any friction": _trace(free),
+        "target impedance": _ideal(),
+    }
     return Data(traces, varied)
 
 
@@ -113,18 +119,19 @@ def check(data: Data) -> Sequence[Claim]:
 _WORDS = {"K": "spring", "B": "damper", "M": "mass"}
 _WHY = {
     "K": (
-        "In steady state the force is K times the displacement, less what friction holds: some 2 N along x, as much as a "
-        "millimetre of this spring. The tip stops anywhere within that band, so the slope over the ends of the intervals "
-        "comes out flat. Impedance control measures the force, but (2.3) has no integral that would find friction out."
+        "In steady state the force is K times the displacement, less what friction holds: some 2 N along x, "
+        "as much as a millimetre of this spring. The tip stops anywhere within that band, so the slope over "
+        "the ends of the intervals comes out flat. Impedance control measures the force, but (2.3) has no "
+        "integral that would find friction out."
     ),
     "B": (
-        "Friction of the joints before they slide is a damper of its own, and after that it withholds force from each "
-        "motion: both look like more damping. Without it, the damper is near its target."
+        "Friction of the joints before they slide is a damper of its own, and after that it withholds force "
+        "from each motion: both look like more damping. Without it, the damper is near its target."
     ),
     "M": (
-        "The velocity is filtered at 35 Hz and comes 7 ms late, and a late damper is a damper and a negative mass: M less "
-        "B times the lag, 5 - 600 x 0.007 = 0.8 kg. That holds without friction; with it, the fit has no mass left to find. "
-        "A target with less damping would keep more of its mass."
+        "The velocity is filtered at 35 Hz and comes 7 ms late, and a late damper is a damper and a negative "
+        "mass: M less B times the lag, 5 - 600 x 0.007 = 0.8 kg. That holds without friction; with it, the "
+        "fit has no mass left to find. A target with less damping would keep more of its mass."
     ),
 }
 
@@ -140,13 +147,16 @@ def _claim(data: Data, name: str) -> Claim:
         thesis="the relation between force and displacement is controlled to satisfy (2.2)",
         measured=(
             f"of the target: foam {spread([100 * getattr(f, name) for f in data.foam], '%', 3)}, rubber "
-            f"{spread([100 * getattr(f, name) for f in data.rubber], '%', 3)}; with hardly any friction {spread(free, '%', 3)}"
+            f"{spread([100 * getattr(f, name) for f in data.rubber], '%', 3)}; with hardly any friction "
+            f"{spread(free, '%', 3)}"
         ),
-        tolerance=f"in 9 of 10 runs on each surface: contact kept, and within {TOLERANCES[name]:.0%} of the target",
+        tolerance=(
+            f"in 9 of 10 runs on each surface: contact kept, and within {TOLERANCES[name]:.0%} of the target"
+        ),
         verdict=decided(min(good) >= ENOUGH * len(both) / 2),
         note=(
-            "The thesis only cites impedance control; it reports no experiment with it, and the target's numbers are ours. "
-            f"{_WHY[name]} {stops_holding(data.varied, lambda f: f.within(name))}"
+            "The thesis only cites impedance control; it reports no experiment with it, and the target's "
+            f"numbers are ours. {_WHY[name]} {stops_holding(data.varied, lambda f: f.within(name))}"
         ),
     )
 
@@ -172,7 +182,10 @@ def _share_panel(axis: Axes, data: Data, name: str) -> None:
         lambda f: f.within(name),
         limit=100.0,
         label=f"{name} [%]",
-        title=f"{_WORDS[name]} found, over the target's; green: within {TOLERANCES[name]:.0%}; dashed: the target",
+        title=(
+            f"{_WORDS[name]} found, over the target's; green: within {TOLERANCES[name]:.0%}; dashed: the "
+            "target"
+        ),
     )
     values = [100 * getattr(f, name) for runs in data.varied.values() for f in runs]
     axis.set_ylim(min(0.0, 1.1 * min(values)), 1.1 * max(120.0, *values))
@@ -250,4 +263,4 @@ def _ideal() -> Trace:
     t = np.arange(len(DEPTHS) * 1000) * 1e-3
     depth = np.repeat(DEPTHS, 1000)
     _, out, _ = lsim(system, depth, t, X0=[TARGET["K"] * DEPTHS[0] / k, 0.0], interp=False)
-    return Trace(t, out)
+    return Trace(t.astype(np.float64), np.asarray(out, dtype=np.float64))

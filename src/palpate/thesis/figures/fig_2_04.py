@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import dots_panel, panels
 from palpate.thesis.force_tracking import ENOUGH, LIMIT, SETTLE, SHARE, VARIED_SEEDS, rms, stops_holding
 from palpate.thesis.runs import Runs
+from palpate.thesis.wide_panel import wide_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,10 +30,11 @@ if TYPE_CHECKING:
 NUMBER = "2.4"
 TITLE = "Direct neural force control of one joint (figures 2.3 and 2.4)"
 CAPTION = (
-    "Joint 2 of the arm alone, its lever on foam. A network of 4-6-1 neurons sees the desired force, the measured one, that "
-    "of the tick before and its own torque, gives the torque, and learns each millisecond from the force's error; nothing "
-    "else controls. Above: its first fifteen seconds. Left: the error against the learning rate; right: at the chosen rate, "
-    "over surfaces, friction and weights. The thesis says that Yabuta and Yamada proposed this and tested it by experiment."
+    "Joint 2 of the arm alone, its lever on foam. A network of 4-6-1 neurons sees the desired force, the "
+    "measured one, that of the tick before and its own torque, gives the torque, and learns each millisecond "
+    "from the force's error; nothing else controls. Above: its first fifteen seconds. Left: the error "
+    "against the learning rate; right: at the chosen rate, over surfaces, friction and weights. The thesis "
+    "says that Yabuta and Yamada proposed this and tested it by experiment."
 )
 
 
@@ -48,6 +51,7 @@ class World:
 
 FOAM, RUBBER = World(KelvinVoigt(5200.0, 200.0, 0.10)), World(KelvinVoigt(34500.0, 480.0, 0.05))
 RATE = 5e-5
+_RUBS: Any = JOINT_FRICTION
 PARAMETERS = {
     "rate": RATE,
     "hidden": 6,
@@ -56,8 +60,8 @@ PARAMETERS = {
         "foam": FOAM,
         "rubber": RUBBER,
         "relaxing\nfoam": World(StandardLinearSolid(5600.0, 13.0, 0.02, 6900.0, 0.23)),
-        "friction\nhalf": World(FOAM.surface, JOINT_FRICTION.scaled(0.5)),
-        "friction\ndouble": World(FOAM.surface, JOINT_FRICTION.scaled(2.0)),
+        "friction\nhalf": World(FOAM.surface, _RUBS.scaled(0.5)),
+        "friction\ndouble": World(FOAM.surface, _RUBS.scaled(2.0)),
         "noise\ndouble": World(FOAM.surface, noise=1.2),
         "inputs\nin N": World(FOAM.surface, force=1.0),
     },
@@ -68,8 +72,9 @@ DURATION, FROM = 15.0, 10.0
 SAME = 0.10
 """How near the integral's error has to be to the network's."""
 FOLLOWS = (
-    f"in 9 of 10 runs on each surface, from {FROM:g} to {DURATION:g} s: RMS of the true force's error at most {LIMIT:g} N "
-    f"outside the first {SETTLE:g} s after each step, mean error in the last second of each interval at most {SHARE:.0%}"
+    f"in 9 of 10 runs on each surface, from {FROM:g} to {DURATION:g} s: RMS of the true force's error at "
+    f"most {LIMIT:g} N outside the first {SETTLE:g} s after each step, mean error in the last second of each "
+    f"interval at most {SHARE:.0%}"
 )
 
 Array = NDArray[np.float64]
@@ -102,19 +107,20 @@ def run(runs: Runs) -> Data:
     worlds: dict[str, World] = PARAMETERS["worlds"]  # type: ignore[assignment]
     two = {"foam": FOAM, "rubber": RUBBER}
     pressed = {
-        name: runs.map(lambda seed, w=world: _neural(w, RATE, seed), _seeds(runs, name))
-        for name, world in worlds.items()
+        name: runs.map(partial(_neural, world, RATE), _seeds(runs, name)) for name, world in worlds.items()
     }
     integral = {
-        name: runs.map(lambda case, w=world: _integral(w, *case), list(zip(pressed[name], runs.seeds, strict=True)))
+        name: runs.map(partial(_integral, world), list(zip(pressed[name], runs.seeds, strict=True)))
         for name, world in two.items()
     }
     rates = {
-        name: [runs.map(lambda seed, w=world, r=rate: _neural(w, r, seed), runs.seeds[:VARIED_SEEDS]) for rate in RATES]
+        name: [runs.map(partial(_neural, world, rate), runs.seeds[:VARIED_SEEDS]) for rate in RATES]
         for name, world in two.items()
     }
-    record = one_joint(FOAM.surface, _network(FOAM, RATE, runs.seeds[0]), _schedule()).run(DURATION, runs.seeds[0])
-    return Data(record.columns, pressed, integral, rates)
+    record = one_joint(FOAM.surface, _network(FOAM, RATE, runs.seeds[0]), _schedule()).run(
+        DURATION, runs.seeds[0]
+    )
+    return Data(dict(record.columns), pressed, integral, rates)
 
 
 def check(data: Data) -> Sequence[Claim]:
@@ -125,7 +131,8 @@ def check(data: Data) -> Sequence[Claim]:
 def _follows(data: Data) -> Claim:
     both = {n: data.worlds[n] for n in ("foam", "rubber")}
     told = "; ".join(
-        f"{n}: RMS {spread([p.settled for p in v], 'N')}, interval ends off by {spread([100 * p.off for p in v], '%', 2)}"
+        f"{n}: RMS {spread([p.settled for p in v], 'N')}, interval ends off by "
+        f"{spread([100 * p.off for p in v], '%', 2)}"
         for n, v in both.items()
     )
     slow = _span(data)
@@ -138,17 +145,21 @@ def _follows(data: Data) -> Claim:
         tolerance=FOLLOWS,
         verdict=decided(all(sum(p.follows for p in v) >= ENOUGH * len(v) for v in both.values())),
         note=(
-            "The thesis only cites this, so inputs, size and rate are ours; 5e-5 is the rate of its own neural controller. "
-            f"Rates from {slow[0]:g} to {slow[1]:g} follow on both surfaces: slower ones have not learned enough within ten "
-            "seconds, faster ones oscillate against the motor's limit, since the gain grows with the weights. The network "
-            "knows one thing of the plant, that more torque presses harder, and no Jacobian is needed for a sign. "
+            "The thesis only cites this, so inputs, size and rate are ours; 5e-5 is the rate of its own "
+            f"neural controller. Rates from {slow[0]:g} to {slow[1]:g} follow on both surfaces: slower ones "
+            "have not learned enough within ten seconds, faster ones oscillate against the motor's limit, "
+            "since the gain grows with the weights. The network knows one thing of the plant, that more "
+            "torque presses harder, and no Jacobian is needed for a sign. "
             f"{stops_holding(data.worlds, lambda p: p.follows)}"
         ),
     )
 
 
 def _is_integral(data: Data) -> Claim:
-    shares = {n: [b.rms / a.rms for a, b in zip(data.worlds[n], data.integral[n], strict=True)] for n in data.integral}
+    shares = {
+        n: [b.rms / a.rms for a, b in zip(data.worlds[n], data.integral[n], strict=True)]
+        for n in data.integral
+    }
     gains = [p.gain for n in data.integral for p in data.worlds[n]]
     return Claim(
         id="YY.INTEGRAL",
@@ -156,20 +167,22 @@ def _is_integral(data: Data) -> Claim:
         claim="To first order it is an integral controller of the gain that its weights give it.",
         thesis="not said in the thesis",
         measured=(
-            "; ".join(f"{n}: {spread([100 * s for s in v], '%', 3)} of the network's RMS" for n, v in shares.items())
+            "; ".join(
+                f"{n}: {spread([100 * s for s in v], '%', 3)} of the network's RMS" for n, v in shares.items()
+            )
             + f"; gain {spread(gains, 'N per N and second')}"
         ),
         tolerance=(
-            f"in 9 of 10 runs on each surface: a plain integral of the network's mean gain from {FROM:g} s on has its RMS "
-            f"error, steps included, within {SAME:.0%}"
+            f"in 9 of 10 runs on each surface: a plain integral of the network's mean gain from {FROM:g} s "
+            f"on has its RMS error, steps included, within {SAME:.0%}"
         ),
         verdict=decided(all(sum(abs(s - 1) <= SAME for s in v) >= ENOUGH * len(v) for v in shares.values())),
         note=(
-            "Each step of learning adds to the torque in proportion to the force error: that is an integral, its gain the "
-            "learning rate times what the network's own sensitivities add up to. Where the integral does not match, the "
-            "network's other terms show: it sees the desired force, so once trained a step of it changes the torque at "
-            "once, which an integral cannot do, and its gain changes with what it has learned. The same in three joints: "
-            "see neural-is-an-integrator."
+            "Each step of learning adds to the torque in proportion to the force error: that is an integral, "
+            "its gain the learning rate times what the network's own sensitivities add up to. Where the "
+            "integral does not match, the network's other terms show: it sees the desired force, so once "
+            "trained a step of it changes the torque at once, which an integral cannot do, and its gain "
+            "changes with what it has learned. The same in three joints: see neural-is-an-integrator."
         ),
     )
 
@@ -177,11 +190,7 @@ def _is_integral(data: Data) -> Claim:
 def plot(data: Data) -> Figure:
     """The force and the gain over time; the error over rates and worlds."""
     drawing, grid = panels([2.6, 2.6], 2, 11.0)
-    for axis in grid[0]:
-        axis.remove()
-    force = drawing.add_subplot(grid[0][0].get_gridspec()[0, :])
-    force.grid(visible=True, color="#e6e6e6", linewidth=0.8)
-    force.spines[["top", "right"]].set_visible(False)
+    force = wide_panel(drawing, grid[0])
     c = data.record
     force.plot(c["t"], c["force"], color=style.BLUE, linewidth=1.1, label="true force")
     force.plot(c["t"], c["force_desired"], color=style.ORANGE, linewidth=1.2, label="desired")
@@ -203,7 +212,9 @@ def plot(data: Data) -> Figure:
 
 def _rate_panel(axis: Axes, data: Data) -> None:
     for (name, found), color in zip(data.rates.items(), (style.BLUE, style.ORANGE), strict=True):
-        axis.loglog(RATES, [np.median([p.settled for p in v]) for v in found], color=color, linewidth=1.2, label=name)
+        axis.loglog(
+            RATES, [np.median([p.settled for p in v]) for v in found], color=color, linewidth=1.2, label=name
+        )
         for rate, v in zip(RATES, found, strict=True):
             axis.plot([rate] * len(v), [p.settled for p in v], "o", color=color, markersize=3)
     axis.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
@@ -216,7 +227,9 @@ def _rate_panel(axis: Axes, data: Data) -> None:
 def _span(data: Data) -> tuple[float, float]:
     """The first and the last of the rates that follow on both surfaces; NaN if none does."""
     good = [
-        rate for i, rate in enumerate(RATES) if all(p.follows for found in data.rates.values() for p in found[i])
+        rate
+        for i, rate in enumerate(RATES)
+        if all(p.follows for found in data.rates.values() for p in found[i])
     ]
     return (min(good), max(good)) if good else (float("nan"), float("nan"))
 
@@ -240,10 +253,13 @@ def _neural(world: World, rate: float, seed: int) -> Pressed:
     return _measured(bench.run(DURATION, seed), bench.loop.joint.lever)
 
 
-def _integral(world: World, network: Pressed, seed: int) -> Pressed:
+def _integral(world: World, case: tuple[Pressed, int]) -> Pressed:
+    network, seed = case
     lever = 0.113
     controller = DirectIntegral(network.gain * 1e-3 * lever)
-    bench = one_joint(world.surface, controller, _schedule(), friction=world.friction, noise=world.noise, lever=lever)
+    bench = one_joint(
+        world.surface, controller, _schedule(), friction=world.friction, noise=world.noise, lever=lever
+    )
     return _measured(bench.run(DURATION, seed), lever)
 
 

@@ -41,13 +41,15 @@ if TYPE_CHECKING:
 NUMBER = "2.5"
 TITLE = "Indirect scheme: a network tunes the gains"
 CAPTION = (
-    "The PID on the force whose gains a network tunes. At the dotted line the foam turns into rubber under the tip. Middle: "
-    "the three gains, over the value that they start about. Below: the error from 7.5 to 12.5 s after contact, for "
-    "several surfaces and poses. The thesis says of Fukuda's controllers that simulation and experiment show them robust "
-    "to a change of the environment's dynamics and of the arm's configuration."
+    "The PID on the force whose gains a network tunes. At the dotted line the foam turns into rubber under "
+    "the tip. Middle: the three gains, over the value that they start about. Below: the error from 7.5 to "
+    "12.5 s after contact, for several surfaces and poses. The thesis says of Fukuda's controllers that "
+    "simulation and experiment show them robust to a change of the environment's dynamics and of the arm's "
+    "configuration."
 )
 PARAMETERS = changed(
-    load("foam-self-tuning"), {**SHORT, "run.press": 12.5, "force.first": 20.0, "force.second": 10.0, "force.period": 2.5}
+    load("foam-self-tuning"),
+    {**SHORT, "run.press": 12.5, "force.first": 20.0, "force.second": 10.0, "force.period": 2.5},
 )
 RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 UNDER = KelvinVoigt(34500.0, 480.0, 0.05)
@@ -102,11 +104,11 @@ def _environment(data: Data) -> Claim:
         tolerance=f"on foam, on rubber and after foam turned into rubber, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(_follow(f) for f in found.values())),
         note=(
-            "The thesis only cites this; architecture, learning rule and numbers are ours: three gains between 0 and twice "
-            "a middle value, tuned down the squared force error with the force taken to answer the command one to one. "
-            "Robust it is, but so is the same PID with its gains left alone: it follows in "
-            f"{_kept(data.fixed)} of the {len(data.fixed)} worlds below, and the learning one in {_kept(data.tuned)}. "
-            f"{stops_holding({**data.tuned, **found}, lambda f: f.follows)}"
+            "The thesis only cites this; architecture, learning rule and numbers are ours: three gains "
+            "between 0 and twice a middle value, tuned down the squared force error with the force taken to "
+            "answer the command one to one. Robust it is, but so is the same PID with its gains left alone: "
+            f"it follows in {_kept(data.fixed)} of the {len(data.fixed)} worlds below, and the learning one "
+            f"in {_kept(data.tuned)}. {stops_holding({**data.tuned, **found}, lambda f: f.follows)}"
         ),
     )
 
@@ -123,9 +125,10 @@ def _configuration(data: Data) -> Claim:
         tolerance=f"with the wall at 0.40, 0.465 and 0.49 m on foam, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(_follow(f) for f in found.values())),
         note=(
-            "The law divides by the arm's inertia and uses its Jacobian, so the pose changes friction's share of the force "
-            "and little else. With the wall at 0.40 m the force comes from a longer lever, and motor 2 is at its limit "
-            f"{reach} of the time below 20 N: no gain can help there. {stops_holding(found, lambda f: f.follows)}"
+            "The law divides by the arm's inertia and uses its Jacobian, so the pose changes friction's "
+            "share of the force and little else. With the wall at 0.40 m the force comes from a longer "
+            f"lever, and motor 2 is at its limit {reach} of the time below 20 N: no gain can help there. "
+            f"{stops_holding(found, lambda f: f.follows)}"
         ),
     )
 
@@ -136,16 +139,20 @@ def _network(data: Data) -> Claim:
     return Claim(
         id="FUK.NETWORK",
         source="fig. 2.5; ours",
-        claim="It is the tuning that makes it so: with the gains of the start left alone the force follows less well.",
+        claim=(
+            "It is the tuning that makes it so: with the gains of the start left alone the force follows "
+            "less well."
+        ),
         thesis="not said in the thesis",
         measured="RMS of the error outside the steps, over that without learning: "
         + "; ".join(f"{_name(n)} {spread([100 * s for s in v], '%', 2)}" for n, v in shares.items()),
         tolerance=f"in 9 of 10 runs of each of these worlds at most {BETTER:.0%}",
         verdict=decided(all(good[n] >= ENOUGH * len(v) for n, v in shares.items())),
         note=(
-            "The untaught loop is already a PID with a moderate integral, so there is little for tuning to make better: "
-            "what helps is more integral against friction, and that the network finds. As the gains stay between 0 and "
-            "twice their middle, choosing the middle decides most of what the loop can become. "
+            "The untaught loop is already a PID with a moderate integral, so there is little for tuning to "
+            "make better: what helps is more integral against friction, and that the network finds. As the "
+            "gains stay between 0 and twice their middle, choosing the middle decides most of what the loop "
+            "can become. "
             f"{stops_holding({n: [*_shares(data, n)] for n in data.tuned}, lambda s: s <= BETTER)}"
         ),
     )
@@ -168,7 +175,10 @@ def plot(data: Data) -> Figure:
         lambda f: f.follows,
         limit=LIMIT,
         label="RMS error [N]",
-        title="outside the steps; green follows, red does not; grey: the gains of the start, left alone; dashed: the limit",
+        title=(
+            "outside the steps; green follows, red does not; grey: the gains of the start, left alone; "
+            "dashed: the limit"
+        ),
     )
     for at, runs in enumerate(data.fixed.values(), start=1):
         spot = at + np.linspace(-0.22, 0.22, len(runs))
@@ -197,7 +207,10 @@ def _worlds() -> dict[str, Experiment]:
 
 
 def _over(
-    runs: Runs, worlds: Mapping[str, Experiment], law: Mapping[str, Any], measure: Callable[[Record], Tracking]
+    runs: Runs,
+    worlds: Mapping[str, Experiment],
+    law: Mapping[str, Any],
+    measure: Callable[[Record], Tracking],
 ) -> dict[str, list[Tracking]]:
     named = [
         (name, (changed(e, law), seed))

@@ -17,6 +17,7 @@ from palpate.thesis.force_loop import ForceLoop
 from palpate.thesis.force_panels import panels
 from palpate.thesis.force_tracking import ENOUGH, SHORT, VARIED_SEEDS, losses, rougher, since_contact
 from palpate.thesis.runs import Runs
+from palpate.thesis.wide_panel import wide_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,11 +26,11 @@ if TYPE_CHECKING:
 NUMBER = "4.3"
 TITLE = "The hybrid force loop: how stiff a surface it bears"
 CAPTION = (
-    "The block diagram of figure 4.3 is the law (4.13), which every run here uses; its force loop is looked at here for "
-    "stability, which the thesis does not do. Left: the stiffness from which the loop is unstable against the surface's "
-    "damping, linear, with the thesis' two sets of gains; dots: the whole arm with hardly any friction, filled where it "
-    "stays stable. Right: the same limit against the cut-off of the controller's own force filter. Below: the limit over "
-    "both gains."
+    "The block diagram of figure 4.3 is the law (4.13), which every run here uses; its force loop is looked "
+    "at here for stability, which the thesis does not do. Left: the stiffness from which the loop is "
+    "unstable against the surface's damping, linear, with the thesis' two sets of gains; dots: the whole arm "
+    "with hardly any friction, filled where it stays stable. Right: the same limit against the cut-off of "
+    "the controller's own force filter. Below: the limit over both gains."
 )
 PARAMETERS = changed(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
 TIP = 8.2
@@ -72,7 +73,10 @@ def run(runs: Runs) -> Data:
     return Data(
         limits,
         {name: np.array([loop(*g, b).limit() for b in DAMPINGS]) for name, g in GAINS.items()},
-        {name: np.array([loop(*g, 200.0, smoothing=c).limit() for c in CUTOFFS]) for name, g in GAINS.items()},
+        {
+            name: np.array([loop(*g, 200.0, smoothing=c).limit() for c in CUTOFFS])
+            for name, g in GAINS.items()
+        },
         np.array([[loop(kf, ki, 60.0).limit() for kf in KFS] for ki in KIS]),
         _stable(runs, limits, BELOW),
         _stable(runs, limits, ABOVE),
@@ -81,7 +85,7 @@ def run(runs: Runs) -> Data:
 
 
 def check(data: Data) -> Sequence[Claim]:
-    """The linear limits against our earlier ones; the arm against the linear limits; a low cut-off against a high one."""
+    """The linear limits against earlier ones; the arm against the linear limits; a low cut-off against a high one."""
     return [_linear(data), _whole(data), _slow(data)]
 
 
@@ -90,20 +94,24 @@ def _linear(data: Data) -> Claim:
     return Claim(
         id="HYB-STABLE",
         source="fig. 4.3; the numbers are from our feasibility study",
-        claim="The linear force loop is stable up to a surface stiffness that grows with damping and with lower gains.",
+        claim=(
+            "The linear force loop is stable up to a surface stiffness that grows with damping and with "
+            "lower gains."
+        ),
         thesis="not in the thesis; the study had 12 and 31 kN/m at 60 N s/m, 95 and 410 kN/m at 480 N s/m",
         measured=f"{told} kN/m in the same order (no noise, so no spread)",
         tolerance=f"each within {NEAR:.0%} of the study's",
         verdict=decided(all(abs(data.limits[c] / k - 1.0) <= NEAR for c, k in STUDY.items())),
         note=(
-            f"A tip of {TIP:g} kg on a spring and a damper, the sensor's third-order filter, its delay, and the controller's "
-            "filter, in steps of a millisecond; no friction. The mass is the arm's at the wall at 0.465 m; between 5 and "
-            "11 kg, which is what poses from 0.40 to 0.49 m give, the first three move by up to 8 %, the fourth by a seventh, "
-            "and below 6 kg there is none. The force's lag of 7.6 ms is what limits "
-            "them: the loop has to turn small before the phase of the tip on its spring and of the lag add up. With the "
-            "foam's gains a surface of 44 kN/m, the thesis' rubber, is stable from a damping of "
-            f"{_needed(data):.0f} N s/m on; whether the gains had to be changed for rubber, as the thesis did, therefore "
-            "depends on the rubber's damping, which least squares got from lagging signals."
+            f"A tip of {TIP:g} kg on a spring and a damper, the sensor's third-order filter, its delay, and "
+            "the controller's filter, in steps of a millisecond; no friction. The mass is the arm's at the "
+            "wall at 0.465 m; between 5 and 11 kg, which is what poses from 0.40 to 0.49 m give, the first "
+            "three move by up to 8 %, the fourth by a seventh, and below 6 kg there is none. The force's lag "
+            "of 7.6 ms is what limits them: the loop has to turn small before the phase of the tip on its "
+            "spring and of the lag add up. With the foam's gains a surface of 44 kN/m, the thesis' rubber, "
+            f"is stable from a damping of {_needed(data):.0f} N s/m on; whether the gains had to be changed "
+            "for rubber, as the thesis did, therefore depends on the rubber's damping, which least squares "
+            "got from lagging signals."
         ),
     )
 
@@ -111,30 +119,35 @@ def _linear(data: Data) -> Claim:
 def _whole(data: Data) -> Claim:
     kept = {c: sum(data.below[c]) for c in data.below}
     lost = {c: len(data.above[c]) - sum(data.above[c]) for c in data.above}
-    holds = all(kept[c] >= ENOUGH * len(data.below[c]) and lost[c] >= ENOUGH * len(data.above[c]) for c in kept)
+    holds = all(
+        kept[c] >= ENOUGH * len(data.below[c]) and lost[c] >= ENOUGH * len(data.above[c]) for c in kept
+    )
     n = len(next(iter(data.below.values())))
     friction = ", ".join(f"{min(v):.2g} to {max(v):.2g}" for v in data.rough.values())
     return Claim(
         id="HYB-STABLE.BENCH",
         source="fig. 4.3; ours",
-        claim="The whole arm, with hardly any friction, is unstable where the linear loop of one direction is.",
+        claim=(
+            "The whole arm, with hardly any friction, is unstable where the linear loop of one direction is."
+        ),
         thesis="not in the thesis",
         measured=(
-            f"stable at {BELOW:.0%} of the limit in {', '.join(map(str, kept.values()))} of {n} runs each, unstable at "
-            f"{ABOVE:.0%} in {', '.join(map(str, lost.values()))} (order as above)"
+            f"stable at {BELOW:.0%} of the limit in {', '.join(map(str, kept.values()))} of {n} runs each, "
+            f"unstable at {ABOVE:.0%} in {', '.join(map(str, lost.values()))} (order as above)"
         ),
         tolerance=(
-            f"in 9 of 10 runs of each of the four cases: at {BELOW:.0%} of the limit contact kept and the true force's "
-            f"standard deviation in the third second at most {SHAKES:g} N, at {ABOVE:.0%} not so"
+            f"in 9 of 10 runs of each of the four cases: at {BELOW:.0%} of the limit contact kept and the "
+            f"true force's standard deviation in the third second at most {SHAKES:g} N, at {ABOVE:.0%} not "
+            "so"
         ),
         verdict=decided(holds),
         note=(
-            "Three joints, encoders, noise and one-sided contact are on the bench and not in the linear loop, so this tests "
-            "the one against the other. The wall is smooth here, too. With the bench's friction the "
-            f"arm bears far more: {friction} times the limit in the four cases (the most tried was {STIFFER[-1]:g} times), "
-            "because before they slide the joints' bristles are springs and dampers themselves. What stays stable for "
-            "small motions may still ring after a hard enough knock. Gains found by trial and error on such an arm lean "
-            "on its friction."
+            "Three joints, encoders, noise and one-sided contact are on the bench and not in the linear "
+            "loop, so this tests the one against the other. The wall is smooth here, too. With the bench's "
+            f"friction the arm bears far more: {friction} times the limit in the four cases (the most tried "
+            f"was {STIFFER[-1]:g} times), because before they slide the joints' bristles are springs and "
+            "dampers themselves. What stays stable for small motions may still ring after a hard enough "
+            "knock. Gains found by trial and error on such an arm lean on its friction."
         ),
     )
 
@@ -146,15 +159,19 @@ def _slow(data: Data) -> Claim:
         source="sec. 4.4",
         claim="A low-pass with a low cut-off makes the system unstable by its lag.",
         thesis="a low cut-off creates a significant time lag and makes the system unstable",
-        measured=f"limit with the foam's gains {_told(slow[0])} at 10 Hz, {_told(fast[0])} at 120 Hz; with the rubber's "
-        f"gains {_told(slow[1])} and {_told(fast[1])}",
-        tolerance="with both sets of gains the limit at 10 Hz is at most half of that at 120 Hz (damping 200 N s/m)",
+        measured=(
+            f"limit with the foam's gains {_told(slow[0])} at 10 Hz, {_told(fast[0])} at 120 Hz; with the rubber's "
+            f"gains {_told(slow[1])} and {_told(fast[1])}"
+        ),
+        tolerance=(
+            "with both sets of gains the limit at 10 Hz is at most half of that at 120 Hz (damping 200 N s/m)"
+        ),
         verdict=decided(all(s <= 0.5 * f for s, f in zip(slow, fast, strict=True))),
         note=(
-            "The thesis speaks of the force's derivative, which these loops do not use; the lag acts on the proportional "
-            "part just the same. A lower cut-off need not lower the limit: far enough below the tip's own frequency the "
-            "filter also takes the gain away, and the curve of the figure says where which of the two wins. Linear, "
-            "without friction, which would hide it."
+            "The thesis speaks of the force's derivative, which these loops do not use; the lag acts on the "
+            "proportional part just the same. A lower cut-off need not lower the limit: far enough below the "
+            "tip's own frequency the filter also takes the gain away, and the curve of the figure says where "
+            "which of the two wins. Linear, without friction, which would hide it."
         ),
     )
 
@@ -164,17 +181,19 @@ def plot(data: Data) -> Figure:
     drawing, grid = panels([3.4, 2.6], 2, 11.0)
     _damping_panel(grid[0][0], data)
     _cutoff_panel(grid[0][1], data)
-    for axis in grid[1]:
-        axis.remove()
-    wide = drawing.add_subplot(grid[1][0].get_gridspec()[1, :])
-    shown = wide.contourf(KFS, 1e3 * KIS, np.log10(data.gains / 1e3), levels=12, cmap="YlGnBu")
+    wide = wide_panel(drawing, grid[1])
+    limits = np.log10(data.gains / 1e3)
+    shown = wide.contourf(KFS, 1e3 * KIS, limits, levels=12, cmap="YlGnBu")
     bar = drawing.colorbar(shown, ax=wide, pad=0.01)
-    ticks = [k for k in (5, 10, 20, 50, 100, 200) if shown.levels[0] <= np.log10(k) <= shown.levels[-1]]
+    lowest, highest = limits.min(), limits.max()
+    ticks = [k for k in (5, 10, 20, 50, 100, 200) if lowest <= np.log10(k) <= highest]
     bar.set_ticks([float(np.log10(k)) for k in ticks], labels=[f"{k}" for k in ticks])
     bar.set_label("stable up to [kN/m]")
     for name, (kf, ki) in GAINS.items():
         wide.plot(kf, 1e3 * ki, "o", color=style.ORANGE, markersize=6)
-        wide.annotate(name.split("(")[1].rstrip(")"), (kf, 1e3 * ki), (6, 4), textcoords="offset points", fontsize=8.5)
+        wide.annotate(
+            name.split("(")[1].rstrip(")"), (kf, 1e3 * ki), (6, 4), textcoords="offset points", fontsize=8.5
+        )
     wide.set(xlabel="K_fp", ylabel="K_fi [1e-3 per sample]")
     wide.set_title("over both gains, damping 60 N s/m; dots: the thesis' gains", loc="left", fontsize=9.5)
     return drawing
@@ -189,7 +208,9 @@ def _damping_panel(axis: Axes, data: Data) -> None:
                 for share, found in ((BELOW, data.below), (ABOVE, data.above)):
                     stable = np.mean(found[case]) >= ENOUGH
                     face = color if stable else "white"
-                    axis.plot(case[0], share * limit / 1e3, "o", color=color, markerfacecolor=face, markersize=6)
+                    axis.plot(
+                        case[0], share * limit / 1e3, "o", color=color, markerfacecolor=face, markersize=6
+                    )
     for name, (damping, stiffness) in SURFACES.items():
         axis.plot(damping, stiffness / 1e3, "s", color=style.GREY, markersize=5)
         axis.annotate(name, (damping, stiffness / 1e3), (5, -10), textcoords="offset points", fontsize=8.5)
@@ -216,7 +237,9 @@ def _cases() -> list[tuple[float, float, float]]:
 
 
 def _at(data: Data, cutoff: float) -> list[float]:
-    return [float(np.exp(np.interp(np.log(cutoff), np.log(CUTOFFS), np.log(v)))) for v in data.filtered.values()]
+    return [
+        float(np.exp(np.interp(np.log(cutoff), np.log(CUTOFFS), np.log(v)))) for v in data.filtered.values()
+    ]
 
 
 def _told(limit: float) -> str:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.decoupling import COUPLED, JUMP, JUMPS, PRINTED, Pair, as_printed, pair_of, pressed
 from palpate.thesis.force_panels import dots_panel, panels
 from palpate.thesis.force_tracking import (
     ENOUGH,
@@ -21,14 +21,13 @@ from palpate.thesis.force_tracking import (
     SHARE,
     SHORT,
     VARIED_SEEDS,
-    losses,
     moved,
     rougher,
     since_contact,
     stops_holding,
 )
 from palpate.thesis.runs import Runs
-from palpate.thesis.turns import Turn, desired_pose, run_with
+from palpate.thesis.wide_panel import wide_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,55 +36,22 @@ if TYPE_CHECKING:
 NUMBER = "4.19"
 TITLE = "Decoupled hybrid control, as printed and corrected"
 CAPTION = (
-    "The force steps between 10 and 20 N; in between, at the dotted lines, the desired y jumps by 5 mm. Left the bench "
-    "as chosen, right with hardly any friction, in the joints or along the wall. The thesis says that (4.19) with the "
-    "identified stiffness decouples force and position. As printed it loses the surface; put right, it takes the "
-    "spikes out of the angle (right). What couples the two on the left is friction, which no law here knows."
+    "The force steps between 10 and 20 N; in between, at the dotted lines, the desired y jumps by 5 mm. Left "
+    "the bench as chosen, right with hardly any friction, in the joints or along the wall. The thesis says "
+    "that (4.19) with the identified stiffness decouples force and position. As printed it loses the "
+    "surface; put right, it takes the spikes out of the angle (right). What couples the two on the left is "
+    "friction, which no law here knows."
 )
 PARAMETERS = changed(
     load("foam-decoupled"), {**SHORT, "run.press": 7.5, "force.first": 10.0, "force.second": 20.0}
 )
-COUPLED = {"controller": {"kind": "proportional-integral", "kf": 1.0, "ki": 3.0}}
-"""(4.13) with the thesis' gains on foam: 0.003 per sample is 3 per second."""
-PRINTED = {"controller.form": "printed", "controller.kf": 1.0}
 FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
 RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
-STEPS, JUMPS = (2.5, 5.0), (1.2, 6.2)
-"""When the force steps, and when y jumps, after contact [s]; y at 10 N, where motor 2 has torque to spare."""
-JUMP = 0.005
-"""Of the desired y, there and back [m]."""
 HALF = 0.5
 """Largest share of what the coupled law lets through."""
 
 LAWS = ("(4.13), coupled", "(4.19) corrected", "(4.19) as printed")
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Stray:
-    """How far one loop's steps carry the other; means over the steps of the largest within a second."""
-
-    y: float  # after a step of force [mm]
-    phi: float  # likewise [deg]
-    force: float  # after a jump of y, as a share of the desired force
-    lost: int  # losses of contact
-
-
-@dataclass(frozen=True)
-class Pair:
-    """The coupled law and the decoupled one, in the same world."""
-
-    coupled: Stray
-    decoupled: Stray
-    stiffness: float  # as identified, which the decoupled law uses [N/m]
-
-    @property
-    def angle(self) -> float:
-        return self.decoupled.phi / self.coupled.phi
-
-    @property
-    def side(self) -> float:
-        return self.decoupled.y / self.coupled.y
 
 
 @dataclass(frozen=True)
@@ -107,15 +73,17 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Both laws in each world, after the stiffness was identified there."""
-    nominal = runs.map(_pair, [(PARAMETERS, seed, {}) for seed in runs.seeds])
-    printed = runs.map(_printed, list(zip(nominal, runs.seeds, strict=True)))
+    nominal = runs.map(pair_of, [(PARAMETERS, seed, {}) for seed in runs.seeds])
+    printed = runs.map(
+        as_printed, [(pair, PARAMETERS, seed) for pair, seed in zip(nominal, runs.seeds, strict=True)]
+    )
     named = [
         (name, (e, seed, law))
         for seed in runs.seeds[:VARIED_SEEDS]
         for name, (e, law) in _variations().items()
     ]
     varied: dict[str, list[Pair]] = {"as\nchosen": nominal}
-    for (name, _), pair in zip(named, runs.map(_pair, [case for _, case in named]), strict=True):
+    for (name, _), pair in zip(named, runs.map(pair_of, [case for _, case in named]), strict=True):
         varied.setdefault(name, []).append(pair)
     k = nominal[0].stiffness
     traces = [_traces(PARAMETERS, runs.seeds[0], k), _traces(changed(PARAMETERS, FREE), runs.seeds[0], k)]
@@ -140,15 +108,16 @@ def _as_printed(data: Data, same: Mapping[str, Any]) -> Claim:
             f"{spread([p.decoupled.phi for p in data.printed], 'degrees')} after a step of force"
         ),
         tolerance=(
-            "in 9 of 10 runs: contact kept; a step of 10 N moves y and the angle at most half as far as under (4.13); a "
-            f"jump of y by {1e3 * JUMP:.0f} mm moves the force by at most {SHARE:.0%}"
+            "in 9 of 10 runs: contact kept; a step of 10 N moves y and the angle at most half as far as "
+            f"under (4.13); a jump of y by {1e3 * JUMP:.0f} mm moves the force by at most {SHARE:.0%}"
         ),
         verdict=decided(_often(data.printed, _all)),
         note=(
-            "K_e multiplies where dimensions ask for 1/K_e: with the thesis' K_fp = 1 and K_e in N/m the loop gain is some "
-            "twenty-seven million, and the motors hammer between their limits. There is no damping of the force, and the "
-            "desired force is fed forward where only the measured one decouples. All three are put right in the next rows; "
-            "that correction is ours, the paper that the thesis cites was not at hand."
+            "K_e multiplies where dimensions ask for 1/K_e: with the thesis' K_fp = 1 and K_e in N/m the "
+            "loop gain is some twenty-seven million, and the motors hammer between their limits. There is no "
+            "damping of the force, and the desired force is fed forward where only the measured one "
+            "decouples. All three are put right in the next rows; that correction is ours, the paper that "
+            "the thesis cites was not at hand."
         ),
         **same,
     )
@@ -160,18 +129,22 @@ def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
         id="DEC.ANGLE",
         claim="Corrected, a step of force no longer turns the end-effector.",
         measured=(
-            f"{spread([100 * p.angle for p in data.nominal], '%', 2)} of the angle's stray under (4.13), which is "
-            f"{spread([p.coupled.phi for p in data.nominal], 'degrees')}; K_e identified as "
+            f"{spread([100 * p.angle for p in data.nominal], '%', 2)} of the angle's stray under (4.13), "
+            f"which is {spread([p.coupled.phi for p in data.nominal], 'degrees')}; K_e identified as "
             f"{spread([p.stiffness / 1e3 for p in data.nominal], 'kN/m')}"
         ),
-        tolerance="in 9 of 10 runs: contact kept, and at most half as far as under (4.13) with the thesis' gains",
+        tolerance=(
+            "in 9 of 10 runs: contact kept, and at most half as far as under (4.13) with the thesis' gains"
+        ),
         verdict=decided(_often(data.nominal, _angle_kept)),
         note=(
-            "The spike that (4.13) gives the angle at each step is gone, as the right half of the figure shows; there the "
-            f"corrected law leaves {spread([100 * p.angle for p in free], '%', 2)}, most of it a limit cycle of the wrist's "
-            "encoder that both laws have. With friction as chosen the wrist's own friction holds the angle anywhere "
-            "within a degree or two; a step shakes it loose and it settles elsewhere, whatever the law. The law has no integral either, so what friction holds "
-            f"back of the force stays. The threshold of one half is ours. {stops_holding(data.varied, _angle_kept)}"
+            "The spike that (4.13) gives the angle at each step is gone, as the right half of the figure "
+            f"shows; there the corrected law leaves {spread([100 * p.angle for p in free], '%', 2)}, most of "
+            "it a limit cycle of the wrist's encoder that both laws have. With friction as chosen the "
+            "wrist's own friction holds the angle anywhere within a degree or two; a step shakes it loose "
+            "and it settles elsewhere, whatever the law. The law has no integral either, so what friction "
+            "holds back of the force stays. The threshold of one half is ours. "
+            f"{stops_holding(data.varied, _angle_kept)}"
         ),
         **same,
     )
@@ -183,17 +156,19 @@ def _side(data: Data, same: Mapping[str, Any]) -> Claim:
         id="DEC.Y",
         claim="Corrected, a step of force no longer moves the tip along the surface.",
         measured=(
-            f"{spread([100 * p.side for p in data.nominal], '%', 2)} of the stray of y under (4.13), which is "
-            f"{spread([p.coupled.y for p in data.nominal], 'mm')}; with hardly any friction "
+            f"{spread([100 * p.side for p in data.nominal], '%', 2)} of the stray of y under (4.13), which "
+            f"is {spread([p.coupled.y for p in data.nominal], 'mm')}; with hardly any friction "
             f"{spread([100 * p.side for p in free], '%', 2)} of {spread([p.coupled.y for p in free], 'mm')}"
         ),
-        tolerance="in 9 of 10 runs: contact kept, and at most half as far as under (4.13) with the thesis' gains",
+        tolerance=(
+            "in 9 of 10 runs: contact kept, and at most half as far as under (4.13) with the thesis' gains"
+        ),
         verdict=decided(_often(data.nominal, _side_kept)),
         note=(
-            "On the bench as chosen the tip sticks to the wall, a friction coefficient of 0.7, and y moves by a tenth of a "
-            "millimetre under any law: there is nothing to decouple. The thesis does not give its surfaces' friction. With "
-            "hardly any, half of what is left is the wrist's limit cycle, and the rest comes with the force's 7.6 ms of lag. "
-            f"{stops_holding(data.varied, _side_kept)}"
+            "On the bench as chosen the tip sticks to the wall, a friction coefficient of 0.7, and y moves "
+            "by a tenth of a millimetre under any law: there is nothing to decouple. The thesis does not "
+            "give its surfaces' friction. With hardly any, half of what is left is the wrist's limit cycle, "
+            f"and the rest comes with the force's 7.6 ms of lag. {stops_holding(data.varied, _side_kept)}"
         ),
         **same,
     )
@@ -205,22 +180,22 @@ def _force(data: Data, same: Mapping[str, Any]) -> Claim:
         id="DEC.FORCE",
         claim="Corrected, a jump of the desired y leaves the force alone.",
         measured=(
-            f"the force strays by {spread([100 * p.decoupled.force for p in data.nominal], '%', 2)}, under (4.13) by "
-            f"{spread([100 * p.coupled.force for p in data.nominal], '%', 2)}; with hardly any friction by "
-            f"{spread([100 * p.decoupled.force for p in free], '%', 2)} and "
+            f"the force strays by {spread([100 * p.decoupled.force for p in data.nominal], '%', 2)}, under "
+            f"(4.13) by {spread([100 * p.coupled.force for p in data.nominal], '%', 2)}; with hardly any "
+            f"friction by {spread([100 * p.decoupled.force for p in free], '%', 2)} and "
             f"{spread([100 * p.coupled.force for p in free], '%', 2)}"
         ),
         tolerance=(
-            f"in 9 of 10 runs: contact kept; within a second of a jump by {1e3 * JUMP:.0f} mm the true force strays by at "
-            f"most {SHARE:.0%} of the desired one"
+            f"in 9 of 10 runs: contact kept; within a second of a jump by {1e3 * JUMP:.0f} mm the true force "
+            f"strays by at most {SHARE:.0%} of the desired one"
         ),
         verdict=decided(_often(data.nominal, _force_kept)),
         note=(
-            "Neither law lets u_x into the force: even (4.18) couples one way only. What disturbs the force is the joints' "
-            "friction: once y moves, joint 2 slides, and its friction is the force's main error. The corrected law strays "
-            "further than the coupled one even without friction, because its higher gain turns more of the sensor's noise "
-            "into motion, which the number includes. At 20 N a jump like this would also find motor 2 at its limit. "
-            f"{stops_holding(data.varied, _force_kept)}"
+            "Neither law lets u_x into the force: even (4.18) couples one way only. What disturbs the force "
+            "is the joints' friction: once y moves, joint 2 slides, and its friction is the force's main "
+            "error. The corrected law strays further than the coupled one even without friction, because its "
+            "higher gain turns more of the sensor's noise into motion, which the number includes. At 20 N a "
+            f"jump like this would also find motor 2 at its limit. {stops_holding(data.varied, _force_kept)}"
         ),
         **same,
     )
@@ -238,10 +213,7 @@ def plot(data: Data) -> Figure:
     grid[2][0].set_ylabel("angle [°]")
     handles, labels = grid[0][0].get_legend_handles_labels()
     drawing.legend(handles, labels, loc="outside upper right", ncols=4, frameon=False, fontsize=8.5)
-    for axis in grid[3]:
-        axis.remove()
-    dots = drawing.add_subplot(grid[3][0].get_gridspec()[3, :])
-    dots.spines[["top", "right"]].set_visible(False)
+    dots = wide_panel(drawing, grid[3])
     dots_panel(
         dots,
         data.varied,
@@ -249,7 +221,9 @@ def plot(data: Data) -> Figure:
         _angle_kept,
         limit=100 * HALF,
         label="share [%]",
-        title="the angle's stray after a step of force, corrected against coupled; each dot a run; dashed: half",
+        title=(
+            "the angle's stray after a step of force, corrected against coupled; each dot a run; dashed: half"
+        ),
     )
     return drawing
 
@@ -323,55 +297,10 @@ def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
     return found
 
 
-def _pair(case: tuple[Experiment, int, Mapping[str, Any]]) -> Pair:
-    world, seed, law = case
-    stiffness = _identified(world, seed)
-    used = stiffness * law.get("wrong", 1.0)
-    changes = {"controller.stiffness": used, **{k: v for k, v in law.items() if k != "wrong"}}
-    coupled, decoupled = changed(world, COUPLED), changed(world, changes)
-    return Pair(_stray(_pressed(coupled, seed)), _stray(_pressed(decoupled, seed)), stiffness)
-
-
-def _printed(case: tuple[Pair, int]) -> Pair:
-    pair, seed = case
-    law = {"controller.stiffness": pair.stiffness, **PRINTED}
-    return replace(pair, decoupled=_stray(_pressed(changed(PARAMETERS, law), seed)))
-
-
-def _identified(world: Experiment, seed: int) -> float:
-    """K_e [N/m] by the matched estimator, after two seconds under the coupled law."""
-    record = run_with(changed(world, {**COUPLED, "run.press": 2.0}), seed, [])
-    return float(record["K_matched"][-1])
-
-
-def _pressed(experiment: Experiment, seed: int) -> Record:
-    jumps = [
-        Turn(at, desired_pose(Vec3(0.0, sign * JUMP, 0.0))) for at, sign in zip(JUMPS, (1, -1), strict=True)
-    ]
-    return run_with(experiment, seed, jumps)
-
-
-def _stray(record: Record) -> Stray:
-    t, force = since_contact(record), record["force"]
-    begun = record["t"][0] - t[0]
-    y = [_furthest(t, record["y"], at) for at in STEPS]
-    phi = [_furthest(t, record["phi"], at) for at in STEPS]
-    pushed = [_furthest(t, force, at - begun) / PARAMETERS.force.first for at in record.meta["turns"]]
-    return Stray(
-        1e3 * float(np.mean(y)), float(np.degrees(np.mean(phi))), float(np.mean(pushed)), losses(record)
-    )
-
-
-def _furthest(t: Array, signal: Array, at: float) -> float:
-    """How far the signal strays within a second, from its mean over the tenth of a second before."""
-    before = signal[(t >= at - 0.1) & (t < at - 5e-7)].mean()
-    return float(np.abs(signal[(t >= at - 5e-7) & (t < at + 1.0)] - before).max())
-
-
 def _traces(world: Experiment, seed: int, stiffness: float) -> dict[str, Trace]:
     known = {"controller.stiffness": stiffness}
     experiments = (changed(world, COUPLED), changed(world, known), changed(world, {**known, **PRINTED}))
-    return {name: _trace(_pressed(e, seed)) for name, e in zip(LAWS, experiments, strict=True)}
+    return {name: _trace(pressed(e, seed)) for name, e in zip(LAWS, experiments, strict=True)}
 
 
 def _trace(record: Record) -> Trace:

@@ -1,0 +1,230 @@
+"""What the figures of the controllers stand on: changes in mid-run, the linear force loop, and their measures."""
+
+import numpy as np
+import pytest
+
+from palpate._vector import Vec3
+from palpate.bench import build, changed, load
+from palpate.environments import KelvinVoigt
+from palpate.instruments import force_sensor
+from palpate.signals.filters import butterworth2
+from palpate.thesis.decoupling import Pair, Stray, pressed, stray
+from palpate.thesis.explanations import e6_friction_compensation as compensation
+from palpate.thesis.figures import fig_2_01, fig_2_02, fig_2_04, fig_2_05, fig_4_03, fig_4_19
+from palpate.thesis.force_loop import ForceLoop
+from palpate.thesis.force_tracking import SHORT, rougher, since_contact
+from palpate.thesis.regain import Regain, drawn_back, found_again, regained
+from palpate.thesis.runs import Runs
+from palpate.thesis.turns import Turn, desired_pose, other_surface, run_with, surface_back
+
+FOAM = changed(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
+RUBBER = KelvinVoigt(34500.0, 480.0, 0.05)
+
+
+def around(record, name, at):
+    """Mean of a column over the 20 ms before and after a time since contact; a row shows the step before it."""
+    t, column = since_contact(record), record[name]
+    return column[(t >= at - 0.02) & (t < at - 5e-7)].mean(), column[
+        (t >= at + 0.002) & (t < at + 0.02)
+    ].mean()
+
+
+def test_a_run_without_turns_is_the_benchs_own_bit_for_bit():
+    ours = run_with(FOAM, 3, [])
+    theirs = build(FOAM).run(FOAM.run.duration, 3, press=FOAM.run.press)
+    for name in theirs.columns:
+        assert np.array_equal(ours[name], theirs[name]), name
+
+
+def test_another_surface_takes_over_the_force():
+    record = run_with(FOAM, 0, [Turn(0.6, other_surface(RUBBER))])
+    before, after = around(record, "force", 0.6)
+    assert after == pytest.approx(before, abs=0.3)
+    deep, shallow = around(record, "penetration", 0.6)
+    assert shallow / deep == pytest.approx(5200.0 / 34500.0, rel=0.05)
+
+
+def test_a_surface_drawn_back_is_lost_and_found():
+    record = run_with(FOAM, 0, [Turn(0.6, surface_back(0.006))])
+    before, after = around(record, "force", 0.6)
+    assert before > 15.0
+    assert after < 2.0
+    one = regained(drawn_back(0))
+    assert one.times == 1
+    assert 1.0 < one.took < 15.0
+
+
+def test_a_jump_of_the_desired_pose_moves_the_error_and_not_the_rate():
+    record = run_with(FOAM, 0, [Turn(0.6, desired_pose(Vec3(0.0, 0.005, 0.0)))])
+    before, after = around(record, "y_measured", 0.6)
+    assert after - before == pytest.approx(-0.005, abs=3e-4)
+    before, after = around(record, "x_measured", 0.6)
+    assert after == pytest.approx(before, abs=1e-4)
+    assert abs(around(record, "vy_measured", 0.6)[1]) < 0.03  # 5 mm in a tick would be 5 m/s
+
+
+def swings(loop, stiffness, seconds=3.0, physics=20000):
+    """How much a small knock has grown, stepping tip, sensor and filter one by one."""
+    sensor, smooth = force_sensor(noise=0.0, bits=32, rate=physics), butterworth2(loop.smoothing, 1000.0)
+    chain, past, total, command = sensor.start(), smooth.start_at(0.0), 0.0, 0.0
+    x, v, f, dt, early, late = 1e-5, 0.0, 0.0, 1.0 / physics, 0.0, 0.0
+    for k in range(round(seconds * physics)):
+        if k % 20 == 0:
+            measured, past = smooth.step(past, chain.held)
+            total += loop.ki * measured
+            command = -loop.kf * measured - total
+        v += dt * (command - stiffness * x - loop.damping * v) / (loop.tip + loop.mass)
+        x += dt * v
+        f = stiffness * x + loop.damping * v
+        _, chain = sensor.sample(chain, f, k, 0.0)
+        early, late = (max(early, abs(x)), late) if k < 0.4 * physics else (early, late)
+        late = max(late, abs(x)) if k > (seconds - 0.4) * physics else late
+    return late / early
+
+
+@pytest.mark.parametrize("gains", [(1.0, 0.003), (0.25, 0.0015)])
+def test_the_linear_limit_is_where_a_stepped_loop_begins_to_swing(gains):
+    """Another way to the same number: the parts of the bench, step by step, without friction."""
+    loop = ForceLoop(*gains, 60.0, 8.2)
+    limit = loop.limit()
+    assert swings(loop, 0.85 * limit) < 1.0
+    assert swings(loop, 1.15 * limit) > 1.0
+
+
+def test_without_gain_every_surface_is_stable():
+    assert ForceLoop(0.0, 0.0, 60.0, 8.2).limit() == np.inf
+
+
+def test_damping_and_lower_gains_bear_stiffer_surfaces():
+    limits = [ForceLoop(kf, 0.003, 60.0, 8.2).limit() for kf in (2.0, 1.0, 0.5, 0.25)]
+    assert limits == sorted(limits)
+    limits = [ForceLoop(1.0, 0.003, b, 8.2).limit() for b in (30.0, 60.0, 120.0, 240.0)]
+    assert limits == sorted(limits)
+    assert ForceLoop(1.0, 0.003, 60.0, 8.2, late=0.010).limit() < ForceLoop(1.0, 0.003, 60.0, 8.2).limit()
+
+
+def test_a_hopeless_loop_has_no_limit():
+    assert np.isnan(ForceLoop(400.0, 0.003, 60.0, 8.2).limit())
+
+
+def test_without_friction_the_arm_is_the_target_spring_and_damper():
+    e = changed(fig_2_02.PARAMETERS, fig_2_02.FREE)
+    found = fig_2_02._found(fig_2_02._record(e, 0))
+    assert pytest.approx(1.0, abs=0.05) == found.K
+    assert pytest.approx(1.0, abs=0.25) == found.B
+    assert pytest.approx(1.0 - 600.0 * 0.007 / 5.0, abs=0.15) == found.M  # the velocity's lag takes the rest
+    rough = fig_2_02._found(fig_2_02._record(fig_2_02.PARAMETERS, 0))
+    assert abs(rough.K - 1.0) > 0.3
+
+
+def test_the_target_impedance_itself_settles_at_what_two_springs_agree_on():
+    ideal = fig_2_02._ideal()
+    for i, depth in enumerate(fig_2_02.DEPTHS):
+        end = ideal.force[1000 * (i + 1) - 1]
+        assert end == pytest.approx(depth * 2000.0 * 5200.0 / 7200.0, rel=0.01)
+
+
+def test_without_friction_a_step_of_force_turns_the_tip_less_when_decoupled():
+    world = changed(fig_4_19.PARAMETERS, fig_4_19.FREE)
+    coupled = stray(pressed(changed(world, fig_4_19.COUPLED), 0))
+    decoupled = stray(pressed(world, 0))
+    assert decoupled.phi < 0.6 * coupled.phi
+    assert decoupled.lost == 0
+
+
+def stray_of(y=1.0, phi=1.0, force=0.01, lost=0):
+    return Stray(y, phi, force, lost)
+
+
+@pytest.mark.parametrize(
+    ("decoupled", "angle", "force"),
+    [
+        (stray_of(phi=0.4), True, True),
+        (stray_of(phi=0.6), False, True),
+        (stray_of(phi=0.4, force=0.2), True, False),
+        (stray_of(phi=0.4, lost=1), False, False),
+    ],
+)
+def test_what_counts_as_decoupled(decoupled, angle, force):
+    pair = Pair(stray_of(), decoupled, 5200.0)
+    assert fig_4_19._angle_kept(pair) == angle
+    assert fig_4_19._force_kept(pair) == force
+
+
+def test_the_original_is_unstable_near_the_stretched_arm_and_not_where_the_experiments_are():
+    everywhere = np.ones((len(fig_2_01.YS), len(fig_2_01.XS)), dtype=bool)
+    growth = fig_2_01._growth(1.0, everywhere)
+    line = growth[np.argmin(np.abs(fig_2_01.YS))]
+    where = (fig_2_01.XS >= 0.40) & (fig_2_01.XS <= 0.49)
+    assert np.isfinite(line[where]).all()
+    assert line[where].max() < fig_2_01.GROWS
+    unstable = growth > fig_2_01.GROWS
+    assert 0.005 < unstable.sum() / np.isfinite(growth).sum() < 0.1
+
+
+def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
+    record = run_with(compensation.PLAIN, 0, [])
+    assert compensation._listing_factor(record) < 1e-6
+    slow = {f"q{i}": record[f"q{i}"] for i in (1, 2, 3)}
+    finer = changed(compensation.PLAIN, {"encoders.counts": (6.144e8, 4.096e8, 2e6)})
+    patched = type(record)({**record.columns, **slow}, record.units, record.meta)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compensation, "PLAIN", finer)
+        assert compensation._listing_factor(patched) > 0.5
+
+
+def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
+    plain, wide, short = (
+        compensation._held(run_with(e, 0, []))
+        for e in (
+            compensation.PLAIN,
+            compensation.PARAMETERS,
+            compensation._blended(compensation.PARAMETERS, 0.002),
+        )
+    )
+    assert wide.error < 0.5 * plain.error
+    assert short.shaking > 5 * plain.shaking
+
+
+def test_a_regain_that_is_late_hard_or_missing_is_not_well():
+    good = Regain(8.0, 0.02, 1.05, 1)
+    assert found_again([good] * 10).verdict == "reproduced"
+    for bad in (Regain(12.0, 0.02, 1.05, 1), Regain(8.0, 0.02, 1.5, 1), Regain(np.inf, np.inf, np.inf, 1)):
+        assert found_again([bad] * 10).verdict == "differs"
+
+
+def test_the_network_alone_follows_and_an_untaught_one_does_not():
+    assert fig_2_04._neural(fig_2_04.FOAM, 5e-5, 0).follows
+    assert not fig_2_04._neural(fig_2_04.FOAM, 1e-7, 0).follows
+
+
+def test_the_turn_of_figure_2_5_changes_the_surface():
+    record = fig_2_05._turned(0)
+    t, force, depth = since_contact(record), record["force"], record["penetration"]
+    for at, stiffness in ((4.9, 5200.0), (9.9, 34500.0)):
+        late = (t > at - 0.2) & (t < at)
+        assert force[late].mean() / depth[late].mean() == pytest.approx(stiffness, rel=0.03)
+
+
+def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():
+    case = (60.0, 1.0, 0.003)
+    stiffness = 2.0 * fig_4_03.loop(1.0, 0.003, 60.0).limit()
+    runs = Runs((0,))
+    free = changed(fig_4_03._press(case, stiffness, fig_4_03.FREE), fig_4_03.FREE_SIDE)
+    assert not fig_4_03._quiet(runs.one(free))
+    assert fig_4_03._quiet(runs.one(fig_4_03._press(case, stiffness, 1.0)))
+
+
+def test_figures_draw_what_they_ran_and_check_it(tmp_path):
+    """The cheapest study whole; the others go the same way in the program's own test."""
+    data = fig_2_04.run(Runs((0, 1)))
+    claims = fig_2_04.check(data)
+    assert [c.id for c in claims] == ["YY", "YY.INTEGRAL"]
+    drawing = fig_2_04.plot(data)
+    drawing.savefig(tmp_path / "one.png")
+    assert (tmp_path / "one.png").stat().st_size > 10_000
+
+
+def test_rougher_friction_is_what_it_says():
+    half = changed(FOAM, rougher(FOAM, 0.5))
+    assert half.friction.coulomb == tuple(0.5 * v for v in FOAM.friction.coulomb)
