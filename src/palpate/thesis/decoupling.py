@@ -46,10 +46,12 @@ class Pair:
 
     @property
     def angle(self) -> float:
+        """How far the tip turns under the decoupled law, over that under the coupled one."""
         return self.decoupled.phi / self.coupled.phi
 
     @property
     def side(self) -> float:
+        """Likewise for y."""
         return self.decoupled.y / self.coupled.y
 
 

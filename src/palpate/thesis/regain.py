@@ -31,6 +31,8 @@ AGAIN, PEAK = 3.0, 1.25
 
 @dataclass(frozen=True)
 class Regain:
+    """What became of a contact that was lost."""
+
     took: float  # from loss to contact [s]; infinite if never
     off: float  # of the force, `AGAIN` seconds later, as a share of the desired one
     peak: float  # largest true force after the loss, over the desired one
@@ -38,11 +40,14 @@ class Regain:
 
     @property
     def well(self) -> bool:
+        """Whether it came back in time, and gently."""
         return self.times == 1 and self.took <= FOUND and self.off <= SHARE and self.peak <= PEAK
 
 
 @dataclass(frozen=True)
 class Trace:
+    """A force [N] and the phase over the time since contact [s]."""
+
     t: Array
     signal: Array
     phase: Array

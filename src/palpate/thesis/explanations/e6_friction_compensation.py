@@ -76,11 +76,14 @@ class Ratio:
 
     @property
     def helps(self) -> bool:
+        """Whether enough of the error is gone, and contact kept."""
         return not self.lost and self.error <= HALF
 
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     traces: dict[str, Trace]
     plain: list[Held]
     printed_blend: list[Held]

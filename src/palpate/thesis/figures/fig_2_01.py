@@ -62,6 +62,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pressed:
+    """How a run answered its steps of force."""
+
     overshoot: float  # over the size of the step, mean over the steps
     phi: float  # largest stray within a second of a step, mean over the steps [deg]
     lost: int
@@ -76,6 +78,7 @@ class Pair:
 
     @property
     def phi(self) -> float:
+        """How far the tip turns under the original, over that under (4.13)."""
         return self.original.phi / self.dynamic.phi
 
     @property
@@ -87,6 +90,8 @@ class Pair:
 
 @dataclass(frozen=True)
 class Trace:
+    """What is drawn of a run, over the time since contact [s]."""
+
     t: Array
     force: Array
     desired: Array
@@ -95,6 +100,8 @@ class Trace:
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     traces: dict[str, Trace]
     varied: dict[str, list[Pair]]
     growth: Array  # of the original over the workspace, shape (y, x) [1/s]; NaN out of reach

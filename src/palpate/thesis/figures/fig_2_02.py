@@ -74,21 +74,27 @@ class Found:
 
 @dataclass(frozen=True)
 class Trace:
+    """A force [N] over the time since contact [s]."""
+
     t: Array
     force: Array
 
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     traces: dict[str, Trace]
     varied: dict[str, list[Found]]
 
     @property
     def foam(self) -> list[Found]:
+        """The runs on foam, as chosen."""
         return self.varied["foam"]
 
     @property
     def rubber(self) -> list[Found]:
+        """The runs on rubber."""
         return self.varied["rubber"]
 
 
@@ -113,7 +119,7 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[Claim]:
     """Spring, damper and mass, each by itself, on foam and rubber."""
-    return [_claim(data, name) for name in ("K", "B", "M")]
+    return [_claim(data, *pair) for pair in (("IMP.K", "K"), ("IMP.B", "B"), ("IMP.M", "M"))]
 
 
 _WORDS = {"K": "spring", "B": "damper", "M": "mass"}
@@ -136,12 +142,12 @@ _WHY = {
 }
 
 
-def _claim(data: Data, name: str) -> Claim:
+def _claim(data: Data, claim: str, name: str) -> Claim:
     free = [100 * getattr(f, name) for f in data.varied["hardly any\nfriction"]]
     both = [*data.foam, *data.rubber]
     good = sum(f.within(name) for f in data.foam), sum(f.within(name) for f in data.rubber)
     return Claim(
-        id=f"IMP.{name}",
+        id=claim,
         source="eq. 2.1-2.3, fig. 2.2 (after Hogan)",
         claim=f"Impedance control holds the {_WORDS[name]} of the target impedance.",
         thesis="the relation between force and displacement is controlled to satisfy (2.2)",

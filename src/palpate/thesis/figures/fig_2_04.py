@@ -91,11 +91,14 @@ class Pressed:
 
     @property
     def follows(self) -> bool:
+        """Whether the force keeps to the desired one."""
         return self.settled <= LIMIT and self.off <= SHARE
 
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     record: dict[str, Array]
     worlds: dict[str, list[Pressed]]
     integral: dict[str, list[Pressed]]  # with the gain that the network had, run by run

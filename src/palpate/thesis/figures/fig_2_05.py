@@ -66,6 +66,8 @@ Case = tuple[Experiment, int]
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     shown: Slot
     gains: Array  # kf, ki, kd over their middle values, shape (n, 3)
     tuned: dict[str, list[Tracking]]

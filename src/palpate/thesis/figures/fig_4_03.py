@@ -58,6 +58,8 @@ Case = tuple[float, float]
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     limits: dict[Case, float]  # linear, by damping and K_fp [N/m]
     curves: dict[str, Array]  # by gains, over DAMPINGS [N/m]
     filtered: dict[str, Array]  # by gains, over CUTOFFS, on the damping of the foam [N/m]

@@ -56,6 +56,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Trace:
+    """What is drawn of a run, over the time since contact [s]."""
+
     t: Array
     force: Array
     desired: Array
@@ -65,6 +67,8 @@ class Trace:
 
 @dataclass(frozen=True)
 class Data:
+    """What `check` and `plot` need."""
+
     traces: list[dict[str, Trace]]  # as chosen, and with hardly any friction
     nominal: list[Pair]
     printed: list[Pair]
