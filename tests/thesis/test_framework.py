@@ -11,7 +11,7 @@ import pytest
 
 import palpate.thesis
 from palpate.errors import InputError
-from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.claims import Claim, decided, spread, with_wholes
 from palpate.thesis.measuring import STATE, measure
 from palpate.thesis.runs import Runs
 from palpate.thesis.study import studies, study
@@ -264,3 +264,17 @@ def test_runs_keep_the_order_of_their_cases_and_pass_errors_on():
     assert runs.map(lambda x: x, []) == []
     with pytest.raises(ZeroDivisionError):
         runs.map(lambda x: 1 / (x - 5), list(range(10)))
+
+
+def test_a_claim_measured_in_parts_has_a_row_of_its_own():
+    def claim(name, verdict):
+        return Claim(name, "sec. 1", f"says {name}", "1", "1", "none", verdict, "why")
+
+    parts = [
+        claim("A.K", "reproduced"), claim("A.B", "differs"), claim("F3.5", "reproduced"), claim("F3.5.fold", "differs"),
+        claim("C.K", "reproduced"), claim("C.B", "reproduced"),
+    ]  # fmt: skip
+    rows = {row.id: row.verdict for row in with_wholes(parts)}
+    assert list(rows) == ["A", "A.K", "A.B", "F3.5", "F3.5.fold", "C", "C.K", "C.B"]
+    assert (rows["A"], rows["C"], rows["F3.5"]) == ("differs", "reproduced", "reproduced")
+    assert with_wholes([]) == []

@@ -51,3 +51,42 @@ def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
     lost = f", {len(v) - len(good)} without a value" if len(good) < len(v) else ""
     low, middle, high = (f"{x:.{digits}g}" for x in (good.min(), np.median(good), good.max()))
     return f"{middle}{tail} ({low} to {high}, {len(v)} seeds{lost})"
+
+
+def with_wholes(claims: Sequence[Claim]) -> list[Claim]:
+    """The claims, and before the first part of each that was only measured in parts ("NN-S.K", "NN-S.B") the whole.
+
+    A whole is reproduced if all its parts are; "not checkable" if all are that.
+    """
+    ids = {claim.id for claim in claims}
+    rows: list[Claim] = []
+    for claim in claims:
+        name = _name(claim)
+        if name not in ids:
+            ids.add(name)
+            rows.append(_whole(name, [c for c in claims if _name(c) == name]))
+        rows.append(claim)
+    return rows
+
+
+def _name(claim: Claim) -> str:
+    """The claim that this one is, or is a part of: "NN-S" of "NN-S.K"; "F3.5" is a name of its own."""
+    name, _, part = claim.id.rpartition(".")
+    return name if name and not part.isdigit() else claim.id
+
+
+def _whole(name: str, parts: Sequence[Claim]) -> Claim:
+    verdicts = {part.verdict for part in parts}
+    verdict: Verdict = verdicts.pop() if len(verdicts) == 1 else "differs"
+    told = [f"{part.id.rpartition('.')[2]}: {part.verdict}" for part in parts]
+    return Claim(
+        id=name,
+        source="; ".join(dict.fromkeys(part.source for part in parts)),
+        claim=" ".join(dict.fromkeys(part.claim for part in parts)),
+        thesis="; ".join(dict.fromkeys(part.thesis for part in parts)),
+        measured="; ".join(told),
+        tolerance="each part by its own threshold",
+        verdict=verdict,
+        note="One sentence of the thesis claims several things at once. They are measured one by one: see the rows "
+        f"{', '.join(part.id for part in parts)}.",
+    )

@@ -14,7 +14,7 @@ import msgspec
 from palpate._jit import sources_stamp
 from palpate.errors import InputError
 from palpate.report import style
-from palpate.thesis.claims import Claim
+from palpate.thesis.claims import Claim, with_wholes
 from palpate.thesis.page import index_page
 from palpate.thesis.runs import Runs
 from palpate.thesis.study import Study
@@ -108,8 +108,8 @@ def _stored(folder: Path) -> State | None:
 def _write(state: State, folder: Path) -> None:
     """Everything that the folder says, each file whole or as it was."""
     finished = [state.done[n] for n in state.wanted if n in state.done]
-    claims = [asdict(claim) for done in finished for claim in done.claims]
-    _replace(folder / "claims.json", _json(claims))
+    rows = with_wholes([claim for done in finished for claim in done.claims])
+    _replace(folder / "claims.json", _json([asdict(row) for row in rows]))
     _replace(folder / "index.html", index_page(state, finished, folder).encode())
     _replace(folder / STATE, _json(state))
 

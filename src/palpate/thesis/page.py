@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from palpate.thesis.claims import with_wholes
+
 if TYPE_CHECKING:
     from palpate.thesis.measuring import Done, State
 
@@ -25,7 +27,8 @@ def index_page(state: State, done: Sequence[Done], folder: Path) -> str:
         done=done,
         images={d.number: _data(folder / f"{d.number}.png") for d in done},
         verdicts=Counter(claim.verdict for claim in claims),
-        claims=[(d.number, claim) for d in done for claim in d.claims],
+        claims=with_wholes(claims),
+        figure={claim.id: d.number for d in done for claim in d.claims},
         missing=[n for n in state.wanted if n not in state.done],
         command=state.command,
         version=__version__,
