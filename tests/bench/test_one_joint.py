@@ -97,7 +97,9 @@ def test_a_run_leaves_the_next_one_as_it_was():
     assert not np.array_equal(one.columns["force_sampled"], bench.run(0.5, seed=2).columns["force_sampled"])
 
 
-@pytest.mark.parametrize("wrong", [{"inertia": 0.0}, {"lever": -1.0}, {"limit": 0.0}, {"rate": 0}, {"steps": 0}])
+@pytest.mark.parametrize(
+    "wrong", [{"inertia": 0.0}, {"lever": -1.0}, {"limit": 0.0}, {"rate": 0}, {"steps": 0}]
+)
 def test_a_joint_that_cannot_be_is_refused(wrong):
     with pytest.raises(InputError, match=f"{next(iter(wrong))} must be above 0"):
         one_joint(FOAM, direct_neural(), STEPS, **wrong)

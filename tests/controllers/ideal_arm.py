@@ -40,6 +40,8 @@ def press(controller, asked, stiffness, duration=0.5, samples=501):
     z0 = [*ARM.inverse(START, 1.0), 0.0, 0.0, 0.0]
     z = solve_ivp(rates, (0.0, duration), z0, "DOP853", t, rtol=1e-10, atol=1e-12).y.T
     senses = [feel(Vec3(*row[:3]), Vec3(*row[3:]))[1] for row in z]
-    return t, *(np.array([list(getattr(s, name)) for s in senses]) for name in ("x", "xd")), np.array(
-        [s.f.x for s in senses]
+    return (
+        t,
+        *(np.array([list(getattr(s, name)) for s in senses]) for name in ("x", "xd")),
+        np.array([s.f.x for s in senses]),
     )

@@ -108,7 +108,9 @@ def test_an_arm_of_seven_joints_follows_a_task_of_six(make):
 def test_seven_joints_accelerate_as_the_six_directions_were_told(name):
     """These compensate all of the dynamics: what is left is J qdd + Jdot qd = u."""
     sense, task, model = inputs(6, 7, 6)
-    (torque,) = walk_on_arrays(MAKERS[name](lambda v: np.full(6, v), lambda v: np.full(7, v)), sense, task, model, 1)
+    (torque,) = walk_on_arrays(
+        MAKERS[name](lambda v: np.full(6, v), lambda v: np.full(7, v)), sense, task, model, 1
+    )
     outside = 0.0 if name == "resolved acceleration" else sense.f
     qdd = np.linalg.solve(model.M, torque - model.h - model.J.T @ (outside + np.zeros(6)))
     xdd = model.J @ qdd + model.Jdqd

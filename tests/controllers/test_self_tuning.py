@@ -60,7 +60,13 @@ def closed(kf, ki, kd, ticks):
     """Force errors when the force answers the command at once, less a friction of 5 N, and the gains are constant."""
     zeros = [np.zeros((4, 4)), np.zeros((3, 5))]
     controller = SelfTuning(
-        *GAINS, Vec3(kf, ki, kd), Vec3(10.0, 5.0, 100.0), 0.0, 0.01, TICK, network(zeros, (kf, ki, kd), 1e-300)
+        *GAINS,
+        Vec3(kf, ki, kd),
+        Vec3(10.0, 5.0, 100.0),
+        0.0,
+        0.01,
+        TICK,
+        network(zeros, (kf, ki, kd), 1e-300),
     )
     state, integral, rate, f, errors = controller.start(), 0.0, 0.0, 0.0, []
     for _ in range(ticks):

@@ -235,7 +235,13 @@ def one_joint(
         rate: ticks a second.
         steps: of the plant between ticks.
     """
-    for name, value in (("inertia", inertia), ("lever", lever), ("limit", limit), ("rate", rate), ("steps", steps)):
+    for name, value in (
+        ("inertia", inertia),
+        ("lever", lever),
+        ("limit", limit),
+        ("rate", rate),
+        ("steps", steps),
+    ):
         if not value > 0:
             raise InputError(f"{name} must be above 0, got {value}")
     physics = rate * steps
@@ -243,4 +249,6 @@ def one_joint(
     force = ForceInput(sensor, analog_filter_190(float(physics)), 0.0, AnalogToDigital(16, 200.0))
     joint = Joint(float(inertia), float(lever), friction.checked(), join(surface))
     smooth = butterworth2(120.0, float(rate))
-    return OneJoint(JointLoop(joint, force, smooth, schedule, controller, float(limit), 1.0 / rate, int(steps)))
+    return OneJoint(
+        JointLoop(joint, force, smooth, schedule, controller, float(limit), 1.0 / rate, int(steps))
+    )

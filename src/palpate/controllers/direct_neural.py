@@ -38,7 +38,13 @@ class DirectNeural(NamedTuple):
     def step(self, state, desired, f):
         """Torque [N m] for the desired and the measured force [N]; learns on the way."""
         net, memory = self.network, state.network
-        see(memory.signals, desired / self.force, f / self.force, state.f / self.force, state.torque / net.amplitude[0])
+        see(
+            memory.signals,
+            desired / self.force,
+            f / self.force,
+            state.f / self.force,
+            state.torque / net.amplitude[0],
+        )
         net.forward(memory)
         torque = net.output(memory, 0)
         net.want(memory, 0, desired - f)

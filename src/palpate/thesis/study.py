@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 class Study(Protocol):
     """A module with one figure.
 
-    ``NUMBER`` is the thesis' number of the figure ("6.11"), or a name of ours for what it does not have ("why-negative-mass").
-    ``TITLE`` is a line; ``CAPTION`` says what is seen, the claim included. ``PARAMETERS`` holds everything that was chosen.
+    ``NUMBER`` is the thesis' number of the figure ("6.11"), or a name of ours for what it does not have
+    ("why-negative-mass"). ``TITLE`` is a line; ``CAPTION`` says what is seen, the claim included. ``PARAMETERS`` holds
+    everything that was chosen.
     """
 
     NUMBER: str
