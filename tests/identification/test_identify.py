@@ -128,6 +128,22 @@ def test_a_large_lag_gives_no_negative_damping():
     assert found.lag[0] == pytest.approx(0.02, abs=2e-3)
 
 
+def test_a_lag_is_not_taken_for_a_mass_below_zero():
+    # To second order, a lag T of the force adds -B T to the mass: a model with a mass fits it without any lag.
+    found = identify(pressed(k=3000.0, b=60.0, lag=0.008))
+    assert found.lag[0] == pytest.approx(0.008, abs=5e-4)
+    assert found.parameters["B"].value == pytest.approx(60, rel=0.05)
+    assert found.parameters["K"].value == pytest.approx(3000, rel=0.02)
+
+
+def test_a_mass_that_is_asked_for_where_there_is_none_spares_the_stiffness():
+    found = identify(pressed(k=3000.0, b=60.0, seed=2), model="kelvin-voigt-mass")
+    assert "model-rejected" not in found.codes
+    assert found.parameters["K"].verdict is Verdict.IDENTIFIED
+    assert found.parameters["K"].value == pytest.approx(3000, rel=0.02)
+    assert found.parameters["M"].verdict is not Verdict.IDENTIFIED
+
+
 def test_noise_of_the_position_is_not_taken_for_a_small_mass():
     p = identify(shaken(position_noise=2e-5), lag=0.0).parameters["M"]
     assert p.verdict is not Verdict.IDENTIFIED
@@ -168,6 +184,25 @@ def test_an_offset_of_the_force_does_no_harm():
     for offset in (-3.0, 2.0):
         found = identify(record(log["time"], log["position"], log["force"] + offset))
         assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+
+
+@pytest.mark.parametrize("offset", [-60.0, -7.0, -4.0, 7.0, 60.0])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_weight_of_a_tool_is_no_contact(offset, sign):
+    # The force rests anywhere, even so that it changes sign in contact: what matters is where the probe moves freely.
+    rng = np.random.default_rng(0)
+    position = 1e-3 - 6e-3 * np.clip(np.abs(TIME - 3) - 1, 0, 1) + 1e-4 * np.sin(40 * TIME)
+    force = force_of(position, lambda d, v: 5000 * d + 40 * v, 1e-3) + rng.normal(0, 0.02, len(TIME))
+    found = identify(record(TIME, sign * position, force + offset))
+    assert len(found.contacts) == 1
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.03)
+
+
+def test_a_log_that_no_model_could_be_of_is_rejected():
+    # Stiffness below zero whichever way the channels count: there is no best model to compare with.
+    found = identify(shaken(k=-5000.0, b=-40.0, m=0.5), lag=0.0, bonded=True)
+    assert all(p.verdict is not Verdict.IDENTIFIED for p in found.parameters.values())
+    assert "model-rejected" in found.codes
 
 
 def test_a_position_that_is_refreshed_slowly():

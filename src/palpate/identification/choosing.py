@@ -32,7 +32,8 @@ _MUCH_BETTER = 0.5
 _NEGLIGIBLE = 0.0005
 """Share of the force's variance below which a misfit asks for no richer model."""
 _HOPELESS = 4.0
-"""A model whose misfit is this many times the best one's is not saved by any lag."""
+"""A model whose misfit is this many times the best one's is not saved by any lag. One with a mass below zero does not
+count as the best: to a damper, a lag of the force looks like that."""
 _ABOVE_NOISE = 3.0
 _UNEXPLAINED = 0.01
 _SLOW_UNEXPLAINED = 0.04
@@ -106,7 +107,7 @@ def choose(question: Question, name: str | None = None) -> Choice:
     fits = [fit(model, motion, force, lag) for model in (KELVIN_VOIGT, KELVIN_VOIGT_MASS)]
     if name is not None or min(1 - fitted.r2 for fitted in fits) > _NEGLIGIBLE:
         fits += [fit(model, motion, force, lag) for model in _richer(question, name)]
-    near = _HOPELESS * min(fitted.rmse for fitted in fits)
+    near = _HOPELESS * min((fitted.rmse for fitted in fits if not _impossible(fitted)), default=np.inf)
     fits = [freed(fitted, motion, force, lag) if fitted.rmse <= near else fitted for fitted in fits]
     judged = _judge(fits, question)
     if name is None:
@@ -132,7 +133,7 @@ def _richer(question: Question, name: str | None) -> list[Model]:
 
 def _judge(fits: list[Fit], question: Question) -> list[Candidate]:
     possible = [fitted for fitted in fits if not _impossible(fitted)]
-    best = min((fitted.rmse for fitted in possible), default=0.0)
+    best = min((fitted.rmse for fitted in possible), default=np.inf)
     return [_candidate(fitted, fits, best, question) for fitted in fits]
 
 
@@ -201,9 +202,11 @@ def _same_kind(one: Fit, other: Fit) -> bool:
 
 
 def _no_model(candidate: Candidate, judged: list[Candidate], question: Question) -> Choice:
-    """A model that does not describe the log cannot tell its lag either: the plain fit stands for it."""
+    """A model that does not describe the log cannot tell its lag either: the plain fit stands in, and may hold."""
     fitted = candidate.fit
     if not question.lag.known and fitted.lag != question.lag.value:
         fitted = fit(fitted.model, question.motion, question.force, question.lag)
         candidate = _candidate(fitted, [c.fit for c in judged], min(c.fit.rmse for c in judged), question)
+        if not candidate.against:
+            return Choice(candidate, False, tuple(judged))
     return Choice(candidate, True, tuple(judged), halves(fitted, question.motion, question.force))

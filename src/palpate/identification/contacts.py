@@ -18,6 +18,8 @@ ONSET = 0.05
 _REACHED = 0.2
 _BLOCKS = 100
 _WIDER = 4.0
+_FREE = 0.25
+"""Share of the position's range that must be travelled without any force for contact to be sure to begin and end."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) 
         bonded: True if the probe is fixed to the surface, False if not, None to find out.
     """
     force = chain(channels.force)
-    rest, peak = _extremes(force, channels.position)
-    if bonded or (bonded is None and _never_free(rest, peak)):
+    rest, peak, sure = _extremes(force, channels.position)
+    if bonded or (bonded is None and not sure and _never_free(rest, peak)):
         return Contacts(((0, len(force)),), True, 1.0, 1.0, 0.0, -np.inf, ())
     sign = 1.0 if peak > rest else -1.0
     level, top = sign * rest, sign * peak
@@ -89,8 +91,8 @@ def _oriented(
     return Contacts(tuple(spans), False, sign, way, level, threshold, tuple(warnings))
 
 
-def _extremes(force: Array, position: Array) -> tuple[float, float]:
-    """The force at rest and at its peak: the two ends of its range.
+def _extremes(force: Array, position: Array) -> tuple[float, float, bool]:
+    """The force at rest and at its peak, the two ends of its range; and whether the position leaves no doubt of it.
 
     Out of contact the position may go anywhere without any force, in contact it may not: so rest is the end at which
     the position spreads wider by far, and if neither does, the end nearer to zero. The ends are those of medians over
@@ -98,7 +100,7 @@ def _extremes(force: Array, position: Array) -> tuple[float, float]:
     """
     width = len(force) // _BLOCKS
     low, high = np.percentile(force, [0.1, 99.9])
-    ratio = 1.0
+    ratio, travelled = 1.0, 0.0
     if width >= 4:
         step = max(width // 4, 1)
         middle, place = (
@@ -108,9 +110,12 @@ def _extremes(force: Array, position: Array) -> tuple[float, float]:
         if np.ptp(middle) > 0.2 * (high - low):
             low, high = middle.min(), middle.max()
             near = ONSET * (high - low)
-            ratio = _spread(place[middle < low + near]) / max(_spread(place[middle > high - near]), 1e-300)
-    from_low = abs(low) <= abs(high) if 1 / _WIDER < ratio < _WIDER else ratio > 1
-    return (float(low), float(high)) if from_low else (float(high), float(low))
+            below, above = (_spread(place[end]) for end in (middle < low + near, middle > high - near))
+            ratio, travelled = below / max(above, 1e-300), max(below, above) / max(_spread(place), 1e-300)
+    told = not 1 / _WIDER < ratio < _WIDER
+    from_low = ratio > 1 if told else abs(low) <= abs(high)
+    rest, peak = (low, high) if from_low else (high, low)
+    return float(rest), float(peak), told and travelled > _FREE
 
 
 def _spread(values: Array) -> float:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from palpate.identification.choosing import Choice, Question
 from palpate.identification.codes import Code, Warn
 from palpate.identification.contacts import Contacts
 from palpate.identification.filters import Chain
+from palpate.identification.fitting import fit
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.result import Comparison, Identification, Parameter, Traces, Verdict
 from palpate.identification.timebase import Channels
@@ -33,7 +36,7 @@ def report(
         warnings.append(Warn(Code.MODEL_REJECTED, text))
     parameters = verdicts(choice, question.lag, terms, warnings)
     if model is None and "M" not in parameters:
-        parameters = _with_mass(parameters, choice, terms)
+        parameters = _with_mass(parameters, choice, question, terms)
     warnings += _curved(choice) + _doubtful_units(parameters, terms)
     traces = _traces(channels, contacts, question, choice, terms)
     return Identification(
@@ -67,15 +70,21 @@ def _instead(choice: Choice) -> str:
     return f"; closest is {name} (R2 {closest.fit.r2:.4f}{blame})"
 
 
-def _with_mass(parameters: dict[str, Parameter], choice: Choice, terms: Terms) -> dict[str, Parameter]:
-    """Say about the mass what the model with a mass found."""
+def _with_mass(
+    parameters: dict[str, Parameter], choice: Choice, question: Question, terms: Terms
+) -> dict[str, Parameter]:
+    """Say about the mass what the model with a mass finds, at its own lag or else at that of the model chosen."""
     mass = next((c.fit for c in choice.others if c.fit.model is KELVIN_VOIGT_MASS), None)
     if mass is None:
         return parameters
     unit = unit_of("M", mass, terms)
-    if choice.candidate.fit.model.name != "kelvin-voigt" or choice.rejected:
-        reason = f"{choice.candidate.fit.model.name} has no mass"
+    chosen = choice.candidate.fit
+    if chosen.model.name != "kelvin-voigt" or choice.rejected:
+        reason = f"{chosen.model.name} has no mass"
     else:
+        if mass.lag == question.lag.value != chosen.lag:  # the log tells no lag to the model with a mass
+            lag = replace(question.lag, value=chosen.lag)
+            mass = fit(KELVIN_VOIGT_MASS, question.motion, question.force, lag)
         half = mass.t * mass.std("M")
         reason = (
             f"the log does not show a mass (95 %: {mass['M'] - half:.3g} to {mass['M'] + half:.3g} {unit})"
