@@ -8,10 +8,10 @@ from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.bench import build, load
 from palpate.bench.tick import compiled_march
 from palpate.controllers import Hybrid, Neural, join
-from palpate.controllers.neural import alike, checked
 from palpate.errors import InputError
 from palpate.networks import Perceptron, layers_of, network, random_layers
 from palpate.robots.arm3 import Arm3
+from palpate.signals.parameters import alike
 from palpate.signals.types import Sense, Task
 
 ALONG_X = Vec3(1.0, 0.0, 0.0)
@@ -92,7 +92,7 @@ def test_at_the_start_it_is_an_integrator():
 
 def test_a_network_that_does_not_fit_is_refused():
     with pytest.raises(InputError, match="9 inputs"):
-        checked(network(random_layers((8, 12, 3), 0, 0.1), 1.0, 0.1))
+        Neural(*Neural.thesis()[:-1], network(random_layers((8, 12, 3), 0, 0.1), 1.0, 0.1))
 
 
 def test_a_saturated_network_says_so():

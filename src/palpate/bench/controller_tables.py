@@ -20,10 +20,11 @@ from palpate.controllers import (
     join,
     self_tuning,
 )
-from palpate.controllers.neural import INPUTS, OUTPUTS, alike
+from palpate.controllers.neural import INPUTS, OUTPUTS
 from palpate.controllers.proportional_integral import integral_gain
 from palpate.errors import InputError
 from palpate.networks import Network, network, random_layers, thesis_layers
+from palpate.signals.parameters import alike, triple
 
 Size = Annotated[int, Meta(ge=1, le=1000)]
 
@@ -171,7 +172,7 @@ def _(c: HybridController, tick: float, wall: float) -> Hybrid:
 
 @made.register
 def _(c: NeuralController, tick: float, wall: float) -> Neural:
-    return Neural(alike(c.kp), alike(c.kv), alike(c.kf), Vec3(*map(float, c.offset)), _network(c))
+    return Neural(alike(c.kp), alike(c.kv), alike(c.kf), triple(c.offset), _network(c))
 
 
 @made.register
@@ -185,7 +186,7 @@ def _(c: ProportionalIntegralController, tick: float, wall: float) -> Proportion
 
 @made.register
 def _(c: RaibertCraigController, tick: float, wall: float) -> RaibertCraig:
-    stiffness, damping, integral = _vector(c.stiffness), _vector(c.damping), _vector(c.integral)
+    stiffness, damping, integral = triple(c.stiffness), triple(c.damping), triple(c.integral)
     return RaibertCraig(stiffness, damping, integral, float(c.kf), float(c.ki), float(c.feed_forward), tick)
 
 
@@ -200,7 +201,7 @@ def _(c: DecoupledHybridController, tick: float, wall: float) -> DecoupledHybrid
 @made.register
 def _(c: ImpedanceController, tick: float, wall: float) -> Impedance:
     target = Vec3(float(wall + c.beyond), 0.0, 0.0)
-    return Impedance(_vector(c.mass), _vector(c.damping), _vector(c.stiffness), target)
+    return Impedance(triple(c.mass), triple(c.damping), triple(c.stiffness), target)
 
 
 @made.register
@@ -209,11 +210,7 @@ def _(c: SelfTuningController, tick: float, wall: float) -> SelfTuning:
     layers = random_layers((self_tuning.INPUTS, *c.layers, self_tuning.OUTPUTS), c.weights_seed, c.scale)
     net = network(list(layers), middle, c.learning_rate)
     numbers = (float(c.dead_zone), float(c.smoothing), tick)
-    return SelfTuning(alike(c.kp), alike(c.kv), _vector(middle), _vector(c.inputs), *numbers, net)
-
-
-def _vector(values: tuple[float, float, float]) -> Vec3:
-    return Vec3(*map(float, values))
+    return SelfTuning(alike(c.kp), alike(c.kv), triple(middle), triple(c.inputs), *numbers, net)
 
 
 def _network(c: NeuralController) -> Network:

@@ -3,15 +3,15 @@
 from typing import NamedTuple
 
 from palpate._jit import law
-from palpate._vector import Vec3, resolve
+from palpate._vector import Vec3
 from palpate.controllers.controller import controller
-from palpate.controllers.resolved_acceleration import position_command
+from palpate.controllers.resolved_acceleration import position_command, resolved_acceleration
 
 
 @law
 def decoupled_hybrid(J, Jdqd, M, h, s, u_x, u_f, f):  # (4.19), friction aside
     """Torque for the task acceleration u_x where s is 0 and u_f where s is 1, against the wrench f [N m]."""
-    return M @ resolve(J, (1.0 - s) * u_x + s * u_f - Jdqd, M) + h + J.T @ f
+    return resolved_acceleration(J, Jdqd, M, h, (1.0 - s) * u_x + s * u_f) + J.T @ f
 
 
 @controller

@@ -3,15 +3,15 @@
 from typing import NamedTuple
 
 from palpate._jit import law
-from palpate._vector import ZERO3, Vec3, resolve
+from palpate._vector import ZERO3, Vec3
 from palpate.controllers.controller import controller
-from palpate.controllers.resolved_acceleration import position_command
+from palpate.controllers.resolved_acceleration import position_command, resolved_acceleration
 
 
 @law
 def hybrid(J, Jdqd, M, h, s, u_x, f_d, u_f):  # (4.13), friction aside
     """Torque that follows u_x where s is 0 and presses with f_d + u_f where s is 1 [N m]."""
-    return M @ resolve(J, (1.0 - s) * u_x - Jdqd, M) + h + J.T @ (s * (f_d + u_f))
+    return resolved_acceleration(J, Jdqd, M, h, (1.0 - s) * u_x) + J.T @ (s * (f_d + u_f))
 
 
 @controller

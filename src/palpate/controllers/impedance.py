@@ -3,20 +3,15 @@
 from typing import NamedTuple
 
 from palpate._jit import law
-from palpate._vector import Vec3, resolve
+from palpate._vector import Vec3
 from palpate.controllers.controller import controller
+from palpate.controllers.resolved_acceleration import resolved_acceleration
 
 
 @law
 def impedance_command(m, b, k, x, xd, x_d, xd_d, xdd_d, f):  # (2.3)
     """Task acceleration of the target impedance under the wrench f on the environment [m/s^2, rad/s^2]."""
     return xdd_d + (b * (xd_d - xd) + k * (x_d - x) - f) / m
-
-
-@law
-def impedance(J, Jdqd, M, h, u, f):
-    """Torque that gives the task acceleration u against the wrench f, were the model perfect [N m]."""
-    return M @ resolve(J, u - Jdqd, M) + h + J.T @ f
 
 
 @controller
@@ -47,4 +42,5 @@ class Impedance(NamedTuple):
         u = impedance_command(
             self.mass, self.damping, self.stiffness, sense.x, sense.xd, x_d, task.xd, task.xdd, sense.f
         )
-        return impedance(model.J, model.Jdqd, model.M, model.h, u, sense.f), state
+        torque = resolved_acceleration(model.J, model.Jdqd, model.M, model.h, u)
+        return torque + model.J.T @ sense.f, state

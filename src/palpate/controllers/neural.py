@@ -11,6 +11,7 @@ from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.errors import InputError
 from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, thesis_layers
+from palpate.signals.parameters import alike, coerced
 
 INPUTS, OUTPUTS = 9, 3
 STUCK = 1e-3
@@ -24,7 +25,17 @@ class NeuralState(NamedTuple):
     command: Vec3  # the network's [N, N, N m]
 
 
+def _check(self):
+    sizes = self.network.sizes
+    if sizes[0] != INPUTS or sizes[-1] != OUTPUTS:
+        raise InputError(
+            f"the neural controller's network has {INPUTS} inputs (pose, pose before, torques) and {OUTPUTS} outputs, "
+            f"got {sizes[0]} and {sizes[-1]}"
+        )
+
+
 @controller
+@coerced(_check)
 class Neural(NamedTuple):
     """The hybrid controller without its integral, and a network whose force command is added through J^T.
 
@@ -41,6 +52,9 @@ class Neural(NamedTuple):
         kf: force gain K_fp [1], shape (3,).
         offset: added to both poses before the network sees them [m, m, rad].
         network: of 9 inputs and 3 outputs.
+
+    Raises:
+        InputError: a network of other inputs or outputs.
     """
 
     kp: Vec3
@@ -101,22 +115,3 @@ def see(signals, x, x_before, torque):
     signals[0], signals[1], signals[2] = x.x, x.y, x.z
     signals[3], signals[4], signals[5] = x_before.x, x_before.y, x_before.z
     signals[6], signals[7], signals[8] = torque.x, torque.y, torque.z
-
-
-def alike(value: float) -> Vec3:
-    """The same number for x, y and phi."""
-    return Vec3(float(value), float(value), float(value))
-
-
-def checked(net: Network) -> Network:
-    """The network, if it fits the controller.
-
-    Raises:
-        InputError: not 9 inputs and 3 outputs.
-    """
-    if net.sizes[0] != INPUTS or net.sizes[-1] != OUTPUTS:
-        raise InputError(
-            f"the neural controller's network has {INPUTS} inputs (pose, pose before, torques) and {OUTPUTS} outputs, "
-            f"got {net.sizes[0]} and {net.sizes[-1]}"
-        )
-    return net

@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from palpate._vector import ZERO3, Vec3
 from palpate.controllers.controller import controller
-from palpate.controllers.hybrid import hybrid
-from palpate.controllers.resolved_acceleration import position_command
+from palpate.controllers.hybrid import Hybrid
 from palpate.signals.parameters import require
 
 
@@ -36,11 +35,7 @@ class ProportionalIntegral(NamedTuple):
         return 0.0 * self.ki
 
     def step(self, state, sense, task, model):
-        error = task.s * (task.f - sense.f)
-        integral = state + self.tick * self.ki * error
-        u_x = position_command(self.kp, self.kv, sense.x, sense.xd, task.x, task.xd, task.xdd)
-        u_f = self.kf * error + integral  # (4.15)
-        return hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f), integral
+        return Hybrid(self.kp, self.kv, self.kf, self.tick * self.ki).step(state, sense, task, model)
 
     def report(self, state):
         """The force integral."""

@@ -1,6 +1,6 @@
 """How parts take their numbers: an integer would be another type to the compiler, and a new compilation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from palpate._vector import Vec3
@@ -45,9 +45,19 @@ def components(value: Any) -> tuple[float, ...]:
     return tuple(value) if isinstance(value, Vec3) else (value,)
 
 
+def alike(value: float) -> Vec3:
+    """The same number three times."""
+    return triple((value, value, value))
+
+
+def triple(values: Iterable[float]) -> Vec3:
+    """Three numbers."""
+    return Vec3(*map(float, values))
+
+
 def _as_it_is(value: Any) -> Any:
     return value
 
 
 def _floats(value: Any) -> Any:
-    return Vec3(*map(float, value)) if isinstance(value, Vec3) else float(value)
+    return triple(value) if isinstance(value, Vec3) else float(value)
