@@ -9,7 +9,7 @@ import pytest
 from palpate._jit import kernel
 from palpate.errors import InputError
 from palpate.instruments import ForceSensor, force_sensor
-from palpate.instruments.converters import AnalogToDigital
+from palpate.instruments.converter import Converter
 from palpate.signals.filters import butterworth3
 
 
@@ -93,4 +93,4 @@ def test_twelve_bits_of_400_newton():
 )
 def test_bad_parameters_are_refused(sampling, noise, words):
     with pytest.raises(InputError, match=words):
-        ForceSensor(butterworth3(120.0, 20000), AnalogToDigital(12, 200.0), noise, sampling, 20000)
+        ForceSensor(butterworth3(120.0, 20000), Converter(12, 200.0), noise, sampling, 20000)

@@ -26,10 +26,11 @@ from palpate.errors import InputError
 from palpate.friction import Coulomb, LuGre
 from palpate.identifiers.front_ends import Centring, Matched
 from palpate.identifiers.least_squares import LeastSquares
-from palpate.instruments import AnalogToDigital, DigitalToAnalog, Encoder, analog_filter_190, force_sensor
+from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
 from palpate.references import Approach, ForceSchedule
 from palpate.robots.arm3 import MOTOR_TORQUE, Arm3
 from palpate.signals.filters import butterworth2, butterworth3, delay, state_variable
+from palpate.signals.parameters import alike, triple
 
 SURFACES = {
     KelvinVoigtSurface: KelvinVoigt,
@@ -46,24 +47,24 @@ def build(experiment: Experiment) -> Bench:
     """
     e = experiment
     check(e)
-    arm = Arm3(limits=Vec3(*e.robot.torque_limits), rotor=Vec3(*e.robot.rotor_inertia))
+    arm = Arm3(limits=triple(e.robot.torque_limits), rotor=triple(e.robot.rotor_inertia))
     q = _start(arm, e)
     rate, tick = float(e.run.rate), 1.0 / e.run.rate
     force = _force_input(e)
     loop = Loop(
-        start=_vector(e.robot.start),
+        start=triple(e.robot.start),
         plant=_plant(arm, e),
-        encoder=Encoder(Vec3(*e.encoders.counts), q),
+        encoder=Encoder(triple(e.encoders.counts), q),
         force=force,
-        output=DigitalToAnalog(12, MOTOR_TORQUE),
+        output=Converter(12, MOTOR_TORQUE),
         conditioning=Conditioning(
             arm, butterworth2(e.filters.motion, rate), butterworth2(e.filters.force, rate), tick
         ),
         sequence=_sequence(e, tick),
         schedule=_schedule(e),
-        approach=ResolvedAcceleration(_all(e.approach.kp), _all(e.approach.kv)),
+        approach=ResolvedAcceleration(alike(e.approach.kp), alike(e.approach.kv)),
         controller=controller_of(e.controller, tick, e.wall.x),
-        compensation=Coulomb(Vec3(*e.compensation.level), Vec3(*e.compensation.blend)),
+        compensation=Coulomb(triple(e.compensation.level), triple(e.compensation.blend)),
         estimators=_estimators(e, rate, matched_delay(e, force)),
         tick=tick,
         steps=e.run.steps,
@@ -72,16 +73,8 @@ def build(experiment: Experiment) -> Bench:
     return Bench(loop, q, meta, e.run.losses)
 
 
-def _all(value: float) -> Vec3:
-    return Vec3(float(value), float(value), float(value))
-
-
-def _vector(values: tuple[float, float, float]) -> Vec3:
-    return Vec3(*map(float, values))
-
-
 def _start(arm: Arm3, e: Experiment) -> Vec3:
-    pose = _vector(e.robot.start)
+    pose = triple(e.robot.start)
     beyond = arm.beyond_reach(pose)
     if beyond > 0.0:
         raise InputError(
@@ -98,12 +91,12 @@ def _start(arm: Arm3, e: Experiment) -> Vec3:
 def _plant(arm: Arm3, e: Experiment) -> Plant:
     f = e.friction
     friction = LuGre(
-        Vec3(*f.bristle_stiffness),
-        Vec3(*f.bristle_damping),
-        Vec3(*f.viscous),
-        Vec3(*f.coulomb),
-        Vec3(*f.static),
-        Vec3(*f.stribeck),
+        triple(f.bristle_stiffness),
+        triple(f.bristle_damping),
+        triple(f.viscous),
+        triple(f.coulomb),
+        triple(f.static),
+        triple(f.stribeck),
     ).checked()
     surface = SURFACES[type(e.surface)](**{k: float(v) for k, v in msgspec.structs.asdict(e.surface).items()})
     side = StickSlip(e.wall.side_stiffness, e.wall.side_damping, e.wall.side_friction)
@@ -114,7 +107,7 @@ def _force_input(e: Experiment) -> ForceInput:
     s, physics = e.force_sensor, e.run.rate * e.run.steps
     sensor = force_sensor(s.cutoff, s.sampling, s.bits, s.full_scale, s.noise, physics)
     analog = analog_filter_190(float(physics))
-    return ForceInput(sensor, analog, 1.0 if s.analog_filter else 0.0, AnalogToDigital(16, 200.0))
+    return ForceInput(sensor, analog, 1.0 if s.analog_filter else 0.0, Converter(16, 200.0))
 
 
 def _sequence(e: Experiment, tick: float) -> Sequence:
@@ -131,9 +124,9 @@ def _schedule(e: Experiment) -> ForceSchedule:
 
 def _estimators(e: Experiment, rate: float, late: float) -> Estimators:
     i, s = e.identification, e.force_sensor
-    P: Mat3 = diagonal(_all(i.covariance))
+    P: Mat3 = diagonal(alike(i.covariance))
     forgetting = float(i.forgetting)
-    thesis = LeastSquares(Vec3(*(float(v) for v in i.initial)), P, forgetting)
+    thesis = LeastSquares(triple(i.initial), P, forgetting)
     sensor = butterworth3(s.cutoff, rate)
     front = Matched(
         sensor.second,
@@ -141,7 +134,7 @@ def _estimators(e: Experiment, rate: float, late: float) -> Estimators:
         delay(late, rate),  # computing, holding, and what the filter's model at this rate lacks
         state_variable(i.cutoff, rate),
     )
-    matched = LeastSquares(_all(0.0), P, forgetting)
+    matched = LeastSquares(alike(0.0), P, forgetting)
     return Estimators(thesis, thesis, matched, front, Centring(forgetting), float(i.touch))
 
 

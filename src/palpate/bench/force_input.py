@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from palpate._jit import part
-from palpate.instruments import AnalogToDigital, ForceSensor, ForceSensorState
+from palpate.instruments import Converter, ForceSensor, ForceSensorState
 from palpate.signals.filters import Biquad, BiquadState
 
 
@@ -28,7 +28,7 @@ class ForceInput(NamedTuple):
     sensor: ForceSensor
     analog: Biquad
     filtered: float
-    converter: AnalogToDigital
+    converter: Converter
 
     def start(self):
         return ForceInputState(self.sensor.start(), self.analog.start(), 0.0)
@@ -41,7 +41,7 @@ class ForceInput(NamedTuple):
 
     def sampled(self, state):
         """What the converter reads now [N]."""
-        return self.converter.read(state.line)
+        return self.converter.convert(state.line)
 
     @property
     def lag(self):

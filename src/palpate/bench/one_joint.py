@@ -12,10 +12,10 @@ from palpate._vector import clip
 from palpate.bench.force_input import ForceInput, ForceInputState
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
 from palpate.environments.surface import Surface
-from palpate.environments.surface_state import SurfaceState, contact_force, impact, part_from, touch
+from palpate.environments.surface_state import SurfaceState, contact_force, follow
 from palpate.errors import InputError
 from palpate.friction import LuGre
-from palpate.instruments import AnalogToDigital, analog_filter_190, force_sensor
+from palpate.instruments import Converter, analog_filter_190, force_sensor
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.signals.filters import Biquad, BiquadState, butterworth2
@@ -84,18 +84,9 @@ class Joint(NamedTuple):
         qd = state.qd + dt * (drive - self.lever * max(force, 0.0)) / self.inertia
         q = state.q + dt * qd
         p, v = self.lever * q, self.lever * qd
-        if force < 0.0:
-            surface = part_from(surface)
-        if surface.contact == 1.0:
-            surface = self.surface.relax(surface, p, v, dt)
-        else:
-            surface = self.surface.free(surface, dt)
-            if p >= surface.deflection and v > surface.rate:
-                common, impulse = impact(tip_mass, self.surface.mass, v, surface.rate)
-                qd -= self.lever * impulse / self.inertia
-                force = impulse / dt
-                surface = touch(surface, common)
-        return JointState(q, qd, bristles, surface), JointTouch(max(force, 0.0), friction)
+        surface, impulse = follow(self.surface, surface, force, p, v, tip_mass, dt)
+        qd -= self.lever * impulse / self.inertia
+        return JointState(q, qd, bristles, surface), JointTouch(max(force, 0.0) + impulse / dt, friction)
 
 
 @part
@@ -246,7 +237,7 @@ def one_joint(
             raise InputError(f"{name} must be above 0, got {value}")
     physics = rate * steps
     sensor = force_sensor(noise=noise, rate=physics)
-    force = ForceInput(sensor, analog_filter_190(float(physics)), 0.0, AnalogToDigital(16, 200.0))
+    force = ForceInput(sensor, analog_filter_190(float(physics)), 0.0, Converter(16, 200.0))
     joint = Joint(float(inertia), float(lever), friction.checked(), join(surface))
     smooth = butterworth2(120.0, float(rate))
     return OneJoint(

@@ -6,7 +6,7 @@ from palpate._jit import part
 from palpate._vector import Vec3, solve
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import Surface
-from palpate.environments.surface_state import SurfaceState, contact_force, impact, part_from, touch
+from palpate.environments.surface_state import SurfaceState, contact_force, follow
 from palpate.friction import LuGre
 from palpate.robots.arm3 import Arm3
 
@@ -82,15 +82,8 @@ class Plant(NamedTuple):
         p = self.arm.pose(q).x - self.wall
         v = normal @ qd
         if force < 0.0:
-            surface, side = part_from(surface), self.side.start()
-        if surface.contact == 1.0:
-            surface = self.surface.relax(surface, p, v, dt)
-        else:
-            surface = self.surface.free(surface, dt)
-            if p >= surface.deflection and v > surface.rate:
-                common, impulse = impact(tip_mass, self.surface.mass, v, surface.rate)
-                qd -= per_normal * impulse
-                force = impulse / dt
-                surface = touch(surface, common)
-        felt = Touch(max(force, 0.0), -slide, p, friction)
+            side = self.side.start()
+        surface, impulse = follow(self.surface, surface, force, p, v, tip_mass, dt)
+        qd -= per_normal * impulse
+        felt = Touch(max(force, 0.0) + impulse / dt, -slide, p, friction)
         return PlantState(q, qd, bristles, surface, side), felt

@@ -12,7 +12,7 @@ from palpate.bench.row import put
 from palpate.bench.sequence import CONTACT, Sequence, SequenceState
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 from palpate.friction import Coulomb
-from palpate.instruments import DigitalToAnalog, Encoder
+from palpate.instruments import Converter, Encoder
 from palpate.references.force_schedule import ForceSchedule
 from palpate.signals.types import Task
 
@@ -42,7 +42,7 @@ class Loop(NamedTuple):
     plant: Plant
     encoder: Encoder
     force: ForceInput
-    output: DigitalToAnalog
+    output: Converter
     conditioning: Conditioning
     sequence: Sequence
     schedule: ForceSchedule
@@ -108,7 +108,7 @@ def think(loop, state, signals, sequence):
         wanted, approach = loop.approach.step(approach, sense, task, model)
         controller = loop.controller.rest(controller, sense)
     wanted += loop.compensation.torque(sense.qd)
-    applied = loop.output.write(clip(wanted, arm.limits))
+    applied = loop.output.convert(clip(wanted, arm.limits))
     return Command(wanted, applied), desired, approach, controller
 
 

@@ -57,6 +57,30 @@ def contact_force(force, surface_mass, tip_mass, free_acceleration):
 
 
 @law
+def follow(surface, state, force, p, v, tip_mass, dt):
+    """The surface after a step that took the tip to p [m] at v [m/s], and the impulse of an impact, else 0 [N s].
+
+    Args:
+        surface: the law of it.
+        state: before the step.
+        force: between the two during the step [N]; where it is negative they part.
+        p: penetration of the tip [m].
+        v: its rate before an impact [m/s].
+        tip_mass: effective mass of the tip along the normal [kg].
+        dt: [s].
+    """
+    if force < 0.0:
+        state = part_from(state)
+    if state.contact == 1.0:
+        return surface.relax(state, p, v, dt), 0.0
+    state = surface.free(state, dt)
+    if p >= state.deflection and v > state.rate:
+        common, impulse = impact(tip_mass, surface.mass, v, state.rate)
+        return touch(state, common), impulse
+    return state, 0.0
+
+
+@law
 def implicitness(mass, damping, stiffness, dt):
     """Weight of the new state in a step: 1/2 (second order), towards 1 where the step outlasts the decay.
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from palpate._jit import part
-from palpate.instruments.converters import AnalogToDigital
+from palpate.instruments.converter import Converter
 from palpate.signals.filters import Cascade, CascadeState, butterworth3
 from palpate.signals.parameters import coerced, require
 
@@ -35,7 +35,7 @@ class ForceSensor(NamedTuple):
     """
 
     analog: Cascade
-    converter: AnalogToDigital
+    converter: Converter
     noise: float
     sampling: int
     rate: int
@@ -58,7 +58,7 @@ class ForceSensor(NamedTuple):
         """
         filtered, analog = self.analog.step(state.analog, force)
         if self.samples_at(k):
-            fresh = self.converter.read(filtered + self.noise * noise)
+            fresh = self.converter.convert(filtered + self.noise * noise)
             return state.computing, ForceSensorState(analog, fresh, state.computing)
         return state.held, ForceSensorState(analog, state.computing, state.held)
 
@@ -77,4 +77,4 @@ def force_sensor(
     rate: int = 20000,
 ) -> ForceSensor:
     """The thesis' sensor (sec. 3.4): 3rd-order 120 Hz, 480 Hz, 12 bits; frequencies [Hz], forces [N]."""
-    return ForceSensor(butterworth3(cutoff, rate), AnalogToDigital(bits, full_scale), noise, sampling, rate)
+    return ForceSensor(butterworth3(cutoff, rate), Converter(bits, full_scale), noise, sampling, rate)
