@@ -24,7 +24,7 @@ def _seed(_: Any, tokens: Sequence[Token]) -> int:
     """The conversion of cyclopts would round 1.5 without a word."""
     (token,) = tokens
     if not token.value.isdecimal():
-        raise InputError("it must be a whole number, 0 or above")
+        raise InputError(f"it must be a whole number, 0 or above, got {token.value!r}")
     return int(token.value)
 
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed
+from palpate.bench.summary import losses
 from palpate.records import Record
-from palpate.thesis.force_tracking import losses, since_contact
+from palpate.thesis.force_tracking import since_contact
 from palpate.thesis.turns import Turn, desired_pose, run_with
 
 Array = NDArray[np.float64]

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
-from palpate.bench.sequence import CONTACT, LOST
+from palpate.bench.sequence import CONTACT
+from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.thesis.claims import spread
 from palpate.thesis.runs import Runs
+from palpate.thesis.worlds import RELAXING_FOAM, SHORT, friction_and_pose
 
 SETTLE = 0.5
 """Seconds after a step of the desired force that are not judged [s]."""
@@ -35,20 +37,8 @@ VARIED_SEEDS = 3
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3}
-"""The last millimetres of the approach: the rest of it takes sixteen seconds and moves errors in contact by 4 %."""
 SINE = {"force.amplitude": 4.0, "force.frequency": 0.5, "force.restart": 5.0}
 """4 sin(pi t), its clock started anew every 5 s as the listing does; that turns the sine's sign each time."""
-RELAXING_FOAM = {
-    "surface": {
-        "kind": "standard-linear-solid",
-        "stiffness": 5600.0,
-        "damping": 13.0,
-        "mass": 0.02,
-        "branch_stiffness": 6900.0,
-        "branch_time": 0.23,
-    }
-}
 FOAM = changed(load("foam-neural"), SHORT)
 RUBBER = changed(load("rubber-neural"), SHORT)
 
@@ -81,12 +71,6 @@ def since_contact(record: Record) -> Array:
     """Time since the first contact [s], shape (n,); negative before."""
     pressing = record["phase"] == CONTACT
     return record["t"] - record["t"][np.argmax(pressing)]
-
-
-def losses(record: Record) -> int:
-    """How often contact was lost."""
-    phase = record["phase"]
-    return int(np.sum((phase[1:] == LOST) & (phase[:-1] == CONTACT)))
 
 
 def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
@@ -170,33 +154,10 @@ def slot(record: Record, start: float, end: float) -> Slot:
     )
 
 
-def moved(experiment: Experiment, x: float) -> Mapping[str, Any]:
-    """Changes that bring start, approach and wall together to a wall at x [m]."""
-    by = x - experiment.wall.x
-    start = experiment.robot.start
-    return {
-        "wall.x": x,
-        "robot.start": (start[0] + by, *start[1:]),
-        "approach.first": experiment.approach.first + by,
-    }
-
-
-def rougher(experiment: Experiment, factor: float) -> Mapping[str, Any]:
-    """Changes that multiply the joints' friction."""
-    f = experiment.friction
-    names = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
-    return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names}
-
-
 def variations(experiment: Experiment, seed: int) -> dict[str, Experiment]:
     """The experiment with other friction, at other poses, on the other foam, from other weights, as in the listing."""
     e = experiment
-    by: dict[str, Mapping[str, Any]] = {
-        "friction\nhalf": rougher(e, 0.5),
-        "friction\ndouble": rougher(e, 2.0),
-        "wall at\n0.40 m": moved(e, 0.40),
-        "wall at\n0.49 m": moved(e, 0.49),
-    }
+    by = friction_and_pose(e)
     if e.surface == FOAM.surface:
         by["relaxing\nfoam"] = RELAXING_FOAM
     if e.controller.__class__ is FOAM.controller.__class__:

@@ -31,6 +31,8 @@ NAMES = {"foam": "plain foam", "rubber": "rubber"}
 
 @dataclass(frozen=True)
 class Data:
+    """What such a figure shows: a press, the answers of a few networks on it, and what the claims rest on."""
+
     press: Press  # that of the first noise seed
     curves: list[Array]  # K, B, M and error of a few starts on it
     grounds: Grounds

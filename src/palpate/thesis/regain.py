@@ -14,8 +14,9 @@ from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_tracking import ENOUGH, SHARE, SHORT, since_contact
+from palpate.thesis.force_tracking import ENOUGH, SHARE, since_contact
 from palpate.thesis.turns import Turn, run_with, surface_back
+from palpate.thesis.worlds import SHORT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

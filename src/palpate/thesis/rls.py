@@ -12,6 +12,7 @@ from palpate.bench import Experiment, changed, load
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 from palpate.thesis.runs import Runs
+from palpate.thesis.worlds import moved
 
 Array = NDArray[np.float64]
 
@@ -108,20 +109,6 @@ def thesis_signals(press: Record) -> tuple[Array, Array]:
     return phi, press["force_measured"]
 
 
-def moved(experiment: Experiment, wall: float) -> Experiment:
-    """The wall elsewhere, and the arm's start with it [m]."""
-    shift = wall - experiment.wall.x
-    start = experiment.robot.start
-    return changed(
-        experiment,
-        {
-            "wall.x": wall,
-            "robot.start": (start[0] + shift, start[1], start[2]),
-            "approach.first": experiment.approach.first + shift,
-        },
-    )
-
-
 def rubbing(experiment: Experiment, factor: float) -> Experiment:
     """Coulomb and static friction of all joints times a factor."""
     friction = experiment.friction
@@ -140,8 +127,8 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
     return {
         "friction halved": rubbing(experiment, 0.5),
         "friction doubled": rubbing(experiment, 2.0),
-        "wall at 0.40 m": moved(experiment, 0.40),
-        "wall at 0.49 m": moved(experiment, 0.49),
+        "wall at 0.40 m": changed(experiment, moved(experiment, 0.40)),
+        "wall at 0.49 m": changed(experiment, moved(experiment, 0.49)),
         "B halved": changed(experiment, {"surface.damping": 0.5 * surface.damping}),
         "B doubled": changed(experiment, {"surface.damping": 2.0 * surface.damping}),
         "M = 0": changed(experiment, {"surface.mass": 0.0}),

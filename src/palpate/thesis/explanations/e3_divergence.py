@@ -24,9 +24,10 @@ from palpate.thesis.divergence_drawing import (
 )
 from palpate.thesis.explanations.e2_integrator import PI
 from palpate.thesis.force_panels import across, legend_inside, panels
-from palpate.thesis.force_tracking import FOAM, RELAXING_FOAM, RUBBER, SINE, moved, rougher, since_contact
+from palpate.thesis.force_tracking import FOAM, RUBBER, SINE, since_contact
 from palpate.thesis.runs import Runs
 from palpate.thesis.watching import HOLD, POSES, TORQUE1, TORQUES, Look, hold, layers, watch
+from palpate.thesis.worlds import RELAXING_FOAM, moved, rougher
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,25 +11,17 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
+from palpate.bench.summary import losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import (
-    ENOUGH,
-    RELAXING_FOAM,
-    SHORT,
-    VARIED_SEEDS,
-    losses,
-    moved,
-    rougher,
-    since_contact,
-    stops_holding,
-)
+from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact, stops_holding
 from palpate.thesis.regain import Regain, Trace, drawn_back, found_again, regain_panel, regained, trace_of
 from palpate.thesis.runs import Runs
 from palpate.thesis.wide_panel import wide_panel
+from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +43,6 @@ PARAMETERS = changed(PLAIN, {"compensation.level": LEVEL, "compensation.blend": 
 PRINTED_BLEND = 0.002
 """[rad/s]"""
 BLENDS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2)
-RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 HALF, SHAKES = 0.5, 5.0
 """Largest share of the error that is left where compensation works; least ratio of shaking that is called a hammer."""
 
@@ -258,12 +249,9 @@ def _blended(experiment: Experiment, blend: float) -> Experiment:
 def _worlds() -> dict[str, Mapping[str, Any]]:
     return {
         "foam": {},
-        "rubber": RUBBER,
+        "rubber": RUBBER_SURFACE,
         "relaxing\nfoam": RELAXING_FOAM,
-        "friction\nhalf": rougher(PLAIN, 0.5),
-        "friction\ndouble": rougher(PLAIN, 2.0),
-        "wall at\n0.40 m": moved(PLAIN, 0.40),
-        "wall at\n0.49 m": moved(PLAIN, 0.49),
+        **friction_and_pose(PLAIN),
     }
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import changed, load
+from palpate.bench.summary import losses
 from palpate.controllers import RaibertCraig
 from palpate.controllers.raibert_craig import growth_rate
 from palpate.records import Record
@@ -18,19 +19,10 @@ from palpate.report import style
 from palpate.robots.arm3 import Arm3
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import (
-    ENOUGH,
-    RELAXING_FOAM,
-    SHORT,
-    VARIED_SEEDS,
-    losses,
-    moved,
-    rougher,
-    since_contact,
-    stops_holding,
-)
+from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact, stops_holding
 from palpate.thesis.runs import Runs
 from palpate.thesis.wide_panel import wide_panel
+from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +40,6 @@ CAPTION = (
 PARAMETERS = changed(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
 DYNAMIC = {"controller": {"kind": "proportional-integral", "kp": 400.0, "kv": 80.0, "kf": 1.0, "ki": 3.0}}
 """(4.13) with the thesis' gains on foam; the original: the same for the force, 400 and 80 inertias for its joints."""
-RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 STEPS = (2.5, 5.0, 7.5)
 WORSE = 1.5
 """Least ratio of the original's overshoot, and of its angle's stray, to those with dynamics."""
@@ -253,12 +244,9 @@ def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
 def _changes() -> dict[str, Mapping[str, Any]]:
     return {
         "foam": {},
-        "rubber": RUBBER,
+        "rubber": RUBBER_SURFACE,
         "relaxing\nfoam": RELAXING_FOAM,
-        "friction\nhalf": rougher(PARAMETERS, 0.5),
-        "friction\ndouble": rougher(PARAMETERS, 2.0),
-        "wall at\n0.40 m": moved(PARAMETERS, 0.40),
-        "wall at\n0.49 m": moved(PARAMETERS, 0.49),
+        **friction_and_pose(PARAMETERS),
     }
 
 

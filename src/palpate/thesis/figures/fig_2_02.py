@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
+from palpate.bench.summary import losses
 from palpate.bench.tick import Loop, LoopState
 from palpate.controllers import Impedance
 from palpate.controllers.any_controller import AnyController
@@ -18,19 +19,10 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import (
-    ENOUGH,
-    RELAXING_FOAM,
-    SHORT,
-    VARIED_SEEDS,
-    losses,
-    moved,
-    rougher,
-    since_contact,
-    stops_holding,
-)
+from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact, stops_holding
 from palpate.thesis.runs import Runs
 from palpate.thesis.turns import Change, Turn, run_with
+from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +41,6 @@ DEPTHS = (0.0090, 0.0050, 0.0080, 0.0040, 0.0095, 0.0060, 0.0085, 0.0045)
 PARAMETERS = changed(
     load("foam-impedance"), {**SHORT, "run.press": float(len(DEPTHS)), "controller.beyond": DEPTHS[0]}
 )
-RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
 TOLERANCES = {"K": 0.10, "B": 0.25, "M": 0.25}
 TARGET = {"K": 2000.0, "B": 600.0, "M": 5.0}
@@ -203,7 +194,7 @@ _ALL = ("foam", "rubber")
 def _worlds() -> dict[str, Experiment]:
     return {
         "foam": PARAMETERS,
-        "rubber": changed(PARAMETERS, RUBBER),
+        "rubber": changed(PARAMETERS, RUBBER_SURFACE),
         "hardly any\nfriction": changed(PARAMETERS, FREE),
         "friction\nhalf": changed(PARAMETERS, rougher(PARAMETERS, 0.5)),
         "friction\ndouble": changed(PARAMETERS, rougher(PARAMETERS, 2.0)),

@@ -19,13 +19,9 @@ from palpate.thesis.force_tracking import (
     ENOUGH,
     FOLLOWS,
     LIMIT,
-    RELAXING_FOAM,
-    SHORT,
     VARIED_SEEDS,
     Slot,
     Tracking,
-    moved,
-    rougher,
     since_contact,
     slot,
     stops_holding,
@@ -34,6 +30,7 @@ from palpate.thesis.force_tracking import (
 )
 from palpate.thesis.runs import Runs
 from palpate.thesis.turns import Turn, other_surface, run_with
+from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +48,6 @@ PARAMETERS = changed(
     load("foam-self-tuning"),
     {**SHORT, "run.press": 12.5, "force.first": 20.0, "force.second": 10.0, "force.period": 2.5},
 )
-RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 UNDER = KelvinVoigt(34500.0, 480.0, 0.05)
 TURN = 6.0
 """When the foam becomes rubber [s after contact]."""
@@ -196,7 +192,7 @@ _POSES = ("foam", "wall at\n0.40 m", "wall at\n0.49 m")
 def _worlds() -> dict[str, Experiment]:
     by: dict[str, Mapping[str, Any]] = {
         "foam": {},
-        "rubber": RUBBER,
+        "rubber": RUBBER_SURFACE,
         "wall at\n0.40 m": moved(PARAMETERS, 0.40),
         "wall at\n0.49 m": moved(PARAMETERS, 0.49),
         "relaxing\nfoam": RELAXING_FOAM,

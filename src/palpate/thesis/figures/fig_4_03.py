@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
+from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided
 from palpate.thesis.force_loop import ForceLoop
 from palpate.thesis.force_panels import panels
-from palpate.thesis.force_tracking import ENOUGH, SHORT, VARIED_SEEDS, losses, rougher, since_contact
+from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact
 from palpate.thesis.runs import Runs
 from palpate.thesis.wide_panel import wide_panel
+from palpate.thesis.worlds import SHORT, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,19 +15,10 @@ from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.decoupling import COUPLED, JUMP, JUMPS, PRINTED, Pair, as_printed, pair_of, pressed
 from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import (
-    ENOUGH,
-    RELAXING_FOAM,
-    SHARE,
-    SHORT,
-    VARIED_SEEDS,
-    moved,
-    rougher,
-    since_contact,
-    stops_holding,
-)
+from palpate.thesis.force_tracking import ENOUGH, SHARE, VARIED_SEEDS, since_contact, stops_holding
 from palpate.thesis.runs import Runs
 from palpate.thesis.wide_panel import wide_panel
+from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +37,6 @@ PARAMETERS = changed(
     load("foam-decoupled"), {**SHORT, "run.press": 7.5, "force.first": 10.0, "force.second": 20.0}
 )
 FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
-RUBBER = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 HALF = 0.5
 """Largest share of what the coupled law lets through."""
 
@@ -286,11 +276,8 @@ def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
     """Other worlds, and a law that is wrong about K_e."""
     worlds: dict[str, Mapping[str, Any]] = {
         "hardly any\nfriction": FREE,
-        "friction\nhalf": rougher(PARAMETERS, 0.5),
-        "friction\ndouble": rougher(PARAMETERS, 2.0),
-        "wall at\n0.40 m": moved(PARAMETERS, 0.40),
-        "wall at\n0.49 m": moved(PARAMETERS, 0.49),
-        "rubber": RUBBER,
+        **friction_and_pose(PARAMETERS),
+        "rubber": RUBBER_SURFACE,
         "relaxing\nfoam": RELAXING_FOAM,
     }
     found: dict[str, tuple[Experiment, Mapping[str, Any]]] = {

@@ -39,6 +39,8 @@ OTHERS = (25.0, 100.0)
 
 @dataclass(frozen=True)
 class Data:
+    """What the figure shows: one press learned at several rates, and how long each takes over seeds and conditions."""
+
     press: Press
     curves: dict[float, Array]  # K, B, M and error by rate, of the first press and start
     found: dict[float, dict[float, list[Answer]]]  # by amplitude and rate, a press and a start for each seed

@@ -20,7 +20,6 @@ from palpate.thesis.force_tracking import (
     FOAM,
     FOLLOWS,
     LIMIT,
-    RELAXING_FOAM,
     SETTLE,
     Slot,
     Tracking,
@@ -32,6 +31,7 @@ from palpate.thesis.force_tracking import (
     tracking,
 )
 from palpate.thesis.runs import Runs
+from palpate.thesis.worlds import RELAXING_FOAM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
