@@ -19,8 +19,6 @@ from palpate.thesis.force_tracking import (
     SINE,
     Tracking,
     following,
-    moved,
-    rougher,
     stops_holding,
     tracking,
     variations,
@@ -28,6 +26,7 @@ from palpate.thesis.force_tracking import (
 from palpate.thesis.runs import Runs
 from palpate.thesis.study import study
 from palpate.thesis.watching import watch
+from palpate.thesis.worlds import moved, rougher
 
 OURS = [f"6.{i}" for i in range(10, 18)] + [
     "neural-is-an-integrator",

@@ -29,7 +29,7 @@ def summarise(record: Record) -> dict[str, Any]:
         "seed": record.meta["seed"],
         "duration_s": float(t[-1]) if len(t) else 0.0,
         "contact_at_s": float(t[np.argmax(pressing)]) if pressing.any() else None,
-        "contacts_lost": int(np.sum((record["phase"][1:] == LOST) & (record["phase"][:-1] == CONTACT))),
+        "contacts_lost": losses(record),
         "force": None,
         "tip": None,
         "saturated": {f"joint{i}": _share(record[f"saturated{i}"]) for i in (1, 2, 3)},
@@ -45,6 +45,12 @@ def summarise(record: Record) -> dict[str, Any]:
         }
         summary["identified"] = _identified(record, last)
     return summary
+
+
+def losses(record: Record) -> int:
+    """How often contact was lost."""
+    phase = record["phase"]
+    return int(np.sum((phase[1:] == LOST) & (phase[:-1] == CONTACT)))
 
 
 def _share(flags: NDArray[np.float64]) -> float:
