@@ -238,6 +238,13 @@ def test_units_off_by_a_thousand_are_suspected():
     assert "unit-guess" in found.codes
 
 
+def test_a_press_of_metres_is_one_of_millimetres():
+    log = pressed()
+    found = identify(record(log["time"], log["position"] * 1e3, log["force"]))
+    assert any(w.code.word == "unit-guess" and "say NAME:mm" in w.text for w in found.warnings)
+    assert "unit-guess" not in identify(log).codes
+
+
 def test_ten_rows_a_second():
     log = pressed()
     found = identify(record(log["time"][::100], log["position"][::100], log["force"][::100]))
@@ -298,6 +305,7 @@ def test_wrong_records(kind):
         ({"lag": float("nan")}, "lag must be"),
         ({"lag": 0.0, "lag_std": -1.0}, "lag's std must be"),
         ({"series_stiffness": 0.0}, "series stiffness must be above 0"),
+        ({"calibration": 5.0}, r"calibration must be below 1.*0\.01 means 1 %"),
     ],
 )
 def test_wrong_arguments(arguments, words):

@@ -1,6 +1,10 @@
 from __future__ import annotations
 
+import gzip
+from datetime import datetime, timedelta
+
 import numpy as np
+import polars
 import pytest
 
 from palpate.errors import InputError
@@ -119,6 +123,44 @@ def test_a_unit_in_the_name_is_taken_and_said(tmp_path):
     assert {note["code"] for note in record.meta["notes"]} == {"unit-guess"}
 
 
+CLOCKS = {
+    "ISO": lambda t: (datetime(2024, 3, 1, 23, 59, 59) + timedelta(seconds=t)).isoformat(),
+    "a zone": lambda t: (datetime(2024, 3, 1, 23, 59, 59) + timedelta(seconds=t)).isoformat() + "Z",
+    "a space": lambda t: str(datetime(2024, 3, 1, 23, 59, 59) + timedelta(seconds=t)),
+    "time of day": lambda t: str((datetime(2024, 3, 1, 12) + timedelta(seconds=t)).time()),
+}
+
+
+@pytest.mark.parametrize("kind", CLOCKS)
+def test_dates_and_times_are_seconds(tmp_path, kind):
+    log = write(tmp_path / "a.csv", [(CLOCKS[kind](0.1 * k), x, f) for k, (_, x, f) in enumerate(rows())])
+    record = read_log(log, **COLUMNS)
+    assert record["time"] == pytest.approx(0.1 * np.arange(len(record)), abs=1e-6)
+    assert record.units["time"] == "s"
+    with pytest.raises(InputError, match=r"'t' holds dates and times.*leave :ms out"):
+        read_log(log, **{**COLUMNS, "time": "t:ms"})
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_dates_in_parquet_are_seconds_whatever_they_count_in(tmp_path, unit):
+    begin = datetime(2024, 3, 1)
+    times = polars.Series(
+        [begin + timedelta(seconds=0.1 * k) for k in range(30)], dtype=polars.Datetime(unit)
+    )
+    for cells in (times, times - begin, times.dt.time()):
+        polars.DataFrame({"t": cells, "x": np.arange(30.0), "f": np.arange(30.0)}).write_parquet(
+            tmp_path / "a"
+        )
+        assert read_log(tmp_path / "a", **COLUMNS)["time"] == pytest.approx(0.1 * np.arange(30), abs=1e-6)
+
+
+def test_a_date_that_is_none_is_named(tmp_path):
+    cells = [(CLOCKS["ISO"](0.1 * k), x, f) for k, (_, x, f) in enumerate(rows())]
+    cells[17] = ("yesterday", *cells[17][1:])
+    with pytest.raises(InputError, match=r"row 18 \(line 19\) holds 'yesterday'"):
+        read_log(write(tmp_path / "a.csv", cells), **COLUMNS)
+
+
 @pytest.mark.parametrize("cell", ["nan", "inf", "-inf", "oops", "1.2.3"])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_a_cell_that_is_no_number_is_named_with_its_row(tmp_path, cell, place):
@@ -148,6 +190,17 @@ WRONG_FILES = {
     "header only": (lambda path: path.write_text("t,x,f\n"), "no rows"),
     "binary": (binary, "not text"),
     "latin": (lambda path: path.write_bytes("t,x,f\n0,1,µ".encode("latin-1")), "UTF-8"),
+    "compressed": (lambda path: path.write_bytes(gzip.compress(b"t,x,f\n0,0,0\n")), "unpack it first"),
+    "UTF-16": (lambda path: path.write_text("t,x,f\n0,0,0\n", encoding="utf-16"), "UTF-16"),
+    "a Macintosh of old": (lambda path: path.write_bytes(b"t,x,f\r0,0,0\r"), "no rows"),
+    "Parquet without rows": (
+        lambda path: polars.DataFrame({"t": [], "x": [], "f": []}).write_parquet(path),
+        "no rows",
+    ),
+    "decimal commas between commas": (
+        lambda path: path.write_text("t,x,f\n0,1,0,2,0,3\n0,2,0,2,0,3\n"),
+        "more cells than its header's 3",
+    ),
     "half a Parquet": (lambda path: path.write_bytes(b"PAR1" + b"x" * 100), "Parquet"),
 }
 
@@ -167,6 +220,7 @@ WRONG_SPECS = {
     "unknown unit": ({"force": "f:parsec"}, r"unknown unit 'parsec'.*mN"),
     "wrong quantity": ({"force": "f:mm"}, "unit of length; force needs"),
     "number too large": ({"force": "7"}, "columns are 0 to 2"),
+    "one column twice": ({"force": "x"}, "force and position cannot be the same column"),
     "no time": ({"time": None}, "--time.*--rate"),
 }
 
@@ -183,6 +237,13 @@ def test_a_wrong_delimiter_is_suspected(tmp_path):
     log = write(tmp_path / "a.csv", rows())
     with pytest.raises(InputError, match="is the delimiter right"):
         read_log(log, delimiter=";", **COLUMNS)
+
+
+def test_a_name_with_a_colon_is_given_with_its_unit(tmp_path):
+    log = write(tmp_path / "a.csv", rows(), header="t,pos:x,f")
+    with pytest.raises(InputError, match=r"unknown column 'pos'.*given with its unit: pos:x:UNIT"):
+        read_log(log, **{**COLUMNS, "position": "pos:x"})
+    assert len(read_log(log, **{**COLUMNS, "position": "pos:x:mm"})) == 30
 
 
 def test_a_column_that_is_there_twice_must_be_named_by_number(tmp_path):

@@ -50,7 +50,7 @@ def identify(
     log
         CSV, with or without a header, or Parquet.
     time
-        Column of the time, in s if no unit is given.
+        Column of the time, in s if no unit is given; dates and times (ISO 8601) too.
     rate
         Rows per second, for a log without a column of time.
     position

@@ -107,6 +107,8 @@ def _check(
     ):
         if not (np.isfinite(value) and value >= 0):
             raise InputError(f"the {name} must be 0 or more, got {value:g}")
+    if calibration >= 1:
+        raise InputError(f"the calibration must be below 1, got {calibration:g}; 0.01 means 1 %")
     if lag is not None and not np.isfinite(lag):
         raise InputError(f"the lag must be a number of seconds, got {lag:g}")
     for name, positive in (("series stiffness", series), ("cut-off", cutoff)):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from palpate.identification.choosing import Choice, Question
 from palpate.identification.codes import Code, Warn
 from palpate.identification.contacts import Contacts
@@ -16,6 +18,8 @@ from palpate.identification.verdicts import Terms, unit_of, verdicts
 from palpate.units import impedance_units
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
+_DEEPEST = 0.5
+"""No press goes deeper [m]."""
 _SHOWN = 20_000
 
 
@@ -37,7 +41,7 @@ def report(
     parameters = verdicts(choice, question.lag, terms, warnings)
     if model is None and "M" not in parameters:
         parameters = _with_mass(parameters, choice, question, terms)
-    warnings += _curved(choice) + _doubtful_units(parameters, terms)
+    warnings += _curved(choice) + _doubtful_units(parameters, terms) + _doubtful_depth(question, terms)
     traces = _traces(channels, contacts, question, choice, terms)
     return Identification(
         model=fitted.model.name,
@@ -98,6 +102,15 @@ def _curved(choice: Choice) -> list[Warn]:
         return []
     text = "the stiffness changes with the position (K2 x^2 + K3 x^3); K is its value at the mean position"
     return [Warn(Code.NONLINEAR_STIFFNESS, text)]
+
+
+def _doubtful_depth(question: Question, terms: Terms) -> list[Warn]:
+    """A press of metres is one of millimetres whose unit was not given."""
+    deep = float(np.ptp(question.motion.position[question.motion.rows]))
+    if terms.position_unit != "m" or deep <= _DEEPEST:
+        return []
+    text = f"the probe moves by {deep:.3g} m in contact: is the position in mm? then say NAME:mm"
+    return [Warn(Code.UNIT_GUESS, text)]
 
 
 def _doubtful_units(parameters: dict[str, Parameter], terms: Terms) -> list[Warn]:

@@ -12,6 +12,14 @@ from palpate.errors import InputError
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "space"}
 _LOOK = 50
+_NO_TEXT = {
+    b"\x1f\x8b": "is compressed by gzip; unpack it first",
+    b"PK\x03\x04": "is a zip archive or a spreadsheet; unpack it, or save the sheet as CSV",
+    b"\x89HDF": "is HDF5; write its columns out as CSV or Parquet",
+    b"\xff\xfe": "is UTF-16 text; save it as UTF-8",
+    b"\xfe\xff": "is UTF-16 text; save it as UTF-8",
+}
+"""What other files begin with."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +74,11 @@ def find_layout(path: Path, delimiter: str | None = None) -> Layout:
 
 def _first_lines(path: Path) -> tuple[int, list[str]]:
     with path.open("rb") as file:
-        if b"\x00" in file.read(65536):
+        begin = file.read(65536)
+        for magic, what in _NO_TEXT.items():
+            if begin.startswith(magic):
+                raise InputError(f"{path} {what}")
+        if b"\x00" in begin:
             raise InputError(f"{path} is not text (it holds zero bytes); give a CSV or a Parquet file")
     try:
         with path.open(encoding="utf-8-sig") as file:

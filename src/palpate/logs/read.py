@@ -36,7 +36,7 @@ def read_log(
     with the columns `time` [s, from 0], `position` [m] and `force` [N]. A file that palpate wrote needs no columns.
 
     Args:
-        path: CSV with or without a header, in any usual dialect, or Parquet.
+        path: CSV with or without a header, in any usual dialect, or Parquet; time may be dates and times (ISO 8601).
         rate: rows per second [1/s], for a log without a column of time.
         start: leave out the rows before it, in seconds from the first row [s].
         end: leave out the rows from it on, likewise [s].
@@ -55,8 +55,11 @@ def read_log(
         return read_record(path)
     table = Table(path, delimiter)
     places = {role: table.resolve(split_spec(spec)[0]) for role, spec in columns.items()}
+    _check_apart(places, table)
     words = [str(word) for word in missing]
     arrays = dict(zip(places, table.numbers(list(places.values()), words), strict=True))
+    if not len(next(iter(arrays.values()))):
+        raise InputError(f"{path} holds a header and no rows; give a log with a row for each sample")
     notes: list[dict[str, Any]] = []
     units = {}
     for role, spec in columns.items():
@@ -72,6 +75,17 @@ def read_log(
     return Record(kept, {name: units[name] for name in kept}, meta)
 
 
+def _check_apart(places: dict[str, int], table: Table) -> None:
+    """Time, position and force are three columns."""
+    seen: dict[int, str] = {}
+    for role in _QUANTITY.keys() & places.keys():
+        other = seen.setdefault(places[role], role)
+        if other != role:
+            name = table.names[places[role]]
+            both = " and ".join(sorted((other, role)))
+            raise InputError(f"{both} cannot be the same column of {table.path}, {name!r}; name two")
+
+
 def columns_of(path: str | Path, delimiter: str | None = None) -> list[str]:
     """Names of a log's columns; numbers from 0 if it has no header.
 
@@ -85,9 +99,14 @@ def _symbol(role: str, spec: str, table: Table, place: int) -> tuple[str, list[d
     """The unit's symbol of one column: said, else stored in the file, else carried by the name, else SI."""
     name, symbol = split_spec(spec)
     own = table.names[place]
+    if own in table.clocks and (symbol or "s") != "s":
+        raise InputError(f"{name!r} holds dates and times, which are read as seconds; leave :{symbol} out")
     if symbol is not None:
         _check_quantity(role, name, symbol)
         return symbol, []
+    if own in table.clocks:
+        _check_quantity(role, name, "s")
+        return "s", []
     if own in table.units:
         return table.units[own], []
     guess = unit_in_name(own, _QUANTITY.get(role, ""))
@@ -132,8 +151,6 @@ def _missing(role: str, values: NDArray[np.float64], name: str, given: bool) -> 
 def _from_zero(arrays: dict[str, NDArray[np.float64]], rate: float | None, path: Path) -> float:
     """Make time start at 0, so that unix time keeps its digits; make it from the rate where there is no column."""
     n = len(next(iter(arrays.values())))
-    if n == 0:
-        raise InputError(f"{path} holds a header and no rows; give a log with a row for each sample")
     if "time" not in arrays:
         if rate is None:
             raise InputError(
@@ -168,7 +185,8 @@ def _cut(
     )
     if not keep.any():
         span = f"{time.min():.6g} to {time.max():.6g} s"
-        raise InputError(
-            f"no row of {path} lies between --start {start} and --end {end}; the log spans {span}"
-        )
+        bounds = [
+            f"--{name} {value:g}" for name, value in (("start", start), ("end", end)) if value is not None
+        ]
+        raise InputError(f"no row of {path} is left by {' and '.join(bounds)}; the log spans {span}")
     return {name: values[keep] for name, values in arrays.items()}

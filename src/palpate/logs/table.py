@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
+from palpate.logs.clock import seconds_of_cells, seconds_of_text
 from palpate.logs.layout import Layout, find_layout
 from palpate.logs.store import stored_about
 
@@ -36,6 +38,7 @@ class Table:
         with path.open("rb") as file:
             self.parquet = file.read(4) == _PARQUET
         self.units: dict[str, str] = {}
+        self.clocks: set[str] = set()
         self.meta: dict[str, Any] = {}
         self.layout: Layout | None = None
         if self.parquet:
@@ -74,7 +77,13 @@ class Table:
     def _no_column(self, name: str) -> InputError:
         text = str(unknown("column", name, self.names))
         if self.layout and len(self.names) == 1:
-            text += f" (only one column was found, parted by {self.layout.delimiter_name}; is the delimiter right?)"
+            text += (
+                f" (only one column was found, parted by {self.layout.delimiter_name}; is the"
+                " delimiter right, and does the table begin in the first line?)"
+            )
+        whole = next((own for own in self.names if own.startswith(f"{name}:")), None)
+        if whole:
+            text += f" (a name that holds a colon is given with its unit: {whole}:UNIT)"
         return InputError(f"{self.path}: {text}")
 
     def numbers(self, places: Sequence[int], missing: Sequence[str] = ()) -> list[NDArray[np.float64]]:
@@ -86,6 +95,11 @@ class Table:
         frame = self._frame(places)
         columns = []
         for place in places:
+            clock = self._clock(place)
+            if clock is not None:
+                self.clocks.add(self.names[place])
+                columns.append(clock)
+                continue
             values = frame[str(place)].to_numpy().astype(float, copy=True)
             values[np.isin(values, [float(word) for word in missing if _is_finite(word)])] = np.nan
             if not np.isfinite(values).all():
@@ -93,6 +107,25 @@ class Table:
                 values[~np.isfinite(values)] = np.nan
             columns.append(values)
         return columns
+
+    def _clock(self, place: int) -> NDArray[np.float64] | None:
+        """A column of dates and times in seconds; None if it is no such column."""
+        if self.parquet:
+            import polars
+
+            if not polars.read_parquet_schema(self.path)[self.names[place]].is_temporal():
+                return None
+            return seconds_of_cells(polars.read_parquet(self.path, columns=[place]).to_series())
+        cell = self._cell(place).alias("cell")
+        first = self._text().select(cell).head(1).collect().to_series().to_list()
+        if not first or not first[0] or _is_finite(first[0]) or seconds_of_text(first[0]) is None:
+            return None
+        cells = self._text().select(cell).collect().to_series().to_list()
+        seconds = [seconds_of_text(text) for text in cells]
+        if None in seconds:
+            row = seconds.index(None)
+            raise InputError(self._bad_cell(place, row, cells[row]))
+        return np.array(seconds, float)
 
     def _frame(self, places: Sequence[int]) -> polars.DataFrame:
         import polars
@@ -110,6 +143,11 @@ class Table:
             return lazy.select(picks).collect(engine="streaming")
         except polars.exceptions.PolarsError as error:
             line = (str(error).splitlines() or ["unreadable"])[0]
+            if "n_extra" in line and self.layout:
+                line = (
+                    f"its rows hold more cells than its header's {len(self.names)};"
+                    f" name every column, or part the cells by something that no number holds"
+                )
             raise InputError(f"{self.path} cannot be read as a table: {line}") from None
 
     def _cell(self, place: int) -> polars.Expr:
@@ -167,7 +205,7 @@ class Table:
         name = self.names[place]
         return (
             f"{self.path}: column {name!r}, {where} holds {str(text)!r}, which is no finite number;"
-            f" mend it, or say --missing {text} if it means that there is no reading"
+            f" mend it, or say --missing {shlex.quote(str(text))} if it means that there is no reading"
         )
 
 
