@@ -23,10 +23,15 @@ def figure(
     drawing = Figure(figsize=(width, height * rows + 0.5), dpi=DPI, layout="constrained")
     axes = drawing.subplots(rows, 1, sharex=True, squeeze=False, **subplots)[:, 0]
     for axis in axes:
-        axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
-        axis.set_axisbelow(True)
-        axis.spines[["top", "right"]].set_visible(False)
+        plain(axis)
     return drawing, list(axes)
+
+
+def plain(axis: Axes) -> None:
+    """A light grid behind the data, and no frame above and to the right."""
+    axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
 
 
 def legend(axis: Axes, **options: Any) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from palpate.report import style
-from palpate.thesis.force_tracking import LIMIT, Slot, Tracking
+from palpate.thesis.force_tracking import LIMIT, Slot, Tracked, Tracking
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,14 +26,15 @@ def panels(heights: Sequence[float], columns: int = 1, width: float = 9.0) -> tu
     drawing = Figure(figsize=size, dpi=style.DPI, layout="constrained")
     grid = drawing.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
     for axis in grid.flat:
-        axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
-        axis.set_axisbelow(True)
-        axis.spines[["top", "right"]].set_visible(False)
+        style.plain(axis)
     return drawing, [list(row) for row in grid]
 
 
-def across(axis: Axes) -> Axes:
-    """The panel, stretched over its whole row."""
+def across(row: Sequence[Axes]) -> Axes:
+    """The first panel of a row, stretched over all of it; the others go."""
+    axis, *others = row
+    for other in others:
+        other.remove()
     where = axis.get_subplotspec()
     if where is not None:
         axis.set_subplotspec(where.get_gridspec()[where.rowspan.start, :])
@@ -102,6 +103,14 @@ def following_panel(axis: Axes, found: Mapping[str, Sequence[Tracking]]) -> None
         label="RMS error [N]",
         title="outside the steps, each dot a run: green follows, red does not; dashed: the limit",
     )
+
+
+def tracked_figure(data: Tracked) -> Figure:
+    """The slot of a force that is to be followed, and the runs."""
+    drawing, ((force,), (dots,)) = panels([3.2, 2.0])
+    force_panel(force, data.shown)
+    following_panel(dots, data.varied)
+    return drawing
 
 
 def legend_inside(axis: Axes, **options: object) -> None:

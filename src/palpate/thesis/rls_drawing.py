@@ -28,9 +28,7 @@ def grid(rows: int) -> tuple[Figure, list[Axes]]:
     drawing = Figure(figsize=(9.0, 2.15 * rows + 0.4), dpi=style.DPI, layout="constrained")
     axes = list(drawing.subplots(rows, 2).ravel())
     for axis in axes:
-        axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
-        axis.set_axisbelow(True)
-        axis.spines[["top", "right"]].set_visible(False)
+        style.plain(axis)
     return drawing, axes
 
 

@@ -27,6 +27,8 @@ LEAST_VELOCITY = 1e-4
 LEAST_ACCELERATION = 0.05
 """[m/s^2]; less is what the filter leaves of no motion."""
 QUANTILES = (10.0, 50.0, 90.0)
+LEVEL, PLAUSIBLE = 0.10, 0.25
+"""By what share K may differ from the thesis' level, and B from the surface's own."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,45 @@ def found_claim(
     verdict = decided(2 * sum(map(holds, nominal)) > len(nominal))
     return Claim(
         what[0], what[1], what[2], what[3], measured, f"{tolerance}; most seeds, {surface}", verdict, note
+    )
+
+
+def level_claim(data: Data, id_: str, source: str, name: str, level: float, why: str) -> Claim:
+    """Whether K_e comes to the thesis' level [kN/m] on the surface of this name."""
+    return found_claim(
+        data,
+        (id_, source, f"K_e of {name} is {level:g} kN/m.", f"{level:g} kN/m"),
+        lambda f: 1e-3 * f.K,
+        lambda f: abs(f.K / (1e3 * level) - 1.0) < LEVEL,
+        "kN/m",
+        f"within {100 * LEVEL:g} % of {level:g} kN/m",
+        why,
+    )
+
+
+def damping_claim(data: Data, id_: str, source: str, why: str) -> Claim:
+    """Whether B_e is plausible: what the thesis could only say, the bench can measure."""
+    return found_claim(
+        data,
+        (id_, source, "B_e is plausible.", "in words"),
+        lambda f: f.B,
+        lambda f: abs(f.B / f.true_B - 1.0) < PLAUSIBLE,
+        "N s/m",
+        f"within {100 * PLAUSIBLE:g} % of the surface's own B, here {data.truth['B']:g} N s/m",
+        f"The thesis could not check it; the bench can. {why}",
+    )
+
+
+def inertia_claim(data: Data, id_: str, source: str, why: str) -> Claim:
+    """Whether M_e is negative."""
+    return found_claim(
+        data,
+        (id_, source, "M_e is negative.", "negative"),
+        lambda f: f.M,
+        lambda f: f.M < 0.0,
+        "kg",
+        "below zero at 8 s",
+        why,
     )
 
 

@@ -166,8 +166,7 @@ def plot(data: Data) -> Figure:
     loss_panel(grid[1][1], data.loss)
     times_panel(grid[2][0], data.courses)
     steps_panel(grid[2][1], data.courses["foam that relaxes"])
-    grid[3][1].remove()
-    causes_panel(across(grid[3][0]), data.causes)
+    causes_panel(across(grid[3]), data.causes)
     return drawing
 
 

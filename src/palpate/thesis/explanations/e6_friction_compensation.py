@@ -16,11 +16,10 @@ from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, panels
+from palpate.thesis.force_panels import across, dots_panel, panels
 from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact, stops_holding
 from palpate.thesis.regain import Regain, Trace, drawn_back, found_again, regain_panel, regained, trace_of
 from palpate.thesis.runs import Runs
-from palpate.thesis.wide_panel import wide_panel
 from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
 if TYPE_CHECKING:
@@ -192,7 +191,7 @@ def _hammer(data: Data) -> Claim:
 def plot(data: Data) -> Figure:
     """The press, the blends, the worlds, the loss."""
     drawing, grid = panels([2.3, 2.4, 1.9, 2.2], 2, 11.0)
-    wide = [wide_panel(drawing, grid[i]) for i in (0, 2, 3)]
+    wide = [across(grid[i]) for i in (0, 2, 3)]
     for (name, one), color in zip(data.traces.items(), (style.GREY, style.RED, style.BLUE), strict=True):
         wide[0].plot(one.t, one.signal, color=color, linewidth=1.0, label=name)
     wide[0].axhline(20.0, color=style.ORANGE, linewidth=1.2)

@@ -18,10 +18,9 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.robots.arm3 import Arm3
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, panels
+from palpate.thesis.force_panels import across, dots_panel, panels
 from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact, stops_holding
 from palpate.thesis.runs import Runs
-from palpate.thesis.wide_panel import wide_panel
 from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
 if TYPE_CHECKING:
@@ -202,7 +201,7 @@ def plot(data: Data) -> Figure:
     """Force and angle over time, the map, and the runs."""
     drawing, grid = panels([2.5, 1.7, 3.0], 2, 11.0)
     for row, name in zip(grid[:2], ("force", "phi"), strict=True):
-        _over_time(wide_panel(drawing, row), data, name)
+        _over_time(across(row), data, name)
     _map_panel(drawing, grid[2][0], data)
     dots_panel(
         grid[2][1],

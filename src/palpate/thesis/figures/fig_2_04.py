@@ -18,10 +18,9 @@ from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, panels
+from palpate.thesis.force_panels import across, dots_panel, panels
 from palpate.thesis.force_tracking import ENOUGH, LIMIT, SETTLE, SHARE, VARIED_SEEDS, rms, stops_holding
 from palpate.thesis.runs import Runs
-from palpate.thesis.wide_panel import wide_panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -193,7 +192,7 @@ def _is_integral(data: Data) -> Claim:
 def plot(data: Data) -> Figure:
     """The force and the gain over time; the error over rates and worlds."""
     drawing, grid = panels([2.6, 2.6], 2, 11.0)
-    force = wide_panel(drawing, grid[0])
+    force = across(grid[0])
     c = data.record
     force.plot(c["t"], c["force"], color=style.BLUE, linewidth=1.1, label="true force")
     force.plot(c["t"], c["force_desired"], color=style.ORANGE, linewidth=1.2, label="desired")

@@ -183,9 +183,7 @@ def plot(data: Data) -> Figure:
     drawing.clear()
     left, right = drawing.subplots(1, 2, width_ratios=(1.6, 1.0))
     for axis in (left, right):
-        axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
-        axis.set_axisbelow(True)
-        axis.spines[["top", "right"]].set_visible(False)
+        style.plain(axis)
     _spectra(left, data)
     _folded(right, data)
     return drawing

@@ -170,9 +170,7 @@ def plot(data: Data) -> Figure:
     drawing.clear()
     upper, lower = drawing.subplots(2, 1, height_ratios=(1.5, 1.0))
     for axis in (upper, lower):
-        axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
-        axis.set_axisbelow(True)
-        axis.spines[["top", "right"]].set_visible(False)
+        style.plain(axis)
     _force(upper, data)
     _thresholds(lower, data)
     return drawing

@@ -15,10 +15,9 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided
 from palpate.thesis.force_loop import ForceLoop
-from palpate.thesis.force_panels import panels
+from palpate.thesis.force_panels import across, panels
 from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.wide_panel import wide_panel
 from palpate.thesis.worlds import SHORT, rougher
 
 if TYPE_CHECKING:
@@ -185,7 +184,7 @@ def plot(data: Data) -> Figure:
     drawing, grid = panels([3.4, 2.6], 2, 11.0)
     _damping_panel(grid[0][0], data)
     _cutoff_panel(grid[0][1], data)
-    wide = wide_panel(drawing, grid[1])
+    wide = across(grid[1])
     limits = np.log10(data.gains / 1e3)
     shown = wide.contourf(KFS, 1e3 * KIS, limits, levels=12, cmap="YlGnBu")
     bar = drawing.colorbar(shown, ax=wide, pad=0.01)

@@ -14,10 +14,9 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.decoupling import COUPLED, JUMP, JUMPS, PRINTED, Pair, as_printed, pair_of, pressed
-from palpate.thesis.force_panels import dots_panel, panels
+from palpate.thesis.force_panels import across, dots_panel, panels
 from palpate.thesis.force_tracking import ENOUGH, SHARE, VARIED_SEEDS, since_contact, stops_holding
 from palpate.thesis.runs import Runs
-from palpate.thesis.wide_panel import wide_panel
 from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose, rougher
 
 if TYPE_CHECKING:
@@ -207,7 +206,7 @@ def plot(data: Data) -> Figure:
     grid[2][0].set_ylabel("angle [°]")
     handles, labels = grid[0][0].get_legend_handles_labels()
     drawing.legend(handles, labels, loc="outside upper right", ncols=4, frameon=False, fontsize=8.5)
-    dots = wide_panel(drawing, grid[3])
+    dots = across(grid[3])
     dots_panel(
         dots,
         data.varied,

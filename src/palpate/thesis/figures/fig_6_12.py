@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.force_panels import following_panel, force_panel, panels
+from palpate.thesis.force_panels import tracked_figure
 from palpate.thesis.force_tracking import (
     FOAM,
     FOLLOWS,
@@ -69,7 +69,4 @@ def check(data: Tracked) -> Sequence[Claim]:
 
 def plot(data: Tracked) -> Figure:
     """A whole cycle of five seconds, and the runs."""
-    drawing, ((force,), (dots,)) = panels([3.2, 2.0])
-    force_panel(force, data.shown)
-    following_panel(dots, data.varied)
-    return drawing
+    return tracked_figure(data)

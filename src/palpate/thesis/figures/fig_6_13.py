@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.force_panels import following_panel, force_panel, panels
+from palpate.thesis.force_panels import tracked_figure
 from palpate.thesis.force_tracking import (
     ENOUGH,
     FOAM,
@@ -63,10 +63,7 @@ def check(data: Tracked) -> Sequence[Claim]:
 
 def plot(data: Tracked) -> Figure:
     """The beginning, and the runs."""
-    drawing, ((force,), (dots,)) = panels([3.2, 2.0])
-    force_panel(force, data.shown)
-    following_panel(dots, data.varied)
-    return drawing
+    return tracked_figure(data)
 
 
 def _late(one: Tracking) -> bool:

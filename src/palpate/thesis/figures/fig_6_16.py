@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.force_panels import following_panel, force_panel, panels
+from palpate.thesis.force_panels import tracked_figure
 from palpate.thesis.force_tracking import FOLLOWS, RUBBER, Tracked, following, stops_holding, told, tracked
 from palpate.thesis.runs import Runs
 
@@ -54,7 +54,4 @@ def check(data: Tracked) -> Sequence[Claim]:
 
 def plot(data: Tracked) -> Figure:
     """The slot, and the runs."""
-    drawing, ((force,), (dots,)) = panels([3.2, 2.0])
-    force_panel(force, data.shown)
-    following_panel(dots, data.varied)
-    return drawing
+    return tracked_figure(data)
