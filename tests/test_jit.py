@@ -173,7 +173,8 @@ class Workshop:
         self.user.mkdir()
         here = Path(palpate.__file__).parent
         (self.package / "__init__.py").write_text("")
-        for name in ("_jit.py", "_vector.py"):
+        (self.package / "_jit").mkdir()
+        for name in ("_vector.py", *(f"_jit/{file.name}" for file in (here / "_jit").glob("*.py"))):
             (self.package / name).write_text((here / name).read_text())
         (self.package / "entry.py").write_text(ENTRY)
         (self.user / "main.py").write_text(MAIN)

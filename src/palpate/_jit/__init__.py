@@ -1,0 +1,12 @@
+"""The bridge to Numba: laws and parts, written once in plain Python, compiled when a kernel is first needed.
+
+`law` and `part` only register. The first call of a `kernel` imports Numba and loads the kernel from the
+cache; only where the cache has none does it hand Numba every law as it stands and every part's own methods as
+overloads, and compile.
+"""
+
+from palpate._jit.kernels import Kernel, kernel
+from palpate._jit.registry import law, part
+from palpate._jit.stamp import sources_stamp
+
+__all__ = ["Kernel", "kernel", "law", "part", "sources_stamp"]

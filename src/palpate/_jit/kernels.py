@@ -1,0 +1,90 @@
+"""Kernels: from the cache where it has them, and else compiled when first called."""
+
+import functools
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+from palpate._jit.overloads import operators_and_members
+from palpate._jit.registry import INSIDE, OPTIONS, laws
+from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
+
+
+class Kernel:
+    """A function that runs compiled; `plain` is the same function as it was written."""
+
+    def __init__(self, function: Callable[..., Any]):
+        self.plain = function
+        self._waiting: Callable[[], None] | None = None
+        functools.update_wrapper(self, function)
+
+    @functools.cached_property
+    def compiled(self) -> Any:
+        """The Numba dispatcher, made when first asked for."""
+        return _dispatcher(self.plain, self._wait)
+
+    def __call__(self, *args: Any) -> Any:
+        return self.compiled(*args)
+
+    def run(self, waiting: Callable[[], None] | None, *args: Any) -> Any:
+        """Calls the kernel; calls `waiting` before, if it has to be compiled, which takes seconds."""
+        self._waiting = waiting
+        try:
+            return self.compiled(*args)
+        finally:
+            self._waiting = None
+
+    def _wait(self) -> None:
+        if self._waiting is not None:
+            self._waiting()
+
+    @property
+    def from_cache(self) -> bool:
+        """Whether every compiled version so far came out of the cache."""
+        return not self.compiled.stats.cache_misses
+
+
+def kernel(function: Callable[..., Any]) -> Kernel:
+    """Marks the entry of a compiled loop."""
+    return Kernel(function)
+
+
+def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
+    import numba
+    from numba.core import caching
+
+    class PackageCache(caching.FunctionCache):
+        def __init__(self, py_func: Callable[..., Any]):
+            super().__init__(py_func)
+            self._cache_file._source_stamp = sources_stamp(home_of(py_func))
+
+        def _index_key(self, sig: Any, codegen: Any) -> Any:
+            # The types as text: an index that holds a user's class cannot be read where that class is not.
+            _, *machine_and_code = super()._index_key(sig, codegen)
+            return (text_of(sig), *machine_and_code, stamp_of(function, sig))
+
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            known = stamp_of(function, sig) is not None
+            found = super().load_overload(sig, target_context) if known else None
+            if found is None:
+                wait()
+                _hand_over()
+            return found
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            if stamp_of(function, sig) is not None:
+                super().save_overload(sig, data)
+
+    dispatcher = numba.njit(**OPTIONS)(function)
+    try:
+        dispatcher._cache = PackageCache(function)
+    except RuntimeError:  # nowhere to write: every process compiles anew
+        _hand_over()
+    return dispatcher
+
+
+def _hand_over() -> None:
+    """Gives Numba the laws registered since the last time, and once and for all the way to ask parts."""
+    operators_and_members()
+    while laws:
+        importlib.import_module("numba.extending").register_jitable(**INSIDE)(laws.pop())

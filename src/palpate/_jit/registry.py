@@ -1,0 +1,37 @@
+"""What is registered to be compiled: laws and parts. Nothing is compiled here, and Numba is not imported."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from palpate import _vector
+
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
+
+laws: list[Callable[..., Any]] = []
+foreign_laws: list[Callable[..., Any]] = []
+parts: dict[type, None] = {}
+PACKAGE = Path(__file__).resolve().parent.parent
+# Division as NumPy's: no branch and no exception inside a loop.
+OPTIONS = {"error_model": "numpy", "nogil": True}
+# What only kernels call needs no way in from outside: making those would be half of all compiling.
+INSIDE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+def law(function: F) -> F:
+    """Marks a plain function as usable inside kernels. It stays a plain function."""
+    laws.append(function)
+    if PACKAGE not in Path(function.__code__.co_filename).parents:
+        foreign_laws.append(function)
+    return function
+
+
+def part(cls: C) -> C:
+    """Marks a NamedTuple whose methods are usable inside kernels. It stays a plain class."""
+    parts[cls] = None
+    return cls
+
+
+part(_vector.Vec3)
+part(_vector.Mat3)

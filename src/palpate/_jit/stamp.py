@@ -1,0 +1,81 @@
+"""What a cached kernel depends on, as a hash: stale kernels are never run."""
+
+import hashlib
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from palpate._jit.registry import PACKAGE, foreign_laws, parts
+
+_IMPORT = re.compile(r"^\s*from (palpate[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+
+
+def sources_stamp(*files: Path) -> str:
+    """A hash of these files and of all of the package's that they import, directly or not.
+
+    A kernel is stale when any file that it may call has changed, which Numba, left alone, does not see.
+    """
+    reached: dict[Path, bytes] = {}
+    waiting = [f.resolve() for f in files]
+    while waiting:
+        file = waiting.pop()
+        if file not in reached and file.exists():
+            reached[file] = file.read_bytes()
+            waiting.extend(_imported(reached[file].decode("utf-8", "replace")))
+    digest = hashlib.sha256()
+    for file in sorted(reached):
+        digest.update(str(file).encode() + b"\0" + reached[file])
+    return digest.hexdigest()
+
+
+def _imported(text: str) -> list[Path]:
+    """The package's files that a source imports names from, or as modules."""
+    root = PACKAGE.parent
+    found = []
+    for module, names in _IMPORT.findall(text):
+        place = root.joinpath(*module.split("."))
+        modules = [place, *(place / name.split(" as ")[0].strip(" ()\n\t") for name in names.split(","))]
+        for m in modules:
+            found += [p for p in (m.with_suffix(".py"), m / "__init__.py") if m.name and p.is_file()]
+    return found
+
+
+def stamp_of(function: Callable[..., Any], types_of_arguments: tuple[Any, ...]) -> str | None:
+    """A hash of all that a kernel given such arguments may depend on; None where it cannot be kept.
+
+    A kernel of the package that is given only the package's parts depends on its own file, theirs, and what those
+    import. With something of the user's among them it may call any law and part registered from outside. Without a
+    file there is nothing to ask; and a class of a script is another class the next time that the script runs.
+    """
+    classes = set(parts_among(types_of_arguments))
+    if any(cls.__module__ == "__main__" for cls in classes):
+        return None
+    things = {function, *classes}
+    if any(PACKAGE not in home_of(x).parents for x in things):
+        things |= {*foreign_laws, *parts}
+    files = {home_of(x) for x in things}
+    return sources_stamp(*files) if all(f.is_file() for f in files) else None
+
+
+def home_of(thing: Any) -> Path:
+    """The file that defines a function or a class."""
+    return Path(getattr(sys.modules.get(thing.__module__), "__file__", None) or "nowhere").resolve()
+
+
+def parts_among(numba_types: Any) -> Any:
+    """The classes of the parts among these types, those inside other parts too."""
+    for kind in numba_types:
+        cls = getattr(kind, "instance_class", None)
+        if cls is not None and cls in parts:
+            yield cls
+        members = getattr(kind, "types", None)
+        if members is not None:
+            yield from parts_among(members)
+
+
+def text_of(numba_types: Any) -> str:
+    """The types in words, with the home of every part's class."""
+    classes = (f"{cls.__module__}.{cls.__qualname__}" for cls in parts_among(numba_types))
+    return "; ".join([*map(str, numba_types), *classes])
