@@ -20,6 +20,11 @@ STEPS = 20
 TICKS, CHUNKS, REPEATS = 500, 40, 5
 
 
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def measure(waiting: Callable[[], None] | None = None) -> dict[str, float | int]:
     """Cost of a tick: on one core (the best of a few), and with a run on each core at the same time.
 
@@ -27,7 +32,6 @@ def measure(waiting: Callable[[], None] | None = None) -> dict[str, float | int]
     """
     bench = build(load(EXPERIMENT))
     noise = np.random.default_rng(0).standard_normal((CHUNKS, TICKS))
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
     def march(_: int) -> float:
         out = np.empty((TICKS, len(COLUMNS)))
@@ -40,13 +44,13 @@ def measure(waiting: Callable[[], None] | None = None) -> dict[str, float | int]
     march(0)
     ticks = TICKS * CHUNKS
     alone = min(march(i) for i in range(REPEATS)) / ticks
-    with ThreadPoolExecutor(cores) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         begun = time.perf_counter()
-        list(pool.map(march, range(REPEATS * cores)))
-        together = (time.perf_counter() - begun) / (REPEATS * cores * ticks)
+        list(pool.map(march, range(REPEATS * cores())))
+        together = (time.perf_counter() - begun) / (REPEATS * cores() * ticks)
     return {
         "ns_per_tick": 1e9 * alone,
         "ticks_per_s": 1.0 / together,
-        "cores": cores,
+        "cores": cores(),
         "times_real_time": bench.loop.tick / alone,
     }

@@ -138,16 +138,11 @@ class NeuralProbe:
         """
         given = (displacement, velocity, acceleration)
         chosen = [own if v is None else v for v, own in zip(given, self.values, strict=True)]
-        x, v, a = map(float, _probe_values(_three(chosen, "values")))
-        still, pressed = self.force((0.0, 0.0, 0.0)), self.force((x, 0.0, 0.0))
-        moving, hastened = self.force((x, v, 0.0)), self.force((x, v, a))
-        return Probed(
-            pressed / x,
-            (moving - pressed) / v,
-            (hastened - moving) / a,
-            still,
-            self._warnings(np.array([x, v, a])),
-        )
+        values = _probe_values(_three(chosen, "values"))
+        net, memory = self._net, self._memory
+        answers = ask(net.sizes, memory.weights, net.amplitude, memory.signals.copy(), self.scale, values)
+        K, B, M = map(float, answers)
+        return Probed(K, B, M, self.force((0.0, 0.0, 0.0)), self._warnings(values))
 
     def estimate(self) -> Estimate:
         """K, B and M at the probe `values`, with a covariance that is not known: no verdict can be "identified"."""

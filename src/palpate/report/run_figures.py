@@ -57,7 +57,7 @@ def _approach(record: Record, path: Path) -> str:
 
 def _force(record: Record, path: Path) -> str:
     drawing, (axis,) = style.figure(1, height=3.4)
-    _, since, shown = _around_contact(record)
+    since, shown = _around_contact(record)
     axis.plot(
         since, record["force_measured"][shown], color="#a9c8e4", linewidth=0.7, label="measured, filtered"
     )
@@ -76,7 +76,7 @@ def _force(record: Record, path: Path) -> str:
 
 def _identification(record: Record, path: Path) -> str:
     drawing, axes = style.figure(3, height=2.0)
-    _, since, shown = _around_contact(record)
+    since, shown = _around_contact(record)
     truth: dict[str, Any] = record.meta["truth"]
     for axis, (name, unit) in zip(axes, (("K", "N/m"), ("B", "N s/m"), ("M", "kg")), strict=True):
         for front, (label, color) in FRONT_ENDS.items():
@@ -128,11 +128,12 @@ def _torque(record: Record, path: Path) -> str:
     return "Torque as applied. Dashed: the limit, where the torque comes near it."
 
 
-def _around_contact(record: Record) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+def _around_contact(record: Record) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Time since contact [s] where it is shown, and which rows those are."""
     t = record["t"]
     start = t[np.argmax(record["phase"] == CONTACT)]
     shown = t >= start - BEFORE
-    return t, (t - start)[shown], shown
+    return (t - start)[shown], shown
 
 
 def _shade(axis: Axes, record: Record) -> None:

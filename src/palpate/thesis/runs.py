@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment, build
+from palpate.bench.speed import cores
 from palpate.records import Record
 
 T = TypeVar("T")
@@ -49,9 +49,5 @@ class Runs:
         if not items:
             return []
         first = work(items[0])
-        with ThreadPoolExecutor(_cores()) as pool:
+        with ThreadPoolExecutor(cores()) as pool:
             return [first, *pool.map(work, items[1:])]
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

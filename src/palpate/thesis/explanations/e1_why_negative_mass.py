@@ -38,7 +38,6 @@ PARAMETERS = {
 LAGS = 1e-3 * np.arange(0.0, 11.0)
 SENSOR_LAG = 5.6e-3
 """[s]; of the force sensor alone, for the lag formula's test."""
-STAGES = ("perfect signals", *CAUSES.values())
 CHAINS = {
     "perfect signals": (),
     "only the force's lag": ("lag", "filter"),

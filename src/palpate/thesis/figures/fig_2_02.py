@@ -141,7 +141,7 @@ def _claim(data: Data, claim: str, name: str) -> Claim:
         id=claim,
         source="eq. 2.1-2.3, fig. 2.2 (after Hogan)",
         claim=f"Impedance control holds the {_WORDS[name]} of the target impedance.",
-        thesis="the relation between force and displacement is controlled to satisfy (2.2)",
+        thesis="force and displacement are made to obey (2.2)",
         measured=(
             f"of the target: foam {spread([100 * getattr(f, name) for f in data.foam], '%', 3)}, rubber "
             f"{spread([100 * getattr(f, name) for f in data.rubber], '%', 3)}; with hardly any friction "

@@ -161,7 +161,7 @@ def _slow(data: Data) -> Claim:
         id="HYB-LAG",
         source="sec. 4.4",
         claim="A low-pass with a low cut-off makes the system unstable by its lag.",
-        thesis="a low cut-off creates a significant time lag and makes the system unstable",
+        thesis="the lag of a low cut-off destabilises the loop",
         measured=(
             f"limit with the foam's gains {_told(slow[0])} at 10 Hz, {_told(fast[0])} at 120 Hz; with the rubber's "
             f"gains {_told(slow[1])} and {_told(fast[1])}"

@@ -115,7 +115,7 @@ def _too_large(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
     return Claim(
         id="NN-ETA.too-large",
         source="sec. 6.2",
-        claim="If the learning rate is too large, learning may never converge.",
+        claim="There are learning rates so large that the network never settles.",
         thesis="in words",
         measured=f"stuck from rate {told}; at {RATES[-1]:g} in {sum(map(stuck, largest))} of {len(largest)} runs",
         tolerance="from some rate up to 1e-1 on, in 9 of 10 runs the error is still above 1 N at the end of the 4 s",
