@@ -8,6 +8,7 @@ from typing import Any
 from palpate._jit.overloads import operators_and_members
 from palpate._jit.registry import INSIDE, OPTIONS, laws
 from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
+from palpate._jit.unbroken import unbroken
 
 
 class Kernel:
@@ -24,13 +25,14 @@ class Kernel:
         return _dispatcher(self.plain, self._wait)
 
     def __call__(self, *args: Any) -> Any:
-        return self.compiled(*args)
+        with unbroken():
+            return self.compiled(*args)
 
     def run(self, waiting: Callable[[], None] | None, *args: Any) -> Any:
         """Calls the kernel; calls `waiting` before, if it has to be compiled, which takes seconds."""
         self._waiting = waiting
         try:
-            return self.compiled(*args)
+            return self(*args)
         finally:
             self._waiting = None
 

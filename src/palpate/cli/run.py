@@ -64,35 +64,43 @@ def run(
         sys.stdout.write(source)
         return 0
     folder = out if out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    with fresh_folder(folder, force=force) as fresh:
-        summary = _run(name, source, seed, folder, fresh, json)
+    title, summary = _run(name, source, seed, folder, force, json)
+    _tell(
+        title, summary, folder, json
+    )  # when all is in its place, so that a reader who has gone loses nothing
     return 130 if summary["end"] == "interrupted" else 0 if summary["end"] == "done" else 1
 
 
-def _run(name: str, source: str, seed: int, folder: Path, fresh: Path, as_json: bool) -> dict[str, Any]:
-    """Runs, writes everything into `fresh` and tells what came out; the summary."""
-    import msgspec
+def _run(
+    name: str, source: str, seed: int, folder: Path, force: bool, as_json: bool
+) -> tuple[str, dict[str, Any]]:
+    """Runs and writes the folder of results; the experiment's title, and the summary."""
     from rich.console import Console
 
     from palpate.bench import summarise
     from palpate.bench.experiment import parse
+
+    with fresh_folder(folder, force=force) as fresh:
+        experiment = parse(source, name)
+        command = f"palpate run {shlex.quote(name)} --seed {seed}"
+        record = _record(Console(stderr=as_json), name, experiment, seed)
+        record = replace(record, meta={**record.meta, "command": command})
+        summary = {"experiment": Path(name).stem, "command": command, **summarise(record)}
+        _write(record, summary, experiment.title, experiment.about, source, fresh)
+    return experiment.title, summary
+
+
+def _write(
+    record: Record, summary: dict[str, Any], title: str, about: str, source: str, folder: Path
+) -> None:
+    import msgspec
+
     from palpate.logs import write_record
 
-    console = Console(stderr=as_json)
-    experiment = parse(source, name)
-    command = f"palpate run {shlex.quote(name)} --seed {seed}"
-    record = _record(console, name, experiment, seed)
-    record = replace(record, meta={**record.meta, "command": command})
-    summary = {"experiment": Path(name).stem, "command": command, **summarise(record)}
-    write_record(record, fresh / "record.parquet")
-    (fresh / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n")
+    write_record(record, folder / "record.parquet")
+    (folder / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n")
     if len(record):
-        _report(record, experiment.title, experiment.about, source, summary, fresh)
-    if as_json:
-        sys.stdout.write(msgspec.json.encode(summary).decode() + "\n")
-    else:
-        _tell(console, experiment.title, summary, folder)
-    return summary
+        _report(record, title, about, source, summary, folder)
 
 
 def _record(console: Console, name: str, experiment: Any, seed: int) -> Record:
@@ -142,13 +150,19 @@ def _report(
     (folder / "report.html").write_text(text, encoding="utf-8")
 
 
-def _tell(console: Console, title: str, summary: dict[str, Any], folder: Path) -> None:
+def _tell(title: str, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
+    import msgspec
     from rich import box
+    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
     from palpate.report.run_tables import notes, tables
 
+    if as_json:
+        sys.stdout.write(msgspec.json.encode(summary).decode() + "\n")
+        return
+    console = Console()
     console.print(
         f"[bold]{escape(title)}[/bold], seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
     )
@@ -161,4 +175,6 @@ def _tell(console: Console, title: str, summary: dict[str, Any], folder: Path) -
         console.print(table)
     for note in notes(summary):
         console.print(f"[yellow]{escape(note)}[/yellow]")
-    console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False)
+    report = folder / "report.html"
+    place = f"report: {report}" if report.exists() else f"nothing to draw; the record is in {folder}"
+    console.print(place, soft_wrap=True, highlight=False)

@@ -1,0 +1,25 @@
+"""Ctrl-C while the compiled loop runs."""
+
+import subprocess
+import sys
+
+SCRIPT = """
+import os, signal, threading
+from palpate.bench import build, load
+
+bench = build(load("foam-hybrid"))
+bench.run(0.1)
+for delay in (0.05, 0.1, 0.15):
+    threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT)).start()
+    record = bench.run(600.0)
+    print(record.meta["end"], len(record) > 0)
+assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+"""
+
+
+def test_the_rows_so_far_are_kept():
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], check=False, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split("\n")[:3] == ["interrupted True"] * 3
