@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -36,6 +36,7 @@ VARIED_SEEDS = 3
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+W = TypeVar("W")
 
 SINE = {"force.amplitude": 4.0, "force.frequency": 0.5, "force.restart": 5.0}
 """4 sin(pi t), its clock started anew every 5 s as the listing does; that turns the sine's sign each time."""
@@ -207,6 +208,21 @@ def tracked(
     return Tracked(
         slot(runs.one(experiment), *shown), nominal, robustness(runs, experiment, nominal, measure)
     )
+
+
+def by_world(
+    runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
+) -> dict[str, list[T]]:
+    """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
+    cases = [
+        (name, world, seed)
+        for name, world in worlds.items()
+        for seed in (runs.seeds if name in full else runs.seeds[:VARIED_SEEDS])
+    ]
+    found: dict[str, list[T]] = {}
+    for (name, _, _), one in zip(cases, runs.map(lambda case: work(*case[1:]), cases), strict=True):
+        found.setdefault(name, []).append(one)
+    return found
 
 
 def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:

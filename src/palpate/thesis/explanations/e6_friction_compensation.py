@@ -17,7 +17,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact, stops_holding
+from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, by_world, since_contact, stops_holding
 from palpate.thesis.regain import Regain, Trace, drawn_back, found_again, regain_panel, regained, trace_of
 from palpate.thesis.runs import Runs
 from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
@@ -255,17 +255,12 @@ def _worlds() -> dict[str, Mapping[str, Any]]:
 
 
 def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
-    named = [
-        (n, c, s)
-        for n, c in _worlds().items()
-        for s in (runs.seeds if n == "foam" else runs.seeds[:VARIED_SEEDS])
-    ]
-    without = runs.over([(changed(PLAIN, c), s) for _, c, s in named], _held)
-    found = runs.over([(changed(PARAMETERS, c), s) for _, c, s in named], lambda r: (_held(r), losses(r)))
-    ratios: dict[str, list[Ratio]] = {}
-    for (name, _, _), a, (b, lost) in zip(named, without, found, strict=True):
-        ratios.setdefault(name, []).append(Ratio(b.error / a.error, lost > 0))
-    return ratios
+    def ratio(world: Mapping[str, Any], seed: int) -> Ratio:
+        without = _held(runs.one(changed(PLAIN, world), seed))
+        compensated = runs.one(changed(PARAMETERS, world), seed)
+        return Ratio(_held(compensated).error / without.error, losses(compensated) > 0)
+
+    return by_world(runs, _worlds(), ratio, {"foam"})
 
 
 def _held(record: Record) -> Held:

@@ -19,7 +19,7 @@ from palpate.report import style
 from palpate.robots.arm3 import Arm3
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact, stops_holding
+from palpate.thesis.force_tracking import ENOUGH, by_world, since_contact, stops_holding
 from palpate.thesis.runs import Runs
 from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
@@ -101,16 +101,9 @@ class Data:
 def run(runs: Runs) -> Data:
     """Both laws in each world; the original's growth at each posture."""
     worlds = {name: changed(PARAMETERS, changes) for name, changes in _changes().items()}
-    named = [
-        (n, (e, s))
-        for n, e in worlds.items()
-        for s in (runs.seeds if n == "foam" else runs.seeds[:VARIED_SEEDS])
-    ]
-    original = runs.over([case for _, case in named], _measured)
-    dynamic = runs.over([(changed(e, DYNAMIC), s) for _, (e, s) in named], _measured)
-    varied: dict[str, list[Pair]] = {}
-    for (name, _), a, b in zip(named, original, dynamic, strict=True):
-        varied.setdefault(name, []).append(Pair(a, b))
+    original = by_world(runs, worlds, lambda e, s: _measured(runs.one(e, s)), {"foam"})
+    dynamic = by_world(runs, worlds, lambda e, s: _measured(runs.one(changed(e, DYNAMIC), s)), {"foam"})
+    varied = {n: [Pair(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
     traces = {LAWS[0]: _trace(runs.one(PARAMETERS)), LAWS[1]: _trace(runs.one(changed(PARAMETERS, DYNAMIC)))}
     growth = _growth(1.0, np.ones((len(YS), len(XS)), dtype=bool))
     others = [_growth(gain, growth > GROWS) for gain in (0.1, 10.0)]

@@ -19,7 +19,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact, stops_holding
+from palpate.thesis.force_tracking import ENOUGH, by_world, since_contact, stops_holding
 from palpate.thesis.runs import Runs
 from palpate.thesis.turns import Change, Turn, run_with
 from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
@@ -92,13 +92,7 @@ class Data:
 def run(runs: Runs) -> Data:
     """Jumps of the desired depth on foam and rubber, and under what is varied."""
     worlds = _worlds()
-    named = [
-        (n, e, s) for n, e in worlds.items() for s in (runs.seeds if n in _ALL else runs.seeds[:VARIED_SEEDS])
-    ]
-    found = runs.map(lambda case: _found(_record(*case[1:])), named)
-    varied: dict[str, list[Found]] = {}
-    for (name, _, _), one in zip(named, found, strict=True):
-        varied.setdefault(name, []).append(one)
+    varied = by_world(runs, worlds, lambda e, s: _found(_record(e, s)), _ALL)
     rough, free = (_record(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
     traces = {
         "with friction": _trace(rough),

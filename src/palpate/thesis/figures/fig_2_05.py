@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +19,9 @@ from palpate.thesis.force_tracking import (
     ENOUGH,
     FOLLOWS,
     LIMIT,
-    VARIED_SEEDS,
     Slot,
     Tracking,
+    by_world,
     since_contact,
     slot,
     stops_holding,
@@ -75,7 +75,9 @@ def run(runs: Runs) -> Data:
     """Each world with the network learning and without; and the turn from foam to rubber."""
     worlds = _worlds()
     measure = tracking(*JUDGED)
-    tuned, fixed = _over(runs, worlds, {}, measure), _over(runs, worlds, FIXED, measure)
+    full = {*_SURFACES, *_POSES}
+    tuned = by_world(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
+    fixed = by_world(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
     turned = runs.map(lambda seed: measure(_turned(seed)), list(runs.seeds))
     record = _turned(runs.seeds[0])
     t = since_contact(record)
@@ -202,23 +204,6 @@ def _worlds() -> dict[str, Experiment]:
         "rate ten\ntimes": {"controller.learning_rate": 1e-2},
     }
     return {name: changed(PARAMETERS, changes) for name, changes in by.items()}
-
-
-def _over(
-    runs: Runs,
-    worlds: Mapping[str, Experiment],
-    law: Mapping[str, Any],
-    measure: Callable[[Record], Tracking],
-) -> dict[str, list[Tracking]]:
-    named = [
-        (name, (changed(e, law), seed))
-        for name, e in worlds.items()
-        for seed in (runs.seeds if name in {*_SURFACES, *_POSES} else runs.seeds[:VARIED_SEEDS])
-    ]
-    found: dict[str, list[Tracking]] = {}
-    for (name, _), one in zip(named, runs.over([case for _, case in named], measure), strict=True):
-        found.setdefault(name, []).append(one)
-    return found
 
 
 def _turned(seed: int) -> Record:
