@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from palpate.errors import InputError, MissingExtra, PalpateError
+    from palpate.errors import InputError, PalpateError
     from palpate.identification import Identification, identify
     from palpate.logs import read_log
     from palpate.records import Record
@@ -17,14 +17,13 @@ if TYPE_CHECKING:
 _HOME = {
     "Identification": "palpate.identification",
     "InputError": "palpate.errors",
-    "MissingExtra": "palpate.errors",
     "PalpateError": "palpate.errors",
     "Record": "palpate.records",
     "identify": "palpate.identification",
     "read_log": "palpate.logs",
 }
 
-__all__ = ["Identification", "InputError", "MissingExtra", "PalpateError", "Record", "identify", "read_log"]
+__all__ = ["Identification", "InputError", "PalpateError", "Record", "identify", "read_log"]
 
 
 def __getattr__(name: str) -> Any:

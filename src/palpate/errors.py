@@ -18,10 +18,6 @@ class InputError(PalpateError, ValueError):
     """
 
 
-class MissingExtra(PalpateError, ImportError):
-    """An optional dependency is not installed; the text names the extra that brings it."""
-
-
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     """The error for a name that is not in a list: it names the nearest, or else all there are."""
     names = sorted(known)

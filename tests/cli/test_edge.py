@@ -13,7 +13,7 @@ import pytest
 from palpate.cli import main
 from palpate.cli._edge import guarded
 from palpate.cli._program import COMMANDS, program
-from palpate.errors import InputError, MissingExtra
+from palpate.errors import InputError, PalpateError
 
 
 def raising(error):
@@ -41,9 +41,9 @@ def test_wrong_input_is_one_line_even_when_the_message_has_several(capsys):
     assert one_line(capsys) == "palpate: press.csv: row 3: 'a' is not a number\n"
 
 
-def test_a_missing_extra_is_wrong_input(capsys):
-    assert guarded(raising(MissingExtra("reading bags needs: pip install palpate[bags]"))) == 2
-    assert "palpate[bags]" in one_line(capsys)
+def test_every_error_that_is_raised_on_purpose_is_one_line(capsys):
+    assert guarded(raising(PalpateError("this is\nnot for palpate"))) == 2
+    assert one_line(capsys) == "palpate: this is not for palpate\n"
 
 
 @pytest.mark.parametrize(

@@ -172,11 +172,9 @@ def _traces(
     step = max(len(channels.position) // _SHOWN, 1)
     fit_step = max(len(question.force) // _SHOWN, 1)
     time = channels.time - chain.delay
-    position = chain(question.motion.position)
     rows = question.motion.rows[::fit_step]
     return Traces(
         time=time[::step],
-        position=position[::step],
         force=chain(contacts.force_sign * channels.force)[::step],
         fitted_time=time[rows],
         fitted_position=question.motion.moved(0, fitted.lag)[::fit_step],

@@ -56,7 +56,6 @@ class Traces:
     """What the figure shows: filtered signals of the whole log and the fit in contact, each of shape (n,) or (m,)."""
 
     time: NDArray[np.float64]
-    position: NDArray[np.float64]
     force: NDArray[np.float64]
     fitted_time: NDArray[np.float64]
     fitted_position: NDArray[np.float64]
