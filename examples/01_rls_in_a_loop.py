@@ -25,5 +25,7 @@ for regressor, force in zip(regressors, forces, strict=True):
 
 estimate = rls.estimate()
 print("     estimate      +- (95 %)    truth")
-for name, value, variance, truth in zip(rls.names, rls.theta, np.diag(estimate.covariance), TRUTH, strict=True):
+for name, value, variance, truth in zip(
+    rls.names, rls.theta, np.diag(estimate.covariance), TRUTH, strict=True
+):
     print(f"{name}  {value:11.4f}  {1.96 * variance**0.5:11.4f}  {truth:8.1f}")
