@@ -18,6 +18,10 @@ class InputError(PalpateError, ValueError):
     """
 
 
+class PartError(PalpateError, TypeError):
+    """A part of the user's cannot run in a loop; the text says where it fails, or what it may not do."""
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     """The error for a name that is not in a list: it names the nearest, or else all there are."""
     names = sorted(known)

@@ -1,15 +1,19 @@
 """Measuring the thesis: what is done stays done, what is wrong is one line, and no claim is forgotten."""
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 import palpate.thesis
+from palpate.bench import changed, load
 from palpate.errors import InputError
 from palpate.thesis.claims import Claim, decided, spread, with_wholes
 from palpate.thesis.measuring import STATE, measure
@@ -278,3 +282,12 @@ def test_a_claim_measured_in_parts_has_a_row_of_its_own():
     assert list(rows) == ["A", "A.K", "A.B", "F3.5", "F3.5.fold", "C", "C.K", "C.B"]
     assert (rows["A"], rows["C"], rows["F3.5"]) == ("differs", "reproduced", "reproduced")
     assert with_wholes([]) == []
+
+
+def test_a_run_cut_short_is_never_measured():
+    experiment = changed(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
+    runs = Runs()
+    runs.one(changed(experiment, {"run.press": 0.1}))  # compiles
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        runs.one(experiment)

@@ -11,6 +11,10 @@ from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
 from palpate._jit.unbroken import unbroken
 
 
+class NotCompiled(Exception):
+    """Numba could not compile a kernel; the cause has its own account of it, which is long."""
+
+
 class Kernel:
     """A function that runs compiled; `plain` is the same function as it was written."""
 
@@ -26,7 +30,12 @@ class Kernel:
 
     def __call__(self, *args: Any) -> Any:
         with unbroken():
-            return self.compiled(*args)
+            try:
+                return self.compiled(*args)
+            except Exception as error:
+                if type(error).__module__.startswith("numba."):
+                    raise NotCompiled(error) from error
+                raise
 
     def run(self, waiting: Callable[[], None] | None, *args: Any) -> Any:
         """Calls the kernel; calls `waiting` before, if it has to be compiled, which takes seconds."""
@@ -67,7 +76,10 @@ def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             known = stamp_of(function, sig) is not None
-            found = super().load_overload(sig, target_context) if known else None
+            try:
+                found = super().load_overload(sig, target_context) if known else None
+            except (ImportError, AttributeError):  # written by another version of these sources
+                found = None
             if found is None:
                 wait()
                 _hand_over()

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate._jit import NotCompiled
 from palpate._vector import Vec3
+from palpate.bench.diagnosis import diagnosed
 from palpate.bench.ending import DONE, INTERRUPTED, NO_CONTACT, Ending, Watchman
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT
@@ -141,7 +143,11 @@ class _Run:
     ) -> LoopState:
         if not self.compiled:
             return _march_plain(self.loop, state, k, noise, out)
-        return compiled_march.run(self.waiting, self.loop, state, k, noise, out)
+        try:
+            return compiled_march.run(self.waiting, self.loop, state, k, noise, out)
+        except NotCompiled as error:
+            found = diagnosed(self.loop, state)
+            raise found from found.__cause__ or error.__cause__
 
 
 def _march_plain(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment, build
+from palpate.bench.ending import INTERRUPTED
 from palpate.bench.speed import cores
 from palpate.records import Record
 
@@ -30,7 +31,10 @@ class Runs:
         """The record of one run, for a figure; of the first seed unless another is given."""
         number = self.seeds[0] if seed is None else seed
         run = experiment.run
-        return build(experiment).run(run.duration, number, press=run.press, waiting=self.waiting)
+        record = build(experiment).run(run.duration, number, press=run.press, waiting=self.waiting)
+        if record.meta["end"] == INTERRUPTED:  # a part of a run would be measured as if it were all of it
+            raise KeyboardInterrupt
+        return record
 
     def over_seeds(self, experiment: Experiment, measure: Callable[[Record], T]) -> list[T]:
         """`measure` of each seed's record; the records themselves are not kept (some 12 MB each)."""
