@@ -10,6 +10,8 @@ from palpate.errors import InputError
 from palpate.identification.choosing import Choice, Question, choose
 from palpate.identification.codes import Code, Warn
 from palpate.identification.fitting import Fit, Lag, fit
+from palpate.identification.hidden_mass import hidden_mass
+from palpate.identification.in_series import take_out
 from palpate.identification.lagging import closing_lag
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
 from palpate.identification.preparing import filter_and_contacts, question_of, thinned
@@ -61,7 +63,7 @@ def identify(
     channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
     warnings = channels.warnings
     if series_stiffness is not None:
-        channels.position = channels.position - channels.force / series_stiffness
+        channels = take_out(channels, series_stiffness, bonded, cutoff)
     channels, chain, contacts = filter_and_contacts(channels, bonded, cutoff)
     warnings += contacts.warnings
     terms = Terms(
@@ -85,7 +87,9 @@ def identify(
     plain = _negative_damping(choice, question)
     if plain is not None:
         question, choice = _at_lag(plain, choice, question, model, warnings)
-        terms = replace(terms, lags=True)
+        terms = replace(terms, lags=True, bent=abs(choice.candidate.fit["K"] - plain["K"]))
+    elif not choice.rejected:
+        terms = replace(terms, hidden=hidden_mass(choice.candidate.fit, question))
     return report(channels, contacts, question, choice, terms, model)
 
 
@@ -141,7 +145,9 @@ def _at_lag(
     """Judge again with the lag that the log tells, or else with that at which loading and unloading coincide."""
     told = choice.candidate.fit
     if not choice.rejected and told["B"] >= 0 and told.lag > 0:
-        value, std, least = told.lag, told.std("lag"), ""
+        hidden = hidden_mass(told, question)
+        more = hidden.shifts["lag"] / told.t if hidden else 0.0
+        value, std, least = told.lag, float(np.hypot(told.std("lag"), more)), ""
     else:
         value, std = closing_lag(question.motion, question.force, -plain["B"] / plain["K"], question.spans)
         least = "at least "

@@ -47,7 +47,7 @@ def report(
         model=fitted.model.name,
         parameters=parameters,
         contacts=tuple(_clock(channels, question, span) for span in contacts.spans),
-        lag=_lag_said(question, choice),
+        lag=_lag_said(question, choice, terms),
         r2=fitted.r2,
         rmse=fitted.rmse,
         n=len(question.force),
@@ -85,6 +85,9 @@ def _with_mass(
     chosen = choice.candidate.fit
     if chosen.model.name != "kelvin-voigt" or choice.rejected:
         reason = f"{chosen.model.name} has no mass"
+    elif terms.hidden:
+        most = f"{terms.hidden.mass:.3g} {unit}"
+        reason = f"the log does not show a mass (95 %: 0 to {most}, which would look like a lag)"
     else:
         if mass.lag == question.lag.value != chosen.lag:  # the log tells no lag to the model with a mass
             lag = replace(question.lag, value=chosen.lag)
@@ -127,13 +130,14 @@ def _doubtful_units(parameters: dict[str, Parameter], terms: Terms) -> list[Warn
     return warnings
 
 
-def _lag_said(question: Question, choice: Choice) -> tuple[float, float] | None:
+def _lag_said(question: Question, choice: Choice, terms: Terms) -> tuple[float, float] | None:
     fitted = choice.candidate.fit
     if question.lag.known:
         told = question.lag.value != 0 or question.lag.std > 0
         return (question.lag.value, question.lag.std) if told else None
     told = not choice.rejected and fitted.std("lag") < 0.5 * question.lag.std
-    return (fitted.lag, fitted.std("lag")) if told else None
+    more = terms.hidden.shifts["lag"] / fitted.t if terms.hidden else 0.0
+    return (fitted.lag, float(np.hypot(fitted.std("lag"), more))) if told else None
 
 
 def _clock(channels: Channels, question: Question, span: tuple[int, int]) -> tuple[float, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from palpate.identification.choosing import Choice
 from palpate.identification.codes import Code, Warn
 from palpate.identification.fitting import Fit, Lag
+from palpate.identification.hidden_mass import HiddenMass, before_position
 from palpate.identification.result import Parameter, Verdict
 from palpate.units import impedance_units
 
@@ -23,6 +24,8 @@ class Terms:
         series: stiffness in series with the surface and its standard deviation [N/m]; None if it is not given.
         force_unit, position_unit: of the record.
         lags: the force was found to lag the position although no lag is calibrated.
+        bent: how far that lag, which may be longer, has moved K [N/m].
+        hidden: the mass that an uncalibrated lag may hide; None if there is none.
     """
 
     tolerance: float
@@ -31,6 +34,8 @@ class Terms:
     force_unit: str
     position_unit: str
     lags: bool
+    bent: float = 0.0
+    hidden: HiddenMass | None = None
 
 
 def verdicts(choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> dict[str, Parameter]:
@@ -38,6 +43,12 @@ def verdicts(choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> di
     fitted = choice.candidate.fit
     names = [n for n in fitted.names if n not in ("offset", "lag", "x0")]
     found = {name: _verdict(name, choice, lag, terms, warnings) for name in names}
+    if terms.hidden and before_position(fitted):
+        text = (
+            f"the force seems to be read {-fitted.lag * 1e3:.2g} ms before the position, which no sensor's lag does: a"
+            f" mass of up to {terms.hidden.mass:.2g} kg looks like this; calibrate the lag and give it with --lag"
+        )
+        warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
     low = [n for n, p in found.items() if p.verdict is Verdict.NOT_IDENTIFIABLE and "lag" not in p.reason]
     low = [n for n in low if n in ("K", "B", "M", "K1", "tau", "n")]
     if low:
@@ -51,19 +62,35 @@ def _verdict(name: str, choice: Choice, lag: Lag, terms: Terms, warnings: list[W
     value = fitted[name]
     std = _whole_std(name, choice, terms)
     unit = unit_of(name, fitted, terms)
-    half = fitted.t * std
-    clear = half < abs(value)
-    if name in fitted.model.positive and value + half < 0:
+    interval = _interval(name, value, fitted.t * std, terms.hidden)
+    half = (interval[1] - interval[0]) / 2
+    std = half / fitted.t
+    if name in fitted.model.positive and interval[1] < 0:
         return _refused(name, value, unit, terms, warnings)
     if terms.lags and name in ("B", "M"):
         return Parameter(None, None, None, unit, Verdict.REJECTED, _LAGS.format(fit=value, unit=unit))
     if choice.rejected:
-        return _of_rejected(name, choice, value, std, half, unit)
+        return _of_rejected(name, choice, value, std, interval, unit)
+    clear = interval[0] > 0 or interval[1] < 0
     if half <= terms.tolerance * abs(value) and clear:
-        reason = f"known to {_percent(half, value)} (95 %)"
-        return Parameter(value, std, (value - half, value + half), unit, Verdict.IDENTIFIED, reason)
-    reason = _why_not(name, fitted, lag, terms, half, value, unit, warnings)
-    return _reported(value, std, half, unit, Verdict.NOT_IDENTIFIABLE, reason)
+        reason = f"known to {_percent(half, value)} (95 %){_with_hidden(name, half, terms)}"
+        return Parameter(value, std, interval, unit, Verdict.IDENTIFIED, reason)
+    reason = _why_not(name, fitted, lag, terms, interval, value, unit, warnings)
+    return _reported(value, std, interval, unit, Verdict.NOT_IDENTIFIABLE, reason)
+
+
+def _interval(name: str, value: float, half: float, hidden: HiddenMass | None) -> tuple[float, float]:
+    """The 95 % interval; it reaches further to the side that a hidden mass would move the parameter to."""
+    shift = hidden.shifts.get(name, 0.0) if hidden else 0.0
+    further = float(np.hypot(half, shift))
+    return (value - half, value + further) if shift > 0 else (value - further, value + half)
+
+
+def _with_hidden(name: str, half: float, terms: Terms) -> str:
+    """Say so if a hidden mass makes most of an interval."""
+    if terms.hidden is None or abs(terms.hidden.shifts.get(name, 0.0)) < half:
+        return ""
+    return f", a mass of up to {terms.hidden.mass:.2g} kg included that would look like a lag"
 
 
 _LAGS = "the force lags the position, and a lag T counts as a damping of -K T: calibrate it and give --lag"
@@ -82,7 +109,9 @@ def _refused(name: str, value: float, unit: str, terms: Terms, warnings: list[Wa
     )
 
 
-def _of_rejected(name: str, choice: Choice, value: float, std: float, half: float, unit: str) -> Parameter:
+def _of_rejected(
+    name: str, choice: Choice, value: float, std: float, interval: tuple[float, float], unit: str
+) -> Parameter:
     """The model does not hold. A stiffness is still a secant through the log; damping and mass are artefacts."""
     seen = "; ".join(choice.candidate.against[:2])
     alone = [f"{label} alone {values[name]:.3g}" for label, values in choice.halves.items() if name in values]
@@ -90,38 +119,57 @@ def _of_rejected(name: str, choice: Choice, value: float, std: float, half: floa
         seen = f"{', '.join(alone)} {_shown(unit)}".rstrip() + f"; {seen}"
     if name == "K":
         reason = f"a secant through the whole contact, not a constant of the surface: {seen}"
-        return _reported(value, std, half, unit, Verdict.REJECTED, reason)
+        return _reported(value, std, interval, unit, Verdict.REJECTED, reason)
     reason = f"the fit's {value:.3g} {_shown(unit)} is an artefact of a model that does not hold: {seen}"
     return Parameter(None, None, None, unit, Verdict.REJECTED, reason)
 
 
-def _reported(value: float, std: float, half: float, unit: str, verdict: Verdict, reason: str) -> Parameter:
+def _reported(
+    value: float, std: float, interval: tuple[float, float], unit: str, verdict: Verdict, reason: str
+) -> Parameter:
     """A number only if its interval excludes zero."""
-    if half >= abs(value):
+    if interval[0] <= 0 <= interval[1]:
         return Parameter(None, None, None, unit, verdict, reason)
-    return Parameter(value, std, (value - half, value + half), unit, verdict, reason)
+    return Parameter(value, std, interval, unit, verdict, reason)
 
 
 def _why_not(
-    name: str, fitted: Fit, lag: Lag, terms: Terms, half: float, value: float, unit: str, warnings: list[Warn]
+    name: str,
+    fitted: Fit,
+    lag: Lag,
+    terms: Terms,
+    interval: tuple[float, float],
+    value: float,
+    unit: str,
+    warnings: list[Warn],
 ) -> str:
-    bounds = f"95 %: {value - half:.3g} to {value + half:.3g} {_shown(unit)}".rstrip()
+    half = (interval[1] - interval[0]) / 2
+    bounds = f"95 %: {interval[0]:.3g} to {interval[1]:.3g} {_shown(unit)}".rstrip()
+    if _with_hidden(name, half, terms):
+        text = f"{name} cannot be told from a lag of the force that hides a mass ({bounds})"
+        return _confounded(text, warnings)
     alone = fitted.t * fitted.std(name, lag_known=True)
     if lag.std and half > 1.5 * alone and alone <= max(terms.tolerance * abs(value), 0.67 * half):
         known = f"{fitted.std('lag') * 1e3:.2g} ms"
         text = f"{name} cannot be told from a lag of the force, which is known to {known} only ({bounds})"
-        if not any(w.code is Code.LAG_DAMPING_CONFOUNDED for w in warnings):
-            warnings.append(
-                Warn(Code.LAG_DAMPING_CONFOUNDED, f"{text}; calibrate the lag and give it with --lag")
-            )
-        return text
+        return _confounded(text, warnings)
     pulled = abs(float(fitted.attenuation[fitted.names.index(name)]))
     if fitted.t * pulled > 0.7 * half:
         return (
             f"noise of the position may have pulled it by {pulled:.2g} ({bounds}); filter lower with --cutoff"
         )
-    limit = f"wider than {terms.tolerance:.0%}" if half < abs(value) else "zero is within it"
+    inside = interval[0] <= 0 <= interval[1]
+    limit = "zero is within it" if inside else f"wider than {terms.tolerance:.0%}"
     return f"the log does not show it above the noise ({bounds}; {limit})"
+
+
+def _confounded(text: str, warnings: list[Warn]) -> str:
+    """Warn once for all parameters that a lag looks like one of them."""
+    if not any(w.code is Code.LAG_DAMPING_CONFOUNDED for w in warnings):
+        warnings.append(
+            Warn(Code.LAG_DAMPING_CONFOUNDED, f"{text}; calibrate the lag and give it with --lag")
+        )
+    return text
 
 
 def _whole_std(name: str, choice: Choice, terms: Terms) -> float:
@@ -130,6 +178,8 @@ def _whole_std(name: str, choice: Choice, terms: Terms) -> float:
     parts = [fitted.std(name), terms.calibration * value if name not in ("n", "tau") else 0.0]
     if choice.rejected:
         parts += [d.spread for d in choice.candidate.disagreements if d.name == name]
+    if name == "K":
+        parts.append(terms.bent / fitted.t)
     if terms.series and name == "K":
         parts.append(terms.series[1] * (value / terms.series[0]) ** 2)
     return float(np.sqrt(np.sum(np.square(parts))))
