@@ -2,6 +2,7 @@
 
 import functools
 import importlib
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +10,8 @@ from palpate._jit.overloads import operators_and_members
 from palpate._jit.registry import INSIDE, OPTIONS, laws
 from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
 from palpate._jit.unbroken import unbroken
+
+_MAKING = threading.Lock()
 
 
 class NotCompiled(Exception):
@@ -21,12 +24,16 @@ class Kernel:
     def __init__(self, function: Callable[..., Any]):
         self.plain = function
         self._waiting: Callable[[], None] | None = None
+        self._dispatcher: Any = None
         functools.update_wrapper(self, function)
 
-    @functools.cached_property
+    @property
     def compiled(self) -> Any:
-        """The Numba dispatcher, made when first asked for."""
-        return _dispatcher(self.plain, self._wait)
+        """The Numba dispatcher, made when first asked for; by one thread, or each would compile its own."""
+        with _MAKING:
+            if self._dispatcher is None:
+                self._dispatcher = _dispatcher(self.plain, self._wait)
+        return self._dispatcher
 
     def __call__(self, *args: Any) -> Any:
         with unbroken():

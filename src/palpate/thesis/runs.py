@@ -49,9 +49,6 @@ class Runs:
         return self.map(work, list(cases))
 
     def map(self, work: Callable[[Any], T], items: Sequence[Any]) -> list[T]:
-        """`work` of each item, in their order, on all cores; the first alone, so that kernels are compiled once."""
-        if not items:
-            return []
-        first = work(items[0])
+        """`work` of each item, in their order, on all cores."""
         with ThreadPoolExecutor(cores()) as pool:
-            return [first, *pool.map(work, items[1:])]
+            return list(pool.map(work, items))
