@@ -4,5 +4,6 @@ from __future__ import annotations
 
 from palpate.logs.read import columns_of, read_log
 from palpate.logs.store import read_record, write_record
+from palpate.logs.whole import whole
 
-__all__ = ["columns_of", "read_log", "read_record", "write_record"]
+__all__ = ["columns_of", "read_log", "read_record", "whole", "write_record"]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.logs.whole import whole
 from palpate.records import Record
 
 KEY = "palpate"
@@ -36,14 +35,8 @@ def write_record(record: Record, path: str | Path) -> Path:
         raise InputError(f"cannot write {path}: there is no folder {path.parent}; make it first")
     about = {KEY: json.dumps({"units": dict(record.units), "meta": dict(record.meta)}, allow_nan=False)}
     frame = polars.DataFrame({name: np.asarray(column, float) for name, column in record.columns.items()})
-    handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    os.close(handle)
-    try:
+    with whole(path) as draft:
         frame.write_parquet(draft, metadata=about)
-        Path(draft).chmod(0o666 & ~_umask())
-        Path(draft).replace(path)
-    finally:
-        Path(draft).unlink(missing_ok=True)
     return path
 
 
@@ -83,9 +76,3 @@ def stored_about(path: Path) -> dict[str, dict[str, Any]] | None:
 
 def _first_line(error: Exception) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0]
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

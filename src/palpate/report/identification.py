@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.logs import whole
 from palpate.report.ownership import SIGNATURE
 
 if TYPE_CHECKING:
@@ -29,14 +28,8 @@ def write_figure(found: Identification, path: Path, title: str) -> Path:
         title: what to call the log.
     """
     figure = draw(found, title)
-    handle, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    os.close(handle)
-    try:
+    with whole(path) as draft:
         figure.savefig(draft, format="png", dpi=110, metadata={"Software": SIGNATURE})
-        Path(draft).chmod(0o644)
-        Path(draft).replace(path)
-    finally:
-        Path(draft).unlink(missing_ok=True)
     return path
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from palpate.logs import whole
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -42,7 +44,6 @@ def legend(axis: Axes, **options: Any) -> None:
 
 def save(drawing: Figure, path: Path) -> Path:
     """Writes the figure as PNG, the file there whole or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    drawing.savefig(part, format="png")
-    part.replace(path)
+    with whole(path) as draft:
+        drawing.savefig(draft, format="png")
     return path

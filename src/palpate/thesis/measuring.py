@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
@@ -13,6 +12,7 @@ import msgspec
 
 from palpate._jit import sources_stamp
 from palpate.errors import InputError
+from palpate.logs import whole
 from palpate.report import style
 from palpate.thesis.claims import Claim, with_wholes
 from palpate.thesis.page import index_page
@@ -119,10 +119,5 @@ def _json(value: Any) -> bytes:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise
+    with whole(path) as draft:
+        draft.write_bytes(content)
