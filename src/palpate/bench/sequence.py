@@ -12,7 +12,8 @@ PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact"}
 @part
 class SequenceState(NamedTuple):
     phase: float  # APPROACH, CONTACT or LOST
-    since: float  # how long this phase has lasted [s]
+    ticks: float  # of this phase so far
+    since: float  # how long that is [s]: ticks times the tick, not a running sum
     x_d: float  # desired x of the approach [m]
     x0: float  # x where the force first reached the switch: displacement counts from here [m]
     contacts: float  # how often contact was made
@@ -37,20 +38,21 @@ class Sequence(NamedTuple):
     tick: float
 
     def start(self):
-        return SequenceState(APPROACH, 0.0, self.approach.start, self.approach.start, 0.0)
+        return SequenceState(APPROACH, 0.0, 0.0, self.approach.start, self.approach.start, 0.0)
 
     def step(self, state, x, force):
         """The state at this tick, from the measured x [m] and the measured force [N]."""
-        phase, since, x_d, x0, contacts = state
+        phase, ticks, _, x_d, x0, contacts = state
+        ticks += 1.0
+        since = ticks * self.tick
         if phase == CONTACT:
             if force < self.release:
-                return SequenceState(LOST, 0.0, x_d, x0, contacts)
-            return SequenceState(CONTACT, since + self.tick, x_d, x0, contacts)
+                return SequenceState(LOST, 0.0, 0.0, x_d, x0, contacts)
+            return SequenceState(CONTACT, ticks, since, x_d, x0, contacts)
         if force >= self.switch:
-            return SequenceState(CONTACT, 0.0, x_d, x, contacts + 1.0)
+            return SequenceState(CONTACT, 0.0, 0.0, x_d, x, contacts + 1.0)
         if phase == LOST:
-            if since + self.tick < self.wait:
-                return SequenceState(LOST, since + self.tick, x_d, x0, contacts)
-            since = self.approach.hold - self.tick  # the hold is not repeated
-        since += self.tick
-        return SequenceState(APPROACH, since, self.approach.position(since), x0, contacts)
+            if since < self.wait:
+                return SequenceState(LOST, ticks, since, x_d, x0, contacts)
+            ticks, since = self.approach.hold / self.tick, self.approach.hold  # the hold is not repeated
+        return SequenceState(APPROACH, ticks, since, self.approach.position(since), x0, contacts)
