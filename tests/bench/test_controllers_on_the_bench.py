@@ -111,9 +111,11 @@ def test_decoupling_keeps_a_step_of_force_out_of_the_angle():
 
 
 def test_the_decoupled_law_as_printed_hammers_and_loses_the_surface():
-    c = pressed({"kind": "decoupled-hybrid", "stiffness": 5200.0, "form": "printed", "kf": 1.0}, press=5.0)
-    assert c["saturated2"].mean() > 0.5
-    assert (c["phase"] == 2).any()
+    """For most of the time: what hammers is chaotic, and now and then it rests for a second or two."""
+    printed = {"kind": "decoupled-hybrid", "stiffness": 5200.0, "form": "printed", "kf": 1.0}
+    runs = [pressed(printed, press=5.0, seed=seed) for seed in range(1, 6)]
+    assert np.median([c["saturated2"].mean() for c in runs]) > 0.5
+    assert all((c["phase"] == 2).any() for c in runs)
     corrected = pressed({"kind": "decoupled-hybrid", "stiffness": 5200.0}, press=5.0)
     assert corrected["saturated2"].mean() < 0.02
     assert (corrected["phase"] == 1).all()

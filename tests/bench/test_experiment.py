@@ -115,6 +115,7 @@ TOGETHER = {
     "estimator's filter": ({"identification.cutoff": 501.0}, r"cutoff in \[identification\] must be below 500 Hz"),
     "sensor's filter": ({"force_sensor.cutoff": 600.0}, r"cutoff in \[force_sensor\] must be below 500 Hz"),
     "sensor faster than physics": ({"force_sensor.sampling": 40000}, r"\[force_sensor\] must be at most 20000 Hz"),
+    "phase beyond a period": ({"force_sensor.phase": 0.0021}, r"phase in \[force_sensor\] must be below 0\.00208333 s"),
     "sensor too slow": ({"force_sensor.sampling": 100}, r"15\.\d ms late .* more than the 9 ticks"),
     "release above switch": ({"approach.release": 5.0}, r"release in \[approach\] must be below switch \(5 N\)"),
     "sensor that cannot feel the switch": ({"force_sensor.full_scale": 4.0}, r"\[force_sensor\] must be above switch"),

@@ -43,6 +43,24 @@ def test_it_swings_at_the_frequency_of_tip_and_surface():
 
 
 @surfaces
+@pytest.mark.parametrize("dt", [4e-4, 5e-5])
+def test_the_surfaces_law_holds_in_central_differences(surface, dt):
+    """Of a lever they are exact, at any step: what an identifier finds is B and M themselves."""
+    joint = Joint(0.126, 0.113, FRICTIONLESS, join(surface))
+    state, rows = joint.start(), []
+    for k in range(round(0.3 / dt)):
+        p = joint.lever * state.q
+        state, felt = joint.advance(state, 1.5 + 0.8 * math.sin(200.0 * k * dt), dt)
+        rows.append((p, felt.force))
+    p, f = np.array(rows[len(rows) // 3 :]).T
+    rate, second = (p[2:] - p[:-2]) / (2 * dt), (p[2:] - 2 * p[1:-1] + p[:-2]) / dt**2
+    law = surface.stiffness * p[1:-1] + surface.damping * rate + surface.mass * second
+    assert f.min() > 0.0
+    # Double precision of p, two differences later: 1e-19/dt^2.
+    np.testing.assert_allclose(f[1:-1], law, rtol=0, atol=1e-9)
+
+
+@surfaces
 def test_an_integral_leaves_no_error(surface):
     record = one_joint(surface, DirectIntegral(1.4e-3), CONSTANT).run(10.0)
     assert record.columns["force"][-2000:].mean() == pytest.approx(15.0, abs=0.3)

@@ -1,5 +1,7 @@
 """The plant by itself: order of its integrator, energy, and contact that never pulls."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -86,6 +88,51 @@ def test_the_integrator_is_of_first_order(surface, where):
     ]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(orders, 1.0, atol=0.15)
+
+
+def shake(plant, state, base, swing, dt, out):
+    """Steps under a torque that swings at 25 Hz; of each: penetration, the branch's stretch, normal force."""
+    for k in range(len(out)):
+        out[k, 0], out[k, 1] = plant.arm.pose(state.q).x - plant.wall, state.surface.internal
+        state, felt = plant.advance(state, base + math.sin(50.0 * math.pi * k * dt) * swing, dt)
+        out[k, 2] = felt.normal
+
+
+compiled_shake = kernel(shake)
+
+
+def misfit(surface, dt, depth=4e-3):
+    """Normal force less what the surface's law gives in central differences of p; and what half a step does to it."""
+    plant = plant_with(surface, LuGre().scaled(0.3))
+    state = pressed(plant, depth)
+    static = surface.force(state.surface, depth, 0.0)
+    out = np.empty((round(0.2 / dt), 3))
+    compiled_shake(
+        plant,
+        state,
+        push(plant, (static, 0, 0), state.q),
+        push(plant, (0.6 * static, 0, 0), state.q),
+        dt,
+        out,
+    )
+    p, z, f = out.T
+    assert f.min() > 0.0, "in contact throughout"
+    rate, second = (p[2:] - p[:-2]) / (2 * dt), (p[2:] - 2 * p[1:-1] + p[:-2]) / dt**2
+    law = [
+        surface.force(SurfaceState(at, 0.0, inside, 1.0), at, v)
+        for at, inside, v in zip(p[1:-1], z[1:-1], rate, strict=True)
+    ]
+    late = 0.5 * dt * np.std(second) * (surface.force(state.surface, depth, 1.0) - static)
+    return np.std(f[1:-1] - law - surface.mass * second), late
+
+
+@pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
+def test_force_belongs_to_the_place_the_rate_and_the_acceleration_of_its_moment(surface):
+    """An identifier that is exact must find B and M, not M less B times half a step."""
+    for dt in (2e-4, 5e-5):
+        misfits, late = misfit(surface, dt)
+        assert misfits < 1e-3 * late, "the damping force would be late by half a step"
+        assert misfits < 1e-5
 
 
 def kinetic(plant, state):

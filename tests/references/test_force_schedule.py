@@ -47,8 +47,23 @@ def test_a_clock_that_restarts_each_five_seconds_flips_the_sine():
         assert restarting.force(t + 5.0) - level == pytest.approx(level - running.force(t + 5.0), abs=1e-9)
 
 
+def test_a_wave_lies_on_top_of_all_and_ends():
+    wave = np.random.default_rng(0).normal(size=700)
+    schedule = STEPS._replace(amplitude=4.0, wave=wave)
+    plain = STEPS._replace(amplitude=4.0)
+    added = np.array([schedule.force(k * TICK) - plain.force(k * TICK) for k in range(2000)])
+    np.testing.assert_allclose(added[:700], wave, rtol=0, atol=1e-13)
+    assert not added[700:].any()
+
+
+@pytest.mark.parametrize("rate", [300.0, 1000.0, 3000.0, 20000.0])
+def test_no_value_of_a_wave_comes_a_tick_early_or_late(rate):
+    schedule = ForceSchedule(0.0, 0.0, 2.5, 0.0, 0.5, 0.0, np.arange(5000.0), rate)
+    assert [schedule.force(k * (1.0 / rate)) for k in range(5000)] == list(range(5000))
+
+
 def test_compiled_is_plain():
-    schedule = STEPS._replace(amplitude=4.0, restart=5.0)
+    schedule = STEPS._replace(amplitude=4.0, restart=5.0, wave=np.linspace(0.0, 3.0, 5000))
     plain, compiled = np.empty(12000), np.empty(12000)
     forces(schedule, 12000, plain)
     kernel(forces)(schedule, 12000, compiled)

@@ -2,6 +2,8 @@
 
 from palpate.bench import build, load
 record = build(load("foam-hybrid")).run(duration=60.0, seed=1, press=8.0)
+
+Without arm and control, a tip on a given path: `given_motion(surface).run(path)`.
 """
 
 from palpate._jit import law, part
@@ -9,16 +11,19 @@ from palpate._vector import Vec3
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
 from palpate.bench.experiment import Experiment, changed, load, names, source
+from palpate.bench.given_motion import GivenMotion, given_motion
 from palpate.bench.summary import summarise
 from palpate.bench.tick import Loop, march, start_at
 
 __all__ = [
     "Bench",
     "Experiment",
+    "GivenMotion",
     "Loop",
     "Vec3",
     "build",
     "changed",
+    "given_motion",
     "law",
     "load",
     "march",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from palpate._jit import NotCompiled
 from palpate._vector import Vec3
@@ -59,6 +59,21 @@ class Bench:
         """The same bench with another controller in contact: a part with ``start()`` and ``step``."""
         return replace(self, loop=self.loop._replace(controller=controller))
 
+    def with_wave(self, wave: ArrayLike) -> Bench:
+        """The same bench, asked for this force on top of its levels and its sine.
+
+        Args:
+            wave: [N], one value a tick from contact on, shape (n,); zero after its end.
+
+        Raises:
+            InputError: not a list of finite numbers.
+        """
+        numbers = np.array(wave, dtype=np.float64)
+        if numbers.ndim != 1 or not np.isfinite(numbers).all():
+            raise InputError(f"wave must be finite numbers of shape (n,), got shape {numbers.shape}")
+        schedule = self.loop.schedule._replace(wave=numbers, rate=1.0 / self.loop.tick)
+        return replace(self, loop=self.loop._replace(schedule=schedule))
+
     def run(
         self,
         duration: float,
@@ -97,7 +112,12 @@ class Bench:
             start_at(self.loop, self.q), total, None if press is None else round(press / tick), progress
         )
         columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
-        return Record(columns, COLUMNS, {**self.meta, "seed": seed, "end": ending.end, "why": ending.why})
+        told = {
+            "instruments": {"force": self.loop.force.told(), "position": {"lag_s": self.loop.encoder.lag}}
+        }
+        return Record(
+            columns, COLUMNS, {**self.meta, **told, "seed": seed, "end": ending.end, "why": ending.why}
+        )
 
 
 @dataclass

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3, diagonal
 from palpate.bench.bench import Bench
@@ -27,7 +31,8 @@ from palpate.friction import Coulomb, LuGre
 from palpate.identifiers.front_ends import Centring, Matched
 from palpate.identifiers.least_squares import LeastSquares
 from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
-from palpate.references import Approach, ForceSchedule
+from palpate.references import Approach, Chirp, ForceSchedule, Multisine
+from palpate.references.force_schedule import NO_WAVE
 from palpate.robots.arm3 import MOTOR_TORQUE, Arm3
 from palpate.signals.filters import butterworth2, butterworth3, delay, state_variable
 from palpate.signals.parameters import alike, triple
@@ -105,7 +110,7 @@ def _plant(arm: Arm3, e: Experiment) -> Plant:
 
 def _force_input(e: Experiment) -> ForceInput:
     s, physics = e.force_sensor, e.run.rate * e.run.steps
-    sensor = force_sensor(s.cutoff, s.sampling, s.bits, s.full_scale, s.noise, physics)
+    sensor = force_sensor(s.cutoff, s.sampling, s.bits, s.full_scale, s.noise, physics, s.phase)
     analog = analog_filter_190(float(physics))
     return ForceInput(sensor, analog, 1.0 if s.analog_filter else 0.0, Converter(16, 200.0))
 
@@ -119,7 +124,23 @@ def _sequence(e: Experiment, tick: float) -> Sequence:
 def _schedule(e: Experiment) -> ForceSchedule:
     f = e.force
     second = f.first if f.second is None else f.second
-    return ForceSchedule(*map(float, (f.first, second, f.period, f.amplitude, f.frequency, f.restart)))
+    steps = ForceSchedule(*map(float, (f.first, second, f.period, f.amplitude, f.frequency, f.restart)))
+    return steps._replace(wave=_wave(e), rate=float(e.run.rate))
+
+
+def _wave(e: Experiment) -> NDArray[np.float64]:
+    """Chirp and multisine, tick by tick: the one as long as it lasts, the other as long as a run may."""
+    chirp, multisine, rate = e.force.chirp, e.force.multisine, e.run.rate
+    if chirp is None and multisine is None:
+        return NO_WAVE
+    longest = e.run.duration if chirp is None or multisine is not None else min(chirp.seconds, e.run.duration)
+    time = np.arange(math.floor(longest * rate) + 1) / rate
+    wave = np.zeros(len(time))
+    if chirp is not None:
+        wave += Chirp(**msgspec.structs.asdict(chirp)).at(time)
+    if multisine is not None:
+        wave += Multisine(**msgspec.structs.asdict(multisine)).at(time)
+    return wave
 
 
 def _estimators(e: Experiment, rate: float, late: float) -> Estimators:

@@ -14,6 +14,7 @@ LONGEST_DELAY = 9.0
 def check(e: Experiment) -> None:
     """Raises an InputError that names the keys of numbers that do not go together."""
     _check_rates(e)
+    _check_waves(e)
     if any(high < low for high, low in zip(e.friction.static, e.friction.coulomb, strict=True)):
         raise InputError(
             f"static in [friction] must be at least coulomb in every joint, got {list(e.friction.static)} "
@@ -44,10 +45,36 @@ def _check_rates(e: Experiment) -> None:
             raise InputError(
                 f"{name} must be below {half:g} Hz, half the rate in [run], got {cutoff:g}; lower it or raise rate"
             )
+    if e.force_sensor.phase * e.force_sensor.sampling >= 1.0:
+        raise InputError(
+            f"phase in [force_sensor] must be below {1.0 / e.force_sensor.sampling:g} s, a period of its sampling, got "
+            f"{e.force_sensor.phase:g}"
+        )
     if e.force_sensor.sampling > physics:
         raise InputError(
             f"sampling in [force_sensor] must be at most {physics} Hz, rate times steps in [run], got "
             f"{e.force_sensor.sampling}"
+        )
+
+
+def _check_waves(e: Experiment) -> None:
+    half, chirp, sines = e.run.rate / 2.0, e.force.chirp, e.force.multisine
+    if chirp is not None and max(chirp.low, chirp.high) >= half:
+        raise InputError(
+            f"low and high in [force.chirp] must be below {half:g} Hz, half the rate in [run], got {chirp.low:g} and "
+            f"{chirp.high:g}"
+        )
+    if sines is None:
+        return
+    lengths = [len(values) for values in (sines.frequencies, sines.amplitudes, sines.phases)]
+    if len(set(lengths)) > 1:
+        raise InputError(
+            f"frequencies, amplitudes and phases in [force.multisine] must be of one length, got {lengths}"
+        )
+    if max(sines.frequencies, default=0.0) >= half:
+        raise InputError(
+            f"frequencies in [force.multisine] must be below {half:g} Hz, half the rate in [run], got "
+            f"{max(sines.frequencies):g}"
         )
 
 

@@ -102,6 +102,8 @@ class ForceSensor(Part):
     """Standard deviation of a sample [N]."""
     cutoff: Positive = 120.0
     sampling: Annotated[int, Meta(ge=1)] = 480
+    phase: NotNegative = 0.0
+    """When its clock ticks first [s], less than a period of its sampling."""
     bits: Annotated[int, Meta(ge=2, le=32)] = 12
     full_scale: Positive = 200.0
     analog_filter: bool = False
@@ -132,6 +134,25 @@ class ApproachTable(Part):
     kv: NotNegative = 80.0
 
 
+class ChirpTable(Part):
+    """A sine [N] that sweeps from a low to a high frequency [Hz] in so many seconds of contact, once."""
+
+    low: Positive
+    high: Positive
+    seconds: Positive
+    amplitude: float
+    logarithmic: bool = False
+    """Its frequency grows by the same factor each second, not by the same difference."""
+
+
+class MultisineTable(Part):
+    """Sines side by side: frequencies [Hz], amplitudes [N], and phases at contact [rad]."""
+
+    frequencies: tuple[Positive, ...]
+    amplitudes: tuple[float, ...]
+    phases: tuple[float, ...]
+
+
 class DesiredForce(Part):
     """Steps between two forces [N] each period [s], and a sine [N], [Hz] whose clock may restart [s]."""
 
@@ -142,6 +163,8 @@ class DesiredForce(Part):
     amplitude: float = 0.0
     frequency: NotNegative = 0.5
     restart: NotNegative = 0.0
+    chirp: ChirpTable | None = None
+    multisine: MultisineTable | None = None
 
 
 class Compensation(Part):
@@ -238,7 +261,9 @@ def changed(experiment: Experiment, changes: Mapping[str, Any]) -> Experiment:
         *outer, key = path.split(".")
         table = tables
         for name in outer:
-            table = table.setdefault(name, {})
+            if table.get(name) is None:
+                table[name] = {}
+            table = table[name]
         table[key] = msgspec.to_builtins(value)
     return _converted(tables, ", ".join(changes))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from types import NoneType
 from typing import Any, Literal, get_args, get_origin
 
 import msgspec
@@ -113,6 +114,8 @@ def _structs(
         kind = next(f.type for f in msgspec.structs.fields(kind) if f.encode_name == step)
     given = _given(tables, steps)
     for one in get_args(kind) or (kind,):
+        if one is NoneType:  # a table that may be left out
+            continue
         config = one.__struct_config__
         if of_any_kind or config.tag_field is None or given.get(config.tag_field) in {config.tag, None}:
             yield one

@@ -33,6 +33,11 @@ class ForceInput(NamedTuple):
     def start(self):
         return ForceInputState(self.sensor.start(), self.analog.start(), 0.0)
 
+    def settled_at(self, force, noise, noise_before):
+        """The state after this force [N] for ever; the noise as the sensor's."""
+        sensor = self.sensor.settled_at(force, noise, noise_before)
+        return ForceInputState(sensor, self.analog.start_at(sensor.held), sensor.held)
+
     def advance(self, state, force, k, noise):
         """The state after physics step k under this force [N]; `noise` as the sensor's."""
         line, sensor = self.sensor.sample(state.sensor, force, k, noise)
@@ -42,6 +47,18 @@ class ForceInput(NamedTuple):
     def sampled(self, state):
         """What the converter reads now [N]."""
         return self.converter.convert(state.line)
+
+    def told(self):
+        """What an identifier has to know of the sampled force: its low-pass, its sampling [Hz], its delay [s].
+
+        The delay is that of a reading that is fresh, beside the low-pass: from its sampling to the line. The
+        analog filter of the line, where it is in use, is no part of what the sensor samples: no name is right.
+        """
+        return {
+            "filter": "unknown" if self.filtered == 1.0 else self.sensor.filter,
+            "sampling_Hz": float(self.sensor.sampling),
+            "delay_s": self.sensor.delay + self.converter.lag,
+        }
 
     @property
     def lag(self):

@@ -12,7 +12,7 @@ from palpate._vector import clip
 from palpate.bench.force_input import ForceInput, ForceInputState
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
 from palpate.environments.surface import Surface
-from palpate.environments.surface_state import SurfaceState, contact_force, follow
+from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
 from palpate.errors import InputError
 from palpate.friction import LuGre
 from palpate.instruments import Converter, analog_filter_190, force_sensor
@@ -79,8 +79,10 @@ class Joint(NamedTuple):
         friction, bristles = self.friction.step(state.bristles, state.qd, dt)
         drive, surface, force = torque - friction, state.surface, 0.0
         if surface.contact == 1.0:
-            elastic = self.surface.force(surface, self.lever * state.q, self.lever * state.qd)
-            force = contact_force(elastic, self.surface.mass, tip_mass, self.lever * drive / self.inertia)
+            elastic, opposed = opposing(
+                self.surface, surface, self.lever * state.q, self.lever * state.qd, dt
+            )
+            force = contact_force(elastic, opposed, tip_mass, self.lever * drive / self.inertia)
         qd = state.qd + dt * (drive - self.lever * max(force, 0.0)) / self.inertia
         q = state.q + dt * qd
         p, v = self.lever * q, self.lever * qd
@@ -192,7 +194,8 @@ class OneJoint:
         end = "done" if finite.all() else "diverged"
         rows = rows if finite.all() else rows[: int(np.argmin(finite))]
         columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
-        return Record(columns, COLUMNS, {"seed": seed, "end": end})
+        told = {"force": self.loop.force.told(), "position": {"lag_s": 0.0}}
+        return Record(columns, COLUMNS, {"seed": seed, "end": end, "instruments": told})
 
 
 #: Joint 2 of the thesis' arm: its friction, chosen as the bench's. [N m/rad], [N m s/rad], [N m], [rad/s]

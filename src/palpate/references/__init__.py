@@ -2,5 +2,6 @@
 
 from palpate.references.approach import Approach
 from palpate.references.force_schedule import ForceSchedule
+from palpate.references.waves import Chirp, Multisine
 
-__all__ = ["Approach", "ForceSchedule"]
+__all__ = ["Approach", "Chirp", "ForceSchedule", "Multisine"]

@@ -1,14 +1,18 @@
 """Desired contact force over time (thesis, sec. 6.3)."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from palpate._jit import part
+
+NO_WAVE = np.empty(0)
 
 
 @part
 class ForceSchedule(NamedTuple):
-    """Steps between two forces, with a sine on top.
+    """Steps between two forces, with a sine on top, and any wave on top of that.
 
     Args:
         first: force at the start [N].
@@ -17,6 +21,8 @@ class ForceSchedule(NamedTuple):
         amplitude: of the sine [N].
         frequency: of the sine [Hz]; 4 sin(pi t) is amplitude 4, frequency 0.5.
         restart: the sine's clock starts anew each so many seconds, as the listing's does; 0 lets it run on.
+        wave: [N], from contact on, shape (n,); zero after its end.
+        rate: of the wave's samples, the loop's own [Hz].
     """
 
     first: float
@@ -25,6 +31,8 @@ class ForceSchedule(NamedTuple):
     amplitude: float
     frequency: float
     restart: float
+    wave: Any = NO_WAVE
+    rate: float = 1000.0
 
     def force(self, since):
         """Desired force [N], `since` seconds after contact."""
@@ -34,4 +42,6 @@ class ForceSchedule(NamedTuple):
         clock = (
             since if self.restart <= 0.0 else since - self.restart * math.floor((since + 5e-7) / self.restart)
         )
-        return level + self.amplitude * math.sin(2.0 * math.pi * self.frequency * clock)
+        i = int((since + 5e-7) * self.rate)
+        on_top = self.wave[i] if i < len(self.wave) else 0.0
+        return level + self.amplitude * math.sin(2.0 * math.pi * self.frequency * clock) + on_top

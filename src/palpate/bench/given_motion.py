@@ -1,0 +1,233 @@
+"""A rig without arm and control: a tip on a prescribed path presses a surface, and the bench's instruments watch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._jit import kernel, law
+from palpate.bench.force_input import ForceInput, ForceInputState
+from palpate.bench.paths import Path, positions
+from palpate.bench.rest_length import rest_for
+from palpate.environments import SurfaceState, join
+from palpate.environments.surface import BUILT_IN
+from palpate.environments.surface_state import follow
+from palpate.errors import InputError
+from palpate.instruments import Converter, analog_filter_190, force_sensor
+from palpate.records import Record
+from palpate.signals.quantise import quantise
+
+COLUMNS = {
+    "t": "s",
+    "x": "m",  # true, of the tip
+    "x_measured": "m",
+    "force": "N",  # true, at t; an impact's impulse has no value at an instant and is in the sampled force only
+    "force_sampled": "N",
+}
+RIGID = 1e12
+"""Effective mass of a tip that nothing turns from its path [kg]."""
+
+
+@law
+def march_path(surface, line, state, way, x, rest, k, steps, noise, out):
+    """len(noise) ticks, the first being the k-th; of each the true force and the reading, into a row of `out`.
+
+    `x` holds the path at the steps of the physics, one more before the first and after the last.
+    """
+    dt = 1.0 / line.sensor.rate
+    for i in range(len(noise)):
+        for j in range(steps):
+            n = i * steps + j
+            before, now, after = x[n] - rest, x[n + 1] - rest, x[n + 2] - rest
+            force = 0.0
+            if state.contact == 1.0:
+                force = surface.force(state, now, (after - before) / (2.0 * dt))
+                force += surface.mass * (after - 2.0 * now + before) / (dt * dt)
+            if j == 0:
+                out[i, 0], out[i, 1] = max(force, 0.0), line.sampled(way)
+            state, impulse = follow(surface, state, force, after, (after - now) / dt, RIGID, dt)
+            way = line.advance(way, max(force, 0.0) + impulse / dt, k * steps + n, noise[i])
+    return state, way
+
+
+compiled_march = kernel(march_path)
+
+
+@dataclass(frozen=True)
+class GivenMotion:
+    """A tip on a given path, surfaces in turn, and instruments; `given_motion` makes it.
+
+    Args:
+        surfaces: each with the time from which on it is there [s], in their order, the first from 0.
+        wall: where the first is undeformed [m].
+        line: the force's way to its reading.
+        resolution: of the position's encoder [m]; 0: none.
+        steps: of the physics between ticks.
+    """
+
+    surfaces: tuple[tuple[float, Any], ...]
+    wall: float
+    line: ForceInput
+    resolution: float
+    steps: int
+
+    @property
+    def tick(self) -> float:
+        """Between two rows [s]."""
+        return self.steps / self.line.sensor.rate
+
+    def run(
+        self, path: Path, duration: float | None = None, seed: int = 0, *, compiled: bool = True
+    ) -> Record:
+        """Moves the tip along a path that grows into the surface.
+
+        A path that starts in contact starts as after a long rest there.
+
+        Args:
+            path: x of the tip [m]: a function of an array of times [s] (also of a step before 0 and after the end);
+                or an array, (n,) with one value a tick, between which it is interpolated by a cubic spline; or
+                (n, steps), with one value a step of the physics.
+            duration: [s]; of a function only, an array has its own.
+            seed: of the noise; the same seed gives the same record, bit for bit.
+            compiled: False runs the same code in plain Python.
+
+        Returns:
+            One row a tick, from 0 on. ``meta["surfaces"]`` has each surface's start, rest position and truth.
+
+        Raises:
+            InputError: a path without finite numbers or of another shape, a duration that is missing or too short.
+        """
+        x = positions(path, duration, self.tick, self.steps)
+        ticks = (len(x) - 2) // self.steps
+        noise = np.random.default_rng(seed).standard_normal(ticks + 2)
+        rows = np.empty((ticks, 2))
+        rests = self._march(x, noise, rows, compiled)
+        t: NDArray[np.float64] = np.arange(float(ticks)) * self.tick
+        at = x[1 : 1 + ticks * self.steps : self.steps].copy()
+        read = quantise(at, self.resolution) if self.resolution > 0.0 else at.copy()
+        columns = (t, at, read, rows[:, 0].copy(), rows[:, 1].copy())
+        return Record(dict(zip(COLUMNS, columns, strict=True)), COLUMNS, {**self._told(rests), "seed": seed})
+
+    def _march(
+        self, x: NDArray[np.float64], noise: NDArray[np.float64], rows: NDArray[np.float64], compiled: bool
+    ) -> list[float]:
+        """Fills the rows, surface by surface; the rest positions of those that were reached [m]."""
+        march = compiled_march if compiled else march_path
+        rest, rests = self.wall, []
+        state, way = self._start(x, noise)
+        for i, (first, last) in enumerate(self._spans(len(rows))):
+            surface = self.surfaces[i][1]
+            if i > 0 and state.contact == 1.0:
+                rest, state = self._changed(i, state, x[first * self.steps :], rest)
+            rests.append(rest)
+            piece = x[first * self.steps : last * self.steps + 2]
+            numbers = noise[first:last], rows[first:last]
+            state, way = march(surface, self.line, state, way, piece, rest, first, self.steps, *numbers)
+        return rests
+
+    def _spans(self, ticks: int) -> list[tuple[int, int]]:
+        """First and last tick of each surface that is reached."""
+        starts = [round(since / self.tick) for since, _ in self.surfaces]
+        return list(pairwise([*(start for start in starts if start < ticks), ticks]))
+
+    def _start(
+        self, x: NDArray[np.float64], noise: NDArray[np.float64]
+    ) -> tuple[SurfaceState, ForceInputState]:
+        surface = self.surfaces[0][1]
+        now, rate, second = self._motion(x, self.wall)
+        state, force = surface.start(), 0.0
+        if now > 0.0:
+            state = SurfaceState(now, rate, 0.0, 1.0)
+            force = max(surface.force(state, now, rate) + surface.mass * second, 0.0)
+        return state, self.line.settled_at(force, noise[-1], noise[-2])
+
+    def _changed(
+        self, i: int, state: SurfaceState, x: NDArray[np.float64], rest: float
+    ) -> tuple[float, SurfaceState]:
+        """Rest position [m] and state of the i-th surface, relaxed, under the force that there is already."""
+        old, new = self.surfaces[i - 1][1], self.surfaces[i][1]
+        now, rate, second = self._motion(x, rest)
+        force = old.force(state, now, rate) + old.mass * second
+        depth = rest_for(new, force - new.mass * second, rate)
+        return rest + now - depth, SurfaceState(depth, rate, 0.0, 1.0)
+
+    def _motion(self, x: NDArray[np.float64], rest: float) -> tuple[float, float, float]:
+        """Penetration, rate and acceleration at the second of these positions."""
+        physics = float(self.line.sensor.rate)
+        before, now, after = (float(at) - rest for at in x[:3])
+        return now, (after - before) * 0.5 * physics, (after - 2.0 * now + before) * physics * physics
+
+    def _told(self, rests: list[float]) -> dict[str, Any]:
+        """What a record says of its making, in plain values."""
+        told = [
+            {"from_s": since, "rest_m": rest, "truth": _truth(surface)}
+            for (since, surface), rest in zip(self.surfaces, rests, strict=False)
+        ]
+        instruments = {"force": self.line.told(), "position": {"lag_s": 0.0}}
+        return {"truth": told[-1]["truth"], "surfaces": told, "instruments": instruments}
+
+
+def given_motion(
+    surface: Any | list[tuple[float, Any]],
+    *,
+    wall: float = 0.0,
+    resolution: float = 5e-6,
+    noise: float = 0.6,
+    phase: float = 0.0,
+    cutoff: float = 120.0,
+    sampling: int = 480,
+    bits: int = 12,
+    full_scale: float = 200.0,
+    analog_filter: bool = False,
+    rate: int = 1000,
+    steps: int = 20,
+) -> GivenMotion:
+    """A tip on a given path, before the thesis' instruments.
+
+    Args:
+        surface: what it presses: one of `palpate.environments` or a part of your own; or a list of several in turn,
+            each with the time [s] from which on it is there, the first from 0. A surface that comes while another is
+            pressed has the rest length that leaves the force as it is.
+        wall: where the first surface is undeformed [m].
+        resolution: of the encoder, in the tip's position [m]; 0: none.
+        noise: standard deviation of a force sample [N].
+        phase: when the force sensor's clock ticks first [s].
+        cutoff: of the force sensor's low-pass [Hz].
+        sampling: of the force sensor [Hz].
+        bits: of the force sensor's converter.
+        full_scale: of the force sensor [N].
+        analog_filter: whether the 190 Hz filter of fig. 3.6 stands between sensor and reading.
+        rate: rows a second.
+        steps: of the physics between them.
+
+    Raises:
+        InputError: a number out of range, surfaces out of order.
+    """
+    for name, value, least in (("rate", rate, 1), ("steps", steps, 1), ("resolution", resolution, 0.0)):
+        if not value >= least:
+            raise InputError(f"{name} must be at least {least}, got {value}")
+    physics = rate * steps
+    sensor = force_sensor(cutoff, sampling, bits, full_scale, noise, physics, phase)
+    line = ForceInput(
+        sensor, analog_filter_190(float(physics)), 1.0 if analog_filter else 0.0, Converter(16, full_scale)
+    )
+    return GivenMotion(_in_turn(surface), float(wall), line, float(resolution), int(steps))
+
+
+def _in_turn(surface: Any | list[tuple[float, Any]]) -> tuple[tuple[float, Any], ...]:
+    turns = surface if isinstance(surface, list) else [(0.0, surface)]
+    if not turns or turns[0][0] != 0.0 or any(b <= a for (a, _), (b, _) in pairwise(turns)):
+        raise InputError(
+            f"surfaces must start at growing times [s], the first at 0, got {[t for t, _ in turns]}"
+        )
+    return tuple((float(since), join(one) if isinstance(one, BUILT_IN) else one) for since, one in turns)
+
+
+def _truth(surface: Any) -> dict[str, dict[str, Any]]:
+    """{name: {"value", "unit"}}; empty of a part that does not tell."""
+    truth = surface.truth() if hasattr(surface, "truth") else {}
+    return {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
