@@ -8,9 +8,12 @@ from hypothesis import strategies as st
 from palpate._vector import Mat3, Vec3
 from palpate.errors import InputError
 from palpate.identifiers import RecursiveLeastSquares
-from palpate.identifiers.least_squares import LeastSquares, gathered, long_run, long_run_variance, rls
+from palpate.identifiers.doubt import Doubt, long_run_variance, unsure
+from palpate.identifiers.forgetting import Directional, Exponential, SIFt
+from palpate.identifiers.least_squares import LeastSquares, learned, rls
+from palpate.identifiers.sizes import Three
 
-SIZES = [3, 5]  # three parameters go by value, other numbers by array
+SIZES = [3, 4, 5]  # three and four parameters go by value, other numbers by array
 
 
 def problem(n, samples=400, seed=0, noise=0.5):
@@ -85,18 +88,66 @@ def test_no_samples_are_no_update():
     assert estimator.estimate().samples == 0
 
 
-@pytest.mark.parametrize("n", SIZES)
-def test_laws_mean_the_same_on_values_and_arrays(n):
-    """The law on plain arrays, stepped, is the compiled estimator."""
-    phi, y, _ = problem(n)
-    theta, P = np.zeros(n), spread_of(n)
-    estimator = RecursiveLeastSquares(theta, P, 0.99)
+class NumPy:
+    """The size of laws that run on plain arrays."""
+
+    def __init__(self, n):
+        self.n = n
+
+    def identity(self):
+        return np.eye(self.n)
+
+
+POLICIES = [Exponential(0.99), Directional(0.98), SIFt(0.98)]
+
+
+@pytest.mark.parametrize(
+    ("n", "policy"),
+    [(n, policy) for n in (3, 4) for policy in POLICIES] + [(5, POLICIES[0])],  # seconds to compile, each
+    ids=lambda p: p if isinstance(p, int) else type(p).__name__,
+)
+def test_laws_mean_the_same_on_values_and_arrays(n, policy):
+    """The laws on plain arrays, stepped, are the compiled estimator."""
+    phi, y, _ = problem(n, samples=250)
+    theta, P = np.zeros(n), 1e4 * np.eye(n)
+    estimator = RecursiveLeastSquares(theta, P, policy)
     estimator.update_many(phi, y)
-    limit = np.trace(P)
+    S, doubt, floor = 100.0 * np.eye(n), unsure(theta, 100.0 * np.eye(n), np.eye(n)), np.full(n, 1e-4)
     for regressor, force in zip(phi, y, strict=True):
-        theta, P, _ = rls(theta, P, regressor, force, 0.99 if np.trace(P) <= limit else 1.0)
+        S, _ = policy.forget(S, regressor, floor)
+        theta, S, doubt, _, _ = learned(theta, S, doubt, regressor, force, policy.keep, NumPy(n))
+    np.testing.assert_allclose(estimator.theta, theta, rtol=1e-9)
+    np.testing.assert_allclose(estimator.covariance, S @ S.T, rtol=1e-8, atol=1e-12 * (S @ S.T).max())
+    np.testing.assert_allclose(estimator.estimate().covariance, doubt.covariance(n), rtol=1e-7)
+
+
+@pytest.mark.parametrize("forgetting", [1.0, 0.98])
+@pytest.mark.parametrize("n", SIZES)
+def test_the_square_root_is_the_textbooks_covariance(n, forgetting):
+    """The thesis' own form beside it, which keeps enough digits on a problem this mild."""
+    phi, y, _ = problem(n, samples=250)
+    theta, P = np.linspace(-1, 1, n), spread_of(n)
+    estimator = RecursiveLeastSquares(theta, P, forgetting)
+    estimator.update_many(phi, y)
+    for regressor, force in zip(phi, y, strict=True):
+        theta, P, _ = rls(theta, P, regressor, force, forgetting)
     np.testing.assert_allclose(estimator.theta, theta, rtol=1e-9)
     np.testing.assert_allclose(estimator.covariance, P, rtol=1e-8, atol=1e-12 * np.abs(P).max())
+
+
+def test_a_vague_start_costs_the_root_half_the_digits():
+    """Twelve decades from the start to the end: six are lost from P as from the textbook's form, three from S."""
+    phi = np.ones((500, 3)) + 1e-2 * np.random.default_rng(0).standard_normal((500, 3))
+    theta, P = np.zeros(3), 1e12 * np.eye(3)
+    root = RecursiveLeastSquares(theta, P)
+    root.update_many(phi, np.ones(500))
+    for regressor in phi:
+        theta, P, _ = rls(theta, P, regressor, 1.0, 1.0)
+    _, s, V = np.linalg.svd(np.vstack([phi, 1e-6 * np.eye(3)]))  # never squares a number
+    exact = (V.T / s**2) @ V
+    plain, ours = (np.abs(C - exact).max() / exact.max() for C in (P, root.covariance))
+    assert ours < 1e-11
+    assert plain > 1e3 * ours
 
 
 finite = st.floats(-1e3, 1e3)
@@ -104,20 +155,21 @@ vectors = st.tuples(finite, finite, finite)
 
 
 @given(vectors, vectors, st.tuples(vectors, vectors, vectors), finite, st.floats(0.5, 1.0))
-def test_vectors_and_arrays_agree_in_each_law(theta, phi, rows, y, forgetting):
-    root = np.array(rows)
-    P = root @ root.T + np.eye(3)
-    by_array = rls(np.array(theta), P, np.array(phi), y, forgetting)
-    by_value = rls(Vec3(*theta), Mat3(*(Vec3(*row) for row in P)), Vec3(*phi), y, forgetting)
-    scale = np.abs(P).max()
-    for ours, theirs in zip(by_value, by_array, strict=True):
-        np.testing.assert_allclose(np.array(ours), theirs, rtol=1e-6, atol=1e-9 * scale)
-    s, S = np.array(phi), root
-    for full in (False, True):
-        by_array = gathered(s, S, np.array(theta), y, forgetting, full)
-        by_value = gathered(Vec3(*phi), Mat3(*(Vec3(*row) for row in S)), Vec3(*theta), y, forgetting, full)
-        for ours, theirs in zip(by_value, by_array, strict=True):
-            np.testing.assert_array_equal(np.array(ours), theirs)
+def test_vectors_and_arrays_agree_in_each_law(theta, phi, rows, y, keep):
+    root = np.array(rows) + 3e3 * np.eye(3)
+    by_hand = lambda A: Mat3(*(Vec3(*map(float, row)) for row in A))  # noqa: E731
+    doubt = Doubt(
+        0.1 * root, 0.5 * root, root @ root.T, root @ root.T, np.array(phi), 5.0, 4.0, 3.0, 2.0, 1.0, 99.0
+    )
+    same = Doubt(*map(by_hand, doubt[:4]), Vec3(*phi), *doubt[5:])
+    by_array = learned(np.array(theta), root, doubt, np.array(phi), y, keep, NumPy(3))
+    by_value = learned(Vec3(*theta), by_hand(root), same, Vec3(*phi), y, keep, Three())
+    for ours, theirs in zip(
+        by_value[:2] + by_value[2] + by_value[3:], by_array[:2] + by_array[2] + by_array[3:], strict=True
+    ):
+        np.testing.assert_allclose(
+            np.array(ours), theirs, rtol=1e-6, atol=1e-9 * (1.0 + np.abs(theirs).max())
+        )
 
 
 def test_the_part_for_kernels_is_the_streaming_estimator():
@@ -130,7 +182,7 @@ def test_the_part_for_kernels_is_the_streaming_estimator():
         streaming.update(regressor, force)
         theta, state = part.step(state, Vec3(*map(float, regressor)), float(force))
     np.testing.assert_array_equal(np.array(theta), streaming.theta)
-    np.testing.assert_array_equal(np.array(state.P), streaming.covariance)
+    np.testing.assert_allclose(np.array(state.root @ state.root.T), streaming.covariance, rtol=1e-15)
     np.testing.assert_allclose(np.array(state.std()), streaming.estimate().std, rtol=1e-12)
 
 
@@ -193,8 +245,8 @@ def test_the_stated_interval_covers_the_truth_as_often_as_it_says(pole):
         z.append((estimate.theta - truth) / estimate.std)
     spread = np.std(z, axis=0)
     # With 120 runs the spread itself is known to 6.5 %; blocks of 100 lose up to 1/6 at pole 0.95,
-    # and two blocks of caution in sixty cost the fast regressor up to a factor of 1.5 there.
-    assert np.all(spread > 0.6), spread
+    # and four blocks of caution in sixty cost the fast regressor up to a factor of 2 there.
+    assert np.all(spread > 0.5), spread
     assert np.all(spread < 1.3), spread
     covered = np.mean(np.abs(z) < 1.96, axis=0)
     assert np.all(covered > 0.89), covered
@@ -210,9 +262,9 @@ def test_the_interval_holds_with_forgetting_too():
         estimator.update_many(phi, rng.standard_normal(3000))
         estimate = estimator.estimate()
         z.append(estimate.theta / estimate.std)
-    # The cautious part knows no fading and is twice too wide: two blocks of it beside some three.
+    # 900 numbers: known to 2.4 %; the measured part has some three blocks to go by.
     spread = np.std(z)
-    assert 0.75 < spread < 1.05, spread
+    assert 0.93 < spread < 1.1, spread
 
 
 def test_little_data_make_a_wide_interval():
@@ -235,10 +287,23 @@ def test_the_long_run_variance_of_white_noise_is_its_variance():
     assert long_run_variance(0.0, 0.0, 0.0, 3.0) == 0.0
 
 
-def test_without_finished_blocks_the_cautious_covariance_stands_alone():
-    P = spread_of(3)
-    nothing = np.zeros((3, 3))
-    np.testing.assert_allclose(long_run(P, 0.3, np.zeros(3), nothing, 0.0), 0.3 * P, rtol=1e-15)
+def test_before_the_first_sample_the_initial_covariance_stands():
+    """And no initial guess is "identified"."""
+    estimator = RecursiveLeastSquares(np.ones(3), 1e2 * np.eye(3), names=("K", "B", "M"))
+    np.testing.assert_allclose(estimator.estimate().covariance, 1e2 * np.eye(3), rtol=1e-15)
+    assert set(estimator.estimate().verdicts().values()) == {"not identifiable"}
+
+
+@pytest.mark.parametrize("policy", [1.0, *POLICIES], ids=str)
+def test_what_was_never_excited_is_never_known(policy):
+    """However long, and however well the rest is known."""
+    rng = np.random.default_rng(2)
+    estimator = RecursiveLeastSquares([3.0, 0.0, 0.0], np.diag([4.0, 1e6, 1e6]), policy)
+    phi = np.column_stack([np.zeros(50_000), rng.standard_normal(50_000), np.ones(50_000)])
+    estimator.update_many(phi, phi @ [0.0, 2.0, 1.0] + 0.01 * rng.standard_normal(50_000))
+    estimate = estimator.estimate()
+    assert estimate.std[0] == pytest.approx(2.0, rel=0.01)
+    assert list(estimate.verdicts().values()) == ["not identifiable", "identified", "identified"]
 
 
 def test_what_is_given_back_is_a_copy():

@@ -1,7 +1,36 @@
-"""Estimators of the environment's mass, damping and stiffness from a stream of samples."""
+"""Estimators of the environment's mass, damping and stiffness from a stream of samples.
 
+| the surface | use | because |
+|---|---|---|
+| stays as it is | `RecursiveLeastSquares` | nothing is forgotten: the batch solution, at any moment |
+| changes slowly, always moved on | its `forgetting=Exponential(0.999)` | simple; 1 / (1 - keep) samples of memory |
+| changes slowly, often left alone | its `forgetting=SIFt(0.999)`, `Directional` | only what is excited is forgotten |
+| drifts at a pace that is known | `KalmanFilter` | each parameter at its own, a mass not at all |
+| may become another at any moment | `RestartingLeastSquares` | notices, dates the change, starts again from there |
+| has no model | `NeuralProbe` | the thesis' way; its answers carry no interval |
+
+All take a regressor and a force with `update` or `update_many`, and answer with `estimate()`: theta, its covariance,
+and the verdict that each parameter deserves. Whoever has a position and a force, not a regressor, puts a
+`ContactIdentifier` before any of them.
+"""
+
+from palpate.identifiers.contact_identifier import ContactIdentifier
+from palpate.identifiers.forgetting import Directional, Exponential, SIFt
+from palpate.identifiers.kalman_filter import KalmanFilter
 from palpate.identifiers.neural_probe import NeuralProbe, Probed
 from palpate.identifiers.recursive_least_squares import RecursiveLeastSquares
+from palpate.identifiers.restarting import RestartingLeastSquares
 from palpate.identifiers.watching import watch
 
-__all__ = ["NeuralProbe", "Probed", "RecursiveLeastSquares", "watch"]
+__all__ = [
+    "ContactIdentifier",
+    "Directional",
+    "Exponential",
+    "KalmanFilter",
+    "NeuralProbe",
+    "Probed",
+    "RecursiveLeastSquares",
+    "RestartingLeastSquares",
+    "SIFt",
+    "watch",
+]

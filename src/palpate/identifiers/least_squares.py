@@ -4,14 +4,22 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, outer, sqrt, trace
+from palpate.identifiers.doubt import Doubt, unsure
+from palpate.identifiers.flat import bounded
+from palpate.identifiers.forgetting import stretch_of
+from palpate.identifiers.sizes import Three
+from palpate.identifiers.square_root import measured
+
+_SIZE = Three()
+_ONES = Vec3(1.0, 1.0, 1.0)
 
 
 @law
 def rls(theta, P, phi, y, forgetting):  # (5.7)-(5.10), with the matrix inversion lemma for (5.9)
-    """One sample: new estimate, new P, innovation scaled to the noise's variance.
+    """One sample on the covariance itself, as the thesis has it: new estimate, new P, innovation scaled to the noise.
 
-    P is lowered by an outer product, which keeps it symmetric to the last bit; the squares of the scaled
-    innovations add up to the residual sum of squares of the batch solution.
+    A yardstick, not what the estimators run on: P is lowered by an outer product, which keeps it symmetric to the
+    last bit, but a vague start costs it twice the digits that it costs a root.
     """
     Pphi = P @ phi
     e = y - phi @ theta  # (5.10)
@@ -20,70 +28,40 @@ def rls(theta, P, phi, y, forgetting):  # (5.7)-(5.10), with the matrix inversio
 
 
 @law
-def bounded(forgetting, P, limit):
-    """The forgetting factor, or 1 while P has grown beyond the limit.
+def learned(theta, S, doubt, phi, y, keep, size):
+    """One sample on a root S that has forgotten already, leaving `keep` of what older samples weigh.
 
-    Without excitation P grows as 1/forgetting^k; so held, an idle estimator stays finite for ever.
+    theta, S, doubt, and the innovation scaled to the noise with the variance that it had before.
     """
-    return forgetting if trace(P) <= limit else 1.0
-
-
-BLOCK = 100
-"""Samples whose scores are summed before they are squared: noise may be correlated over less than this."""
-_DOUBT = 2.0
-"""Blocks that the cautious first-order correction counts for, beside those that were seen."""
+    theta, S, gain, e, a = measured(theta, S, phi, y, 1.0)
+    e = e / sqrt(a)
+    return theta, S, doubt.after(phi, gain, e, keep, keep, size), e, a
 
 
 @law
-def gathered(scores, spread, phi, e, keep, full):
-    """The sum of the scores phi e of a block, and the sum of the finished blocks' squares, discounted as P is."""
-    scores, spread = keep * scores + e * phi, keep * keep * spread
-    if full:
-        return 0.0 * scores, spread + outer(scores, scores)
-    return scores, spread
-
-
-@law
-def long_run(P, noise, scores, spread, blocks):
-    """Covariance of the estimate under noise of any colour that a `BLOCK` outlasts.
-
-    P S P, where S is the covariance of the sum of all scores, measured by the means of blocks (Newey and West,
-    1987, for the form; Alexopoulos and Seila, 1996, for the blocks). A few blocks say little, so it starts from
-    noise * P, with the noise's long-run variance of `long_run_variance`, which errs on the wide side.
-    """
-    measured = P @ (spread + outer(scores, scores)) @ P
-    return (_DOUBT * noise * P + blocks * measured) / (_DOUBT + blocks)
-
-
-@law
-def long_run_variance(weight, squares, products, parameters):
-    """Variance of the noise times what its correlation in time costs: (1 + r)/(1 - r), r that of neighbours.
-
-    r is held below 0.99. Right for first-order noise under slow regressors, too wide under fast ones.
-    """
-    if squares <= 0.0:
-        return 0.0
-    r = max(min(products / squares, 0.99), 0.0)
-    return squares / max(weight - parameters, 1.0) * (1.0 + r) / (1.0 - r)
+def root3(P):
+    """The lower triangular S with S S^T = P (Cholesky)."""
+    a = sqrt(P.r1.x)
+    b, d = P.r2.x / a, P.r3.x / a
+    c = sqrt(P.r2.y - b * b)
+    e = (P.r3.y - d * b) / c
+    return Mat3(Vec3(a, 0.0, 0.0), Vec3(b, c, 0.0), Vec3(d, e, sqrt(P.r3.z - d * d - e * e)))
 
 
 @part
 class LeastSquaresState(NamedTuple):
     theta: Vec3  # estimate
-    P: Mat3  # inverse information, of unit noise
-    weight: float  # samples seen, the old ones discounted
-    squares: float  # of the scaled innovations, discounted alike
-    products: float  # of each with the one before
-    last: float  # scaled innovation
-    scores: Vec3  # of the block under way
-    spread: Mat3  # of the finished blocks' scores
-    blocks: float  # finished, the old ones discounted
-    filled: float  # samples in the block under way
+    root: Mat3  # of the inverse information, of unit noise
+    doubt: Doubt
+
+    @property
+    def weight(self):
+        """How many samples were seen, the old ones discounted."""
+        return self.doubt.weight
 
     def std(self):
         """Standard deviation of each parameter."""
-        noise = long_run_variance(self.weight, self.squares, self.products, 3.0)
-        C = long_run(self.P, noise, self.scores, self.spread, self.blocks)
+        C = self.doubt.covariance(3.0)
         return sqrt(Vec3(C.r1.x, C.r2.y, C.r3.z))
 
 
@@ -93,7 +71,7 @@ class LeastSquares(NamedTuple):
 
     Args:
         theta: initial estimate.
-        P: initial inverse information; its trace bounds P for ever.
+        P: initial covariance; it bounds P for ever.
         forgetting: in (0, 1]; 1 forgets nothing.
     """
 
@@ -102,25 +80,12 @@ class LeastSquares(NamedTuple):
     forgetting: float
 
     def start(self):
-        none = 0.0 * self.theta
-        return LeastSquaresState(self.theta, self.P, 0.0, 0.0, 0.0, 0.0, none, outer(none, none), 0.0, 0.0)
+        root = root3(self.P)
+        return LeastSquaresState(self.theta, root, unsure(self.theta, root, _SIZE.identity()))
 
     def step(self, state, phi, y):
-        keep = bounded(self.forgetting, state.P, trace(self.P))
-        theta, P, e = rls(state.theta, state.P, phi, y, keep)
-        filled = state.filled + 1.0
-        full = filled >= BLOCK
-        scores, spread = gathered(state.scores, state.spread, phi, e, keep, full)
-        blocks = keep * keep * state.blocks
-        return theta, LeastSquaresState(
-            theta,
-            P,
-            keep * state.weight + 1.0,
-            keep * state.squares + e * e,
-            keep * state.products + e * state.last,
-            e,
-            scores,
-            spread,
-            blocks + 1.0 if full else blocks,
-            0.0 if full else filled,
-        )
+        variances, total = Vec3(self.P.r1.x, self.P.r2.y, self.P.r3.z), trace(self.P)
+        floor, even = _ONES / variances, _ONES / Vec3(total, total, total)
+        S = stretch_of(self.forgetting) * bounded(state.root, floor, even, _SIZE)
+        theta, S, doubt, _, _ = learned(state.theta, S, state.doubt, phi, y, self.forgetting, _SIZE)
+        return theta, LeastSquaresState(theta, S, doubt)

@@ -105,7 +105,13 @@ class NeuralProbe:
         Raises:
             InputError: a regressor of another shape, or a number that is not finite; the network is unchanged.
         """
-        self.update_many(np.asarray(regressor, dtype=np.float64)[None], np.array([force], dtype=np.float64))
+        try:
+            phi, y = np.asarray(regressor, dtype=np.float64), float(force)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"a sample must be numbers, got regressor {regressor!r}, force {force!r}"
+            ) from None
+        self.update_many(phi[None], np.array([y]))
 
     def update_many(self, regressors: ArrayLike, forces: ArrayLike) -> None:
         """Takes k samples in, as k calls of `update` would: regressors of shape (k, 3), forces of shape (k,)."""

@@ -1,0 +1,145 @@
+"""What all estimators on a stream share: a flat state, one compiled update, and the checks in front of it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from palpate._jit import Kernel
+from palpate.errors import InputError
+from palpate.identifiers.sizes import size_of
+from palpate.signals.types import Estimate
+
+HUGE = 1e300
+"""A sum of squares beyond it, or not a number, is no sample."""
+
+
+class Streaming(ABC):
+    """Estimates theta in ``force = regressor . theta``; the update is compiled in the constructor.
+
+    Args:
+        state: all that is known, flat; the first n values are theta.
+        n: number of parameters.
+        policy: the part that tells the kernels how to update.
+        names: of the parameters, in the order of the regressor.
+    """
+
+    names: tuple[str, ...]
+
+    def __init__(self, state: NDArray[np.float64], n: int, policy: Any, names: tuple[str, ...] | None):
+        self.names = names if names is not None else tuple(f"theta{i}" for i in range(n))
+        if len(self.names) != n:
+            raise InputError(f"names must be as many as parameters: got {len(self.names)} names for {n}")
+        self._n, self._state, self._policy, self._size = n, state, policy, size_of(n)
+        self._bind()
+
+    @staticmethod
+    @abstractmethod
+    def _kernels() -> tuple[Kernel, Kernel]:
+        """The update by one sample and by many."""
+
+    @abstractmethod
+    def estimate(self) -> Estimate:
+        """The estimate with its covariance, from which its verdicts follow."""
+
+    @property
+    @abstractmethod
+    def covariance(self) -> NDArray[np.float64]:
+        """P, shape (n, n)."""
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """The estimate, shape (n,)."""
+        return self._state[: self._n].copy()
+
+    def update(self, regressor: ArrayLike, force: float) -> None:
+        """Takes one sample in: regressor of shape (n,), force a number.
+
+        Raises:
+            InputError: a regressor of another shape, or a number that is not finite; the estimate is unchanged.
+        """
+        try:
+            taken = self._one(
+                self._state, np.ascontiguousarray(regressor, np.float64), force, self._policy, self._size
+            )
+        except (TypeError, ValueError):  # not numbers, or more than one dimension
+            taken = False
+        if not taken:
+            raise self._refusal(regressor, force)
+
+    def update_many(self, regressors: ArrayLike, forces: ArrayLike) -> None:
+        """Takes k samples in, as k calls of `update` would: regressors of shape (k, n), forces of shape (k,).
+
+        Raises:
+            InputError: shapes that do not fit; or a sample that is not finite, those before it having been taken in.
+        """
+        phi = np.ascontiguousarray(regressors, dtype=np.float64)
+        y = np.ascontiguousarray(forces, dtype=np.float64)
+        if phi.ndim != 2 or phi.shape[1] != self._n or y.shape != phi.shape[:1]:
+            raise InputError(
+                f"regressors must have shape (k, {self._n}) and forces (k,), got {phi.shape} and {y.shape}"
+            )
+        done = self._many(self._state, phi, y, self._policy, self._size)
+        if done < len(y):
+            raise InputError(
+                f"sample {done} is not finite: regressor {phi[done]}, force {y[done]}; "
+                f"the {done} before it were taken in"
+            )
+
+    def _refusal(self, regressor: ArrayLike, force: Any) -> InputError:
+        shape = np.shape(regressor)
+        if shape != (self._n,):
+            return InputError(f"regressor must have shape ({self._n},), got {shape}")
+        return InputError(
+            f"a sample must be finite numbers, got regressor {regressor!r}, force {force!r}; leave it out"
+        )
+
+    def _bind(self) -> None:
+        one, many = self._kernels()
+        # An impossible sample compiles the update and leaves the state alone.
+        self._one = _entry(one, self._state, np.full(self._n, np.nan), 0.0, self._policy, self._size)
+        self._many = many.compiled
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            name: value.copy() if name == "_state" else value
+            for name, value in self.__dict__.items()
+            if name not in ("_one", "_many")
+        }
+
+    def __setstate__(self, known: dict[str, Any]) -> None:
+        self.__dict__.update(known)
+        self._bind()
+
+
+def _entry(kernel: Kernel, *example: Any) -> Any:
+    """The compiled code for such arguments, without the look-up by type that half of a short call's time goes into.
+
+    It still checks that they are arrays of as many dimensions and numbers; not what an array holds.
+    """
+    import numba
+
+    kernel(*example)
+    return kernel.compiled.overloads[tuple(map(numba.typeof, example))].entry_point
+
+
+def checked(theta: ArrayLike, covariance: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Copies of theta, shape (n,), and of its covariance, shape (n, n), symmetric to the last bit.
+
+    Raises:
+        InputError: shapes that do not fit, numbers that are not finite, a matrix that is no covariance.
+    """
+    start, P = np.array(theta, dtype=np.float64), np.array(covariance, dtype=np.float64)
+    n = start.size
+    if start.ndim != 1 or n == 0:
+        raise InputError(f"theta must have shape (n,) with n at least 1, got {start.shape}")
+    if P.shape != (n, n):
+        raise InputError(f"covariance must have shape ({n}, {n}) as theta has {n} values, got {P.shape}")
+    if not (np.isfinite(start).all() and np.isfinite(P).all()):
+        raise InputError("theta and covariance must be finite")
+    if not np.allclose(P, P.T, rtol=1e-12, atol=0.0) or np.linalg.eigvalsh(P)[0] <= 0.0:
+        raise InputError("covariance must be symmetric and positive definite, for example 1e6 * identity")
+    return start, 0.5 * (P + P.T)
