@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.errors import InputError, unknown
+from palpate.errors import InputError
 from palpate.logs.clock import seconds_of_cells, seconds_of_text
+from palpate.logs.columns import place_of
 from palpate.logs.layout import Layout, find_layout
 from palpate.logs.store import stored_about
 
 if TYPE_CHECKING:
     import polars
-
-_PARQUET = b"PAR1"
 
 
 class Table:
@@ -28,15 +27,14 @@ class Table:
     Args:
         path: the file.
         delimiter: of a CSV file; found when None.
+        parquet: whether it is Parquet.
 
     Raises:
-        InputError: the file is missing, a folder, empty, or of a kind that palpate does not read.
+        InputError: the file is of a kind that palpate does not read.
     """
 
-    def __init__(self, path: Path, delimiter: str | None = None) -> None:
-        self.path = _checked(path)
-        with path.open("rb") as file:
-            self.parquet = file.read(4) == _PARQUET
+    def __init__(self, path: Path, delimiter: str | None = None, *, parquet: bool = False) -> None:
+        self.path, self.parquet = path, parquet
         self.units: dict[str, str] = {}
         self.clocks: set[str] = set()
         self.meta: dict[str, Any] = {}
@@ -60,31 +58,23 @@ class Table:
         Raises:
             InputError: there is no such column (those there are, are listed), or there are two.
         """
-        places = [i for i, own in enumerate(self.names) if own == name]
-        if len(places) > 1:
-            numbers = ", ".join(map(str, places))
-            raise InputError(
-                f"{self.path} has {len(places)} columns named {name!r}; name one by number: {numbers}"
-            )
-        if places:
-            return places[0]
-        if name.isdigit():
-            if int(name) < len(self.names):
-                return int(name)
-            raise InputError(f"{self.path} has no column {name}; its columns are 0 to {len(self.names) - 1}")
-        raise self._no_column(name)
+        try:
+            return place_of(name, self.names, self.path)
+        except InputError as error:
+            raise InputError(f"{error}{self._doubts(name)}") from None
 
-    def _no_column(self, name: str) -> InputError:
-        text = str(unknown("column", name, self.names))
+    def _doubts(self, name: str) -> str:
+        """What may be behind a column that is not there."""
+        if name in self.names or name.isdigit():
+            return ""
+        text = ""
         if self.layout and len(self.names) == 1:
-            text += (
+            text = (
                 f" (only one column was found, parted by {self.layout.delimiter_name}; is the"
                 " delimiter right, and does the table begin in the first line?)"
             )
         whole = next((own for own in self.names if own.startswith(f"{name}:")), None)
-        if whole:
-            text += f" (a name that holds a colon is given with its unit: {whole}:UNIT)"
-        return InputError(f"{self.path}: {text}")
+        return f"{text} (a name that holds a colon is given with its unit: {whole}:UNIT)" if whole else text
 
     def numbers(self, places: Sequence[int], missing: Sequence[str] = ()) -> list[NDArray[np.float64]]:
         """The columns at these places; an empty cell, or one that holds a word of `missing`, is NaN.
@@ -220,13 +210,3 @@ def _words(path: Path) -> list[str]:
     with path.open(encoding="utf-8-sig") as file:
         lines = (line.split() for line in file if not line.startswith("#"))
         return [",".join(words) for words in lines if words]
-
-
-def _checked(path: Path) -> Path:
-    if not path.exists():
-        raise InputError(f"there is no file {path}; check the path")
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give a log file, CSV or Parquet")
-    if path.stat().st_size == 0:
-        raise InputError(f"{path} is empty; give a log with a row of numbers for each sample")
-    return path

@@ -1,0 +1,16 @@
+"""From a wrench and a pose in three dimensions to a force and a position along the contact's normal.
+
+A wrist's force sensor shows f = R^T (s F + w) + b: the force F that the tool exerts, turned into the tool's axes by
+its rotation R and with a sign s that drivers choose, the tool's weight w and the sensor's bias b. The pose p, R of a
+frame on the tool gives the point that touches, p + R r. Along the normal n these are F n and (p + R r) n.
+"""
+
+from __future__ import annotations
+
+from palpate.contact_frame.arm import robot_stiffness, with_arm
+from palpate.contact_frame.declared import Arm, ContactFrame
+from palpate.contact_frame.identifying import identify_contact
+from palpate.contact_frame.projecting import project
+from palpate.contact_frame.telling import told
+
+__all__ = ["Arm", "ContactFrame", "identify_contact", "project", "robot_stiffness", "told", "with_arm"]

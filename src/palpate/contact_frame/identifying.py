@@ -1,0 +1,82 @@
+"""A log of an arm, identified: projected on the contact's normal, with what the arm puts in taken out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from palpate.contact_frame.arm import with_arm
+from palpate.contact_frame.declared import Arm, ContactFrame
+from palpate.contact_frame.projecting import project
+from palpate.contact_frame.signals_in_base import FORCE
+from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
+from palpate.records import Record
+
+
+def identify_contact(
+    record: Record,
+    frame: ContactFrame | None = None,
+    arm: Arm | None = None,
+    *,
+    tolerance: float = 0.25,
+    calibration: float = 0.0,
+    **options: Any,
+) -> tuple[Identification, Record]:
+    """Find what an arm touched.
+
+    Args:
+        record: force and position, or wrench and pose, over time.
+        frame: how wrench and pose stand to each other and to the surface; not for a record of one axis.
+        arm: what lies between the sensors and the surface.
+        tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
+        calibration: relative standard deviation of the scales of force and position together.
+        options: of `palpate.identify`.
+
+    Returns:
+        The identification, and the record along the normal that it is of.
+
+    Raises:
+        InputError: the record or an argument is wrong, in one line.
+    """
+    arm = arm or Arm()
+    arm = replace(
+        arm,
+        position_from=arm.position_from or record.meta.get("position_from"),
+        tool_mass=arm.tool_mass or record.meta.get("tool_mass_kg"),
+    )
+    spread = 0.0
+    in_space = FORCE[0] in record.columns
+    if in_space:
+        record = project(record, frame or ContactFrame())
+        spread = record.meta["contact_frame"]["scale_std"]
+    if arm.stiffness is not None:
+        options |= {"series_stiffness": arm.stiffness[0], "series_std": arm.stiffness[1]}
+    scale = float(np.hypot(calibration, spread))
+    found = identify(record, tolerance=tolerance, calibration=scale, **options)
+    if in_space and not record.meta["contact_frame"]["normal_shown"]:
+        found = _untouched(found)
+    about = _about(arm) | {"force_filter": str(options.get("force_filter") or "none")}
+    record = replace(record, meta={**record.meta, "arm": about})
+    return with_arm(found, arm, tolerance, from_pose=in_space), record
+
+
+def _untouched(found: Identification) -> Identification:
+    """Where the force has no direction, what was fitted along one of them is chance."""
+    reason = "the force has no direction, so nothing seems to be touched"
+    refused = {
+        name: Parameter(None, None, None, p.unit, Verdict.NOT_IDENTIFIABLE, reason)
+        for name, p in found.parameters.items()
+    }
+    warnings = [warn for warn in found.warnings if warn.code is not Code.NO_CONTACT]
+    return replace(found, parameters=refused, warnings=(*warnings, Warn(Code.NO_CONTACT, reason)))
+
+
+def _about(arm: Arm) -> dict[str, Any]:
+    """What is known of the arm, as plain values."""
+    return {
+        "tool_mass_kg": list(arm.tool_mass) if arm.tool_mass else None,
+        "robot_stiffness_N_per_m": list(arm.stiffness) if arm.stiffness else None,
+        "position_from": arm.position_from,
+    }

@@ -1,0 +1,164 @@
+"""From a record in three dimensions to one along the contact's normal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.contact_frame.declared import ContactFrame
+from palpate.contact_frame.lever import line_misses_tcp
+from palpate.contact_frame.normal import Normal, direction_of, scale_std
+from palpate.contact_frame.signals_in_base import Signals, signals_of
+from palpate.contact_frame.unloading import Unloaded, in_range
+from palpate.contact_frame.vectors import read_rows
+from palpate.errors import InputError
+from palpate.records import Record
+
+Array = NDArray[np.float64]
+
+_FOLLOWS = 0.5
+_MATTERS = 0.02
+
+
+def project(record: Record, frame: ContactFrame) -> Record:
+    """Force and position along the contact's normal, of a wrench and a pose.
+
+    The point that touches is p + R tcp, with the pose p, R; the force's weight and bias are those of the free rows; the
+    normal is given, or the direction in which the force changes. Position grows into the surface, and the force is
+    positive when it presses.
+
+    Args:
+        record: with `time`, `force_x`, ..., `position_x`, ..., and where there are some `torque_x`, ...,
+            `quaternion_x`, ..., `quaternion_w`; as `palpate.logs.read_wrench_and_pose` gives it.
+        frame: what the user says.
+
+    Returns:
+        A record with `time` [s], `position` [m] and `force` [N]. Its `meta["contact_frame"]` holds what was declared
+        and found; its `scale_std` is what the normal's uncertainty adds to K, B and M, as `identify(calibration=...)`.
+
+    Raises:
+        InputError: what was declared does not fit the record.
+    """
+    signals = signals_of(record, frame)
+    signals, freed, notes = in_range(signals, frame)
+    normal = _normal(signals, freed, frame)
+    sign, normal, turned = _oriented(signals, freed, normal, frame)
+    position = (signals.place - signals.place[read_rows(signals.place)][0]) @ normal.direction
+    spread = scale_std(normal, *_in_contact(signals, freed))
+    notes += turned + _warnings(signals, freed, normal, spread)
+    about = _about(signals, freed, normal, sign, frame) | {"scale_std": spread}
+    meta = {**record.meta, "contact_frame": about, "notes": [*record.meta.get("notes", ()), *notes]}
+    columns = {"time": signals.time, "position": position, "force": sign * freed.force @ normal.direction}
+    return Record(columns, {"time": "s", "position": "m", "force": "N"}, meta)
+
+
+def _normal(signals: Signals, freed: Unloaded, frame: ContactFrame) -> Normal:
+    if frame.normal is None:
+        direction, std = direction_of(freed.force[freed.there])
+        return Normal(direction, std, found=True)
+    direction = np.array(frame.normal) / np.linalg.norm(frame.normal)
+    if frame.normal_frame == "tool":
+        rows = freed.inside if freed.inside.any() else freed.there
+        direction = (signals.rotations[rows] @ direction).mean(axis=0)
+        direction /= np.linalg.norm(direction)
+    return Normal(direction, 0.0, found=False)
+
+
+def _in_contact(signals: Signals, freed: Unloaded) -> tuple[Array, Array]:
+    """Forces and places in contact; of the whole log where there is none."""
+    rows = freed.inside if (freed.inside & freed.there).sum() > 1 else np.ones(len(freed.inside), bool)
+    placed = read_rows(signals.place)
+    return freed.force[rows & freed.there], signals.place[rows & placed]
+
+
+def _oriented(
+    signals: Signals, freed: Unloaded, normal: Normal, frame: ContactFrame
+) -> tuple[float, Normal, list[dict[str, Any]]]:
+    """The sign that makes the force what the tool exerts, and the normal turned into the surface."""
+    together = _correlation(signals, freed, normal.direction)
+    sign = {"action": 1.0, "reaction": -1.0, None: -1.0 if together < 0 else 1.0}[frame.force_sign]
+    if frame.force_sign is not None and freed.free.any() and sign * together < -_FOLLOWS:
+        other = "reaction" if frame.force_sign == "action" else "action"
+        raise InputError(
+            f"the wrench was declared to be the {frame.force_sign}, but falls as the tool goes in: say --force-sign"
+            f" {other}, or check --wrench-frame and --normal"
+        )
+    pressing = sign * _mean_press(signals, freed, normal.direction)
+    if pressing >= 0:
+        return sign, normal, []
+    turned = Normal(-normal.direction, normal.std, normal.found)
+    if normal.found:
+        return sign, turned, []
+    text = "the normal given points out of the surface; it was turned round"
+    return sign, turned, [{"code": "position-sign-reversed", "text": text}]
+
+
+def _correlation(signals: Signals, freed: Unloaded, direction: Array) -> float:
+    """Of the force with the position along a direction, in contact; the same for the direction turned round."""
+    rows = (freed.inside if freed.inside.any() else freed.there) & freed.there
+    placed = read_rows(signals.place)
+    position = np.interp(signals.time[rows], signals.time[placed], signals.place[placed] @ direction)
+    force = freed.force[rows] @ direction
+    if len(force) < 2 or not (np.ptp(position) and np.ptp(force)):
+        return 0.0
+    return float(np.corrcoef(position, force)[0, 1])
+
+
+def _mean_press(signals: Signals, freed: Unloaded, direction: Array) -> float:
+    """How much larger the force along a direction is in contact than out of it [N]; 0 if the tool never leaves."""
+    inside = freed.inside & freed.there
+    if not (freed.free.any() and inside.any()):
+        return 0.0
+    return float((freed.force[inside].mean(axis=0) - freed.force[freed.free].mean(axis=0)) @ direction)
+
+
+def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) -> list[dict[str, Any]]:
+    notes = []
+    if signals.guess:
+        notes.append({"code": "frame-guess", "text": f"{signals.guess}; say --wrench-frame if it is not so"})
+    if not normal.shown:
+        text = "the force changes in all directions alike, so it shows no normal: is anything touched?"
+        notes.append({"code": "normal-uncertain", "text": text})
+    elif spread > _MATTERS:
+        text = (
+            f"the normal is known to {np.degrees(normal.std):.2g} deg about each axis (one std), which leaves K, B and"
+            f" M uncertain by {spread:.2g} of their value; give --normal"
+        )
+        notes.append({"code": "normal-uncertain", "text": text})
+    if not freed.free.any():
+        text = (
+            "no free motion in the log: the force's bias, the tool's weight and the surface's position cannot be told"
+            " apart, and none of them is given"
+        )
+        notes.append({"code": "contact-at-start", "text": text})
+    return notes
+
+
+def _about(
+    signals: Signals, freed: Unloaded, normal: Normal, sign: float, frame: ContactFrame
+) -> dict[str, Any]:
+    """What was declared and what was found, as plain values."""
+    load = freed.load
+    return {
+        "wrench_frame": signals.wrench_frame,
+        "wrench_frame_said": frame.wrench_frame is not None,
+        "sensor_rpy_rad": list(frame.sensor_rpy) if frame.sensor_rpy else None,
+        "tcp_m": list(frame.tcp),
+        "wrench_at_m": list(frame.wrench_at),
+        "force_sign": "action" if sign > 0 else "reaction",
+        "force_sign_said": frame.force_sign is not None,
+        "gravity_compensated": frame.gravity_compensated,
+        "normal": normal.direction.tolist(),
+        "normal_found": normal.found,
+        "normal_std_rad": normal.std,
+        "normal_shown": normal.shown,
+        "free_said_s": list(frame.free) if frame.free else None,
+        "free_rows": int(freed.free.sum()),
+        "bias_N": load.bias.tolist(),
+        "weight_N": load.weight.tolist() if load.separable else None,
+        "weight_std_N": load.weight_std if load.separable else None,
+        "load_std_N": load.std,
+        "line_of_action_off_m": line_misses_tcp(signals, freed.free, freed.inside, frame),
+    }

@@ -1,0 +1,84 @@
+"""What was declared and found about an arm's log, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+_GRAVITY = 9.80665
+_FAR = 0.01
+
+
+def told(meta: Mapping[str, Any]) -> list[str]:
+    """Sentences for a user, from the metadata of a record along the normal."""
+    lines = list(meta.get("facts", ()))
+    about = meta.get("contact_frame")
+    if about:
+        lines += [_wrench(about), _normal(about), _load(about), *_lever(about)]
+    return lines + _arm(meta.get("arm") or {})
+
+
+def _wrench(about: Mapping[str, Any]) -> str:
+    side = {
+        "action": "what the tool exerts on the surface",
+        "reaction": "what the surface exerts on the tool",
+    }
+    sign = side[about["force_sign"]] + ("" if about["force_sign_said"] else " (found)")
+    axes = (
+        f"wrench in the {about['wrench_frame']}'s axes{'' if about['wrench_frame_said'] else ' (concluded)'}"
+    )
+    if about["sensor_rpy_rad"]:
+        axes += f", turned by {_listed(np.degrees(about['sensor_rpy_rad']))} deg"
+    if any(about["tcp_m"]):
+        axes += f"; the tool touches at {_listed(1e3 * np.array(about['tcp_m']))} mm"
+    return f"{axes}; {sign}"
+
+
+def _normal(about: Mapping[str, Any]) -> str:
+    normal = f"normal into the surface {_listed(about['normal'])} in the base"
+    if not about["normal_found"]:
+        return f"{normal}, as given"
+    std = np.degrees(about["normal_std_rad"])
+    return f"{normal}, found from the force (std {std:.2g} deg), which adds {100 * about['scale_std']:.2g} % to K, B, M"
+
+
+def _load(about: Mapping[str, Any]) -> str:
+    if not about["free_rows"]:
+        return "no free motion: bias and weight are not known"
+    if about["weight_N"] is None:
+        what = "bias" if about["gravity_compensated"] else "bias and weight together"
+        return f"{what} {_listed(about['bias_N'])} N in the tool's axes (std {about['load_std_N']:.2g} N)"
+    weight, std = float(np.linalg.norm(about["weight_N"])), about["weight_std_N"]
+    mass = f"--tool-mass {weight / _GRAVITY:.3g}:{std / _GRAVITY:.1g} would take its inertia out of M"
+    return f"tool's weight {weight:.3g} N (std {std:.2g} N; {mass}); bias {_listed(about['bias_N'])} N"
+
+
+def _lever(about: Mapping[str, Any]) -> list[str]:
+    off = about["line_of_action_off_m"]
+    if off is None:
+        return []
+    doubt = "; are --tcp, --wrench-at and --wrench-frame right?" if off > _FAR else ""
+    return [f"the force passes {1e3 * off:.2g} mm from the tool centre point, by the torque{doubt}"]
+
+
+def _arm(arm: Mapping[str, Any]) -> list[str]:
+    lines = []
+    if arm.get("robot_stiffness_N_per_m"):
+        value, std = arm["robot_stiffness_N_per_m"]
+        lines.append(f"the arm's own {value:.4g} N/m (std {std:.2g}) are taken out of K")
+    if any(arm.get("tool_mass_kg") or ()):
+        value, std = arm["tool_mass_kg"]
+        lines.append(f"the tool's {value:.3g} kg (std {std:.2g}) are taken out of M")
+    if arm.get("position_from"):
+        lines.append(f"position from the {arm['position_from']}")
+    if arm.get("force_filter", "none") != "none":
+        lines.append(
+            f"force filtered by {arm['force_filter']} before it was sampled; the position goes through the same"
+        )
+    return lines
+
+
+def _listed(values: Sequence[float] | np.ndarray[Any, Any]) -> str:
+    return "(" + ", ".join(f"{value:.3g}" if abs(value) > 1e-9 else "0" for value in values) + ")"

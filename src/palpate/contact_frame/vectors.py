@@ -1,0 +1,48 @@
+"""Vectors and rotations over time, with rows that hold no reading."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError
+
+Array = NDArray[np.float64]
+
+_UNIT = 0.1
+
+
+def read_rows(vectors: Array) -> NDArray[np.bool_]:
+    """Rows of vectors, shape (n, k), that hold a reading in each component."""
+    return np.isfinite(vectors.sum(axis=1))
+
+
+def continuous(quaternions: Array) -> Array:
+    """Quaternions, shape (n, 4), each with the sign that is nearer to the one before.
+
+    q and -q are the same rotation, and drivers change between them at will; what lies between them is none.
+    """
+    together = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
+    signs = np.cumprod(np.r_[1.0, np.where(together < 0, -1.0, 1.0)])
+    steady: Array = quaternions * signs[:, None]
+    return steady
+
+
+def matrices(time: Array, quaternions: Array) -> Array:
+    """Rotation matrices, shape (n, 3, 3), of quaternions (x, y, z, w), shape (n, 4); rows of NaN are bridged.
+
+    Raises:
+        InputError: they are not of unit length.
+    """
+    from scipy.spatial.transform import Rotation
+
+    there = read_rows(quaternions)
+    lengths = np.linalg.norm(quaternions[there], axis=1)
+    if not len(lengths) or np.abs(lengths - 1).max() > _UNIT:
+        worst = lengths[np.argmax(np.abs(lengths - 1))] if len(lengths) else float("nan")
+        raise InputError(f"the pose's quaternions must have length 1, got {worst:.3g}; give them as x,y,z,w")
+    steady = continuous(quaternions[there])
+    if not there.all():
+        steady = np.column_stack([np.interp(time, time[there], part) for part in steady.T])
+    turned: Array = Rotation.from_quat(steady).as_matrix()
+    return turned

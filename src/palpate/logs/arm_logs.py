@@ -1,0 +1,126 @@
+"""Wrench and pose of an arm's log, in three dimensions."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import InputError
+from palpate.logs.bags import Bag
+from palpate.logs.from_table import open_table
+from palpate.logs.kinds import Kind, kind_of
+from palpate.logs.read import read_log
+from palpate.logs.roles import POSE, WRENCH
+from palpate.records import Record
+
+_WRENCHES = {
+    "geometry_msgs/msg/WrenchStamped": "wrench.",
+    "geometry_msgs/msg/Wrench": "",
+}
+_POSES = {
+    "geometry_msgs/msg/PoseStamped": ("pose.position.", "pose.orientation."),
+    "geometry_msgs/msg/Pose": ("position.", "orientation."),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": ("pose.pose.position.", "pose.pose.orientation."),
+    "nav_msgs/msg/Odometry": ("pose.pose.position.", "pose.pose.orientation."),
+    "geometry_msgs/msg/TransformStamped": ("transform.translation.", "transform.rotation."),
+    "geometry_msgs/msg/PointStamped": ("point.", ""),
+    "geometry_msgs/msg/Point": ("", ""),
+}
+"""Where the components are, by the types that palpate knows as a wrench or as a pose."""
+_COUNTS = {"wrench": (WRENCH, (3, 6)), "pose": (POSE, (3, 7))}
+_ORDERS = {"wrench": "fx,fy,fz or fx,fy,fz,tx,ty,tz", "pose": "x,y,z or x,y,z,qx,qy,qz,qw"}
+
+
+def is_wrench(kind: str) -> bool:
+    """Whether a type of message is a wrench."""
+    return kind in _WRENCHES
+
+
+def is_pose(kind: str) -> bool:
+    """Whether a type of message is a pose, or a point."""
+    return kind in _POSES
+
+
+def read_wrench_and_pose(
+    path: str | Path, wrench: str | None = None, pose: str | None = None, **options: Any
+) -> Record:
+    """Read wrench and pose of a log into a record of three dimensions.
+
+    Args:
+        path: of the log.
+        wrench: a topic of a bag, or columns of any log, `fx,fy,fz` or `fx,fy,fz,tx,ty,tz`, each `NAME` or `NAME:UNIT`;
+            of a bag the only topic that is one, when None.
+        pose: likewise, `x,y,z` or `x,y,z,qx,qy,qz,qw`.
+        options: of `read_log`: `time` of a log that is no bag, `start`, `end`, `missing`, ...
+
+    Returns:
+        A record with `time`, `force_x` ... `torque_z` and `position_x` ... `quaternion_w`, as far as they are there.
+
+    Raises:
+        InputError: whatever is wrong with the file or with these arguments, in one line.
+    """
+    path = Path(path)
+    kind = kind_of(path)
+    with Bag(path, kind) if kind.is_bag else nullcontext() as bag:
+        wrench = wrench or _only("wrench", bag, path)
+        pose = pose or _only("pose", bag, path)
+        columns = _columns("wrench", wrench, path, kind, bag) | _columns("pose", pose, path, kind, bag)
+    record = read_log(path, **(options | columns))
+    facts = [f"wrench of {wrench}, pose of {pose}", *record.meta.get("facts", ())]
+    return Record(record.columns, record.units, {**record.meta, "facts": facts})
+
+
+def _only(what: str, bag: Bag | None, path: Path) -> str:
+    """The only topic of a bag that is a wrench, or a pose."""
+    if bag is None:
+        raise InputError(f"name the {what}'s columns of {path} with --{what} {_ORDERS[what]}")
+    known = _WRENCHES if what == "wrench" else _POSES
+    there = [
+        topic.name for topic in bag.topics.values() if topic.kind in known and topic.count and topic.known
+    ]
+    if len(there) == 1:
+        return there[0]
+    found = f"there are {', '.join(there)}" if there else f"none of its topics is a {what}"
+    raise InputError(
+        f"name the {what} of {path} with --{what} TOPIC ({found}), or force and position with --force TOPIC.FIELD"
+        f" --position TOPIC.FIELD; palpate topics {path} lists them"
+    )
+
+
+def _columns(what: str, spec: str, path: Path, kind: Kind, bag: Bag | None) -> dict[str, str]:
+    """Columns by role."""
+    roles, counts = _COUNTS[what]
+    names = spec.split(",")
+    if len(names) == 1:
+        names = _of_topic(what, spec, bag) if bag else _of_matrix(what, spec, path, kind)
+    if len(names) not in counts:
+        raise InputError(f"--{what} needs {_ORDERS[what]}, got {len(names)} columns: {','.join(names)}")
+    return dict(zip(roles, names, strict=False))
+
+
+def _of_topic(what: str, name: str, bag: Bag) -> list[str]:
+    topic = bag.topic(name)
+    if what == "wrench" and topic.kind in _WRENCHES:
+        at = f"{name}.{_WRENCHES[topic.kind]}"
+        return [f"{at}{part}.{axis}" for part in ("force", "torque") for axis in "xyz"]
+    if what == "pose" and topic.kind in _POSES:
+        place, turn = _POSES[topic.kind]
+        names = [f"{name}.{place}{axis}" for axis in "xyz"]
+        return names + [f"{name}.{turn}{axis}" for axis in "xyzw" if turn]
+    raise InputError(
+        f"{name} is a {topic.kind}, which palpate does not know as a {what}; name its fields:"
+        f" --{what} {','.join(f'{name}.FIELD' for _ in range(3))}"
+    )
+
+
+def _of_matrix(what: str, name: str, path: Path, kind: Kind) -> list[str]:
+    """The columns of a matrix of a MATLAB file; quaternions have two orders there, so they are not guessed at."""
+    columns = [own for own in open_table(path, kind).names if own.rpartition(".")[0] == name]
+    if what == "pose" and len(columns) > 3:
+        raise InputError(
+            f"name the columns of {name} one by one, --pose {name}.0,{name}.1,...: x,y,z,qx,qy,qz,qw, the scalar last"
+        )
+    if not columns:
+        raise InputError(f"--{what} needs {_ORDERS[what]} of {path}, got {name!r}")
+    return columns

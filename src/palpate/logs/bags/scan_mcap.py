@@ -1,0 +1,86 @@
+"""An MCAP file read from its beginning, for one without its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from struct import unpack_from
+from typing import TYPE_CHECKING, BinaryIO
+
+from palpate.logs.bags.scanning import End, Raw, connection
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
+_MAGIC = 8
+
+
+def scan_mcap(path: Path) -> Iterator[Connection | Raw | End]:
+    """Channels and messages of an MCAP file as far as they are whole."""
+    schemas: dict[int, tuple[str, str, str]] = {}
+    finished = False
+    with path.open("rb") as file:
+        file.seek(_MAGIC)
+        for operation, data in _records(file):
+            if operation == _SCHEMA:
+                name, encoding, definition = _strings(data, 2, 3)
+                schemas[_number(data)] = (name, encoding, definition)
+            elif operation == _CHANNEL:
+                about = schemas.get(unpack_from("<H", data, 2)[0], ("", "", ""))
+                topic, coding = _strings(data, 4, 2)
+                kind = about[0] if coding == "cdr" else f"{about[0]} as {coding}"
+                yield connection(_number(data), topic, kind, *about[1:])
+            elif operation == _MESSAGE:
+                channel, _, received = unpack_from("<HIQ", data)
+                yield Raw(channel, received, data[22:])
+            elif operation == _FOOTER:
+                finished = True
+    yield End(finished)
+
+
+def _records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """Operations and data of all whole records, those inside of chunks included.
+
+    The records of a chunk that is not compressed are read where they stand, so that a cut in it costs one message.
+    """
+    from rosbags.rosbag2.errors import ReaderError
+    from rosbags.rosbag2.storage_mcap import decompress
+
+    while len(head := file.read(9)) == 9:
+        operation, size = head[0], unpack_from("<Q", head, 1)[0]
+        if operation == _CHUNK:
+            fixed = file.read(32)
+            if len(fixed) < 32:
+                return
+            whole, crc, letters = unpack_from("<QII", fixed, 16)
+            packing = file.read(letters + 8)[:letters].decode(errors="replace")
+            if not packing:
+                continue
+            size -= 32 + letters + 8
+        data = file.read(size)
+        if len(data) < size:
+            return
+        if operation != _CHUNK:
+            yield operation, data
+            continue
+        try:
+            inside = decompress(data, packing, whole, crc)
+        except (ReaderError, RuntimeError, ValueError, OSError):
+            return
+        yield from _records(BytesIO(inside))
+
+
+def _number(data: bytes) -> int:
+    number: int = unpack_from("<H", data)[0]
+    return number
+
+
+def _strings(data: bytes, place: int, count: int) -> tuple[str, ...]:
+    found = []
+    for _ in range(count):
+        (length,) = unpack_from("<I", data, place)
+        found.append(data[place + 4 : place + 4 + length].decode(errors="replace"))
+        place += 4 + length
+    return tuple(found)

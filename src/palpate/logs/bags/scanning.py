@@ -1,0 +1,67 @@
+"""What the scanners of damaged bags yield, and how much of a file they found whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+
+
+class Raw(NamedTuple):
+    """A message as it lies in the file.
+
+    Args:
+        channel: the number of its connection.
+        received: when the recorder got it [ns].
+        data: serialised.
+    """
+
+    channel: int
+    received: int
+    data: bytes
+
+
+class End(NamedTuple):
+    """Where the whole part of a file ends.
+
+    Args:
+        finished: the recorder closed the file, and its end is there.
+        share: of the file that is lost, 0 if only its index is; None if the file does not tell how long it was to be.
+    """
+
+    finished: bool
+    share: float | None = None
+
+
+Scan = Callable[[Path], Iterator["Connection | Raw | End"]]
+"""Reads a file from its beginning as far as it is whole; yields connections before their messages, and the end last."""
+
+
+def connection(number: int, topic: str, kind: str, encoding: str, definition: str) -> Connection:
+    """A connection such as rosbags' own readers have.
+
+    Args:
+        number: its own in this file.
+        topic: its name.
+        kind: the type of its messages, as `geometry_msgs/msg/Pose`.
+        encoding: of the definition: ros1msg, ros2msg, ros2idl; or something that cannot be read.
+        definition: of the type.
+    """
+    from rosbags.interfaces import (
+        Connection,
+        ConnectionExtRosbag2,
+        MessageDefinition,
+        MessageDefinitionFormat,
+    )
+
+    formats = {
+        "ros1msg": MessageDefinitionFormat.MSG,
+        "ros2msg": MessageDefinitionFormat.MSG,
+        "ros2idl": MessageDefinitionFormat.IDL,
+        "omgidl": MessageDefinitionFormat.IDL,
+    }
+    about = MessageDefinition(formats.get(encoding, MessageDefinitionFormat.NONE), definition)
+    return Connection(number, topic, kind, about, "", 0, ConnectionExtRosbag2("cdr", []), None)

@@ -1,0 +1,47 @@
+"""Records that `palpate run` and the bench wrote: they say themselves what measured them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from palpate.logs.kinds import Kind, kind_of
+from palpate.logs.read import read_log
+from palpate.logs.store import stored_about
+from palpate.records import Record
+from palpate.signals.low_pass import LowPass
+
+RUN = {"time": "t", "position": "x_measured", "force": "force_sampled"}
+"""What a run's record calls the columns of a log: encoder's position, and the force as the sensor sampled it."""
+
+
+def is_run(path: Path) -> bool:
+    """Whether a file is the record of a run."""
+    if kind_of(path) is not Kind.PARQUET:
+        return False
+    about = stored_about(path)
+    return about is not None and set(RUN.values()) <= set(about["units"])
+
+
+def read_run(path: Path, **options: Any) -> Record:
+    """Time, position and force of a run's record; `options` are those of `read_log`."""
+    record = read_log(path, **(options | RUN))
+    fact = f"a run's record: {RUN['position']} and {RUN['force']}, measured as the record itself says"
+    no_tool = {"tool_mass_kg": (0.0, 0.0)}  # the bench's force is that on the surface itself
+    return Record(record.columns, record.units, {**record.meta, **no_tool, "facts": [fact]})
+
+
+def measured_by(path: Path) -> dict[str, Any]:
+    """The lag [s] and the force filter that a run's record states, as `palpate.identify` takes them; or neither.
+
+    The lag is that of a fresh reading: the sensor's low-pass at rest, its wait, less what the position is late.
+    """
+    about = stored_about(path)
+    instruments: Mapping[str, Any] = about["meta"].get("instruments", {}) if about else {}
+    force, position = instruments.get("force"), instruments.get("position", {})
+    if not force or force["filter"] == "unknown":
+        return {}
+    low_pass = LowPass.parse(force["filter"])
+    lag = low_pass.lag + force["delay_s"] - position.get("lag_s", 0.0)
+    return {"lag": lag, "force_filter": force["filter"] if low_pass.roll_off else None}
