@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.identification.models import Motion
+from palpate.identification.sensor_path import SensorPath
+
 Array = NDArray[np.float64]
 
 FASTEST = 1 / 8
@@ -55,3 +58,11 @@ def _edge(signal: Array, dt: float) -> float:
 def _smooth(power: Array) -> Array:
     width = max(len(power) // 100, 1)
     return np.convolve(power, np.ones(width) / width, mode="same")
+
+
+def highest_motion(motion: Motion) -> float:
+    """The frequency below which the position moved while it was fitted, by where its spectrum meets its floor [Hz]."""
+    chain, rows = motion.chain, motion.rows
+    rows = chain.instants[rows].astype(np.intp) if isinstance(chain, SensorPath) else rows
+    stretch = motion.position[rows[0] : rows[-1] + 1]
+    return _edge(stretch, chain.dt) if len(stretch) >= _FEWEST_SEGMENT else float("inf")

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import unknown
-from palpate.identification.fitting import Fit, Lag, fit
+from palpate.identification.fitting import Fit, fit
+from palpate.identification.judging import (
+    MUCH_BETTER,
+    NEGLIGIBLE,
+    Candidate,
+    Question,
+    below_zero,
+    judge,
+    judged,
+)
 from palpate.identification.lagging import freed
 from palpate.identification.models import (
     CURVED,
@@ -18,60 +27,36 @@ from palpate.identification.models import (
     KELVIN_VOIGT_MASS,
     NAMES,
     Model,
-    Motion,
+    at_rest_before,
+    direction,
     hunt_crossley,
+    relaxing,
     standard_linear_solid,
+    with_friction,
+    without_noise,
 )
-from palpate.identification.parts import Disagreement, compare_parts, halves
+from palpate.identification.parts import halves
+from palpate.identification.regression import solve
+from palpate.identification.unknown_lag import over_all_lags
+from palpate.identification.whiteness import whiteness
+
+__all__ = ["Candidate", "Choice", "Question", "choose", "with_mass"]
 
 Array = NDArray[np.float64]
+Tried = tuple[Fit, Question]
 
 _BETTER = 0.7
-"""A richer model must leave less than this share of the mean square to be preferred."""
-_MUCH_BETTER = 0.5
-_NEGLIGIBLE = 0.0005
-"""Share of the force's variance below which a misfit asks for no richer model."""
+"""A richer model must leave less than this share of the mean square, where it was not fitted, to be preferred."""
 _HOPELESS = 4.0
 """A model whose misfit is this many times the best one's is not saved by any lag. One with a mass below zero does not
 count as the best: to a damper, a lag of the force looks like that."""
-_ABOVE_NOISE = 3.0
-_UNEXPLAINED = 0.01
-_SLOW_UNEXPLAINED = 0.04
-_SLOW = 0.35
-_SIGNIFICANT = 3.0
-
-
-_CHAIN_CORRELATION = 2 * 2.3
-"""Integral of the autocorrelation of white noise behind the filter chain, in its time constants."""
-
-
-@dataclass(frozen=True)
-class Question:
-    """What all candidates are judged on.
-
-    Args:
-        motion, force: the filtered log; force of shape (n,).
-        spans: number of the contact that each row belongs to, shape (n,).
-        lag: what is known about it.
-        tolerance: largest half-width of an identified parameter's interval, as a share of its value.
-        free_noise: deviation of the filtered force out of contact [N]; None if it is never out of contact.
-    """
-
-    motion: Motion
-    force: Array
-    spans: NDArray[np.intp]
-    lag: Lag
-    tolerance: float
-    free_noise: float | None
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A fitted model and what speaks against it."""
-
-    fit: Fit
-    against: tuple[str, ...]
-    disagreements: tuple[Disagreement, ...] = ()
+_BOTH_WAYS = 0.1
+"""Share of the rows that must go either way for friction to be told from an offset."""
+_CLEARLY = 0.5
+"""Of `direction`, where a row goes one way."""
+_TOO_FREE = "an exponent and a relaxation together are more than a press can tell apart"
+_MANY = 20_000
+"""Rows beyond which a probe fixed to the surface is not tried for relaxation unasked: it takes long."""
 
 
 @dataclass(frozen=True)
@@ -96,100 +81,108 @@ def choose(question: Question, name: str | None = None) -> Choice:
 
     Args:
         question: the log.
-        name: a model to hold to, None to choose by Schwarz's criterion among those that nothing speaks against.
+        name: a model to hold to, None to choose, among those that nothing speaks against, by what they predict of rows
+            they were not fitted to and by Schwarz's criterion.
 
     Raises:
         InputError: there is no model of this name.
     """
     if name is not None and name not in NAMES:
         raise unknown("model", name, NAMES)
-    motion, force, lag = question.motion, question.force, question.lag
-    fits = [fit(model, motion, force, lag) for model in (KELVIN_VOIGT, KELVIN_VOIGT_MASS)]
-    if name is not None or min(1 - fitted.r2 for fitted in fits) > _NEGLIGIBLE:
-        fits += [fit(model, motion, force, lag) for model in _richer(question, name)]
-    near = _HOPELESS * min((fitted.rmse for fitted in fits if not _impossible(fitted)), default=np.inf)
-    fits = [freed(fitted, motion, force, lag) if fitted.rmse <= near else fitted for fitted in fits]
-    judged = _judge(fits, question)
-    if name is None:
-        return _chosen(judged, question)
-    asked = [c for c in judged if c.fit.model.name == name]
-    fine = [c for c in asked if not c.against]
-    best = min(fine, key=lambda c: len(c.fit.names)) if fine else asked[0]
-    return Choice(best, False, tuple(judged)) if fine else _no_model(best, judged, question)
+    tried = [_tried(model, question) for model in (KELVIN_VOIGT, KELVIN_VOIGT_MASS)]
+    if _unexplained(tried, question, name):
+        tried += _richer(question, name)
+        tried += _rubbing(tried, question)
+    possible = [fitted.rmse for fitted, _ in tried if not below_zero(fitted)]
+    near = _HOPELESS * min(possible, default=np.inf)
+    tried = [(_freed(fitted, own) if fitted.rmse <= near else fitted, own) for fitted, own in tried]
+    every = tuple(judge(tried))
+    candidates = [c for c in every if name in (None, c.fit.model.name)]
+    fine = [c for c in candidates if not c.against and (name is not None or _needed(c.fit))]
+    if fine:
+        return Choice(_best(fine), False, every)
+    return _no_model(_least_bad(candidates, question), every, question)
 
 
-def _richer(question: Question, name: str | None) -> list[Model]:
+def _tried(model: Model, question: Question) -> Tried:
+    own = replace(question, motion=without_noise(question.motion)) if model.of_power else question
+    return fit(model, own.motion, own.force, own.lag), own
+
+
+def _freed(fitted: Fit, question: Question) -> Fit:
+    motion, lag = question.motion, question.lag
+    if motion.matched:
+        open_mass = "M" in fitted.names and lag.mass is None and not fitted.model.knobs
+        return over_all_lags(fitted, motion, question.force, lag) if open_mass and not lag.known else fitted
+    return freed(fitted, motion, question.force, lag)
+
+
+def _unexplained(tried: list[Tried], question: Question, name: str | None) -> bool:
+    """Whether the plain models leave anything to explain, or another one is asked for."""
+    if name is not None and name not in (KELVIN_VOIGT.name, KELVIN_VOIGT_MASS.name):
+        return True
+    if question.motion.matched:
+        return not any(whiteness(fitted.residuals).white for fitted, _ in tried)
+    return name is not None or min(1 - fitted.r2 for fitted, _ in tried) > NEGLIGIBLE
+
+
+def _richer(question: Question, name: str | None) -> list[Tried]:
     """The models worth trying beside the plain ones: for a probe that leaves the surface, or one fixed to it."""
     motion = question.motion
-    makers: list[Callable[[], Model]] = []
     if motion.bonded:
-        makers += [lambda: CURVED, lambda: CURVED_MASS]
-    if not motion.bonded or name == "standard-linear-solid" or len(motion.rows) < 20_000:
-        makers.append(lambda: standard_linear_solid(motion))
-    if not motion.bonded or name == "hunt-crossley":
-        makers.append(lambda: hunt_crossley(motion))
-    return [make() for make in makers]
+        models = [CURVED, CURVED_MASS]
+        if len(motion.rows) < _MANY or name == "standard-linear-solid":
+            models.append(standard_linear_solid(motion))
+        if name == "hunt-crossley":
+            models.append(hunt_crossley(motion))
+        return [_tried(model, question) for model in models]
+    return [_one_sided(make, question) for make in (standard_linear_solid, hunt_crossley)]
 
 
-def _judge(fits: list[Fit], question: Question) -> list[Candidate]:
-    possible = [fitted for fitted in fits if not _impossible(fitted)]
-    best = min((fitted.rmse for fitted in possible), default=np.inf)
-    return [_candidate(fitted, fits, best, question) for fitted in fits]
+def _one_sided(make: Callable[..., Model], question: Question) -> Tried:
+    """A model with the place of the surface in it, fitted to the touches too where the log has them."""
+    wider = question.with_touches
+    if wider is None:
+        return _tried(make(question.motion), question)
+    return _tried(at_rest_before(make(wider.motion)), wider)
 
 
-def _candidate(fitted: Fit, fits: list[Fit], best: float, question: Question) -> Candidate:
-    against = [f"{name} would be below zero" for name in _impossible(fitted)]
-    if best**2 < _MUCH_BETTER * fitted.rmse**2 and 1 - fitted.r2 > _NEGLIGIBLE:
-        winner = min((f for f in fits if f.rmse == best), key=lambda f: len(f.names))
-        label = winner.model.name + (" with a curved spring" if "K3" in winner.names else "")
-        against.append(f"{label} fits with {best**2 / fitted.rmse**2:.0%} of the squared misfit")
-    against += _not_noise(fitted, question)
-    parts = compare_parts(fitted, question.motion, question.force, question.spans, question.tolerance)
-    against += [_said(part) for part in parts]
-    return Candidate(fitted, tuple(against), tuple(parts))
-
-
-def _not_noise(fitted: Fit, question: Question) -> list[str]:
-    """What a fit leaves is noise only if it is no larger than the noise out of contact, and no slower."""
-    noise = question.free_noise
-    if noise is None:
+def _rubbing(tried: list[Tried], question: Question) -> list[Tried]:
+    """The same models with friction, where the log moves both ways and friction takes much off the misfit."""
+    way = direction(question.motion)
+    seen = way[question.motion.rows] if not question.motion.matched else way
+    if min(float(np.mean(seen > _CLEARLY)), float(np.mean(seen < -_CLEARLY))) < _BOTH_WAYS:
         return []
-    left = 1 - fitted.r2
-    if fitted.rmse > _ABOVE_NOISE * noise and left > _UNEXPLAINED:
-        times = f"{fitted.rmse / noise:.2g} times the" if noise > 1e-6 * fitted.rmse else "far above the"
-        return [f"its misfit of {fitted.rmse:.2g} N is {times} noise out of contact"]
-    chain = question.motion.chain
-    white = len(question.force) * chain.dt * chain.rate / _CHAIN_CORRELATION
-    if left > _SLOW_UNEXPLAINED and fitted.noise.effective < _SLOW * white:
-        return [f"its misfit ({left:.0%} of the force's variance) is too slow for noise"]
-    return []
+    best, own = min(tried, key=lambda one: one[0].rmse)
+    rubbed = own.motion.filtered(way, 0, best.lag)
+    knobs = {knob.name: best[knob.name] for knob in best.model.knobs}
+    columns = np.column_stack([*best.model.columns(own.motion, knobs, best.lag), rubbed])
+    left = own.force - columns @ solve(columns, own.force)
+    if float(left @ left) > _BETTER * float(best.residuals @ best.residuals):
+        return []
+    return [_tried(with_friction(fitted.model, way), mine) for fitted, mine in tried]
 
 
-def _said(part: Disagreement) -> str:
-    values = ", ".join(f"{value:.3g} in {label}" for label, value in part.parts.items())
-    return f"{part.name} is {values}"
-
-
-def _impossible(fitted: Fit) -> list[str]:
-    """Parameters below zero by more than chance, which no passive surface has."""
-    known = [name for name in fitted.model.positive if name in fitted.names]
-    return [name for name in known if fitted[name] + _SIGNIFICANT * fitted.std(name, lag_known=True) < 0]
-
-
-def _chosen(judged: list[Candidate], question: Question) -> Choice:
-    fine = [c for c in judged if not c.against and _needed(c.fit)]
-    if not fine:
-        plain = next(c for c in judged if c.fit.model is KELVIN_VOIGT)
-        mass = next(c for c in judged if c.fit.model is KELVIN_VOIGT_MASS)
-        with_mass = question.motion.bonded and mass.fit.rmse**2 < _MUCH_BETTER * plain.fit.rmse**2
-        return _no_model(mass if with_mass else plain, judged, question)
-    effective = min(fine, key=lambda c: c.fit.rmse).fit.noise.effective
-    best = fine[0]
-    for candidate in fine[1:]:
-        better = candidate.fit.rmse**2 < _BETTER * best.fit.rmse**2 or _same_kind(candidate.fit, best.fit)
-        if better and candidate.fit.score(effective) < best.fit.score(effective):
+def _best(candidates: list[Candidate]) -> Candidate:
+    """The first, unless a later one predicts better what it has not seen and is worth its parameters."""
+    effective = min(candidates, key=lambda c: c.rmse).fit.noise.effective
+    best = candidates[0]
+    for candidate in candidates[1:]:
+        better = candidate.held_out**2 < _BETTER * best.held_out**2 or _same_kind(candidate.fit, best.fit)
+        if better and candidate.score(effective) < best.score(effective):
             best = candidate
-    return Choice(best, False, tuple(judged))
+    return best
+
+
+def with_mass(choice: Choice, name: str | None) -> Choice:
+    """The same with a mass in the model, for damping and lag are not known without one; unless a model was asked for.
+
+    Where the force sensor's own way is known, a mass that the log does not show costs no more than an interval.
+    """
+    if name is not None or choice.rejected or choice.candidate.fit.model is not KELVIN_VOIGT:
+        return choice
+    found = [c for c in choice.others if c.fit.model is KELVIN_VOIGT_MASS and not c.against]
+    return replace(choice, candidate=found[0]) if found else choice
 
 
 def _needed(fitted: Fit) -> bool:
@@ -198,15 +191,38 @@ def _needed(fitted: Fit) -> bool:
 
 
 def _same_kind(one: Fit, other: Fit) -> bool:
-    return one.model is KELVIN_VOIGT_MASS and other.model is KELVIN_VOIGT
+    """Whether the one has a mass beside what the other has."""
+    plain = other.model.name == KELVIN_VOIGT.name
+    return (
+        plain and set(one.model.linear) == {*other.model.linear, "M"} and one.model.knobs == other.model.knobs
+    )
 
 
-def _no_model(candidate: Candidate, judged: list[Candidate], question: Question) -> Choice:
+def _least_bad(candidates: list[Candidate], question: Question) -> Candidate:
+    """What stands in where no model describes the log: a plain one, unless another is much nearer to it.
+
+    It must also tell from loading alone what comes after at least as well: a richer model may follow anything, but
+    what is no property of the contact does not foretell.
+    """
+    first = candidates[0]
+    if first.fit.model is not KELVIN_VOIGT:
+        return first
+    if question.motion.bonded:
+        mass = next(c for c in candidates if c.fit.model is KELVIN_VOIGT_MASS)
+        return mass if mass.rmse**2 < MUCH_BETTER * first.rmse**2 else first
+    possible = [c for c in candidates[1:] if not below_zero(c.fit) and _needed(c.fit)]
+    possible = [c for c in possible if c.foretold <= first.foretold]
+    return _best([first, *possible])
+
+
+def _no_model(candidate: Candidate, every: tuple[Candidate, ...], question: Question) -> Choice:
     """A model that does not describe the log cannot tell its lag either: the plain fit stands in, and may hold."""
-    fitted = candidate.fit
-    if not question.lag.known and fitted.lag != question.lag.value:
-        fitted = fit(fitted.model, question.motion, question.force, question.lag)
-        candidate = _candidate(fitted, [c.fit for c in judged], min(c.fit.rmse for c in judged), question)
+    own = candidate.question
+    if not question.lag.known and candidate.fit.lag != question.lag.value:
+        candidate = judged(Candidate(*_tried(candidate.fit.model, own)), list(every))
         if not candidate.against:
-            return Choice(candidate, False, tuple(judged))
-    return Choice(candidate, True, tuple(judged), halves(fitted, question.motion, question.force))
+            return Choice(candidate, False, every)
+    if candidate.fit.model.name == "hunt-crossley":
+        relaxed = Candidate(*_tried(relaxing(candidate.fit.model, own.motion), own), (_TOO_FREE,))
+        every = (*every, relaxed)
+    return Choice(candidate, True, every, halves(candidate.fit, own.motion, own.force))

@@ -44,6 +44,17 @@ class Code(Enum):
     CONTACT_AT_START = (
         "The log begins in contact: the force without contact is not known, and is estimated as an offset."
     )
+    LOG_CUT_SHORT = "The bag is damaged or was never closed; what is whole of it was read."
+    CLOCKS_DISAGREE = (
+        "The clocks that stamped two topics differ."
+        " What moves them together leaves a lag that nobody has calibrated."
+    )
+    FRAME_GUESS = (
+        "The axes that the wrench is given in were taken from what the messages say; --wrench-frame says it."
+    )
+    NORMAL_UNCERTAIN = (
+        "The contact's normal was found from the force, and so badly that it matters for the parameters."
+    )
     NEGATIVE_STIFFNESS = "The force falls as the penetration grows: no passive surface does that."
 
     @property

@@ -73,6 +73,10 @@ class Chain:
         full = _convolve(padded, taps)
         return full[start : start + len(signal)] + (level if derivative == 0 else 0.0)
 
+    def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
+        """The same at the samples `rows` only, shape (len(rows),)."""
+        return self(signal, derivative, lag)[rows]
+
     def noise_gain(self, derivatives: tuple[int, ...]) -> Array:
         """Covariance of the filtered derivatives of white noise of unit variance, shape (k, k)."""
         taps = np.stack([self._taps(derivative, 0.0)[0] for derivative in derivatives])

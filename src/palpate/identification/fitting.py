@@ -8,29 +8,17 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.identification.beforehand import LAG, NOTHING, Beforehand, Lag, beforehand
 from palpate.identification.models import Knob, Model, Motion
 from palpate.identification.regression import Noise, covariance, noise_of, quantile, solve
+from palpate.identification.uncertainty import attenuation, undone, with_lag
 
 Array = NDArray[np.float64]
 
 _ROUNDS = 30
 _CONVERGED = 1e-6
-_LAG = "lag"
-
-
-@dataclass(frozen=True)
-class Lag:
-    """What is known about how much later the force is read than the position.
-
-    Args:
-        value: [s]; where the fit starts if it is not known.
-        std: its standard deviation [s]; of a lag that is not known: how large it may be.
-        known: calibrated beforehand, so that the log is not asked.
-    """
-
-    value: float = 0.0
-    std: float = 0.0
-    known: bool = True
+_WALK = (-0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
+"""Where the search for a lag that nobody knows starts, in its deviations."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +36,7 @@ class Fit:
         noise: colour of the residuals.
         lag: the lag used [s].
         attenuation: how far noise of the position may have pulled each parameter, shape (p,); part of `cov`.
+        matched: behind a force sensor whose own way is known, where the lag is one of the parameters.
     """
 
     model: Model
@@ -62,6 +51,7 @@ class Fit:
     noise: Noise
     lag: float
     attenuation: Array
+    matched: bool = False
 
     def __getitem__(self, name: str) -> float:
         return float(self.theta[self.names.index(name)])
@@ -92,6 +82,7 @@ class _Point:
     residuals: Array
 
     rss: float
+    cost: float  # rss, and what the knowledge from before has against it
 
 
 def fit(model: Model, motion: Motion, force: Array, lag: Lag, free_lag: bool = False) -> Fit:
@@ -102,47 +93,79 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag, free_lag: bool = F
         motion: the position.
         force: filtered, at the motion's rows, shape (n,).
         lag: what is known about it; if it is not known, its uncertainty is part of every interval.
-        free_lag: look for the lag in this log.
+        free_lag: look for the lag in this log. Where the force sensor's own way is known, that is always done, within
+            the deviation given.
     """
-    best = _best_start(model, motion, force, lag.value)
-    best = _descend(model, motion, force, best, lag, free_lag)
-    return _finish(model, motion, force, best, lag)
+    asks = motion.matched and lag.std > 0
+    lags = lag.value + lag.std * np.array(_WALK if asks and not lag.known else (0.0,))
+    best = min((_best_start(model, motion, force, float(at)) for at in lags), key=lambda point: point.rss)
+    known = NOTHING
+    for _ in range(2 if asks or lag.mass else 1):
+        best = _descend(model, motion, force, best, lag, free_lag or asks, known)
+        noise = float(np.sqrt(best.rss / max(len(force) - len(best.theta), 1)))
+        known = beforehand(lag, noise, asks)
+    if known.known:
+        best = _descend(model, motion, force, best, lag, free_lag or asks, known)
+    return _finish(model, motion, force, best, lag, known)
 
 
-def _evaluate(model: Model, motion: Motion, force: Array, knobs: dict[str, float], lag: float) -> _Point:
+def _evaluate(
+    model: Model, motion: Motion, force: Array, knobs: dict[str, float], lag: float, known: Beforehand
+) -> _Point:
     columns = np.column_stack(model.columns(motion, knobs, lag))
-    theta = solve(columns, force)
+    rows, targets = known.rows(model.linear)
+    theta = (
+        solve(np.vstack([columns, rows]), np.concatenate([force, targets]))
+        if len(rows)
+        else solve(columns, force)
+    )
     residuals = force - columns @ theta
-    return _Point(knobs, lag, columns, theta, residuals, float(residuals @ residuals))
+    rss = float(residuals @ residuals)
+    against = float(np.sum((targets - rows @ theta) ** 2)) if len(rows) else 0.0
+    if LAG in known.known:
+        value, weight = known.known[LAG]
+        against += (weight * (lag - value)) ** 2
+    return _Point(knobs, lag, columns, theta, residuals, rss, rss + against)
 
 
 def profile(fitted: Fit, motion: Motion, force: Array, lag: float) -> float:
     """Sum of squared residuals of the same model and knobs at another lag."""
     knobs = {knob.name: fitted[knob.name] for knob in fitted.model.knobs}
-    return _evaluate(fitted.model, motion, force, knobs, lag).rss
+    return _evaluate(fitted.model, motion, force, knobs, lag, NOTHING).rss
 
 
 def _best_start(model: Model, motion: Motion, force: Array, lag: float) -> _Point:
     points = (
-        _evaluate(model, motion, force, dict(zip([k.name for k in model.knobs], values, strict=True)), lag)
+        _evaluate(
+            model, motion, force, dict(zip([k.name for k in model.knobs], values, strict=True)), lag, NOTHING
+        )
         for values in product(*(knob.starts for knob in model.knobs))
     )
     return min(points, key=lambda point: point.rss)
 
 
-def _descend(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag, free_lag: bool) -> _Point:
+def _descend(
+    model: Model,
+    motion: Motion,
+    force: Array,
+    point: _Point,
+    lag: Lag,
+    free_lag: bool,
+    known: Beforehand,
+) -> _Point:
     """Levenberg and Marquardt over the knobs and the lag, the linear parameters solved for at every step."""
     outer = [*model.knobs, *([_lag_knob(motion, lag)] if free_lag else [])]
+    point = _evaluate(model, motion, force, point.knobs, point.lag, known) if known.known else point
     if not outer:
         return point
     damping = 1e-3
     for _ in range(_ROUNDS):
         slopes = _slopes(model, motion, point, outer)
-        jacobian = np.column_stack([point.columns, slopes])
-        step = _damped(jacobian, point.residuals, len(point.theta), damping)
-        trial = _moved(model, motion, force, point, outer, step[len(point.theta) :])
-        if trial.rss < point.rss:
-            gain = 1 - trial.rss / point.rss
+        jacobian, residuals = _with_rows(np.column_stack([point.columns, slopes]), point, model, outer, known)
+        step = _damped(jacobian, residuals, len(point.theta), damping)
+        trial = _moved(model, motion, force, point, outer, step[len(point.theta) :], known)
+        if trial.cost < point.cost:
+            gain = 1 - trial.cost / point.cost
             point, damping = trial, max(damping / 10, 1e-9)
             if gain < _CONVERGED:
                 break
@@ -153,16 +176,28 @@ def _descend(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag
     return point
 
 
+def _with_rows(
+    jacobian: Array, point: _Point, model: Model, outer: list[Knob], known: Beforehand
+) -> tuple[Array, Array]:
+    """The rows of what is known beforehand under those of the log."""
+    names = (*model.linear, *(knob.name for knob in outer))
+    rows, targets = known.rows(names)
+    if not len(rows):
+        return jacobian, point.residuals
+    now = np.array([*point.theta, *(point.knobs.get(knob.name, point.lag) for knob in outer)])
+    return np.vstack([jacobian, rows]), np.concatenate([point.residuals, targets - rows @ now])
+
+
 def _lag_knob(motion: Motion, lag: Lag) -> Knob:
     limit = 3 * lag.std
-    return Knob(_LAG, (lag.value,), lag.value - limit, lag.value + limit, 0.02 / motion.chain.rate)
+    return Knob(LAG, (lag.value,), lag.value - limit, lag.value + limit, 0.02 / motion.chain.rate)
 
 
 def _slopes(model: Model, motion: Motion, point: _Point, outer: list[Knob]) -> Array:
     """Derivatives of the predicted force by each knob in its own scale, shape (n, len(outer))."""
     found = []
     for knob in outer:
-        if knob.name == _LAG:
+        if knob.name == LAG:
             up = model.columns(motion, point.knobs, point.lag + knob.step)
             down = model.columns(motion, point.knobs, point.lag - knob.step)
             found.append((np.column_stack(up) - np.column_stack(down)) @ point.theta / (2 * knob.step))
@@ -186,21 +221,27 @@ def _damped(jacobian: Array, residuals: Array, linear: int, damping: float) -> A
 
 
 def _moved(
-    model: Model, motion: Motion, force: Array, point: _Point, outer: list[Knob], step: Array
+    model: Model,
+    motion: Motion,
+    force: Array,
+    point: _Point,
+    outer: list[Knob],
+    step: Array,
+    known: Beforehand,
 ) -> _Point:
     knobs, lag = dict(point.knobs), point.lag
     for knob, change in zip(outer, step, strict=True):
-        if knob.name == _LAG:
+        if knob.name == LAG:
             lag = float(np.clip(lag + change, knob.low, knob.high))
         elif knob.logarithmic:
             value = knobs[knob.name] * np.exp(np.clip(change, -1.0, 1.0))
             knobs[knob.name] = float(np.clip(value, knob.low, knob.high))
         else:
             knobs[knob.name] = float(np.clip(knobs[knob.name] + change, knob.low, knob.high))
-    return _evaluate(model, motion, force, knobs, lag)
+    return _evaluate(model, motion, force, knobs, lag, known)
 
 
-def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag) -> Fit:
+def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag, known: Beforehand) -> Fit:
     knob = _lag_knob(motion, lag)
     outer = [*model.knobs, knob]
     slopes = _slopes(model, motion, point, outer)
@@ -208,60 +249,42 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag)
         if own.logarithmic:
             slopes[:, i] /= point.knobs[own.name]
     jacobian = np.column_stack([point.columns, slopes])
-    names = (*model.linear, *(k.name for k in model.knobs), _LAG)
+    names = (*model.linear, *(k.name for k in model.knobs), LAG)
     noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.known))
-    fixed = np.zeros((len(names), len(names)))
-    pulled = _attenuation(model, motion, jacobian[:, :-1], point.theta)
-    fixed[:-1, :-1] = covariance(jacobian[:, :-1], motion.rows, noise) + np.outer(pulled, pulled)
     theta = np.array([*point.theta, *(point.knobs[k.name] for k in model.knobs), point.lag])
+    level = float(np.sqrt(point.rss / max(len(force) - len(point.theta), 1)))
+    std = known.std(names, level)
+    fixed = np.zeros((len(names), len(names)))
+    if motion.matched and model.of_position:
+        by_noise = undone(model, motion, jacobian, theta, level, lag, std)
+        theta, pulled, less = theta + by_noise.step, by_noise.doubt, by_noise.less
+    else:
+        pulled, less = np.append(attenuation(model, motion, jacobian[:, :-1], point.theta), 0.0), None
+    fixed[:-1, :-1] = covariance(
+        jacobian[:, :-1],
+        motion.rows,
+        noise,
+        None if std is None else std[:-1],
+        None if less is None else less[:-1, :-1],
+    ) + np.outer(pulled[:-1], pulled[:-1])
+    residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.knobs.values(), point.lag])
     spread = float(np.mean((force - force.mean()) ** 2))
-    rmse = float(np.sqrt(point.rss / len(force)))
+    rmse = float(np.sqrt(np.mean(residuals**2)))
     return Fit(
         model=model,
         names=names,
         theta=theta,
-        cov=_with_lag(jacobian, fixed, motion, noise, lag, pulled),
+        cov=with_lag(jacobian, fixed, motion, noise, lag, pulled, std, less),
         fixed_cov=fixed,
-        predicted=force - point.residuals,
-        residuals=point.residuals,
+        predicted=force - residuals,
+        residuals=residuals,
         r2=1 - rmse**2 / spread if spread else 0.0,
         rmse=rmse,
         noise=noise,
-        lag=point.lag,
-        attenuation=np.append(pulled, 0.0),
+        lag=float(theta[-1]),
+        attenuation=pulled,
+        matched=motion.matched,
     )
-
-
-def _attenuation(model: Model, motion: Motion, jacobian: Array, theta: Array) -> Array:
-    """How far white noise of the position pulls the parameters: (Phi' Phi)^-1 n S theta, S the noise of the columns."""
-    shift = np.zeros(jacobian.shape[1])
-    if motion.noise == 0:
-        return shift
-    places = [model.linear.index(name) for name in model.derivatives]
-    spread = motion.chain.noise_gain(tuple(model.derivatives.values())) * motion.noise**2
-    shift[places] = len(motion.rows) * spread @ theta[places]
-    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
-    scale[scale == 0] = 1.0
-    gram = jacobian.T @ jacobian / np.outer(scale, scale)
-    pulled: Array = np.linalg.lstsq(gram, shift / scale, rcond=1e-12)[0] / scale
-    return pulled
-
-
-def _with_lag(jacobian: Array, fixed: Array, motion: Motion, noise: Noise, lag: Lag, pulled: Array) -> Array:
-    """The covariance with the lag's own uncertainty, be it calibrated (the log is not asked) or found in the log."""
-    if lag.std == 0:
-        return fixed
-    if not lag.known:
-        prior = np.full(jacobian.shape[1], np.inf)
-        prior[-1] = lag.std
-        found = covariance(jacobian, motion.rows, noise, prior)
-        found[:-1, :-1] += np.outer(pulled, pulled)
-        return found
-    shift = -solve(jacobian[:, :-1], jacobian[:, -1])  # how the answer moves with the lag
-    grown = fixed + np.pad(np.outer(shift, shift), (0, 1)) * lag.std**2
-    grown[-1, :-1] = grown[:-1, -1] = shift * lag.std**2
-    grown[-1, -1] = lag.std**2
-    return grown
 
 
 def part_of(fitted: Fit, motion: Motion, force: Array, inside: NDArray[np.bool_]) -> tuple[Fit, Array]:

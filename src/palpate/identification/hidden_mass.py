@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Question
-from palpate.identification.fitting import Fit, Lag, fit, profile
+from palpate.identification.fitting import Fit, fit, profile
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
 
 _TOLD = 0.5

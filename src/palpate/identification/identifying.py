@@ -6,20 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.errors import InputError
-from palpate.identification.choosing import Choice, Question, choose
+from palpate.errors import InputError, unknown
+from palpate.identification.bandwidth import highest_motion
+from palpate.identification.beforehand import Lag
+from palpate.identification.choosing import Choice, Question, choose, with_mass
 from palpate.identification.codes import Code, Warn
-from palpate.identification.fitting import Fit, Lag, fit
+from palpate.identification.estimators import LEAST_SQUARES, METHODS, estimated_by
+from palpate.identification.fitting import Fit, fit
 from palpate.identification.hidden_mass import hidden_mass
 from palpate.identification.in_series import take_out
-from palpate.identification.lagging import closing_lag
+from palpate.identification.judging import below_zero
+from palpate.identification.lagging import closing_lag, flat_between
+from palpate.identification.matching import matched_question, samples_of
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
 from palpate.identification.preparing import filter_and_contacts, question_of, thinned
 from palpate.identification.reporting import nothing, report
 from palpate.identification.result import Identification
-from palpate.identification.timebase import channels_of
+from palpate.identification.timebase import channels_of, held_force
 from palpate.identification.verdicts import Terms
 from palpate.records import Record
+from palpate.signals.low_pass import LowPass
 
 _MOST_SAMPLES = 2_000_000
 _FOLLOWS = 0.3
@@ -37,6 +43,9 @@ def identify(
     series_std: float = 0.0,
     bonded: bool | None = None,
     cutoff: float | None = None,
+    force_filter: LowPass | str | None = None,
+    mass: tuple[float, float] | None = None,
+    method: str = LEAST_SQUARES,
 ) -> Identification:
     """Find what a probe touched, and how far to trust it.
 
@@ -54,16 +63,27 @@ def identify(
         series_std: standard deviation of that [N/m].
         bonded: True if the probe is fixed to the surface, False if it is not, None to find out.
         cutoff: of the filter chain [Hz]; None to choose.
+        force_filter: what the force sensor low-passes the force with before it is sampled, as `butterworth3:120`.
+            The position then goes through the same, and is read at the sensor's own samples. The lag, if it is given,
+            is that of a fresh reading, this low-pass included.
+        mass: what is known of the mass beforehand, value and standard deviation [kg]; 0 fixes it.
+        method: least-squares; instrumental-variables or output-error, where noise of the position would pull it.
 
     Raises:
         InputError: the record or an argument is wrong, in one line.
     """
     _check(tolerance, calibration, lag, lag_std, series_stiffness, series_std, cutoff)
+    _check_method(method, force_filter is not None)
+    low_pass = LowPass.parse(force_filter) if isinstance(force_filter, str) else force_filter
+    if low_pass is not None and not low_pass.sections:
+        low_pass = None
     channels = channels_of(record)
-    channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
+    if low_pass is None:
+        channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
     warnings = channels.warnings
     if series_stiffness is not None:
         channels = take_out(channels, series_stiffness, bonded, cutoff)
+    samples = samples_of(channels, held_force(record, channels), low_pass) if low_pass is not None else None
     channels, chain, contacts = filter_and_contacts(channels, bonded, cutoff)
     warnings += contacts.warnings
     terms = Terms(
@@ -72,13 +92,20 @@ def identify(
     )  # fmt: skip
     if not contacts.spans:
         return nothing(channels, chain, terms, model or "kelvin-voigt")
-    question = question_of(channels, chain, contacts, lag, lag_std, tolerance)
+    known = Lag(lag or 0.0, lag_std, lag is not None, mass)
+    if samples is not None:
+        question = matched_question(samples, contacts, chain, channels, known, tolerance)
+        choice = with_mass(choose(question, model), model)
+        terms = replace(terms, band=highest_motion(question.motion))
+        return report(channels, chain, contacts, question, choice, terms, model)
+    question = question_of(channels, chain, contacts, known, tolerance)
+    terms = replace(terms, band=highest_motion(question.motion))
     choice = choose(question, model)
     if choice.rejected and contacts.bonded and _reversed(choice):
         channels.force = -channels.force
         text = "stiffness and mass are both below zero: the force's sign was turned round"
         warnings.append(Warn(Code.FORCE_SIGN_REVERSED, text))
-        question = question_of(channels, chain, contacts, lag, lag_std, tolerance)
+        question = question_of(channels, chain, contacts, known, tolerance)
         choice = choose(question, model)
     if contacts.bonded and _unrelated(choice):
         text = "the force does not follow the position: nothing seems to be touched"
@@ -90,7 +117,17 @@ def identify(
         terms = replace(terms, lags=True, bent=abs(choice.candidate.fit["K"] - plain["K"]))
     elif not choice.rejected:
         terms = replace(terms, hidden=hidden_mass(choice.candidate.fit, question))
-    return report(channels, contacts, question, choice, terms, model)
+    candidate = estimated_by(method, choice.candidate, contacts.force_sign * channels.force)
+    return report(channels, chain, contacts, question, replace(choice, candidate=candidate), terms, model)
+
+
+def _check_method(method: str, matched: bool) -> None:
+    if method not in METHODS:
+        raise unknown("method", method, METHODS)
+    if method != LEAST_SQUARES and matched:
+        raise InputError(
+            f"a known force filter is for {LEAST_SQUARES}: leave --force-filter out for {method}"
+        )
 
 
 def _check(
@@ -121,8 +158,8 @@ def _check(
 
 
 def _reversed(choice: Choice) -> bool:
-    mass = [c.fit for c in choice.others if c.fit.model is KELVIN_VOIGT_MASS]
-    return bool(mass) and all(mass[0][n] + 3 * mass[0].std(n, lag_known=True) < 0 for n in ("K", "M"))
+    best = min((c.fit for c in choice.others if "M" in c.fit.names), key=lambda fitted: fitted.rmse)
+    return {"K", "M"} <= set(below_zero(best))
 
 
 def _unrelated(choice: Choice) -> bool:
@@ -147,14 +184,16 @@ def _at_lag(
     if not choice.rejected and told["B"] >= 0 and told.lag > 0:
         hidden = hidden_mass(told, question)
         more = hidden.shifts["lag"] / told.t if hidden else 0.0
-        value, std, least = told.lag, float(np.hypot(told.std("lag"), more)), ""
+        value, std, least, flat = told.lag, float(np.hypot(told.std("lag"), more)), "", ""
     else:
         value, std = closing_lag(question.motion, question.force, -plain["B"] / plain["K"], question.spans)
+        low, high = flat_between(question.motion, question.force, value, std)
         least = "at least "
+        flat = f", while the misfit is flat (to a thousandth) from {low:.2g} to {high:.2g} s"
     text = (
         f"without a lag the fit gives B = {plain['B']:.3g}, below zero: the force is read {least}"
-        f"{value:.3g} s (std {std:.2g} s) after the position; B is refused until the lag is calibrated (--lag)"
+        f"{value:.3g} s (std {std:.2g} s) after the position{flat}; B is refused until the lag is calibrated (--lag)"
     )
     warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
     shifted = replace(question, lag=Lag(value, std))
-    return shifted, choose(shifted, model or choice.candidate.fit.model.name)
+    return shifted, choose(shifted, model or (plain if flat else told).model.name)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from palpate.errors import InputError
-from palpate.identification.fitting import Lag, fit
+from palpate.identification.beforehand import Lag
+from palpate.identification.fitting import fit
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
 from palpate.identification.preparing import filter_and_contacts, question_of
 from palpate.identification.timebase import Channels
@@ -26,7 +27,7 @@ def take_out(channels: Channels, stiffness: float, bonded: bool | None, cutoff: 
     fewer, chain, contacts = filter_and_contacts(channels, bonded, cutoff)
     if not contacts.spans:
         return channels
-    question = question_of(fewer, chain, contacts, 0.0, 0.0, 1.0)
+    question = question_of(fewer, chain, contacts, Lag(), 1.0)
     model = KELVIN_VOIGT_MASS if contacts.bonded else KELVIN_VOIGT
     apparent = fit(model, question.motion, question.force, Lag())["K"]
     if abs(apparent) >= stiffness:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.fitting import Fit, Lag, fit, profile
-from palpate.identification.models import Model, Motion
+from palpate.identification.beforehand import Lag
+from palpate.identification.fitting import Fit, fit, profile
+from palpate.identification.models import KELVIN_VOIGT, Model, Motion
 
 Array = NDArray[np.float64]
 
@@ -19,17 +20,21 @@ _LONGEST = 0.25
 _SHARE = 1 / 50
 _WALK = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
 _WALK_UP_TO = 50_000
+_FLAT = 1e-3
+"""Share of the rms misfit that no log tells two lags apart by: the model's own error is larger."""
+_PARABOLAS = 3
 
 
-def unknown_lag(motion: Motion, rate: float) -> Lag:
+def unknown_lag(motion: Motion, rate: float, mass: tuple[float, float] | None = None) -> Lag:
     """How large a lag may be that nobody has said anything about: two readings, or a fiftieth of the contact.
 
     Args:
         motion: of the log.
         rate: fresh readings per second [1/s].
+        mass: what is known of it.
     """
-    duration = len(motion.rows) * motion.chain.dt
-    return Lag(0.0, float(np.clip(duration * _SHARE, 2 / rate, max(_LONGEST, 2 / rate))), known=False)
+    std = float(np.clip(motion.duration * _SHARE, 2 / rate, max(_LONGEST, 2 / rate)))
+    return Lag(0.0, std, known=False, mass=mass)
 
 
 def freed(fixed: Fit, motion: Motion, force: Array, lag: Lag) -> Fit:
@@ -84,3 +89,35 @@ def closing_lag(motion: Motion, force: Array, start: float, spans: NDArray[np.in
         lags.append(fit(ELASTIC, part, force[inside], known, free_lag=True).lag)
     spread = float(np.std(lags, ddof=1)) if len(lags) >= 3 else 0.0
     return whole.lag, max(spread, whole.std("lag"))
+
+
+def flat_between(motion: Motion, force: Array, lag: float, std: float) -> tuple[float, float]:
+    """Between which lags [s] the misfit of a spring and a damper stays within a thousandth of its least.
+
+    A longer lag with more damping is nearly the same force, so the misfit runs through a wide valley, taken here for a
+    parabola as wide as what is flat of it.
+
+    Args:
+        motion: of the log.
+        force: filtered, at the motion's rows, shape (n,).
+        lag: near the valley's bottom [s].
+        std: how far from it the valley is asked [s].
+    """
+    plain = fit(KELVIN_VOIGT, motion, force, Lag(lag))
+    bottom, half = lag, max(2 * std, motion.chain.dt)
+    for _ in range(_PARABOLAS):
+        if not np.isfinite(half):
+            break
+        bottom, half = _parabola(plain, motion, force, bottom, half)
+    return bottom - half, bottom + half
+
+
+def _parabola(plain: Fit, motion: Motion, force: Array, middle: float, step: float) -> tuple[float, float]:
+    """Bottom of the parabola through three misfits, and how far from it the misfit has grown by a thousandth [s]."""
+    before, here, after = (np.sqrt(profile(plain, motion, force, middle + k * step)) for k in (-1, 0, 1))
+    bend = (before - 2 * here + after) / step**2
+    if bend <= 0:
+        return middle, float("inf")
+    slope = (after - before) / (2 * step)
+    least = here - slope**2 / (2 * bend)
+    return float(middle - slope / bend), float(np.sqrt(2 * _FLAT * max(least, 0.0) / bend))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.filters import Chain, low_pass_once
+from palpate.identification.position_noise import NOISELESS, PositionNoise
+from palpate.identification.sensor_path import SensorPath
 
 Array = NDArray[np.float64]
 
@@ -18,18 +20,20 @@ class Motion:
     """The position of a log as the models see it: filtered on demand, and kept at the rows that are fitted.
 
     Args:
-        chain: the filter.
+        chain: the filter of both channels, or the way through a force sensor that is known.
         position: raw, counted into the surface from `origin`, shape (n,).
-        rows: the samples that are fitted, shape (m,).
+        rows: the samples that are fitted, shape (m,): of the position behind a filter, of the force behind a sensor.
         bonded: whether the probe is fixed to the surface.
         noise: standard deviation of the position's own white noise; it makes every column of the regression uncertain.
+        own_noise: the same where the force sensor's own way is known, with the jumps of a coarse encoder.
     """
 
-    chain: Chain
+    chain: Chain | SensorPath
     position: Array
     rows: NDArray[np.intp]
     bonded: bool
     noise: float = 0.0
+    own_noise: PositionNoise = NOISELESS
     _kept: dict[tuple[int, float], Array] = field(default_factory=dict)
     _powers: dict[int, Array] = field(default_factory=dict)
 
@@ -44,7 +48,7 @@ class Motion:
 
     def filtered(self, signal: Array, derivative: int, lag: float) -> Array:
         """Any raw signal through the same chain, at t - lag, shape (m,)."""
-        return self.chain(signal, derivative, lag)[self.rows]
+        return self.chain.read(signal, derivative, lag, self.rows)
 
     def power(self, n: int, lag: float) -> Array:
         """The position squared or cubed, filtered, at t - lag, shape (m,)."""
@@ -53,9 +57,29 @@ class Motion:
         return self.filtered(self._powers[n], 0, lag)
 
     @property
+    def matched(self) -> bool:
+        """Whether the force sensor's own way is known, so that its readings are as white as their noise."""
+        return isinstance(self.chain, SensorPath)
+
+    @property
+    def duration(self) -> float:
+        """Time that the rows cover [s]."""
+        return len(self.rows) * (self.chain.period if isinstance(self.chain, SensorPath) else self.chain.dt)
+
+    @property
     def ones(self) -> Array:
         """The column of the offset, shape (m,)."""
         return np.ones(len(self.rows))
+
+
+def on_rows(motion: Motion, rows: NDArray[np.intp]) -> Motion:
+    """The same motion at other rows, shape (m,)."""
+    return replace(motion, rows=rows, _kept={})
+
+
+def without_noise(motion: Motion) -> Motion:
+    """The same as if nothing disturbed the position: what a fit makes of its noise holds for no power of the depth."""
+    return replace(motion, noise=0.0, own_noise=NOISELESS)
 
 
 @dataclass(frozen=True)
@@ -79,7 +103,7 @@ class Model:
 
     Args:
         name: the word for `--model`.
-        linear: names of the parameters that its columns stand for; `offset` is the last one.
+        linear: names of the parameters that its columns stand for; `offset` is the last one, if there is one.
         columns: from a motion, the knobs and the force's lag [s] to the columns, each of shape (m,).
         knobs: what it is not linear in, scaled to the log at hand.
         positive: parameters that no passive surface has below zero.
@@ -89,7 +113,19 @@ class Model:
     linear: tuple[str, ...]
     columns: Columns
     knobs: tuple[Knob, ...] = ()
-    positive: tuple[str, ...] = ("K", "B", "M")
+    positive: tuple[str, ...] = ("K", "B", "M", "Fc")
+
+    @property
+    def of_position(self) -> bool:
+        """Whether the force is made of the position and its derivatives alone, and so its noise too."""
+        return (
+            self.linear[-1] == "offset" and set(self.linear[:-1]) == set(self.derivatives) and not self.knobs
+        )
+
+    @property
+    def of_power(self) -> bool:
+        """Whether the force goes with a power of the depth."""
+        return any(knob.name == "n" for knob in self.knobs)
 
     @property
     def derivatives(self) -> dict[str, int]:
@@ -118,9 +154,14 @@ def _with_curve(columns: Columns) -> Columns:
     return curved
 
 
+def _deep(motion: Motion, knobs: dict[str, float]) -> Array:
+    """Penetration: the position beyond the surface, zero before it, shape (n,). A probe fixed to it is always in it."""
+    return motion.position if motion.bonded else np.maximum(motion.position - knobs["x0"], 0.0)
+
+
 def _standard_linear_solid(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
     """f = K x + B v + K1 y, where the spring K1 of the Maxwell branch is stretched by y: y' + y/tau = x'."""
-    d = motion.position if motion.bonded else np.maximum(motion.position - knobs["x0"], 0.0)
+    d = _deep(motion, knobs)
     branch = d - d[0] - low_pass_once(d - d[0], knobs["tau"], motion.chain.dt)
     columns = [motion.filtered(d, k, lag) for k in (0, 1)]
     return [*columns, motion.filtered(branch, 0, lag), motion.ones]
@@ -141,18 +182,20 @@ CURVED_MASS = Model(
     "kelvin-voigt-mass", ("K", "B", "M", "K2", "K3", "offset"), _with_curve(_kelvin_voigt_mass)
 )
 
+_STILL = 0.05
+"""Share of the highest speeds below which the way is doubtful."""
+
 NAMES = ("kelvin-voigt", "kelvin-voigt-mass", "standard-linear-solid", "hunt-crossley")
 
 
 def standard_linear_solid(motion: Motion) -> Model:
     """The standard linear solid with a relaxation time that this log can show: between the filter's and the log's."""
-    dt = motion.chain.dt
-    shortest, longest = 2 / motion.chain.rate, len(motion.rows) * dt
+    shortest, longest = 2 / motion.chain.rate, motion.duration
     starts = tuple(np.geomspace(3 * shortest, longest / 3, 4))
     tau = Knob("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
     knobs = (tau,) if motion.bonded else (tau, _touch(motion))
     linear = ("K", "B", "K1", "offset")
-    return Model("standard-linear-solid", linear, _standard_linear_solid, knobs, ("K", "B", "K1"))
+    return Model("standard-linear-solid", linear, _standard_linear_solid, knobs, ("K", "B", "K1", "Fc"))
 
 
 def _touch(motion: Motion) -> Knob:
@@ -164,4 +207,58 @@ def _touch(motion: Motion) -> Knob:
 def hunt_crossley(motion: Motion) -> Model:
     """Hunt and Crossley's contact (1975): stiffness and damping both grow with d^n, so the force starts from zero."""
     n = Knob("n", (1.5,), 0.5, 5.0, 1e-3)
-    return Model("hunt-crossley", ("K", "B", "offset"), _hunt_crossley, (n, _touch(motion)), ("K", "B"))
+    return Model("hunt-crossley", ("K", "B", "offset"), _hunt_crossley, (n, _touch(motion)), ("K", "B", "Fc"))
+
+
+def relaxing(model: Model, motion: Motion) -> Model:
+    """Hunt and Crossley's contact with a Maxwell branch beside its spring: f = K s + B s v + K1 y, s = d^n."""
+    tau = standard_linear_solid(motion).knobs[0]
+
+    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+        own = model.columns(motion, knobs, lag)
+        stretched = _deep(motion, knobs) ** knobs["n"]
+        branch = (
+            stretched - stretched[0] - low_pass_once(stretched - stretched[0], knobs["tau"], motion.chain.dt)
+        )
+        return [*own[:2], motion.filtered(branch, 0, lag), *own[2:]]
+
+    linear = (*model.linear[:2], "K1", *model.linear[2:])
+    return replace(model, linear=linear, columns=columns, knobs=(*model.knobs, tau))
+
+
+def at_rest_before(model: Model) -> Model:
+    """The same where the log shows what the force rests at before the touch, so that no offset is left to find.
+
+    An offset and the place of the surface do the same to a straight spring, and nearly the same to a curved one.
+    """
+
+    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+        return model.columns(motion, knobs, lag)[:-1]
+
+    return replace(model, linear=model.linear[:-1], columns=columns)
+
+
+def with_friction(model: Model, way: Array) -> Model:
+    """The same with Coulomb's friction Fc, which is against the motion: `way` of `direction`, in contact only."""
+    last = model.linear[-1:] if model.linear[-1] == "offset" else ()
+    count = len(model.linear) - len(last)
+
+    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+        own = model.columns(motion, knobs, lag)
+        rubbing = way * (motion.position > knobs["x0"]) if "x0" in knobs else way
+        return [*own[:count], motion.filtered(rubbing, 0, lag), *own[count:]]
+
+    return replace(model, linear=(*model.linear[:count], "Fc", *last), columns=columns)
+
+
+def direction(motion: Motion) -> Array:
+    """Which way the probe moves: 1 into the surface, -1 out of it, less where it is nearly still. Shape (n,)."""
+    from scipy.signal import savgol_filter
+
+    dt, rate = motion.chain.dt, motion.chain.rate
+    window = min(2 * max(round(1 / (rate * dt)), 2) + 1, (len(motion.position) - 1) // 2 * 2 + 1)
+    speed = savgol_filter(motion.position, window, 2, deriv=1, delta=dt)
+    jitter = motion.noise * np.sqrt(12 / window**3) / dt  # of the slope of a line through that many readings
+    least = max(_STILL * float(np.percentile(np.abs(speed), 95)), 3 * float(jitter), 1e-300)
+    way: Array = np.tanh(speed / least)
+    return way

@@ -9,12 +9,16 @@ from numpy.typing import NDArray
 
 from palpate.identification.fitting import Fit, part_of
 from palpate.identification.models import Motion
+from palpate.identification.regression import solve
 
 Array = NDArray[np.float64]
 
 _MOST_CONTACTS = 12
 _SIGNIFICANT = 4.0
 _EXPLAINED = 0.5
+_FEWEST = 30
+_ONE_WAY = ("offset", "Fc")
+"""While the probe moves one way only, friction is an offset."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +52,14 @@ def compare_parts(
         tolerance: largest half-width of an identified parameter's interval, as a share of its value.
     """
     found: dict[str, Disagreement] = {}
+    knobs = {knob.name: fitted[knob.name] for knob in fitted.model.knobs}
+    columns = np.column_stack(fitted.model.columns(motion, knobs, fitted.lag))
     for parts in _partitions(motion, spans, fitted.lag):
-        fits = {label: part_of(fitted, motion, force, inside)[0] for label, inside in parts.items()}
-        if len(fits) < 2 or not _explain(fitted, fits, parts):
+        if len(parts) < 2 or not _explain(fitted, columns, force, parts):
             continue
-        for name in fitted.model.linear[:-1]:
-            hit = _disagree(name, fitted, fits, tolerance)
+        fits = {label: part_of(fitted, motion, force, inside)[0] for label, inside in parts.items()}
+        for name in fitted.model.linear:
+            hit = _disagree(name, fitted, fits, tolerance) if name not in _ONE_WAY else None
             if hit and (name not in found or hit.spread > found[name].spread):
                 found[name] = hit
     return list(found.values())
@@ -73,7 +79,7 @@ def _partitions(motion: Motion, spans: NDArray[np.intp], lag: float) -> list[dic
         partitions.append(
             {f"{word} third": thirds == i for i, word in enumerate(("first", "second", "last"))}
         )
-    return [{k: v for k, v in parts.items() if v.sum() >= 30} for parts in partitions]
+    return [{k: v for k, v in parts.items() if v.sum() >= _FEWEST} for parts in partitions]
 
 
 def _ways(motion: Motion, lag: float) -> dict[str, NDArray[np.bool_]]:
@@ -86,16 +92,19 @@ def halves(fitted: Fit, motion: Motion, force: Array) -> dict[str, dict[str, flo
     """What loading alone and unloading alone give, by label and by parameter."""
     found = {}
     for label, inside in _ways(motion, fitted.lag).items():
-        if inside.sum() >= 30:
+        if inside.sum() >= _FEWEST:
             part = part_of(fitted, motion, force, inside)[0]
             found[label] = {name: part[name] for name in part.names}
     return found
 
 
-def _explain(fitted: Fit, fits: dict[str, Fit], parts: dict[str, NDArray[np.bool_]]) -> bool:
+def _explain(fitted: Fit, columns: Array, force: Array, parts: dict[str, NDArray[np.bool_]]) -> bool:
     """Whether the parts, each with its own answer, leave much less unexplained than one answer for all does."""
-    own = sum(float(fit.residuals @ fit.residuals) for fit in fits.values())
-    common = sum(float(fitted.residuals[inside] @ fitted.residuals[inside]) for inside in parts.values())
+    own = common = 0.0
+    for inside in parts.values():
+        left = force[inside] - columns[inside] @ solve(columns[inside], force[inside])
+        own += float(left @ left)
+        common += float(fitted.residuals[inside] @ fitted.residuals[inside])
     return own < (1 - _EXPLAINED) * common
 
 

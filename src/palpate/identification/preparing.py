@@ -7,14 +7,15 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.identification.bandwidth import FASTEST, choose_cutoff
+from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Question
 from palpate.identification.codes import Code
 from palpate.identification.contacts import Contacts, find_contacts
 from palpate.identification.filters import Chain, block_means, white_noise
-from palpate.identification.fitting import Lag
 from palpate.identification.lagging import unknown_lag
 from palpate.identification.models import Motion
 from palpate.identification.timebase import Channels
+from palpate.identification.touch import Touch, touching
 
 Array = NDArray[np.float64]
 
@@ -64,19 +65,38 @@ def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
 
 
 def question_of(
-    channels: Channels, chain: Chain, contacts: Contacts, lag: float | None, lag_std: float, tolerance: float
+    channels: Channels, chain: Chain, contacts: Contacts, known: Lag, tolerance: float
 ) -> Question:
     """What the models are fitted to and judged on."""
     position = contacts.position_sign * channels.position
     force = chain(contacts.force_sign * channels.force)
     rows, spans = _rows(channels, chain, contacts)
     filtered = chain(position)
-    position = position - _origin(filtered, rows, contacts)
+    origin = _origin(filtered, rows, contacts)
+    position = position - origin
     motion = Motion(chain, position, rows, contacts.bonded, white_noise(position))
-    known = unknown_lag(motion, channels.rate) if lag is None else Lag(lag, lag_std)
+    lag = known if known.known else unknown_lag(motion, channels.rate, known.mass)
+    touch = _touch(force, channels, chain, contacts, rows, spans)
+    free_noise = _free_noise(force, channels, chain, contacts)
     return Question(
-        motion, force[rows], spans, known, tolerance, _free_noise(force, channels, chain, contacts)
+        motion, force[rows], spans, lag, tolerance, free_noise, touch, origin, contacts.position_sign
     )
+
+
+def _touch(
+    force: Array,
+    channels: Channels,
+    chain: Chain,
+    contacts: Contacts,
+    rows: NDArray[np.intp],
+    spans: NDArray[np.intp],
+) -> Touch | None:
+    """The rows with those before each touch, where the log shows what the force rests at."""
+    if contacts.bonded:
+        return None
+    margin = int(np.ceil(chain.settling / chain.dt))
+    begins = [begin for begin, _ in contacts.spans]
+    return touching(force, contacts.resting, rows, spans, begins, margin, _settled(channels.valid, margin))
 
 
 def _origin(filtered: Array, rows: NDArray[np.intp], contacts: Contacts) -> float:
@@ -99,8 +119,9 @@ def _rows(channels: Channels, chain: Chain, contacts: Contacts) -> tuple[NDArray
     usable = _settled(channels.valid, int(np.ceil(chain.settling / chain.dt)))
     step = max(int(1 / (8 * chain.cutoff * chain.dt)), 1)
     rows, spans = [], []
+    noise = 0.0 if contacts.bonded else white_noise(channels.force)
     for number, (begin, end) in enumerate(contacts.spans):
-        last = end if contacts.bonded else _left(channels, contacts, begin, end)
+        last = end if contacts.bonded else left_at(channels, contacts, begin, end, noise)
         own = np.arange(begin + _settling(chain, begin, end - begin), last, step)
         own = own[usable[own]]
         rows.append(own)
@@ -124,10 +145,10 @@ def _settling(chain: Chain, begin: int, length: int) -> int:
     return min(int(np.ceil((chain.settling - eaten) / chain.dt)), length // 4)
 
 
-def _left(channels: Channels, contacts: Contacts, begin: int, end: int) -> int:
-    """The sample after the last one in contact by the raw force, at least half of the filtered contact."""
+def left_at(channels: Channels, contacts: Contacts, begin: int, end: int, noise: float) -> int:
+    """The sample after the last in contact by the raw force, its noise [N]; at least half of the filtered one."""
     force = contacts.force_sign * channels.force[begin:end]
-    clear = max(contacts.threshold, contacts.resting + 4 * white_noise(channels.force))
+    clear = max(contacts.threshold, contacts.resting + 4 * noise)
     above = np.flatnonzero(force > clear)
     middle = begin + (end - begin) // 2
     return max(begin + int(above[-1]) + 1, middle) if len(above) else end

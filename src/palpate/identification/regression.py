@@ -69,7 +69,13 @@ def noise_of(residuals: Array, place: NDArray[np.intp], parameters: int) -> Nois
     return Noise(curve * effective / (effective - parameters), effective, variance)
 
 
-def covariance(columns: Array, place: NDArray[np.intp], noise: Noise, prior: Array | None = None) -> Array:
+def covariance(
+    columns: Array,
+    place: NDArray[np.intp],
+    noise: Noise,
+    prior: Array | None = None,
+    less: Array | None = None,
+) -> Array:
     """Covariance of the least-squares answer under coloured noise, shape (p, p).
 
     (A + L)^-1 (Phi' Gamma Phi + prior part) (A + L)^-1 with A = Phi' Phi: the sandwich with the noise's own Gamma.
@@ -79,6 +85,7 @@ def covariance(columns: Array, place: NDArray[np.intp], noise: Noise, prior: Arr
         place: rows of the even grid, shape (n,).
         noise: colour of the noise.
         prior: standard deviation of each parameter known beforehand, infinite where nothing is; shape (p,).
+        less: information that noise of the columns themselves only pretends, shape (p, p).
     """
     place = _closed_up(place)
     scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
@@ -91,6 +98,8 @@ def covariance(columns: Array, place: NDArray[np.intp], noise: Noise, prior: Arr
         weight = level / (prior * scale) ** 2
         gram = gram + np.diag(weight)
         meat = meat + level * np.diag(weight)
+    if less is not None:
+        gram = gram - less / np.outer(scale, scale)
     bread = np.linalg.pinv(gram, rcond=1e-14, hermitian=True)
     cov: Array = bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale)
     return cov

@@ -9,22 +9,26 @@ import numpy as np
 from palpate.identification.choosing import Choice, Question
 from palpate.identification.codes import Code, Warn
 from palpate.identification.contacts import Contacts
-from palpate.identification.filters import Chain
+from palpate.identification.filters import Chain, block_means
 from palpate.identification.fitting import fit
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.result import Comparison, Identification, Parameter, Traces, Verdict
+from palpate.identification.sensor_path import SensorPath
 from palpate.identification.timebase import Channels
 from palpate.identification.verdicts import Terms, unit_of, verdicts
+from palpate.signals import Estimate
 from palpate.units import impedance_units
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
 _DEEPEST = 0.5
 """No press goes deeper [m]."""
-_SHOWN = 20_000
+_SHOWN = 50_000
+"""Samples of each trace: what is more is thinned, and averaged where it was fitted."""
 
 
 def report(
     channels: Channels,
+    chain: Chain,
     contacts: Contacts,
     question: Question,
     choice: Choice,
@@ -32,7 +36,7 @@ def report(
     model: str | None,
 ) -> Identification:
     """Pass the verdicts, and say everything there is to know; warnings are collected in the channels' list."""
-    fitted = choice.candidate.fit
+    fitted, own = choice.candidate.fit, choice.candidate.question
     warnings = channels.warnings
     if choice.rejected:
         seen = "; ".join(choice.candidate.against[:3]) or "its parameters make no sense"
@@ -42,34 +46,31 @@ def report(
     if model is None and "M" not in parameters:
         parameters = _with_mass(parameters, choice, question, terms)
     warnings += _curved(choice) + _doubtful_units(parameters, terms) + _doubtful_depth(question, terms)
-    traces = _traces(channels, contacts, question, choice, terms)
+    traces = _traces(channels, chain, contacts, own, choice, terms)
     return Identification(
         model=fitted.model.name,
         parameters=parameters,
-        contacts=tuple(_clock(channels, question, span) for span in contacts.spans),
+        contacts=tuple(_clock(channels, chain, contacts, span) for span in contacts.spans),
         lag=_lag_said(question, choice, terms),
         r2=fitted.r2,
         rmse=fitted.rmse,
-        n=len(question.force),
+        n=len(own.force),
         warnings=tuple(warnings),
         comparison=tuple(
-            Comparison(_label(c.fit.names, c.fit.model.name), c.fit.r2, c.fit.rmse, "; ".join(c.against))
+            Comparison(c.label, c.fit.r2, c.fit.rmse, "; ".join(c.against), c.held_out, c.whiteness.p)
             for c in choice.others
         ),
         cutoff=question.motion.chain.cutoff,
         traces=traces,
+        estimate=Estimate(fitted.names, fitted.theta, fitted.cov, fitted.noise.effective),
     )
-
-
-def _label(names: tuple[str, ...], model: str) -> str:
-    return f"{model}, curved spring" if "K3" in names else model
 
 
 def _instead(choice: Choice) -> str:
     closest = min(choice.others, key=lambda c: c.fit.rmse)
     if closest.fit.model is choice.candidate.fit.model:
         return ""
-    name = _label(closest.fit.names, closest.fit.model.name)
+    name = closest.label
     blame = f", but {closest.against[0]}" if closest.against else ""
     return f"; closest is {name} (R2 {closest.fit.r2:.4f}{blame})"
 
@@ -140,9 +141,11 @@ def _lag_said(question: Question, choice: Choice, terms: Terms) -> tuple[float, 
     return (fitted.lag, float(np.hypot(fitted.std("lag"), more))) if told else None
 
 
-def _clock(channels: Channels, question: Question, span: tuple[int, int]) -> tuple[float, float]:
+def _clock(
+    channels: Channels, chain: Chain, contacts: Contacts, span: tuple[int, int]
+) -> tuple[float, float]:
     """Times of a contact on the log's own clock: the filter's delay is taken off."""
-    delay = question.motion.chain.delay if not question.motion.bonded else 0.0
+    delay = 0.0 if contacts.bonded else chain.delay
     begin, end = (channels.start + i * channels.dt - delay for i in span)
     return max(float(begin), channels.start), float(end)
 
@@ -165,25 +168,48 @@ def nothing(channels: Channels, chain: Chain, terms: Terms, model: str) -> Ident
         0,
         tuple(channels.warnings),
         cutoff=chain.cutoff,
+        traces=_untouched(channels, chain, terms),
     )
+
+
+def _untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
+    """The force of a log in which nothing is touched: seen, it says why."""
+    step = max(len(channels.force) // _SHOWN, 1)
+    none = np.empty(0)
+    time, force = channels.time - chain.delay, chain(channels.force)
+    return Traces(
+        time[::step], force[::step], none, none, none, none,
+        position_unit=terms.position_unit, force_unit=terms.force_unit,
+    )  # fmt: skip
 
 
 def _traces(
-    channels: Channels, contacts: Contacts, question: Question, choice: Choice, terms: Terms
+    channels: Channels, chain: Chain, contacts: Contacts, question: Question, choice: Choice, terms: Terms
 ) -> Traces:
-    chain = question.motion.chain
     fitted = choice.candidate.fit
     step = max(len(channels.position) // _SHOWN, 1)
-    fit_step = max(len(question.force) // _SHOWN, 1)
+    size = max(len(question.force) // _SHOWN, 1)
     time = channels.time - chain.delay
-    rows = question.motion.rows[::fit_step]
+    linear = fitted.model.linear
+    knobs = {knob.name: fitted[knob.name] for knob in fitted.model.knobs}
+    columns = fitted.model.columns(question.motion, knobs, fitted.lag)
     return Traces(
         time=time[::step],
-        force=chain(contacts.force_sign * channels.force)[::step],
-        fitted_time=time[rows],
-        fitted_position=question.motion.moved(0, fitted.lag)[::fit_step],
-        fitted_force=question.force[::fit_step],
-        predicted=fitted.predicted[::fit_step],
+        force=chain(contacts.force_sign * channels.force)[::step] - question.resting,
+        fitted_time=block_means(_fitted_time(time, question), size),
+        fitted_position=block_means(question.motion.moved(0, fitted.lag), size),
+        fitted_force=block_means(question.force, size),
+        predicted=block_means(fitted.predicted, size),
+        columns={name: block_means(c, size) for name, c in zip(linear, columns, strict=True)},
+        theta={name: fitted[name] for name in linear},
+        beforehand={"M": question.lag.mass[1]} if question.lag.mass and "M" in linear else {},
+        matched=question.motion.matched,
         position_unit=terms.position_unit,
         force_unit=terms.force_unit,
     )
+
+
+def _fitted_time(time: np.ndarray, question: Question) -> np.ndarray:
+    """When the rows of the fit were: those of the filtered log, or the force sensor's own samples [s]."""
+    chain, rows = question.motion.chain, question.motion.rows
+    return chain.start + chain.instants[rows] * chain.dt if isinstance(chain, SensorPath) else time[rows]

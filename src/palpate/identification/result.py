@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.codes import Warn
+from palpate.signals import Estimate
 
 
 class Verdict(StrEnum):
@@ -43,17 +44,39 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Comparison:
-    """How well one of the models fits the same filtered force."""
+    """How well one of the models fits the same filtered force.
+
+    Args:
+        model: what it is called.
+        r2, rmse: of the fit.
+        note: what speaks against it.
+        held_out: rms of what it misses of the rows in contact when it is fitted to the others.
+        whiteness: probability of residuals no whiter than these, were they white.
+    """
 
     model: str
     r2: float
     rmse: float
     note: str
+    held_out: float = float("nan")
+    whiteness: float = float("nan")
 
 
 @dataclass(frozen=True)
 class Traces:
-    """What the figure shows: filtered signals of the whole log and the fit in contact, each of shape (n,) or (m,)."""
+    """What the figure shows: filtered signals of the whole log, shape (n,), and the fit in contact, shape (m,).
+
+    Args:
+        time, force: of the whole log [s], [N].
+        fitted_time, fitted_position, fitted_force: of the samples that were fitted [s], [m], [N].
+        predicted: the force by the model [N].
+        columns: by linear parameter, what one unit of it adds to the predicted force, shape (m,).
+        theta: the fit's own number of each of them, also where no number is given to the user.
+        beforehand: standard deviation of what was known of some of them before the log.
+        matched: whether the samples are the force sensor's own, with noise as white as its; else all have passed a
+            filter chain.
+        position_unit, force_unit: of the log.
+    """
 
     time: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -61,6 +84,10 @@ class Traces:
     fitted_position: NDArray[np.float64]
     fitted_force: NDArray[np.float64]
     predicted: NDArray[np.float64]
+    columns: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    theta: dict[str, float] = field(default_factory=dict)
+    beforehand: dict[str, float] = field(default_factory=dict)
+    matched: bool = False
     position_unit: str = "m"
     force_unit: str = "N"
 
@@ -79,6 +106,7 @@ class Identification:
         comparison: all the models that were tried.
         cutoff: of the filter chain [Hz].
         traces: for the figure.
+        estimate: the fit's own parameters with their covariance, before any verdict; offset and lag among them.
     """
 
     model: str
@@ -92,6 +120,7 @@ class Identification:
     comparison: tuple[Comparison, ...] = ()
     cutoff: float = float("nan")
     traces: Traces | None = field(default=None, repr=False)
+    estimate: Estimate | None = field(default=None, repr=False)
 
     @property
     def codes(self) -> tuple[str, ...]:

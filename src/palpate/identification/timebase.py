@@ -86,6 +86,15 @@ def channels_of(record: Record) -> Channels:
     return Channels(float(time[0]), dt, x, f, near_x & near_f, rate, warnings)
 
 
+def held_force(record: Record, channels: Channels) -> Array:
+    """The force as it stood in the log at the channels' times, held from row to row, shape (n,)."""
+    time, force = record["time"], record["force"]
+    there = np.isfinite(force)
+    rows = np.searchsorted(time[there], channels.time + channels.dt / 4, side="right") - 1
+    held: Array = force[there][np.maximum(rows, 0)]
+    return held
+
+
 def _check(time: Array, position: Array, force: Array) -> None:
     if len(time) < _FEWEST:
         raise InputError(

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Choice
 from palpate.identification.codes import Code, Warn
-from palpate.identification.fitting import Fit, Lag
+from palpate.identification.fitting import Fit
 from palpate.identification.hidden_mass import HiddenMass, before_position
 from palpate.identification.result import Parameter, Verdict
+from palpate.identification.surface import surface, together
 from palpate.units import impedance_units
 
 
@@ -25,6 +27,7 @@ class Terms:
         force_unit, position_unit: of the record.
         lags: the force was found to lag the position although no lag is calibrated.
         bent: how far that lag, which may be longer, has moved K [N/m].
+        band: frequency below which the probe moved [Hz].
         hidden: the mass that an uncalibrated lag may hide; None if there is none.
     """
 
@@ -35,6 +38,7 @@ class Terms:
     position_unit: str
     lags: bool
     bent: float = 0.0
+    band: float = np.inf
     hidden: HiddenMass | None = None
 
 
@@ -43,16 +47,21 @@ def verdicts(choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> di
     fitted = choice.candidate.fit
     names = [n for n in fitted.names if n not in ("offset", "lag", "x0")]
     found = {name: _verdict(name, choice, lag, terms, warnings) for name in names}
+    place = surface(choice.candidate, choice.rejected, terms.tolerance, terms.position_unit)
+    if place:
+        found["x0"] = place
     if terms.hidden and before_position(fitted):
         text = (
             f"the force seems to be read {-fitted.lag * 1e3:.2g} ms before the position, which no sensor's lag does: a"
             f" mass of up to {terms.hidden.mass:.2g} kg looks like this; calibrate the lag and give it with --lag"
         )
         warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
+    if fitted.matched and not lag.known and _lag_rules(fitted):
+        _confounded("B cannot be told from a lag of the force", fitted, terms, warnings)
     low = [n for n, p in found.items() if p.verdict is Verdict.NOT_IDENTIFIABLE and "lag" not in p.reason]
     low = [n for n in low if n in ("K", "B", "M", "K1", "tau", "n")]
     if low:
-        text = f"the log does not show {', '.join(low)} above the noise: press faster, deeper or more often"
+        text = f"the log does not show {', '.join(low)} above the noise: {_remedy(low[-1], terms)}"
         warnings.append(Warn(Code.LOW_EXCITATION, text))
     return found
 
@@ -117,8 +126,11 @@ def _of_rejected(
     alone = [f"{label} alone {values[name]:.3g}" for label, values in choice.halves.items() if name in values]
     if len(alone) == 2:
         seen = f"{', '.join(alone)} {_shown(unit)}".rstrip() + f"; {seen}"
-    if name == "K":
-        reason = f"a secant through the whole contact, not a constant of the surface: {seen}"
+    if name in ("K", "n"):
+        curved = "n" in choice.candidate.fit.names
+        what = "of the curve through" if curved else "a secant through"
+        reason = f"{what} the whole contact, not a constant of the surface: {seen}"
+        reason += together(choice.candidate) if name == "n" else ""
         return _reported(value, std, interval, unit, Verdict.REJECTED, reason)
     reason = f"the fit's {value:.3g} {_shown(unit)} is an artefact of a model that does not hold: {seen}"
     return Parameter(None, None, None, unit, Verdict.REJECTED, reason)
@@ -147,12 +159,12 @@ def _why_not(
     bounds = f"95 %: {interval[0]:.3g} to {interval[1]:.3g} {_shown(unit)}".rstrip()
     if _with_hidden(name, half, terms):
         text = f"{name} cannot be told from a lag of the force that hides a mass ({bounds})"
-        return _confounded(text, warnings)
+        return _confounded(text, fitted, terms, warnings)
     alone = fitted.t * fitted.std(name, lag_known=True)
     if lag.std and half > 1.5 * alone and alone <= max(terms.tolerance * abs(value), 0.67 * half):
         known = f"{fitted.std('lag') * 1e3:.2g} ms"
         text = f"{name} cannot be told from a lag of the force, which is known to {known} only ({bounds})"
-        return _confounded(text, warnings)
+        return _confounded(text, fitted, terms, warnings)
     pulled = abs(float(fitted.attenuation[fitted.names.index(name)]))
     if fitted.t * pulled > 0.7 * half:
         return (
@@ -160,16 +172,41 @@ def _why_not(
         )
     inside = interval[0] <= 0 <= interval[1]
     limit = "zero is within it" if inside else f"wider than {terms.tolerance:.0%}"
-    return f"the log does not show it above the noise ({bounds}; {limit})"
+    return f"the log does not show it above the noise ({bounds}; {limit}): {_remedy(name, terms)}"
 
 
-def _confounded(text: str, warnings: list[Warn]) -> str:
-    """Warn once for all parameters that a lag looks like one of them."""
+def _lag_rules(fitted: Fit) -> bool:
+    """Whether what is not known of the lag makes most of what is not known of the damping."""
+    if not {"K", "B"} <= set(fitted.names):
+        return False
+    return abs(fitted["K"]) * fitted.std("lag") > 2 * fitted.std("B", lag_known=True)
+
+
+def _remedy(name: str, terms: Terms) -> str:
+    """What would show a parameter."""
+    if name in ("B", "M") and np.isfinite(terms.band):
+        more = "mass needs" if name == "M" else "damping needs"
+        return f"the position moved only below {terms.band:.2g} Hz, {more} faster motion; try palpate excite"
+    return "press deeper, longer or more often; try palpate excite"
+
+
+def _confounded(text: str, fitted: Fit, terms: Terms, warnings: list[Warn]) -> str:
+    """Warn once for all parameters that a lag looks like one of them, and say what is known of them together."""
     if not any(w.code is Code.LAG_DAMPING_CONFOUNDED for w in warnings):
-        warnings.append(
-            Warn(Code.LAG_DAMPING_CONFOUNDED, f"{text}; calibrate the lag and give it with --lag")
-        )
+        whole = f"{text}{_together(fitted, terms)}; calibrate the lag T and give it with --lag"
+        warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, whole))
     return text
+
+
+def _together(fitted: Fit, terms: Terms) -> str:
+    """The combination of damping and lag that a narrow band shows: B - K T, for (M s^2 + B s + K) e^(-sT)."""
+    if not {"K", "B", "lag"} <= set(fitted.names):
+        return ""
+    own = [fitted.names.index(name) for name in ("B", "K", "lag")]
+    slope = np.array([1.0, -fitted.lag, -fitted["K"]])
+    std = float(np.sqrt(max(slope @ fitted.cov[np.ix_(own, own)] @ slope, 0.0)))
+    value = fitted["B"] - fitted["K"] * fitted.lag
+    return f"; what is known is B - K T = {value:.4g} +- {fitted.t * std:.2g} {_shown(unit_of('B', fitted, terms))}"
 
 
 def _whole_std(name: str, choice: Choice, terms: Terms) -> float:
@@ -191,14 +228,18 @@ def unit_of(name: str, fitted: Fit, terms: Terms) -> str:
     plain = units["K"] == "1"
     if name == "tau":
         return "s"
+    if name == "Fc":
+        return terms.force_unit
     if name == "n" or plain:
         return "1"
+    if name == "Fc":
+        return terms.force_unit
     if name in ("K2", "K3"):
         return f"{terms.force_unit}/{terms.position_unit}^{name[1]}"
     if fitted.model.name == "hunt-crossley":
         n = fitted["n"]
-        power = f"{terms.position_unit}^{n:.3g}" if name == "K" else f"{terms.position_unit}^{n + 1:.3g}"
-        return f"{terms.force_unit}/{power}" if name == "K" else f"{terms.force_unit} s/{power}"
+        power = f"{terms.position_unit}^{n + 1:.3g}" if name == "B" else f"{terms.position_unit}^{n:.3g}"
+        return f"{terms.force_unit} s/{power}" if name == "B" else f"{terms.force_unit}/{power}"
     return units["K" if name == "K1" else name]
 
 

@@ -1,0 +1,145 @@
+"""How near the identification comes to the Cramer-Rao bound, and how often its 95 % intervals hold the truth.
+
+    python benchmarks/identification/accuracy.py --trials 200            # all rows
+    python benchmarks/identification/accuracy.py foam-step --trials 2000
+
+Each trial is a press on the bench with a surface, a noise and a phase of the force sensor of its own. The errors and
+the half-widths are divided by the bound of their own trial, so that surfaces of all sizes can stand in one row.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from presses import CHIRP_START, STEP_START, THESIS_START, Condition, Trial, trial
+
+CONDITIONS = {
+    "foam-step": Condition("foam-hybrid", STEP_START),
+    "rubber-step": Condition("rubber-hybrid", STEP_START),
+    "foam-chirp": Condition("foam-chirp", CHIRP_START),
+    "rubber-chirp": Condition("rubber-chirp", CHIRP_START),
+    "foam-step-lag-unknown": Condition("foam-hybrid", STEP_START, lag_known=False),
+    "rubber-step-lag-unknown": Condition("rubber-hybrid", STEP_START, lag_known=False),
+    "foam-chirp-lag-unknown-mass-fixed": Condition("foam-chirp", CHIRP_START, lag_known=False, mass="fixed"),
+    "rubber-chirp-lag-unknown-mass-fixed": Condition(
+        "rubber-chirp", CHIRP_START, lag_known=False, mass="fixed"
+    ),
+    "foam-chirp-lag-unknown-mass-prior": Condition("foam-chirp", CHIRP_START, lag_known=False, mass="prior"),
+    "rubber-chirp-lag-unknown-mass-prior": Condition(
+        "rubber-chirp", CHIRP_START, lag_known=False, mass="prior"
+    ),
+    "foam-chirp-thesis-pose": Condition("foam-chirp", THESIS_START),
+    "rubber-chirp-thesis-pose": Condition("rubber-chirp", THESIS_START),
+}
+_T = 1.96
+
+
+@dataclass(frozen=True)
+class Line:
+    """One parameter under one condition, over all trials.
+
+    Args:
+        rms: of the error, over the bound.
+        bias: mean of the error over the rms of the error.
+        relative: median of |error|/truth.
+        coverage: share of 95 % intervals that hold the truth.
+        width: median of the half-width over that of the bound.
+        identified: share of verdicts "identified".
+    """
+
+    parameter: str
+    trials: int
+    rms: float
+    bias: float
+    relative: float
+    coverage: float
+    width: float
+    identified: float
+    error: float
+
+
+def line(name: str, trials: list[Trial]) -> Line:
+    """The figures of one parameter."""
+    error = np.array([t.value[name] - t.truth[name] for t in trials])
+    std = np.array([t.std[name] for t in trials])
+    bound = np.array([t.bound[name] for t in trials])
+    truth = np.array([t.truth[name] for t in trials])
+    scaled = error / np.maximum(bound, 1e-300)
+    rms = float(np.sqrt(np.mean(scaled**2)))
+    return Line(
+        name,
+        len(trials),
+        rms,
+        float(np.mean(scaled)) / rms,
+        float(np.sqrt(np.mean((error / truth) ** 2))),
+        float(np.mean(np.abs(error) <= _T * std)),
+        float(np.median(std / np.maximum(bound, 1e-300))),
+        float(np.mean([t.verdict.get(name) == "identified" for t in trials])),
+        float(np.sqrt(np.mean(error**2))),
+    )
+
+
+def main() -> None:
+    """Run the conditions asked for and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("conditions", nargs="*", default=list(CONDITIONS), metavar="CONDITION")
+    parser.add_argument("--trials", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0, help="of the first trial")
+    parser.add_argument("--json", type=Path, help="write every figure there")
+    asked = parser.parse_args()
+    unknown = set(asked.conditions) - set(CONDITIONS)
+    if unknown:
+        parser.error(f"no condition {', '.join(sorted(unknown))}; there are: {', '.join(CONDITIONS)}")
+    seeds = range(asked.seed, asked.seed + asked.trials)
+    print(
+        f"{asked.trials} trials each, seeds {seeds[0]} to {seeds[-1]}; errors and widths over the bound's deviation"
+    )
+    print(
+        f"{'':36}{'':5}{'rms':>7}{'bias/rms':>10}{'rms/truth':>11}{'cover':>8}{'width':>7}{'identified':>12}"
+    )
+    figures = {}
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        for name in asked.conditions:
+            begin = time.perf_counter()
+            trials = list(pool.map(trial, [CONDITIONS[name]] * len(seeds), seeds, chunksize=4))
+            figures[name] = _show(name, trials, time.perf_counter() - begin)
+    if asked.json:
+        asked.json.write_text(json.dumps(figures, indent=1))
+
+
+def _show(name: str, trials: list[Trial], seconds: float) -> dict[str, object]:
+    condition = CONDITIONS[name]
+    parameters = ["K", "B", *(["M"] if condition.mass == "free" else [])]
+    parameters += [] if condition.lag_known else ["lag"]
+    lines = [line(parameter, trials) for parameter in parameters]
+    for i, row in enumerate(lines):
+        title = name if i == 0 else ""
+        print(
+            f"{title:36}{row.parameter:5}{row.rms:7.2f}{row.bias:10.2f}{row.relative:11.3%}{row.coverage:8.1%}"
+            f"{row.width:7.2f}{row.identified:12.1%}"
+            + (f"  rms {row.error * 1e3:.3f} ms" if row.parameter == "lag" else "")
+        )
+    confounded = float(np.mean(["lag-damping-confounded" in t.codes for t in trials]))
+    rejected = float(np.mean(["model-rejected" in t.codes for t in trials]))
+    print(f"{'':36}lag-damping-confounded {confounded:.1%}, model-rejected {rejected:.1%}, {seconds:.0f} s")
+    return {"lines": [vars(row) for row in lines], "confounded": confounded, "rejected": rejected}
+
+
+def _in_ms(row: Line) -> str:
+    return f"  rms {row.error * 1e3:.3f} ms" if row.parameter == "lag" else ""
+
+
+if __name__ == "__main__":
+    main()

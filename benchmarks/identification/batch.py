@@ -1,0 +1,135 @@
+"""What the whole way from a record to an Identification costs, for a million samples of each channel.
+
+    python benchmarks/identification/batch.py
+    python benchmarks/identification/batch.py --rows 100000 --profile 15
+
+The log: foam pressed with 15 N, and about that the bench's chirp of 5 N from 0.5 to 40 Hz in 20 s, again and again,
+1 kHz, through an encoder of 5 um and the force sensor's whole chain. `wall` is the best of several calls, `CPU` the
+processor's time of the same call, which another program on the machine does not lengthen so much.
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import os
+import pstats
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from presses import log_of
+
+from palpate.bench import given_motion, load
+from palpate.environments import KelvinVoigt
+from palpate.identification import Identification, identify
+from palpate.logs import read_log, write_record
+from palpate.records import Record
+from palpate.references import Chirp
+from palpate.signals.low_pass import LowPass
+
+RATE = 1000
+MEAN, AMPLITUDE = 15.0, 5.0  # of the force [N]
+LOW, HIGH, PERIOD = 0.5, 40.0, 20.0  # of the sweep [Hz], [s]
+LEAD = 0.5  # in the air and down into the surface [s]
+MODEL = "kelvin-voigt-mass"
+
+
+def path(rows: int, surface: KelvinVoigt) -> NDArray[np.float64]:
+    """The tip's position at each row [m], shape (rows,), 0 being the surface."""
+    time_ = np.arange(rows) / RATE
+    u = np.clip(time_ / LEAD, 0.0, 1.0)
+    rest = MEAN / surface.stiffness
+    down = rest * (1.2 * u**3 * (10.0 - 15.0 * u + 6.0 * u * u) - 0.2)
+    since = np.maximum(time_ - LEAD, 0.0) % PERIOD
+    omega = 2.0 * np.pi * (LOW + (HIGH - LOW) * since / PERIOD)
+    impedance = np.hypot(surface.stiffness - surface.mass * omega**2, surface.damping * omega)
+    return down + np.where(time_ > LEAD, Chirp(LOW, HIGH, PERIOD, AMPLITUDE).at(since) / impedance, 0.0)
+
+
+def press(rows: int, seed: int) -> tuple[Record, LowPass, float]:
+    """A log of the motion, with the force sensor's low-pass and its whole lag [s]."""
+    nominal = load("foam-chirp").surface
+    surface = KelvinVoigt(nominal.stiffness, nominal.damping, nominal.mass)
+    record = given_motion(surface, phase=0.0011).run(path(rows, surface), seed=seed)
+    told = record.meta["instruments"]["force"]
+    low_pass = LowPass.parse(told["filter"])
+    return log_of(record), low_pass, low_pass.lag + told["delay_s"]
+
+
+def tellings(low_pass: LowPass, lag: float) -> dict[str, dict[str, Any]]:
+    """What the identification is told, by title."""
+    return {
+        "force filter, lag calibrated": {"force_filter": low_pass, "lag": lag},
+        "force filter, lag calibrated, model given": {"force_filter": low_pass, "lag": lag, "model": MODEL},
+        "force filter, lag unknown": {"force_filter": low_pass},
+        "lag calibrated": {"lag": lag},
+        "nothing": {},
+        "nothing but the model": {"model": MODEL},
+    }
+
+
+def timed(work: Callable[[], Any], repeats: int) -> tuple[float, float]:
+    """The least of several calls by the clock, and by the processor's [s]; one before them warms up."""
+    work()
+    walls, busy = [], []
+    for _ in range(repeats):
+        clock, processor = time.perf_counter(), time.process_time()
+        work()
+        walls.append(time.perf_counter() - clock)
+        busy.append(time.process_time() - processor)
+    return min(walls), min(busy)
+
+
+def show(title: str, rows: int, seconds: tuple[float, float], found: Identification | None = None) -> None:
+    """Prints a line of the table."""
+    million = rows / 1e6
+    said = ", ".join(f"{name} {p.verdict}" for name, p in found.parameters.items()) if found else ""
+    print(f"{title:42}{seconds[0] / million:8.2f}{seconds[1] / million:8.2f}   {said}", flush=True)
+
+
+def hot_spots(work: Callable[[], Any], count: int) -> None:
+    """Prints the functions that take the most time by themselves."""
+    profile = cProfile.Profile()
+    profile.runcall(work)
+    pstats.Stats(profile).strip_dirs().sort_stats("tottime").print_stats(count)
+
+
+def main() -> None:
+    """Time every telling and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--rows", type=int, default=1_000_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--profile", type=int, default=0, metavar="N", help="show N hot spots of each")
+    asked = parser.parse_args()
+    log, low_pass, lag = press(asked.rows, asked.seed)
+    load_now = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    print(f"{asked.rows} rows, seed {asked.seed}, {os.cpu_count()} cores, {load_now:.1f} programs at work")
+    print(f"{'seconds per million samples; told:':42}{'wall':>8}{'CPU':>8}")
+    for title, known in tellings(low_pass, lag).items():
+
+        def work(known: dict[str, Any] = known) -> Identification:
+            return identify(log, **known)
+
+        show(title, asked.rows, timed(work, asked.repeats), work())
+        if asked.profile:
+            hot_spots(work, asked.profile)
+    with TemporaryDirectory() as folder:
+        file = write_record(log, Path(folder) / "press.parquet")
+        seconds = timed(
+            lambda: read_log(file, time="time", position="position", force="force"), asked.repeats
+        )
+        show("to read it from Parquet, beside that", asked.rows, seconds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""Presses on the bench with a truth, a seed and a sensor phase of their own, identified, with the bound beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from palpate.bench import build, load
+from palpate.bench.experiment import changed
+from palpate.identification import identify
+from palpate.identification.information import ForceChain, bound, phase_std
+from palpate.records import Record
+from palpate.signals.low_pass import LowPass
+
+NAMES = ("K", "B", "M")
+FIELDS = {"K": "stiffness", "B": "damping", "M": "mass"}
+SPREAD = 1.3
+"""The truth lies between its nominal value divided and multiplied by this."""
+STEP_START = (0.454, 0.0, 0.0168)
+CHIRP_START = (0.454, 0.0, 0.0208)
+"""Start poses that bring the last link along the normal in contact: the wrist's coarse encoder (2000 counts) then moves
+the tip's position along the normal to second order only."""
+THESIS_START = (0.454, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is pressed on, how, and what the identification is told.
+
+    Args:
+        experiment: its name.
+        start: pose [m, m, rad].
+        lag_known: whether the lag is calibrated.
+        mass: "free", "fixed" (at its truth) or "prior" (a deviation of half of it).
+        changes: of the experiment.
+    """
+
+    experiment: str
+    start: tuple[float, float, float]
+    lag_known: bool = True
+    mass: str = "free"
+    changes: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One press and what was found, by name: truth, estimate, its deviation and the bound of that; lag in seconds."""
+
+    truth: dict[str, float]
+    value: dict[str, float]
+    std: dict[str, float]
+    bound: dict[str, float]
+    verdict: dict[str, str]
+    codes: tuple[str, ...]
+
+
+def press(condition: Condition, seed: int) -> tuple[Record, LowPass, float]:
+    """Run one press; with the force sensor's low-pass and its whole lag [s]."""
+    rng = np.random.default_rng([seed, 480])
+    nominal = load(condition.experiment)
+    factor = np.exp(rng.uniform(-np.log(SPREAD), np.log(SPREAD), 3))
+    truth = {
+        f"surface.{FIELDS[n]}": float(getattr(nominal.surface, FIELDS[n]) * f)
+        for n, f in zip(NAMES, factor, strict=True)
+    }
+    experiment = changed(
+        nominal,
+        {
+            **truth,
+            "approach.hold": 0.3,
+            "approach.first": 0.4625 + 0.001 * float(rng.uniform()),
+            "force_sensor.phase": float(rng.uniform(0, 1 / nominal.force_sensor.sampling)),
+            "robot.start": condition.start,
+            **condition.changes,
+        },
+    )
+    record = build(experiment).run(experiment.run.duration, seed=seed, press=experiment.run.press)
+    force = record.meta["instruments"]["force"]
+    low_pass = LowPass.parse(force["filter"])
+    return record, low_pass, low_pass.lag + force["delay_s"]
+
+
+def log_of(record: Record) -> Record:
+    """What a log of the press holds: time, the measured position, the force as sampled."""
+    columns = {"time": record["t"], "position": record["x_measured"], "force": record["force_sampled"]}
+    return Record(columns, {"time": "s", "position": "m", "force": "N"})
+
+
+def trial(condition: Condition, seed: int) -> Trial:
+    """One press, identified: the estimates before any verdict, with the verdicts beside them."""
+    record, low_pass, lag = press(condition, seed)
+    truth = {name: record.meta["truth"][name]["value"] for name in NAMES}
+    mass = _mass(condition, truth["M"], seed)
+    found = identify(
+        log_of(record),
+        model="kelvin-voigt-mass",
+        force_filter=low_pass,
+        lag=lag if condition.lag_known else None,
+        mass=mass,
+    )
+    estimate, traces = found.estimate, found.traces
+    if estimate is None or traces is None:
+        raise RuntimeError(f"seed {seed}: nothing was found to identify ({found.codes})")
+    span = float(traces.fitted_time[0]), float(traces.fitted_time[-1])
+    return Trial(
+        truth | {"lag": lag},
+        dict(zip(estimate.names, estimate.theta.tolist(), strict=True)),
+        dict(zip(estimate.names, estimate.std.tolist(), strict=True)),
+        _bound(record, truth, low_pass, condition, span),
+        {name: str(p.verdict) for name, p in found.parameters.items()},
+        found.codes,
+    )
+
+
+def _mass(condition: Condition, truth: float, seed: int) -> tuple[float, float] | None:
+    """What the identification is told of the mass: a prior is off by its own deviation, as an honest one is."""
+    if condition.mass == "free":
+        return None
+    if condition.mass == "fixed":
+        return truth, 0.0
+    return float(np.random.default_rng([seed, 481]).normal(truth, truth / 2)), truth / 2
+
+
+def _bound(
+    record: Record,
+    truth: dict[str, float],
+    low_pass: LowPass,
+    condition: Condition,
+    span: tuple[float, float],
+) -> dict[str, float]:
+    sensor = record.meta["experiment"]["force_sensor"]
+    chain = ForceChain(low_pass, sensor["sampling"], sensor["noise"], phase_std(sensor["sampling"], 1000))
+    known = {} if condition.lag_known else {"lag": np.inf}
+    known |= {"fixed": {"M": 0.0}, "prior": {"M": truth["M"] / 2}, "free": {}}[condition.mass]
+    best = bound(record["t"], record["penetration"], truth, chain, known=known, span=span)
+    return dict(zip(best.names, best.std.tolist(), strict=True))

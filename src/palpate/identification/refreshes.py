@@ -1,0 +1,179 @@
+"""When a sensor that is slower than the log was refreshed: the even grid behind a pattern of held readings.
+
+A fresh value shows in the first row after it came out, so each change says only within one row when it came. Together
+they say more: an even grid must have one refresh in each of these rows and none in the others, which leaves a small
+interval of its phase (of 1/12 row, for 480 readings a second in a log of 1000 rows).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_BLOCKS = 32
+_ROUNDS = 12
+_EVERY_ROW = 0.9
+_FEWEST = 10
+_AT_FIRST = 1 << 14
+"""Rows on each side of the middle in which the grid is looked for first."""
+_ROOM = 1e-9
+"""Of the phase, in rows: with less a pattern only just contradicts a grid."""
+_SHORTEST = 2.0
+"""Per cent of the steps between changes that may be shorter than two samples can be apart."""
+
+
+@dataclass(frozen=True)
+class Refreshes:
+    """The sensor's own samples.
+
+    Args:
+        instants: when each came out, in rows, shape (m,).
+        rows: the first row that shows it, shape (m,).
+        spread: standard deviation of what is not known of the common phase, in rows.
+        period: rows between two samples.
+    """
+
+    instants: Array
+    rows: NDArray[np.intp]
+    spread: float
+    period: float
+
+
+def refreshes_of(values: Array) -> Refreshes:
+    """The samples behind the readings `values`, shape (n,), of evenly spaced rows.
+
+    A channel that changes in nearly every row is taken to be as fast as the log.
+    """
+    changed = np.flatnonzero(np.diff(values)) + 1
+    if len(changed) < _FEWEST or len(changed) > _EVERY_ROW * len(values):
+        return _in_every_row(len(values))
+    counted = [_numbered(changed, *beat) for beat in _beats(changed)]
+    even = [grid for grid in (_even(number, changed, period) for number, period in counted) if grid]
+    as_fast = np.bincount(np.diff(changed)).argmax() == 1
+    if not even and as_fast:  # and often the same twice
+        return _in_every_row(len(values))
+    if not even:  # each refresh is somewhere in the row before it shows
+        own = changed.astype(np.float64) - 0.5
+        return Refreshes(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
+    grid = max(even, key=lambda grid: grid.period)  # with the fewest samples that no change shows
+    first = int(np.ceil((-0.5 - grid.phase) / grid.period))
+    last = int(np.floor((len(values) - 1 - grid.phase) / grid.period))
+    instants = grid.phase + np.arange(first, last + 1) * grid.period
+    rows = np.ceil(instants - grid.room * 1e-6).astype(np.intp)
+    kept = (rows >= 0) & (rows < len(values))
+    return Refreshes(instants[kept], rows[kept], grid.spread, grid.period)
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Instants phase + number * period; `room`: how far they stand from the ends of their rows at least; in rows."""
+
+    phase: float
+    period: float
+    room: float
+    spread: float
+
+
+def _in_every_row(count: int) -> Refreshes:
+    return Refreshes(np.arange(count, dtype=np.float64), np.arange(count), 0.0, 1.0)
+
+
+def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
+    """Periods of the strongest line that the shortest steps allow, and a place in the middle of a sample's row.
+
+    Some samples equal the one before and show no change, but that only weakens the lines of the changes' spectrum. As
+    rows are whole, a line at f stands at 1 - f too; from periods near 2 both may be meant.
+    """
+    far = np.abs(changed - changed[len(changed) // 2])
+    own = changed[far < _near(far)]
+    least = float(np.percentile(np.diff(own), _SHORTEST))
+    size = 8 << int(own[-1] - own[0]).bit_length()
+    line = np.zeros(size)
+    line[own - own[0]] = 1.0
+    spectrum = np.fft.rfft(line)
+    first = int(np.ceil(size / (least + 1)))
+    last = max(int(size / max(least - 0.2, 1 / _EVERY_ROW)), first)
+    bins = np.arange(first, last + 1)
+    best = int(bins[np.argmax(np.abs(spectrum[np.minimum(bins, size - bins)]))])
+    angle = float(np.angle(spectrum[min(best, size - best)])) / (2 * np.pi)
+    angle = angle if best <= size // 2 else -angle
+    meant = [(size / best, -angle), (size / (size - best), angle)][: 2 if first <= size - best <= last else 1]
+    return [(period, own[0] + part * period) for period, part in meant]
+
+
+def _near(far: NDArray[np.intp]) -> int:
+    """How far from the middle of the changes the grid is looked for, in rows: enough of them must be there."""
+    return max(_AT_FIRST, int(np.partition(far, _FEWEST - 1)[_FEWEST - 1]) + 1)
+
+
+def _numbered(changed: NDArray[np.intp], period: float, middle: float) -> tuple[NDArray[np.intp], float]:
+    """Which sample of an even grid each change is, and the grid's period in rows.
+
+    Counted from the middle of the log to both sides, the period made better on the way.
+    """
+    far = np.abs(changed - changed[len(changed) // 2])
+    reach = _near(far)
+    while True:
+        own = changed[far < reach]
+        period, middle = (float(x) for x in np.polyfit(np.round((own - middle) / period), own, 1))
+        if len(own) == len(changed):
+            return np.round((changed - middle) / period).astype(np.intp), period
+        reach *= 2
+
+
+def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) -> _Grid | None:
+    """The grid whose instants stand farthest from the ends of their rows; None if no grid has one in each.
+
+    Phase and period of all that have form a polygon. What is not known of the phase is how far the polygon reaches,
+    where the phase is that in the middle of the log.
+    """
+    middle = float(np.mean(number))
+    count = number.astype(np.float64) - middle
+    best, room = _farthest((0.0, 0.0, -1.0), count, changed, (0.0, period))
+    if room <= _ROOM:
+        return None
+    reach = [_farthest((way, 0.0, 0.0), count, changed, best)[0][0] for way in (1.0, -1.0)]
+    return _Grid(best[0] - best[1] * middle, best[1], room, (reach[1] - reach[0]) / np.sqrt(12))
+
+
+def _farthest(
+    goal: tuple[float, float, float], count: Array, changed: NDArray[np.intp], begin: tuple[float, float]
+) -> tuple[tuple[float, float], float]:
+    """Phase and period, and how far all instants are from the ends of their rows, by a linear programme.
+
+    Of its constraints, two a change, only those are taken that were violated most in their part of the log.
+
+    Args:
+        goal: what of phase, period and room is made smallest; the room is at least 0 where it is no part of it.
+        count: number of each sample from the middle of the log, shape (m,).
+        changed: the row that shows it, shape (m,).
+        begin: phase and period to begin with.
+    """
+    from scipy.optimize import linprog
+
+    own = np.array([0, len(count) - 1])
+    widest = goal[2] != 0
+    bounds = [(None, None), (None, None), (None if widest else 0.0, None)]
+    (phase, period), room = begin, np.inf
+    for _ in range(_ROUNDS):
+        left = changed - period * count
+        size = -(-len(left) // _BLOCKS)
+        blocks = [(first, left[first : first + size]) for first in range(0, len(left), size)]
+        extremes = [first + int(at) for first, block in blocks for at in (block.argmin(), block.argmax())]
+        grown = np.union1d(own, extremes)
+        if len(grown) == len(own) or (widest and room <= _ROOM):
+            break
+        own, n = grown, count[grown]
+        above = np.column_stack([np.ones_like(n), n, np.ones_like(n)])
+        below = above * [-1, -1, 1]
+        limits = np.r_[left[own], 1 - left[own]]
+        found = linprog(goal, np.vstack([above, below]), limits, bounds=bounds)
+        if not found.success:
+            return begin, -np.inf
+        phase, room = float(found.x[0]), float(found.x[2])
+        period += float(found.x[1])
+    return (phase, period), room

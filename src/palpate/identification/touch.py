@@ -1,0 +1,76 @@
+"""The same log with its touches in it: rows from before each touch to where the probe leaves.
+
+In contact, the place of the surface is only an offset, and the first depths are behind the filter's settling. But a
+contact whose stiffness grows from zero shows its exponent there more than anywhere. Models that are one-sided by
+themselves, with the place of the surface as a parameter, hold before the touch as after it, so nothing has to settle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Rows that hold the touches.
+
+    Args:
+        rows: shape (m,).
+        spans: number of the contact that each belongs to, shape (m,).
+        inside: which of them are those of the contacts proper, shape (m,).
+        force: filtered, less what it rests at out of contact, shape (m,).
+        resting: what it rests at [N].
+    """
+
+    rows: Rows
+    spans: Rows
+    inside: NDArray[np.bool_]
+    force: Array
+    resting: float
+
+
+def touching(
+    force: Array,
+    resting: float,
+    rows: Rows,
+    spans: Rows,
+    begins: Sequence[int],
+    margin: int,
+    usable: NDArray[np.bool_],
+) -> Touch | None:
+    """The rows in contact and those from `margin` before each touch; None if no touch is in the log.
+
+    Args:
+        force: filtered, shape (n,).
+        resting: what it rests at out of contact [N].
+        rows: in contact, settled, shape (m,).
+        spans: number of the contact that each belongs to, shape (m,).
+        begins: first row behind the touch of each contact.
+        margin: rows before the touch; fewer where the contact before is nearer, none where it is too near.
+        usable: rows whose filter remembers only valid readings, shape (n,).
+    """
+    before, left = [], 0
+    for number in np.unique(spans):
+        own = rows[spans == number]
+        first = max(begins[number] - margin, left + margin)
+        if first < begins[number]:
+            step = int(own[1] - own[0]) if len(own) > 1 else 1
+            fresh = np.arange(own[0] - step, first - 1, -step)
+            before += [(row, number) for row in fresh if usable[row]]
+        left = int(own[-1])
+    if not before:
+        return None
+    fresh, numbers = np.array(before, dtype=np.intp).T
+    every = np.r_[rows, fresh]
+    order = np.argsort(every)
+    inside = np.r_[np.ones(len(rows), bool), np.zeros(len(fresh), bool)]
+    return Touch(
+        every[order], np.r_[spans, numbers][order], inside[order], force[every[order]] - resting, resting
+    )

@@ -1,0 +1,208 @@
+"""The sensor's own samples, found behind readings that a faster log has held."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from palpate.identification.refreshes import refreshes_of
+
+STEP = 1 / 12
+"""Of the grid that the instants of 480 samples a second fall on, between 1000 rows a second [rows]."""
+
+
+def held(instants, samples, count):
+    """What `count` rows show of samples that came out at these instants: each row the last one until then."""
+    shown = np.searchsorted(instants, np.arange(count), side="right") - 1
+    return samples[shown]
+
+
+def grid(period, phase, count):
+    """An even grid of instants [rows] from before the first to the last row, the first shown in row 0."""
+    instants = phase + period * np.arange(-1, int(count / period) + 2)
+    return instants[instants <= count - 1]
+
+
+def noisy(seed, number):
+    return np.random.default_rng(seed).normal(size=number)
+
+
+def rows_of(instants):
+    return np.ceil(instants).astype(int)
+
+
+periods = st.floats(1.15, 12.0)
+phases = st.floats(0.001, 0.999).filter(lambda p: 0.01 < p * 25 % 1 < 0.99)
+"""Of a period; where a sample comes out at the very instant of a row, rounding decides which row shows it."""
+seeds = st.integers(0, 2**32 - 1)
+
+
+@settings(max_examples=40)
+@given(periods, phases, seeds)
+def test_any_even_grid_is_recovered(period, phase, seed):
+    count = 1500
+    instants = grid(period, phase * period, count)
+    values = held(instants, noisy(seed, len(instants)), count)
+    found = refreshes_of(values)
+    inside = instants[instants > 0]
+    wanted, rows = rows_of(inside), found.rows[found.instants > 0]
+    # The first sample and the last may stand so near to the edge of their row that they count as out of the log.
+    assert set(wanted[1:-1]) <= set(rows.tolist())
+    assert set(rows[1:-1]) <= set(wanted.tolist())
+    place = np.searchsorted(found.rows, wanted[1:-1])
+    # A sample is in the row before it shows for sure; together they are much narrower than that.
+    error = found.instants[place] - inside[1:-1]
+    assert np.abs(error).max() <= np.sqrt(3) * found.spread + 4 * period / len(wanted) + 1e-6
+    assert found.period == pytest.approx(period, abs=4 / len(wanted) + 1e-9)
+
+
+@settings(max_examples=25)
+@given(phases, seeds)
+def test_the_spread_holds_the_true_phase(phase, seed):
+    """480 in 1000: within a twelfth of a row, wherever the clock stands, and no nearer."""
+    instants = grid(25 / 12, phase * 25 / 12, 2000)
+    found = refreshes_of(held(instants, noisy(seed, len(instants)), 2000))
+    place = np.searchsorted(found.rows, rows_of(instants[5:-5]))
+    error = found.instants[place] - instants[5:-5]
+    assert found.spread == pytest.approx(STEP / np.sqrt(12), rel=1e-3)
+    assert np.abs(error).max() <= STEP / 2 * 1.001
+    assert np.ptp(error) < 1e-6, "the grid is as even as the clock's"
+
+
+def test_at_its_rate():
+    """Over all phases, the error has the deviation that is stated and no mean."""
+    errors, spreads = [], []
+    for seed in range(100):
+        phase = np.random.default_rng([seed, 1]).uniform(0, 25 / 12)
+        instants = grid(25 / 12, phase, 500)
+        found = refreshes_of(held(instants, noisy(seed, len(instants)), 500))
+        place = np.searchsorted(found.rows, rows_of(instants[5]))
+        errors.append(found.instants[place] - instants[5])
+        spreads.append(found.spread)
+    scaled = np.array(errors) / spreads
+    assert abs(scaled.mean()) < 3 / np.sqrt(100)
+    assert scaled.std() == pytest.approx(1.0, abs=0.15)  # of 100 numbers of an even distribution: 5 %
+
+
+@settings(max_examples=40)
+@given(st.sampled_from([25 / 12, 2.5, 3.3, 8.0]), phases, seeds, st.floats(0.02, 0.6))
+def test_samples_that_equal_the_one_before_are_there_all_the_same(period, phase, seed, share):
+    """They show no change: a resting force, coarsely converted."""
+    instants = grid(period, phase * period, 2000)
+    rng = np.random.default_rng(seed)
+    samples = noisy(seed, len(instants))
+    for k in np.flatnonzero(rng.uniform(size=len(samples)) < share):
+        samples[k] = samples[k - 1]
+    values = held(instants, samples, 2000)
+    found = refreshes_of(values)
+    place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
+    np.testing.assert_array_equal(found.rows[place], rows_of(instants[3:-3]))
+    np.testing.assert_array_equal(values[found.rows[place]], samples[3:-3])
+    assert np.abs(found.instants[place] - instants[3:-3]).max() <= np.sqrt(3) * found.spread + 0.02
+
+
+def test_a_sensor_that_rests_for_long_is_followed_through():
+    """Ten samples of fifty each, and nothing in between: the count goes on."""
+    instants = grid(25 / 12, 0.4, 3000)
+    samples = noisy(3, len(instants))
+    moving = (np.arange(len(samples)) // 60) % 2 == 0
+    samples = np.where(moving, samples, np.repeat(samples[::60], 60)[: len(samples)])
+    found = refreshes_of(held(instants, samples, 3000))
+    place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
+    assert np.abs(found.instants[place] - instants[3:-3]).max() <= STEP
+
+
+@pytest.mark.parametrize("drift", [-2e-4, -3e-5, 3e-5, 2e-4])
+def test_a_clock_that_is_off_by_parts_in_a_million_is_not_taken_for_the_nominal_one(drift):
+    """Over 20 s, 0.2 per mille is four rows; every sample is found, and far nearer than the row it shows in."""
+    period = 25 / 12 * (1 + drift)
+    instants = grid(period, 0.3, 20_000)
+    found = refreshes_of(held(instants, noisy(4, len(instants)), 20_000))
+    place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
+    assert found.period == pytest.approx(period, abs=1e-6)
+    # The rows that a drifting grid passes leave less than STEP open.
+    assert np.abs(found.instants[place] - instants[3:-3]).max() < 0.02
+    assert found.spread < STEP / np.sqrt(12)
+
+
+@pytest.mark.parametrize("nominal", [2.0, 3.0, 10.0])
+@pytest.mark.parametrize("slips", [-2.4, -1.6, 0.0, 1.6, 2.4])
+def test_a_clock_in_step_with_the_rows_but_for_a_few(nominal, slips):
+    """A sample more or less every some seconds: near 2 rows, one kind looks nearly like the other."""
+    instants = grid(nominal * (1 + slips / 20_000), 0.3, 20_000)
+    found = refreshes_of(held(instants, noisy(4, len(instants)), 20_000))
+    own = instants[3:-3]
+    place = np.searchsorted(found.rows, rows_of(own))
+    np.testing.assert_array_equal(found.rows[place], rows_of(own))
+    error = found.instants[place] - own
+    assert np.abs(error).max() < 1.0
+    # What moves the lag of all of them is the mean, and that is stated: up to a whole row in step, less after slips.
+    assert abs(error.mean()) <= np.sqrt(3) * found.spread + 1e-3
+    if slips == 0:
+        assert found.spread == pytest.approx(1 / np.sqrt(12), rel=0.01)
+
+
+def test_a_clock_without_an_even_beat_leaves_each_sample_half_a_row_before_it_shows():
+    rng = np.random.default_rng(5)
+    instants = np.cumsum(25 / 12 + rng.uniform(-0.6, 0.6, 900))
+    samples = noisy(6, 900)
+    values = held(np.r_[-1.0, instants], np.r_[0.0, samples], 1800)
+    found = refreshes_of(values)
+    own = np.intersect1d(found.rows, rows_of(instants), return_indices=True)
+    assert len(own[0]) >= 860  # two samples within one row are one change
+    error = found.instants[own[1]] - instants[own[2]]
+    assert np.abs(error).max() <= 0.5 + 1e-9
+    # What is stated is how well the mean of them is known, which the lag is confounded with.
+    assert abs(error.mean()) < 4 * found.spread
+    assert found.spread < 0.02
+
+
+@pytest.mark.parametrize(("period", "repeated"), [(1.0, 0.0), (1.05, 0.0), (1.0, 0.2), (1.0, 0.6)])
+def test_a_channel_as_fast_as_the_log_is_fresh_in_every_row(period, repeated):
+    """However often it reads the same twice."""
+    instants = grid(period, 0.0, 500)
+    rng = np.random.default_rng(7)
+    samples = noisy(7, len(instants))
+    for k in np.flatnonzero(rng.uniform(size=len(samples)) < repeated):
+        samples[k] = samples[k - 1]
+    found = refreshes_of(held(instants, samples, 500))
+    np.testing.assert_array_equal(found.rows, np.arange(500))
+    np.testing.assert_array_equal(found.instants, np.arange(500.0))
+    assert (found.spread, found.period) == (0.0, 1.0)
+
+
+@given(st.integers(1, 9), st.integers(0, 400))
+def test_what_hardly_ever_changes_has_no_grid_of_its_own(changes, first):
+    values = np.zeros(5000)
+    for k in range(changes):
+        values[first + 480 * k + 1 :] += 1.0
+    found = refreshes_of(values)
+    np.testing.assert_array_equal(found.rows, np.arange(5000))
+
+
+@pytest.mark.parametrize("period", [60.0, 100.3, 1000.7])
+def test_a_sensor_a_hundred_times_slower_than_the_log(period):
+    instants = grid(period, 0.3, 20_000)
+    found = refreshes_of(held(instants, noisy(9, len(instants)), 20_000))
+    own = instants[instants > 0]
+    place = np.searchsorted(found.rows, rows_of(own))
+    assert np.abs(found.instants[place] - own).max() <= 0.5
+    assert found.period == pytest.approx(period, rel=1e-3)
+
+
+def test_a_lone_change_long_before_all_others_does_not_hide_them():
+    instants = grid(25 / 12, 0.3, 60_000)
+    samples = noisy(10, len(instants))
+    samples[: len(samples) * 9 // 10] = 0.0
+    samples[3:] += 1.0
+    found = refreshes_of(held(instants, samples, 60_000))
+    place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
+    assert np.abs(found.instants[place] - instants[3:-3]).max() <= STEP
+
+
+def test_the_readings_alone_count_not_their_size():
+    instants = grid(25 / 12, 0.7, 1000)
+    values = held(instants, noisy(8, len(instants)), 1000)
+    one, other = refreshes_of(values), refreshes_of(-1e-3 * values + 50)
+    np.testing.assert_array_equal(one.instants, other.instants)
+    np.testing.assert_array_equal(one.rows, other.rows)
