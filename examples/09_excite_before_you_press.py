@@ -1,0 +1,39 @@
+"""Design a force that shows stiffness, damping and mass, press with it, and see whether it told what was foretold.
+
+The surface is known here, so that the answer can be judged. For one that is not, give ranges: the design serves all
+of a range. `palpate excite` does the same from the command line. The touch itself, which a design leaves out of
+account, tells something of its own about K.
+"""
+
+import palpate
+from palpate.bench import build
+from palpate.bench.experiment import parse
+from palpate.excitation import Budget, Question, SurfaceRange, design
+from palpate.records import Record
+from palpate.report.excitation_files import experiment
+from palpate.signals.low_pass import LowPass
+
+truth = {"K": 5200.0, "B": 200.0, "M": 0.3}
+surfaces = SurfaceRange(*((value, value) for value in truth.values()))
+precision = {"K": 0.05, "B": 0.05, "M": 0.2}
+found = design(Question(surfaces, Budget(mean=15.0, peak=20.0), precision))
+print(f"{len(found.wave.frequencies)} sines for {found.seconds:g} s")
+
+press = parse(experiment(found), "the design")  # the same text that `palpate excite --experiment` writes
+run = build(press).run(press.run.duration, seed=1, press=press.run.press)
+rows = run["phase"] == 1.0
+columns = {"time": run["t"][rows], "position": run["x"][rows], "force": run["force_sampled"][rows]}
+sensor = LowPass.parse("butterworth3:120")
+told = palpate.identify(
+    Record(columns, {"time": "s", "position": "m", "force": "N"}),
+    model="kelvin-voigt-mass",
+    force_filter=sensor,
+    lag=sensor.lag + run.meta["instruments"]["force"]["delay_s"],
+    bonded=True,
+)
+for name, foretold in found.made.worst(found.seconds).items():
+    p = told.parameters[name]
+    half = (p.ci95[1] - p.ci95[0]) / 2 / truth[name]
+    print(
+        f"{name}: {p.value:.4g} {p.unit}, in truth {truth[name]:g}; ± {half:.1%}, foretold ± {foretold:.1%}"
+    )

@@ -1,0 +1,68 @@
+"""A sweep between the two frequencies that tell most."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.excitation.budget import used_up
+from palpate.excitation.prediction import Made, Prediction
+from palpate.excitation.question import Question
+from palpate.references.waves import Chirp
+
+Array = NDArray[np.float64]
+
+_ENDS = 6  # places for each end of the sweep
+_FINE = 64  # frequencies of a sweep that are looked at
+
+
+def make(question: Question, seconds: float) -> Made:
+    """The best sweep of so many seconds: from where to where, and whether evenly or logarithmically."""
+    budget = question.budget
+    grid = np.geomspace(budget.lowest, budget.highest, _ENDS)
+    sweeps = [
+        Chirp(float(low), float(high), seconds, 1.0, logarithmic)
+        for low, high, logarithmic in product(grid, grid, (False, True))
+        if low < high and low * seconds >= 1
+    ] or [Chirp(budget.lowest, budget.highest, seconds, 1.0, False)]
+    made = (_predicted(question, _within_budget(question, sweep)) for sweep in sweeps)
+    return min(made, key=lambda found: found.excess(seconds, question.precision))
+
+
+def _frequencies(sweep: Chirp) -> Array:
+    """What the sweep passes at even times [rad/s], shape (_FINE,)."""
+    share = (np.arange(_FINE) + 0.5) / _FINE
+    if sweep.logarithmic:
+        return 2 * np.pi * sweep.low * (sweep.high / sweep.low) ** share
+    return 2 * np.pi * (sweep.low + share * (sweep.high - sweep.low))
+
+
+def _within_budget(question: Question, sweep: Chirp) -> Chirp:
+    omega = _frequencies(sweep)
+
+    def share(amplitude: float) -> float:
+        felt = float(np.abs(question.forces(omega, np.full(_FINE, amplitude))).max())
+        return min(_share(question, sweep._replace(amplitude=amplitude)), question.budget.swing / felt)
+
+    return sweep._replace(amplitude=used_up(share, question.budget.desired_swing))
+
+
+def _share(question: Question, sweep: Chirp) -> float:
+    return question.budget.share(sweep.amplitude, 2 * np.pi * sweep.high * sweep.amplitude)
+
+
+def _predicted(question: Question, sweep: Chirp) -> Made:
+    omega = _frequencies(sweep)
+    forces = question.forces(omega, np.full(_FINE, sweep.amplitude))
+    information = question.information(omega, forces).mean(axis=1)
+    predictions = []
+    for surface, force, told in zip(question.surfaces.surfaces(), forces, information, strict=True):
+        felt = float(np.abs(force).max())
+        travel = 2 * float(np.abs(force / surface.impedance(omega)).max())
+        between = (question.budget.mean - felt, question.budget.mean + felt)
+        predictions.append(
+            Prediction(surface, question.surfaces.names, told, question.prior, between, travel)
+        )
+    return Made(sweep, tuple(predictions), gap=0.0)

@@ -1,0 +1,128 @@
+"""A multisine whose power lies where it tells most, and whose peaks are low."""
+
+from __future__ import annotations
+
+from math import ceil, floor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError
+from palpate.excitation.budget import used_up
+from palpate.excitation.phases import low_peak, summed
+from palpate.excitation.prediction import Made, Prediction
+from palpate.excitation.question import Question
+from palpate.excitation.spectra import optimal
+from palpate.references.waves import Multisine
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+Harmonics = NDArray[np.intp]
+
+PERIOD = 2.0
+"""Of a multisine that may last longer [s]; its frequencies lie 1/PERIOD apart."""
+_LINES, _MOST = 32, 128  # frequencies that the spectrum is looked for on, and that the wave is made of
+_ROUNDS = 6
+_QUICK, _THOROUGH = 60, 500  # rounds of clipping, to choose a width and for good
+_USUAL_CREST = 1.5
+_FAINT = 0.003  # of the strongest power; a line below it is left out
+_MIXES = (0.0, 0.5, 0.8, 0.95)
+_POINTS = 32  # a cycle of the highest line
+_WIDTHS = (0.01, 0.05, 0.1, 0.2, 0.4, 0.8)  # of a line, in the frequency's logarithm
+
+
+def make(question: Question, seconds: float) -> Made:
+    """The best multisine of so many seconds, a whole number of its periods.
+
+    Where the budget limits the rate of change, power at high frequencies is made dearer until it pays no more.
+
+    Raises:
+        InputError: the band has room for fewer than two frequencies.
+    """
+    mixes = _MIXES if np.isfinite(question.budget.rate) else _MIXES[:1]
+    return min(
+        (_make(question, seconds, mix) for mix in mixes),
+        key=lambda made: made.excess(seconds, question.precision),
+    )
+
+
+def _make(question: Question, seconds: float, mix: float) -> Made:
+    harmonics, base = _harmonics(question, seconds), 2 * np.pi / _period(question, seconds)
+    places = np.unique(np.round(np.geomspace(1, len(harmonics), _LINES)).astype(np.intp)) - 1
+    omega = base * harmonics[places].astype(np.float64)
+    costs = (1 - mix) + mix * omega**2 / np.mean(omega**2)
+    powers, gap = np.full(len(omega), 1 / costs.sum()), np.inf
+    strength = question.budget.desired_swing / _USUAL_CREST
+    for _ in range(_ROUNDS):  # friction makes the answer depend on the power, so the two are found in turns
+        forces = question.forces(omega, strength * np.sqrt(2 * powers))
+        unit = seconds * question.information(omega, forces) / powers[:, None, None]
+        found = optimal(unit, question.prior, question.wanted, question.criterion, costs, powers)
+        powers, gap = found.powers, found.gap
+
+    def spread(width: float, rounds: int) -> Made:
+        amplitudes = _spread(omega, powers, base * harmonics.astype(np.float64), width)
+        used = amplitudes > 0
+        phases = low_peak(amplitudes[used], harmonics[used], rounds)
+        return _within_budget(question, harmonics[used], base, amplitudes[used], phases, gap)
+
+    tried = {width: spread(width, _QUICK).excess(seconds, question.precision) for width in _WIDTHS}
+    return spread(min(tried, key=tried.__getitem__), _THOROUGH)
+
+
+def _spread(omega: Array, powers: Array, dense: Array, width: float) -> Array:
+    """Amplitudes on a dense grid of frequencies, each line of a spectrum spread over a width of the logarithm.
+
+    A few lines side by side beat: their peak is high, and the budget of force leaves them little power. Spread over
+    many lines with the right phases they tell almost as much a unit of power, and the budget leaves them more of it.
+    """
+    distance = np.log(dense[:, None] / omega) / width
+    shares = np.exp(-0.5 * distance**2) * np.gradient(np.log(dense))[:, None]
+    spread = (shares / shares.sum(axis=0)) @ powers
+    return np.sqrt(np.where(spread > _FAINT * spread.max(), spread, 0.0))
+
+
+def _within_budget(
+    question: Question, harmonics: Harmonics, base: float, amplitudes: Array, phases: Array, gap: float
+) -> Made:
+    """As strong as the budget allows, for the desired force and for the force on every surface."""
+    omega, start = base * harmonics.astype(np.float64), np.exp(1j * phases)
+
+    def share(strength: float) -> float:
+        asked = strength * amplitudes * start
+        peak, slope = np.abs(summed(np.stack([asked, 1j * omega * asked]), harmonics, _POINTS)).max(axis=1)
+        phasors = question.forces(omega, strength * amplitudes) * start
+        felt = np.abs(summed(phasors, harmonics, _POINTS)).max()
+        return min(question.budget.share(float(peak), float(slope)), question.budget.swing / float(felt))
+
+    amplitudes = amplitudes * used_up(share, question.budget.desired_swing)
+    forces = question.forces(omega, amplitudes)
+    told = question.information(omega, forces).sum(axis=1)
+    predictions = []
+    for surface, force, information in zip(question.surfaces.surfaces(), forces, told, strict=True):
+        felt_there = question.budget.mean + summed(force * start, harmonics, _POINTS)
+        moved = summed(force / surface.impedance(omega) * start, harmonics, _POINTS)
+        between = float(felt_there.min()), float(felt_there.max())
+        names, prior = question.surfaces.names, question.prior
+        predictions.append(Prediction(surface, names, information, prior, between, float(np.ptp(moved))))
+    frequencies = omega / (2 * np.pi)
+    wave = Multisine(tuple(frequencies.tolist()), tuple(amplitudes.tolist()), tuple(phases.tolist()))
+    return Made(wave, tuple(predictions), gap)
+
+
+def _period(question: Question, seconds: float) -> float:
+    """The usual period, or the one next to it of which `seconds` are a whole number [s]."""
+    usual = max(PERIOD, 1 / question.budget.lowest)
+    return seconds / max(1, floor(seconds / usual + 1e-9))
+
+
+def _harmonics(question: Question, seconds: float) -> Harmonics:
+    """Those of the period that lie in the band; of many, every second, third or so."""
+    budget, period = question.budget, _period(question, seconds)
+    first, last = max(ceil(budget.lowest * period - 1e-9), 1), floor(budget.highest * period + 1e-9)
+    if last <= first:
+        raise InputError(
+            f"a multisine of {seconds:g} s has fewer than two frequencies between {budget.lowest:g} and "
+            f"{budget.highest:g} Hz; make it longer or the band wider"
+        )
+    return np.arange(first, last + 1, ceil((last - first + 1) / _MOST))

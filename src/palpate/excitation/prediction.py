@@ -1,0 +1,69 @@
+"""What an excitation will tell about a surface, known before the robot moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.excitation.spectra import covariance
+from palpate.excitation.surfaces import Surface
+from palpate.references.waves import Chirp, Multisine
+
+Array = NDArray[np.float64]
+Wave = Multisine | Chirp
+
+ALL = ("K", "B", "M")
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Of one surface.
+
+    Args:
+        surface: which.
+        names: of the parameters that are identified.
+        information: about them (of their logarithms) and the lag, of a second, shape (n, n).
+        prior: known beforehand about the same, shape (n, n).
+        force: lowest and highest force on the surface [N].
+        travel: of the tip, from end to end [m].
+    """
+
+    surface: Surface
+    names: tuple[str, ...]
+    information: Array
+    prior: Array
+    force: tuple[float, float]
+    travel: float
+
+    def half_widths(self, seconds: float) -> dict[str, float]:
+        """95 % half-width of each parameter, as a share of its value, after so many seconds."""
+        C = covariance(seconds * self.information, self.prior)
+        return {name: 1.96 * float(np.sqrt(C[i, i])) for i, name in enumerate(self.names)}
+
+
+@dataclass(frozen=True)
+class Made:
+    """A wave about the mean force, and what it will tell.
+
+    Args:
+        wave: added to the mean force [N].
+        predictions: one a surface.
+        gap: by how much its spectrum may at most miss the best there is, as a share of the criterion.
+    """
+
+    wave: Wave
+    predictions: tuple[Prediction, ...]
+    gap: float
+
+    def worst(self, seconds: float) -> dict[str, float]:
+        """The largest half-width of each parameter on any surface, as a share of its value."""
+        widths = [prediction.half_widths(seconds) for prediction in self.predictions]
+        return {name: max(found[name] for found in widths) for name in self.predictions[0].names}
+
+    def excess(self, seconds: float, precision: Mapping[str, float]) -> float:
+        """The largest half-width per that asked for, of any parameter on any surface: at most 1 is good enough."""
+        widths = self.worst(seconds)
+        return max(widths[name] / asked for name, asked in precision.items())

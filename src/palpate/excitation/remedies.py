@@ -1,0 +1,95 @@
+"""What would help where an excitation cannot do what is asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+from palpate.excitation.design import MAKERS, Design, needed
+from palpate.excitation.question import LONGEST, Question
+
+_MUCH = 10.0  # times the force
+_HELPS, _SOONER = 0.95, 0.5  # of the excess, or of the time needed; what helps less is no remedy
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A change of the limits, and what it would bring.
+
+    Args:
+        change: in words.
+        reached: largest half-width of each parameter on any surface with it.
+        enough: whether that is what was asked.
+        needed: how long it must last with it [s], the change of the duration aside; may be infinite.
+    """
+
+    change: str
+    reached: dict[str, float]
+    enough: bool
+    needed: float
+
+
+def remedies(found: Design) -> list[Remedy]:
+    """Of more time, more force, faster changes, a wider band and a better known lag those that help.
+
+    If none is enough by itself, all of them at once.
+    """
+    helpful = []
+    if found.needed <= LONGEST:
+        told = f"{ceil(found.needed)} s instead of {found.seconds:g} s"
+        helpful.append(Remedy(told, found.made.worst(found.needed), True, found.needed))
+    together = found.question
+    for change in (_stronger, _steeper, _wider, _synchronous):
+        words, other = change(found.question, found.excess)
+        if other == found.question:
+            continue
+        tried = _tried(words, other, found.seconds)
+        if _excess(tried, found) < _HELPS * found.excess or tried.needed < _SOONER * found.needed:
+            helpful.append(tried)
+            together = change(together, found.excess)[1]
+    if len(helpful) > 1 and not any(remedy.enough for remedy in helpful):
+        helpful.append(_tried("all of these", together, found.seconds))
+    return helpful
+
+
+def _tried(words: str, question: Question, seconds: float) -> Remedy:
+    made = MAKERS[question.kind](question, seconds)
+    enough = made.excess(seconds, question.precision) <= 1
+    return Remedy(words, made.worst(seconds), enough, needed(made, question))
+
+
+def _excess(tried: Remedy, found: Design) -> float:
+    return max(tried.reached[name] / asked for name, asked in found.question.precision.items())
+
+
+def _stronger(question: Question, excess: float) -> tuple[str, Question]:
+    budget, more = question.budget, min(1.1 * excess, _MUCH)
+    swing = more * budget.swing
+    mean = max(budget.mean, budget.least + swing)
+    drive = None if budget.drive is None else more * budget.drive
+    words = (
+        f"a force of {mean:.3g} N with {swing:.3g} N to each side instead of {budget.mean:g} N "
+        f"with {budget.swing:g} N"
+    )
+    return words, replace(question, budget=replace(budget, mean=mean, peak=mean + swing, drive=drive))
+
+
+def _steeper(question: Question, excess: float) -> tuple[str, Question]:
+    rate = question.budget.rate
+    faster = min(1.1 * excess, _MUCH) * rate
+    words = f"a force that changes by {faster:.3g} N/s instead of {rate:g} N/s"
+    return words, replace(question, budget=replace(question.budget, rate=faster))
+
+
+def _wider(question: Question, _excess: float) -> tuple[str, Question]:
+    budget = question.budget
+    highest = max(budget.highest, min(2 * budget.highest, 0.45 * question.sensors.force.sampling))
+    words = f"frequencies up to {highest:g} Hz instead of {budget.highest:g} Hz"
+    return words, replace(question, budget=replace(budget, highest=highest))
+
+
+def _synchronous(question: Question, _excess: float) -> tuple[str, Question]:
+    sensors = question.sensors
+    exact = replace(sensors, lag_std=0.0, force=replace(sensors.force, phase_std=0.0))
+    words = f"a lag between force and position known exactly, not to {1e6 * sensors.lag_error:.0f} us"
+    return words, replace(question, sensors=exact)

@@ -1,0 +1,80 @@
+"""What the sensors make of a motion: information about the surface, a second and a frequency at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import hypot
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError
+from palpate.excitation.surfaces import Surface
+from palpate.identification.information import ForceChain, phase_std
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
+
+LAG_UNIT = 1e-4
+"""The lag is counted in tenths of a millisecond, so that it is of the size of the relative parameters."""
+_SURE = 1e-8  # s; a lag known better is known as well as exactly
+
+
+def bench_chain() -> ForceChain:
+    """The force sensor of the bench, logged at 1 kHz."""
+    return ForceChain(phase_std=phase_std(480, 1000))
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Of force and position, and the log that keeps what they say.
+
+    Args:
+        force: the force sensor's chain.
+        position_step: of the position's quantisation [m].
+        rate: positions a second [Hz].
+        lag_std: how well the lag between force and position is calibrated [s].
+    """
+
+    force: ForceChain = field(default_factory=bench_chain)
+    position_step: float = 1.6e-6
+    rate: float = 1000.0
+    lag_std: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, low in (("position_step", 0.0), ("lag_std", 0.0), ("rate", 1e-9)):
+            if not low <= getattr(self, name) < np.inf:
+                raise InputError(f"{name} of the sensors must be {low:g} or above, got {getattr(self, name)}")
+
+    def information(self, surface: Surface, omega: Array, force: Complex) -> Array:
+        """Fisher information about (ln K, ln B, ln M, lag) of a second at each frequency, shape (F, 4, 4).
+
+        Both noises are white; that of the position acts like a force of |Z H| times its size. The offset is known
+        from the mean alone, and the mean says nothing else as long as the touch is not known exactly.
+
+        Args:
+            surface: what is touched.
+            omega: angular frequencies [rad/s], shape (F,).
+            force: phasors of the force on the surface [N], shape (F,).
+        """
+        low_pass, Z = self.force.low_pass.at(omega), surface.impedance(omega)
+        s = 1j * omega
+        K, B, M = surface.values
+        motion = low_pass * force / Z
+        columns = np.stack([K + 0 * s, B * s, M * s**2, -s * Z * LAG_UNIT], axis=-1) * motion[:, None]
+        quantised = (np.abs(Z * low_pass) * self.position_step) ** 2 / 12
+        density = self.force.noise**2 / self.force.sampling + quantised / self.rate  # N^2/Hz, of both signs
+        outer = np.real(columns[:, :, None] * np.conj(columns[:, None, :]))
+        return outer / (2 * density[:, None, None])
+
+    def prior(self) -> Array:
+        """Information about the same four before anything has moved: that of the lag, shape (4, 4)."""
+        known = np.zeros((4, 4))
+        known[3, 3] = (LAG_UNIT / max(self.lag_error, _SURE)) ** 2
+        return known
+
+    @property
+    def lag_error(self) -> float:
+        """What is not known of the lag, the phase of the samples included: a standard deviation [s]."""
+        return hypot(self.lag_std, self.force.phase_std)
