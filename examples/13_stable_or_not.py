@@ -1,0 +1,29 @@
+"""Ask the linear model whether a force loop is stable, how near it is to not being so, and on which surfaces.
+
+The model is the bench's own tick, differentiated where the arm presses at rest: all three joints, the sensor's lag, its
+480 samples a second under a loop of 1000. Friction is left out; with it (friction=True) what would swing may stick.
+"""
+
+from palpate.analysis import linearise, margins, stable_intervals, stable_stiffness
+from palpate.bench import load
+from palpate.bench.experiment import changed
+
+foam = load("foam-hybrid")
+loop = linearise(foam)
+slowest = loop.modes[0]
+print(
+    f"foam: {'stable' if loop.stable else 'unstable'}, the slowest motion dies away at {-slowest.rate:.2f} /s"
+)
+for mode in loop.modes[:6]:
+    if mode.frequency > 0.0:
+        print(f"  it swings at {mode.frequency:.1f} Hz, damping ratio {mode.damping:.2f}")
+found = margins(loop)
+print(f"  it bears {found.gain:.1f} times the gain, or {1e3 * found.delay:.0f} ms more of lag")
+
+low, high = stable_stiffness(foam, 1e3, 1e6)
+print(f"the same gains are stable up to {high / 1e3:.0f} kN/m, B_e being {foam.surface.damping:g} N s/m")
+
+stiff = changed(foam, {"surface.stiffness": 1.2 * high})
+print(f"a fifth beyond: {'stable' if linearise(stiff).stable else 'unstable'}")
+for low, high in stable_intervals(stiff, "controller.kf", 0.0, 2.0):
+    print(f"  there kf may lie in {low:.2f} ... {high:.2f}")

@@ -1,0 +1,13 @@
+"""Many runs: parameters over anything that an experiment has, metrics by name, one table; resumable at any moment.
+
+from palpate.studies import run
+frame = run(text_of_a_study, "runs/mine")
+"""
+
+from __future__ import annotations
+
+from palpate.studies.local import Local
+from palpate.studies.metrics import METRICS, Metric
+from palpate.studies.running import run
+
+__all__ = ["METRICS", "Local", "Metric", "run"]

@@ -1,0 +1,79 @@
+"""The rows of a study as one table, in the order of the runs whatever the order in which they were finished."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from palpate.errors import InputError
+from palpate.logs import whole
+from palpate.studies.metrics import METRICS
+from palpate.studies.one import Row
+from palpate.studies.plan import Plan
+
+if TYPE_CHECKING:
+    from polars import DataFrame
+
+NAME = "results.parquet"
+CHUNK = 20_000
+"""Rows that are taken at a time from text to columns."""
+
+
+def table(plan: Plan, rows: Iterable[Row]) -> DataFrame:
+    """The rows as columns: run, parameters, seed, result, why, metrics; each run once, sorted by its number."""
+    import polars
+
+    schema = _schema(plan)
+    frames = [polars.DataFrame(columns, schema=schema) for columns in _columns(plan, rows)]
+    joined = polars.concat(frames) if frames else polars.DataFrame(schema=schema)
+    return joined.unique("run", keep="first", maintain_order=True).sort("run").rechunk()
+
+
+def write(frame: DataFrame, plan: Plan, path: Path) -> None:
+    """Writes the table as Parquet, whole or not at all; units and texts of the metrics in the file's own metadata.
+
+    Raises:
+        InputError: the disk is full.
+    """
+    import polars
+
+    about = {name: {"unit": METRICS[name].unit, "text": METRICS[name].text} for name in plan.study.metrics}
+    metadata = {"palpate": msgspec.json.encode({"title": plan.study.title, "metrics": about}).decode()}
+    try:
+        with whole(path) as draft:
+            frame.write_parquet(draft, metadata=metadata)
+    except (OSError, polars.exceptions.PolarsError) as error:
+        raise InputError(
+            f"{path}: {_line(error)}; the runs are saved: free some space, and the same command writes the table"
+        ) from error
+
+
+def _columns(plan: Plan, rows: Iterable[Row]) -> Iterator[dict[str, list[Any]]]:
+    left, texts = iter(rows), [name for name, kind in plan.columns.items() if kind is str]
+    while chunk := list(islice(left, CHUNK)):
+        columns: dict[str, list[Any]] = {"run": [r.run for r in chunk]}
+        for name in plan.columns:
+            values = [r.at.get(name) for r in chunk]
+            columns[name] = [None if v is None else str(v) for v in values] if name in texts else values
+        columns |= {"result": [r.result for r in chunk], "why": [r.why for r in chunk]}
+        columns |= {name: [r.metrics[i] for r in chunk] for i, name in enumerate(plan.study.metrics)}
+        yield columns
+
+
+def _schema(plan: Plan) -> dict[str, Any]:
+    import polars
+
+    kinds = {int: polars.Int64, float: polars.Float64, bool: polars.Boolean, str: polars.String}
+    told = {name: kinds[kind] for name, kind in plan.columns.items()}
+    metrics = dict.fromkeys(plan.study.metrics, polars.Float64)
+    return {"run": polars.Int64, **told, "result": polars.String, "why": polars.String, **metrics}
+
+
+def _line(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return (str(error).splitlines() or [type(error).__name__])[0]

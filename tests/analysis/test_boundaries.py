@@ -1,0 +1,44 @@
+"""Where the loop is stable, over any number of the experiment."""
+
+import pytest
+
+from analysis.worlds import surface
+from palpate.analysis import linearise, stable_intervals, stable_stiffness
+from palpate.bench.experiment import changed
+from palpate.errors import InputError
+
+# Of a tip alone, y and phi left out, as a feasibility study had them [N/m].
+ONE_DIRECTION = [(60.0, 1.0, 0.003, 12e3), (480.0, 0.25, 0.0015, 410e3)]
+
+
+@pytest.mark.parametrize(("damping", "kf", "ki", "limit"), ONE_DIRECTION)
+def test_the_limits_are_those_of_one_direction_but_for_what_the_others_do(damping, kf, ki, limit):
+    """The arm's joints share their inertia, and 20 N on a moving lever are a spring: up to a fifth."""
+    low, high = stable_stiffness(surface(1e4, damping, kf, ki), 1e3, 1e6)
+    assert low == 1e3
+    assert high == pytest.approx(limit, rel=0.21)
+
+
+def test_the_boundary_is_where_the_growth_is_one():
+    base = surface(1e4, 480.0, 1.0, 0.003)
+    low, high = stable_stiffness(base, 5e4, 2e5, x=0.4688)
+    assert low == 5e4
+    for share in (0.999, 1.001):
+        on = linearise(changed(base, {"surface.stiffness": share * high}), x=0.4688)
+        assert on.stable == (share < 1.0)
+
+
+def test_intervals_of_a_gain():
+    ((low, high),) = stable_intervals(surface(5e4, 480.0, 1.0, 0.003), "controller.kf", 0.0, 10.0)
+    assert low == 0.0
+    assert 1.0 < high < 10.0
+    assert not linearise(surface(5e4, 480.0, 1.05 * high, 0.003)).stable
+
+
+def test_what_has_no_interval_is_told():
+    with pytest.raises(InputError, match="no stiffness from"):
+        stable_stiffness(surface(1e4, 60.0, 1.0, 0.003), 1e5, 2e5)
+    with pytest.raises(InputError, match="lower end first"):
+        stable_intervals(surface(1e4, 60.0, 1.0, 0.003), "controller.kf", 2.0, 1.0)
+    with pytest.raises(InputError, match="stiffnes"):
+        stable_intervals(surface(1e4, 60.0, 1.0, 0.003), "surface.stiffnes", 1.0, 2.0)

@@ -1,0 +1,129 @@
+"""A study on a Dask cluster of real processes: the same table as here, whatever dies on the way."""
+
+import threading
+import time
+from types import SimpleNamespace
+
+import pytest
+from distributed import KilledWorker
+
+from palpate.errors import InputError
+from palpate.studies import cluster as clusters
+from palpate.studies.cluster import Cluster, run_batch
+from palpate.studies.local import Local
+from palpate.studies.one import Job
+from palpate.studies.running import Work
+from palpate.studies.sources import sources
+from studies.cluster import local_cluster
+from studies.small import SMALL, Formula, planned
+
+MORE = SMALL.replace("points = 3", "points = 20")
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory):
+    """The table of `MORE` from the threads of this process."""
+    folder = tmp_path_factory.mktemp("here") / "out"
+    Work(planned(MORE), MORE, folder, Local()).done()
+    return (folder / "results.parquet").read_bytes()
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    with local_cluster(tmp_path, workers=2) as running:
+        yield running
+
+
+def on(address, folder, **options):
+    """The table of `MORE` from a cluster."""
+    runner = Cluster(address, **options)
+    try:
+        Work(planned(MORE), MORE, folder, runner).done()
+    finally:
+        runner.close()
+    return (folder / "results.parquet").read_bytes()
+
+
+def test_two_workers_make_the_table_that_threads_make_and_one_may_die(cluster, tmp_path, here, monkeypatch):
+    monkeypatch.setattr(clusters, "UNIT", 0.02)  # more batches than two, so that the death falls among them
+    assert on(cluster.address, tmp_path / "both") == here
+
+    def kill():
+        time.sleep(0.3)
+        cluster.workers[0].kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    assert on(cluster.address, tmp_path / "one") == here
+    killer.join()
+    assert cluster.workers[0].wait() != 0
+
+
+def test_a_cluster_that_goes_away_loses_nothing(cluster, tmp_path, here, monkeypatch):
+    monkeypatch.setattr(clusters, "UNIT", 0.02)
+    folder, source = tmp_path / "out", MORE
+
+    def leave(finished):
+        if finished >= 20:
+            cluster.scheduler.kill()
+
+    runner = Cluster(cluster.address)
+    with pytest.raises(InputError, match="went away") as gone:
+        Work(planned(source), source, folder, runner, leave).done()
+    runner.close()
+    assert "the same command goes on from there" in str(gone.value)
+    Work(planned(source), source, folder, Local()).done()
+    assert (folder / "results.parquet").read_bytes() == here
+
+
+def test_a_cluster_without_workers_is_told_of(tmp_path):
+    with local_cluster(tmp_path, workers=0) as empty, pytest.raises(InputError, match="has had no worker"):
+        on(empty.address, tmp_path / "out", patience=1.0)
+
+
+def test_no_scheduler_is_told_of(monkeypatch):
+    monkeypatch.setattr(clusters, "CONNECT", 0.5)
+    for address in ("tcp://127.0.0.1:9", "nonsense://x", "127.0.0.1:notaport"):
+        with pytest.raises(InputError, match="no Dask scheduler answers at"):
+            Cluster(address)
+
+
+def jobs(count):
+    plan = planned(SMALL)
+    return [Job(plan.setting(i), tuple(plan.study.metrics), None, False) for i in range(count)]
+
+
+def test_a_worker_with_other_sources_refuses():
+    with pytest.raises(InputError, match="another version of palpate"):
+        run_batch(jobs(1), "0123456789abcdef")
+    assert len(run_batch(jobs(2), sources())) == 2
+
+
+class Deadly:
+    """A batch that its workers died of."""
+
+    def result(self):
+        raise KilledWorker("task", SimpleNamespace(address="tcp://10.0.0.7:1"), 3)
+
+
+def test_of_runs_that_kill_workers_each_is_tried_alone_and_becomes_a_row():
+    hand = clusters._Hand(None, "tcp://somewhere", 1.0)
+    assert hand._taken(Deadly(), jobs(2)) is None
+    ((row, record),) = hand._taken(Deadly(), jobs(1))
+    assert (row.run, row.result, row.metrics, record) == (0, "failed", (None, None, None), None)
+    assert "tcp://10.0.0.7:1" in row.why
+
+
+def test_batches_grow_to_the_unit():
+    batches = clusters._Batches(iter(jobs(12) * 100))
+    first = next(batches)
+    assert 0.5 * clusters.UNIT < len(first) * 0.2 * 1000 * clusters.TICK < 1.5 * clusters.UNIT
+    batches.took(
+        [(row, None) for row, _ in Formula(lambda _: 0.0).run(first[:1])]
+    )  # which says that it took 1 s
+    batches._seconds = 0.05
+    assert len(next(batches)) == 4
+    batches._seconds = 5.0
+    assert len(next(batches)) == 1
+    batches.again(first[:2])
+    assert [len(next(batches)) for _ in range(3)] == [1, 1, 1]
