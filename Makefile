@@ -34,9 +34,11 @@ format: .venv/dev.stamp ## wrap the code, sort the imports, mend what ruff can m
 
 check: lint test ## everything that has to pass before a commit
 
-bench: .venv/run.stamp ## measure what a tick, an update and a cold start cost here
+bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold start cost here
 	$(BIN)/palpate speed
-	$(BIN)/python benchmarks/tick.py
+	-$(BIN)/python benchmarks/c_yardstick/compare.py
+	$(BIN)/python benchmarks/side_by_side.py
+	$(BIN)/python benchmarks/many_runs.py
 	$(BIN)/python benchmarks/least_squares.py
 	$(BIN)/python benchmarks/cold_start.py
 

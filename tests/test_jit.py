@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 import palpate
@@ -277,3 +278,48 @@ def test_a_part_of_a_script_leaves_nothing_in_the_cache(workshop):
     for _ in range(2):
         assert workshop.run("script.py")[1] is False
     assert {path.name: path.stat().st_size for path in cache.iterdir()} == before
+
+
+@part
+class Trace(NamedTuple):
+    """A part with an array in it, beside parts of plain numbers only."""
+
+    place: Mat3
+    kept: np.ndarray
+
+    def renewed(self, x):
+        """With another array, each number of it greater by x."""
+        greater = np.zeros(len(self.kept))
+        for i in range(len(greater)):
+            greater[i] = self.kept[i] + x
+        return Trace(self.place, greater)
+
+
+@kernel
+def renewing(trace, n):
+    for _ in range(n):
+        trace = trace.renewed(1.0)
+    return trace
+
+
+@pytest.fixture
+def allocations():
+    """Numba's own account of its arrays, while a test runs."""
+    from numba.core.runtime import _nrt_python, rtsys
+
+    _nrt_python.memsys_enable_stats()
+    yield rtsys.get_allocation_stats
+    _nrt_python.memsys_disable_stats()
+
+
+def test_arrays_in_parts_live_as_long_as_they_are_held_and_no_longer(allocations):
+    """Numba counts references only where there are any; the count has to be right all the same."""
+    trace = Trace(Mat3(ZERO3, ZERO3, ZERO3), np.arange(3.0))
+    before = allocations()
+    for _ in range(100):
+        renewed = renewing(trace, 10)
+    np.testing.assert_array_equal(renewed.kept, np.arange(3.0) + 10.0)
+    np.testing.assert_array_equal(trace.kept, np.arange(3.0))
+    del renewed
+    after = allocations()
+    assert after.mi_alloc - before.mi_alloc == after.mi_free - before.mi_free >= 1000

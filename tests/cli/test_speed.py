@@ -5,8 +5,10 @@ from itertools import count
 
 import pytest
 
-from palpate.bench import speed
+from palpate.bench import build, load, speed
+from palpate.bench.experiment import changed
 from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import CONTACT
 
 
 def test_json_is_one_object_that_agrees_with_itself(program):
@@ -39,8 +41,15 @@ def test_the_figures_follow_from_a_clock_and_the_ticks_that_were_run(monkeypatch
     assert sum(marched) == (1 + 2 * speed.REPEATS) * a_run
     assert found["ns_per_tick"] == pytest.approx(1e9 / a_run)
     assert found["cores"] == 1
-    # Side by side the clock is looked at twice in each run, and once before and after all.
-    assert found["ticks_per_s"] == pytest.approx(speed.REPEATS * a_run / (2 * speed.REPEATS + 1))
+    # The clock goes on by one from before a run to after it, beside others or not.
+    assert found["ticks_per_s"] == pytest.approx(a_run)
+
+
+def test_what_is_measured_presses_and_learns():
+    bench = build(changed(load(speed.EXPERIMENT), speed.PRESSING))
+    record = bench.run(1.0)
+    assert (record["phase"] == CONTACT).mean() > 0.5
+    assert record["adapted2"][-1] != record["adapted2"][0]  # a norm of the network's weights
 
 
 def test_people_get_a_table(program):

@@ -10,7 +10,7 @@ from palpate._jit import kernel
 from palpate.errors import InputError
 from palpate.instruments import ForceSensor, force_sensor
 from palpate.instruments.converter import Converter
-from palpate.signals.filters import butterworth3
+from palpate.signals.filters import butterworth3, lowpass2
 
 
 @kernel
@@ -41,6 +41,34 @@ def test_sampling_does_not_drift():
 def test_intervals_are_41_or_42_steps():
     steps = instants(force_sensor(), 20000)
     assert {b - a for a, b in itertools.pairwise(steps)} == {41, 42}
+
+
+@pytest.mark.parametrize("phase", [0.0, 1e-4, 7.3e-4, 1.0 / 960.0, 2.0e-3])
+def test_a_phase_moves_every_sampling_instant(phase):
+    sensor = force_sensor(phase=phase)
+    steps = np.array(instants(sensor, 200000))
+    exact = np.ceil((sensor.shift + np.arange(4800) * 20000) / 480)
+    assert sensor.shift / (480 * 20000) == pytest.approx(phase, abs=0.06e-6)
+    np.testing.assert_array_equal(steps, exact)
+
+
+@pytest.mark.parametrize("phase", [0.0, 1e-4, 7.3e-4, 2.0e-3])
+@pytest.mark.parametrize("sampling", [480, 500, 1000, 333])
+def test_the_delay_of_a_sample_is_its_mean(phase, sampling):
+    """From the sampled step to the clock's tick after which the value is read, over all positions of the two clocks."""
+    sensor = force_sensor(sampling=sampling, phase=phase % (1.0 / sampling))
+    steps = np.array(instants(sensor, 60000 + 60000 // sampling))[: 3 * sampling + 1]
+    clock = (sensor.shift / (sampling * 20000.0)) + np.arange(1, 3 * sampling + 1) / sampling
+    readable = clock + 1.0 / 20000.0  # the step after the one that puts it out, as far as that can be told
+    assert np.mean(readable - steps[:-1] / 20000.0) == pytest.approx(sensor.delay, abs=1e-9)
+
+
+def test_the_filters_name_is_that_of_its_corner():
+    assert force_sensor().filter == "butterworth3:120"
+    assert force_sensor(cutoff=100.0 / 3.0).filter == "butterworth3:33.3333333"
+    sensor = force_sensor()
+    other = sensor._replace(analog=sensor.analog._replace(second=lowpass2(120.0, 0.8, 20000.0)))
+    assert other.filter == "unknown"
 
 
 def test_a_sample_comes_out_one_cycle_later_and_is_held():
@@ -94,3 +122,9 @@ def test_twelve_bits_of_400_newton():
 def test_bad_parameters_are_refused(sampling, noise, words):
     with pytest.raises(InputError, match=words):
         ForceSensor(butterworth3(120.0, 20000), Converter(12, 200.0), noise, sampling, 20000)
+
+
+@pytest.mark.parametrize("phase", [-1e-4, 1.0 / 480.0, 1.0])
+def test_a_phase_of_more_than_a_period_is_refused(phase):
+    with pytest.raises(InputError, match=r"phase must be at least 0 and below 0\.00208333 s"):
+        force_sensor(phase=phase)

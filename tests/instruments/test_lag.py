@@ -56,10 +56,9 @@ def stated():
 
 @pytest.mark.parametrize("measure", [lag_by_ramp, lag_by_sine])
 def test_the_force_chain_is_as_late_as_it_says(measure):
-    # The two clocks start together: they meet in 12 phases only, and a tick that falls on a sample sees the
-    # one before, so that the mean age is 1/24000 s more than half a cycle. Samples are taken at the first
-    # physics step after their time, 1/3 step late in the mean, and are that much younger.
-    seen = stated() + 1 / 24000 - 1 / 3 / PHYSICS
+    # The two clocks start together: they meet in 25 phases only, 1/12000 s apart, of which the oldest reading is a
+    # step younger than a cycle, so that the mean age is a step less 1/24000 s under half a cycle.
+    seen = stated() + 1 / 24000 - 1 / PHYSICS
     np.testing.assert_allclose(measure(chain)[[0, 2]], seen[[0, 2]], atol=2e-6)
     # The analog filter averages over the steps of the held line.
     np.testing.assert_allclose(measure(chain), stated(), atol=40e-6)

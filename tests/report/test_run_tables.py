@@ -1,11 +1,10 @@
 """A run's tables: figures with as many digits as they carry, and notes on what must not be missed."""
 
-import numpy as np
 import pytest
 
 from bench.quick import quick
 from palpate.bench import build, summarise
-from palpate.report.run_tables import _interval, _number, notes, tables
+from palpate.report.run_tables import notes, tables
 
 
 @pytest.fixture(scope="module")
@@ -64,27 +63,3 @@ def test_what_must_not_be_missed_is_noted(summary, changes, told):
     assert notes(quiet) == []
     (note,) = notes({**quiet, **changes})
     assert re.search(told, note)
-
-
-@pytest.mark.parametrize(
-    ("value", "half", "text"),
-    [
-        (5195.28, 15.4, "5195 ± 15"),
-        (5195.28, 1.54, "5195.3 ± 1.5"),
-        (0.0251, 0.282, "0.03 ± 0.28"),
-        (5195.28, 1540.0, "5195 ± 1540"),
-        (-0.0004, 0.00012, "-0.00040 ± 0.00012"),
-        (5195.28, 0.0, "5195 ± ?"),
-        (5195.28, np.nan, "5195 ± ?"),
-    ],
-)
-def test_an_interval_has_two_digits_of_its_half_width(value, half, text):
-    assert _interval(value, half) == text
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(None, "-"), (5195.28, "5195"), (0.034512, "0.03451"), (43897.2, "43897"), (2e5, "200000")],
-)
-def test_a_number_has_four_digits_where_they_mean_something(value, text):
-    assert _number(value) == text

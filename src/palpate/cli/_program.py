@@ -8,7 +8,10 @@ from cyclopts import App
 # and returns its exit code. The line is repeated here so that the help imports none of them.
 COMMANDS = {
     "identify": "Find what a robot touched, from a log: stiffness, damping, mass.",
+    "topics": "List what a log holds: topics, variables, columns.",
+    "excite": "Design a force that shows what a surface is, and say how well beforehand.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
+    "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "thesis": "Measure every figure and every claim of the thesis again.",
     "speed": "Measure what one tick of the closed loop costs here.",
 }

@@ -2,42 +2,106 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
+from palpate.cli._arm_options import ArmOptions, FrameOptions
+from palpate.cli._log_options import LogOptions, read
+from palpate.cli._values import with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
     from palpate.records import Record
 
-_NEGATIVE = Parameter(negative=())
+_FLAG = Parameter(negative=())
+
+
+@Parameter(name="*", group=Group("The model", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class ModelOptions:
+    """What is fitted, and what is known beforehand.
+
+    Parameters
+    ----------
+    model
+        kelvin-voigt, kelvin-voigt-mass, standard-linear-solid or hunt-crossley; chosen if not given.
+    lag
+        How much later the force is read than the position, SECONDS or SECONDS:STD, if it is calibrated.
+    force_filter
+        What the force went through before it was sampled, as butterworth3:120 (order and Hz), joined by +; or none.
+    mass
+        What is known of the mass beforehand, in kg, VALUE or VALUE:STD.
+    tolerance
+        Largest half-width of an identified parameter's 95 % interval, as a share of its value.
+    calibration
+        Relative standard deviation of the scales of force and position together, as 0.01.
+    bonded
+        The probe is fixed to the surface, or is not; found out if neither is said.
+    cutoff
+        Of the filters that all channels pass through, in Hz; chosen if not given.
+    """
+
+    model: str | None = None
+    lag: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    force_filter: str | None = None
+    mass: str | None = None
+    tolerance: float = 0.25
+    calibration: float = 0.0
+    bonded: bool | None = None
+    cutoff: float | None = None
+
+    def known(self, log: Path, options: LogOptions) -> dict[str, Any]:
+        """The keywords of `palpate.identify`; a run of palpate's own says itself what measured it."""
+        from palpate.logs.own_runs import is_run, measured_by
+
+        known: dict[str, Any] = measured_by(log) if options.plain and is_run(log) else {}
+        lag = with_std("lag", self.lag)
+        if lag is not None:
+            known |= {"lag": lag[0], "lag_std": lag[1]}
+        if self.force_filter is not None:
+            known["force_filter"] = None if self.force_filter == "none" else self.force_filter
+        if self.mass is not None:
+            known["mass"] = with_std("mass", self.mass, "0.5:0.02")
+        names = ("model", "tolerance", "calibration", "bonded", "cutoff")
+        return known | {name: getattr(self, name) for name in names}
+
+
+@Parameter(name="*", group=Group("What is written", sort_key=5))
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions:
+    """Where results go.
+
+    Parameters
+    ----------
+    figure
+        Where to write the figure, a PNG; LOG.identify.png in the current folder if not given.
+    no_figure
+        Write no figure.
+    report
+        Where to write a page with everything, an HTML file.
+    json
+        Print one JSON object and nothing else; a figure is written only if --figure is given.
+    """
+
+    figure: Path | None = None
+    no_figure: Annotated[bool, _FLAG] = False
+    report: Path | None = None
+    json: Annotated[bool, _FLAG] = False
 
 
 def identify(
     log: Path,
     /,
     *,
-    time: str | None = None,
-    rate: float | None = None,
-    position: str | None = None,
-    force: str | None = None,
-    model: str | None = None,
-    lag: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    tolerance: float = 0.25,
-    calibration: float = 0.0,
-    series_stiffness: str | None = None,
-    bonded: bool | None = None,
-    start: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
-    end: float | None = None,
-    missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = (),
-    delimiter: str | None = None,
-    cutoff: float | None = None,
-    figure: Path | None = None,
-    no_figure: Annotated[bool, _NEGATIVE] = False,
-    json: Annotated[bool, _NEGATIVE] = False,
+    source: LogOptions | None = None,
+    frame: FrameOptions | None = None,
+    arm: ArmOptions | None = None,
+    fitted: ModelOptions | None = None,
+    output: OutputOptions | None = None,
 ) -> int:
     """Find what a robot touched, from a log: stiffness, damping, mass.
 
@@ -45,133 +109,92 @@ def identify(
 
     palpate identify press.csv --time time_s --position position_mm:mm --force force_mN:mN
 
+    A bag with one wrench and one pose needs no names; palpate topics LOG lists what a log holds:
+
+    palpate identify press.mcap --wrench-frame tool --tcp 0,0,120:mm
+
     Parameters
     ----------
     log
-        CSV, with or without a header, or Parquet.
-    time
-        Column of the time, in s if no unit is given; dates and times (ISO 8601) too.
-    rate
-        Rows per second, for a log without a column of time.
-    position
-        Column of the position, in m if no unit is given; the unit 1 takes the numbers as they stand.
-    force
-        Column of the force, in N if no unit is given; g is what a scale shows.
-    model
-        kelvin-voigt, kelvin-voigt-mass, standard-linear-solid or hunt-crossley; chosen if not given.
-    lag
-        How much later the force is read than the position, SECONDS or SECONDS:STD, if it is calibrated.
-    tolerance
-        Largest half-width of an identified parameter's 95 % interval, as a share of its value.
-    calibration
-        Relative standard deviation of the scales of force and position together, as 0.01.
-    series_stiffness
-        What lies between the position sensor and the surface, N/m or N/m:STD; it is taken out.
-    bonded
-        The probe is fixed to the surface, or is not; found out if neither is said.
-    start
-        Leave out what is before, in seconds from the first row.
-    end
-        Leave out what is after, in seconds from the first row.
-    missing
-        A value that means "no reading", as -1; may be given again. A plain one is found by itself.
-    delimiter
-        Between two cells of a CSV file; found if not given.
-    cutoff
-        Of the filters that all channels pass through, in Hz; chosen if not given.
-    figure
-        Where to write the figure, a PNG; LOG.identify.png in the current folder if not given.
-    no_figure
-        Write no figure.
-    json
-        Print one JSON object and nothing else; a figure is written only if --figure is given.
+        CSV, Parquet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; or the record.parquet of a run.
     """
-    from palpate.identification import identify as identify_record
-
-    picture = _picture(log, figure, wanted=not no_figure and (figure is not None or not json))
-    record = _read(log, time, rate, position, force, start, end, missing, delimiter)
-    known_lag = _with_std("lag", lag)
-    series = _with_std("series-stiffness", series_stiffness)
-    found = identify_record(
-        record,
-        model=model,
-        lag=known_lag[0] if known_lag else None,
-        lag_std=known_lag[1] if known_lag else 0.0,
-        tolerance=tolerance,
-        calibration=calibration,
-        series_stiffness=series[0] if series else None,
-        series_std=series[1] if series else 0.0,
-        bonded=bonded,
-        cutoff=cutoff,
-    )
-    if picture is not None and found.traces is not None:
-        from palpate.report.identification import write_figure
-
-        write_figure(found, picture, title=log.name)
-    _print(found, log, picture if found.traces is not None else None, json)
+    source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
+    fitted, output = fitted or ModelOptions(), output or OutputOptions()
+    figure, page = _figure(log, output), _page(output)
+    found, record = _identified(log, source, frame, arm, fitted)
+    if found.traces is None:
+        figure = None
+    _write(found, log, figure, page)
+    _print(found, record, log, [path for path in (figure, page) if path is not None], output.json)
     return 0 if found.found else 1
 
 
-def _read(
-    log: Path,
-    time: str | None,
-    rate: float | None,
-    position: str | None,
-    force: str | None,
-    start: float | None,
-    end: float | None,
-    missing: tuple[str, ...],
-    delimiter: str | None,
-) -> Record:
-    from palpate.logs import columns_of, read_log
+def _identified(
+    log: Path, source: LogOptions, frame: FrameOptions, arm: ArmOptions, fitted: ModelOptions
+) -> tuple[Identification, Record]:
+    from palpate.contact_frame import identify_contact, robot_stiffness
 
-    names = {"time": time, "position": position, "force": force}
-    there = columns_of(log, delimiter)
-    if rate is None:
-        names["time"] = time or ("time" if "time" in there else None)
-    for role in ("position", "force"):
-        names[role] = names[role] or (role if role in there else None)
-    lacking = [
-        role for role, name in names.items() if name is None and not (role == "time" and rate is not None)
-    ]
-    if lacking:
-        options = ", ".join(f"--{role}" for role in lacking)
-        if "time" in lacking:
-            options += " (or --rate)"
-        raise InputError(f"name the columns of {log} with {options}; there are: {', '.join(there)}")
-    columns = {role: name for role, name in names.items() if name is not None}
-    return read_log(log, rate=rate, start=start, end=end, missing=missing, delimiter=delimiter, **columns)
-
-
-def _with_std(option: str, text: str | None) -> tuple[float, float] | None:
-    """`VALUE` or `VALUE:STD` as two numbers."""
-    if text is None:
-        return None
-    try:
-        value, _, std = text.partition(":")
-        return float(value), float(std) if std else 0.0
-    except ValueError:
+    known = fitted.known(log, source)
+    said, between = frame.frame(), arm.arm()
+    record = read(log, source, samples=known.get("force_filter") is not None)
+    in_space = "force_x" in record.columns
+    if said is not None and not in_space:
         raise InputError(
-            f"--{option} needs VALUE or VALUE:STD, as 0.0076 or 0.0076:0.0002, got {text!r}"
-        ) from None
+            "--wrench-frame, --tcp, --normal and their like are of a wrench and a pose; this log has one axis"
+        )
+    if arm.robot_stiffness_from is not None:
+        wall = arm.robot_stiffness_from
+        whole = read(
+            wall, replace(source, start=None, end=None), samples=known.get("force_filter") is not None
+        )
+        rigid = replace(between, position_from="tip")
+        pressed, _ = identify_contact(whole, replace(said, free=None) if said else None, rigid, **known)
+        between = replace(between, stiffness=robot_stiffness(pressed, wall.name))
+    return identify_contact(record, said, between, **known)
 
 
-def _picture(log: Path, figure: Path | None, wanted: bool) -> Path | None:
+def _figure(log: Path, output: OutputOptions) -> Path | None:
     """Where the figure goes; found wrong before any work is done."""
-    if not wanted:
+    if output.no_figure or (output.figure is None and output.json):
         return None
-    path = figure if figure is not None else Path(f"{log.stem}.identify.png")
-    if path.suffix.lower() != ".png":
-        raise InputError(f"the figure is a PNG; name it {path.with_suffix('.png')} instead of {path}")
-    if not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no folder {path.parent}; make it first")
+    path = output.figure if output.figure is not None else Path(f"{log.stem}.identify.png")
+    _check_place(path, ".png", "the figure is a PNG")
     from palpate.report.ownership import check_ours
 
     check_ours(path)
     return path
 
 
-def _print(found: Identification, log: Path, picture: Path | None, json: bool) -> None:
+def _page(output: OutputOptions) -> Path | None:
+    """Where the page goes; likewise."""
+    path = output.report
+    if path is None:
+        return None
+    _check_place(path, ".html", "the report is an HTML file")
+    if path.is_dir() or (path.exists() and b"palpate identify" not in path.read_bytes()):
+        raise InputError(f"{path} is there and palpate did not write it; name another with --report")
+    return path
+
+
+def _check_place(path: Path, suffix: str, what: str) -> None:
+    if path.suffix.lower() != suffix:
+        raise InputError(f"{what}; name it {path.with_suffix(suffix)} instead of {path}")
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write {path}: there is no folder {path.parent}; make it first")
+
+
+def _write(found: Identification, log: Path, figure: Path | None, page: Path | None) -> None:
+    if figure is not None:
+        from palpate.report.identification import write_figure
+
+        write_figure(found, figure, title=log.name)
+    if page is not None:
+        from palpate.report.identification_page import write_page
+
+        write_page(found, page, title=log.name)
+
+
+def _print(found: Identification, record: Record, log: Path, written: list[Path], json: bool) -> None:
     if json:
         from json import dumps
 
@@ -179,8 +202,12 @@ def _print(found: Identification, log: Path, picture: Path | None, json: bool) -
         return
     from rich.console import Console
 
+    from palpate.contact_frame import told
     from palpate.report.identification_table import show
 
     show(found, log.name, Console(highlight=False))
-    if picture is not None:
-        Console(highlight=False, soft_wrap=True).print(f"figure: {picture}")
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    for line in told(record.meta):
+        console.print(line)
+    for path in written:
+        console.print(f"{'figure' if path.suffix.lower() == '.png' else 'report'}: {path}")

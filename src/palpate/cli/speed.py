@@ -14,7 +14,7 @@ def speed(*, json: Annotated[bool, Parameter(negative="")] = False) -> int:
     Args:
         json: print ns_per_tick, ticks_per_s, cores and times_real_time as JSON and nothing else.
     """
-    from palpate.bench.speed import STEPS, measure
+    from palpate.bench.speed import EXPERIMENT, STEPS, measure
     from palpate.cli._waiting import COMPILING
 
     figures = measure(waiting=lambda: print(COMPILING, file=sys.stderr))  # noqa: T201
@@ -24,7 +24,7 @@ def speed(*, json: Annotated[bool, Parameter(negative="")] = False) -> int:
         sys.stdout.write(msgspec.json.encode(figures).decode() + "\n")
         return 0
     print(  # noqa: T201
-        f"one tick of foam-hybrid, {STEPS} steps of the physics included: "
+        f"one tick of {EXPERIMENT}, pressing and learning, {STEPS} steps of the physics included: "
         f"{figures['ns_per_tick'] / 1e3:.2f} us on one core\n"
         f"{figures['times_real_time']:.0f} times real time; {figures['ticks_per_s']:.3g} ticks a second "
         f"on all {figures['cores']} cores"

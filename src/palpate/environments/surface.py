@@ -11,6 +11,7 @@ from palpate.errors import InputError
 
 _KELVIN_VOIGT, _SOLID, _HUNT_CROSSLEY = 0, 1, 2
 _MEMBERS = (KelvinVoigt(1, 0, 0), StandardLinearSolid(1, 0, 0, 0, 1), HuntCrossley(1, 0, 1, 0))
+BUILT_IN = (KelvinVoigt, StandardLinearSolid, HuntCrossley)
 
 
 @part
@@ -71,10 +72,9 @@ class Surface(NamedTuple):
 
 def join(environment: KelvinVoigt | StandardLinearSolid | HuntCrossley) -> Surface:
     """The surface that behaves as this environment."""
-    kinds = [type(member) for member in _MEMBERS]
-    if type(environment) not in kinds:
-        known = ", ".join(kind.__name__ for kind in kinds)
+    if type(environment) not in BUILT_IN:
+        known = ", ".join(kind.__name__ for kind in BUILT_IN)
         raise InputError(f"cannot join a {type(environment).__name__}; there are: {known}")
-    kind = kinds.index(type(environment))
+    kind = BUILT_IN.index(type(environment))
     members = (*_MEMBERS[:kind], environment, *_MEMBERS[kind + 1 :])
     return Surface._make((kind, environment.mass, *members))

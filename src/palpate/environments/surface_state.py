@@ -44,12 +44,31 @@ def impact(tip_mass, surface_mass, tip_velocity, surface_velocity):
 
 
 @law
+def opposing(surface, state, p, v, dt):
+    """Force [N] and mass [kg] with which a surface opposes a tip that moves with it: the two for `contact_force`.
+
+    Steps of dt leave the rate half a step behind p: at p it is v + a dt/2, so that damping acts as a mass of
+    dt/2 times itself. Where it is not proportional to the rate it is taken as the slope over a millimetre a second.
+
+    Args:
+        surface: the law of it.
+        state: at the moment of p.
+        p: penetration now [m].
+        v: its rate dt/2 ago [m/s].
+        dt: [s].
+    """
+    force = surface.force(state, p, v)
+    damping = (surface.force(state, p, v + 1e-3) - force) / 1e-3
+    return force, surface.mass + 0.5 * dt * damping
+
+
+@law
 def contact_force(force, surface_mass, tip_mass, free_acceleration):
     """Force [N] between tip and surface that move together; negative: they are about to part.
 
     Args:
         force: the surface's own, without inertia [N].
-        surface_mass: [kg].
+        surface_mass: of what moves with the tip [kg].
         tip_mass: effective mass of the tip along the normal, 1/(n^T J M^-1 J^T n) of an arm [kg].
         free_acceleration: of the tip into the surface if there were no normal contact force [m/s^2].
     """

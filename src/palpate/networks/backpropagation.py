@@ -26,17 +26,31 @@ def slope(s):
 
 
 @law
+def weighed(threshold, weights, signals):
+    """A neuron's sum. The weights come as a slice: the compiler then knows that no index is below zero."""
+    u = threshold
+    for i in range(len(weights)):
+        u += weights[i] * signals[i]
+    return u
+
+
+@law
+def shift(weights, d, signals):
+    """Moves a neuron's weights by d times what came in."""
+    for i in range(len(weights)):
+        weights[i] += d * signals[i]
+
+
+@law
 def forward(sizes, weights, signals):  # (4.23), (4.24)
     """Fills `signals` from the inputs on; the outputs are still without their amplitudes."""
     w, before = 0, 0
     for layer in range(1, len(sizes)):
         n = sizes[layer - 1]
         here = before + n
+        into = signals[before:here]
         for j in range(here, here + sizes[layer]):
-            u = weights[w]
-            for i in range(n):
-                u += weights[w + 1 + i] * signals[before + i]
-            signals[j] = sigmoid(u)
+            signals[j] = sigmoid(weighed(weights[w], weights[w + 1 : w + 1 + n], into))
             w += n + 1
         before = here
 
@@ -68,11 +82,11 @@ def descend(sizes, weights, signals, deltas, learning_rate, thresholds):  # (4.2
     for layer in range(1, len(sizes)):
         n = sizes[layer - 1]
         here = before + n
+        into = signals[before:here]
         for j in range(here, here + sizes[layer]):
             d = learning_rate * deltas[j]
             weights[w] += thresholds * d
-            for i in range(n):
-                weights[w + 1 + i] += d * signals[before + i]
+            shift(weights[w + 1 : w + 1 + n], d, into)
             w += n + 1
         before = here
 

@@ -1,22 +1,32 @@
-"""The figure of an identification: the force with its fit, what is left, and force against position."""
+"""The figure of an identification: everything that tells how far to trust it, on one picture."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from palpate.identification.result import Verdict
 from palpate.logs import whole
+from palpate.report import identification_fit as fit
+from palpate.report import identification_trust as trust
+from palpate.report import style
+from palpate.report.identification_growth import growth
+from palpate.report.identification_words import MARKS, headline, number, subtitle, unit
 from palpate.report.ownership import SIGNATURE
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from palpate.identification.result import Identification, Traces
 
-_MANY = 10_000
-_MEASURED, _FITTED, _TOUCH = "#4477aa", "#cc3311", "#ddaa33"
+_WIDE, _HIGH, _HEAD = 13.0, 11.6, 1.3
+_VERDICTS = {
+    Verdict.IDENTIFIED: style.GREEN,
+    Verdict.NOT_IDENTIFIABLE: style.ORANGE,
+    Verdict.REJECTED: style.RED,
+}
 
 
 def write_figure(found: Identification, path: Path, title: str) -> Path:
@@ -29,81 +39,102 @@ def write_figure(found: Identification, path: Path, title: str) -> Path:
     """
     figure = draw(found, title)
     with whole(path) as draft:
-        figure.savefig(draft, format="png", dpi=110, metadata={"Software": SIGNATURE})
+        figure.savefig(draft, format="png", dpi=style.DPI, metadata={"Software": SIGNATURE})
     return path
 
 
 def draw(found: Identification, title: str) -> Figure:
     """The figure of an identification; needs its traces."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     traces = found.traces
     if traces is None:
         raise ValueError("an identification without traces has no figure")
-    figure = Figure(figsize=(11, 6.2), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplot_mosaic("ffl;ffl;rrl", sharex=False)
-    _force(axes["f"], found, traces)
-    _residual(axes["r"], traces)
-    axes["r"].sharex(axes["f"])
-    _loop(axes["l"], traces)
-    figure.suptitle(_title(found, title), fontsize=11, x=0.01, ha="left")
+    with style.inked():
+        figure = _figure(_WIDE, _HIGH if len(traces.fitted_time) else _HIGH / 2)
+        ratios = _HEAD, figure.get_figheight() - _HEAD
+        parts: Any = figure.subfigures(2, 1, height_ratios=ratios)
+        head, body = parts
+        _head(head, found, title)
+        if not len(traces.fitted_time):
+            fit.force(_titled(body.subplots(), "Force over time"), found, traces)
+        else:
+            _panels(body, found, traces)
     return figure
 
 
-def _title(found: Identification, title: str) -> str:
-    parts = []
-    for name, p in found.parameters.items():
-        if name in ("K2", "K3"):
-            continue
-        unit = "" if p.unit == "1" else f" {p.unit}"
-        half = (p.ci95[1] - p.ci95[0]) / 2 if p.ci95 else 0.0
-        number = f"{p.value:.4g} ± {half:.3g}{unit}" if p.value is not None else "no number"
-        parts.append(f"{name} {number} ({p.verdict})")
-    return f"{title}: {found.model}, R² {found.r2:.4f}\n" + ",  ".join(parts)
+def _head(figure: Any, found: Identification, title: str) -> None:
+    """The log, the outcome, and each parameter with its verdict."""
+    figure.text(0.01, 0.97, title, fontsize=13, fontweight="bold", va="top")
+    figure.text(0.01, 0.75, headline(found), fontsize=11, va="top")
+    figure.text(0.01, 0.56, subtitle(found), fontsize=9, va="top")
+    wide = 1.0 / max(len(found.parameters), 4)
+    for i, (name, p) in enumerate(found.parameters.items()):
+        said = f"{name}  {number(p)} {unit(p) if p.value is not None else ''}"
+        figure.text(0.01 + i * wide, 0.35, said, fontsize=12, va="top")
+        verdict = f"{MARKS[p.verdict]} {p.verdict}"
+        figure.text(0.01 + i * wide, 0.14, verdict, fontsize=9.5, va="top", color=_VERDICTS[p.verdict])
 
 
-def _unit(name: str, unit: str) -> str:
-    return name if unit == "1" else f"{name} [{unit}]"
+def _panels(figure: Any, found: Identification, traces: Traces) -> None:
+    top, middle, bottom = figure.subfigures(3, 1, height_ratios=(1.15, 1.0, 1.25))
+    left, right = top.subplots(1, 2)
+    fit.loop(_titled(left, "Force against penetration"), found, traces)
+    fit.force(_titled(right, "Force over time"), found, traces)
+    left, right = middle.subplots(1, 2)
+    fit.residual(_titled(left, "What the model leaves"), found, traces)
+    trust.residual_spectrum(_titled(right, "Is it noise?"), found, traces)
+    left, right = bottom.subfigures(1, 2)
+    settle(left, found, "How the estimates settled")
+    excite(right, found, traces, "What was excited")
 
 
-def _force(axes: Any, found: Identification, traces: Traces) -> None:
-    for i, (start, end) in enumerate(found.contacts):
-        axes.axvspan(start, end, color=_TOUCH, alpha=0.15, lw=0, label="contact" if i == 0 else None)
-    axes.plot(traces.time, traces.force, color=_MEASURED, lw=1.2, label="force, filtered")
-    time, predicted = _broken(traces.fitted_time, traces.predicted)
-    axes.plot(time, predicted, color=_FITTED, lw=1.2, label=found.model)
-    axes.set_ylabel(_unit("force", traces.force_unit))
-    axes.legend(loc="best", frameon=False, fontsize=8)
-    axes.tick_params(labelbottom=False)
+def settle(figure: Any, found: Identification, title: str = "") -> None:
+    """How the estimates settled, one panel a parameter."""
+    grown = growth(found)
+    names = trust.settled(grown)
+    if not names:
+        trust.empty(figure.subplots(), "too few samples to watch the estimates settle")
+        return
+    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for i, (name, axis) in enumerate(zip(names, axes, strict=True)):
+        trust.settling(_titled(axis, title if i == 0 else ""), found, name, grown[name])
+    style.legend(axes[0])
+    axes[-1].set_xlabel("data up to [s]")
 
 
-def _residual(axes: Any, traces: Traces) -> None:
-    time, left = _broken(traces.fitted_time, traces.fitted_force - traces.predicted)
-    axes.axhline(0, color="0.7", lw=0.8)
-    axes.plot(time, left, color=_FITTED, lw=0.9)
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel(_unit("misfit", traces.force_unit))
+def excite(figure: Any, found: Identification, traces: Traces, title: str = "") -> None:
+    """What was excited, and under it which term carries the force."""
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.6, 1))
+    trust.excitation(_titled(above, title), found, traces)
+    trust.shares(_titled(below, ""), found, traces)
+    above.set_xlabel("")
 
 
-def _loop(axes: Any, traces: Traces) -> None:
-    scale, unit = (1e3, "mm") if traces.position_unit == "m" else (1.0, traces.position_unit)
-    _, position = _broken(traces.fitted_time, scale * traces.fitted_position)
-    _, measured = _broken(traces.fitted_time, traces.fitted_force)
-    _, predicted = _broken(traces.fitted_time, traces.predicted)
-    # Lines between thinned samples would cross where no motion was, so many samples are dots.
-    many = len(position) > _MANY
-    style = {"ls": "", "marker": ".", "ms": 1.5, "mew": 0} if many else {"lw": 1.0}
-    axes.plot(position, measured, color=_MEASURED, label="measured", **style)
-    axes.plot(position, predicted, color=_FITTED, label="fit", **style)
-    axes.set_xlabel(_unit("position from touch", unit))
-    axes.set_ylabel(_unit("force", traces.force_unit))
-    axes.legend(loc="best", frameon=False, fontsize=8)
+def one(
+    panel: Callable[[Axes, Identification, Traces], None], found: Identification, traces: Traces
+) -> Figure:
+    """A figure of one panel."""
+    with style.inked():
+        figure = _figure(6.4, 3.5)
+        panel(_titled(figure.subplots(), ""), found, traces)
+    return figure
 
 
-def _broken(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lines that are not drawn across the time between two contacts."""
-    step = np.diff(time)
-    gaps: np.ndarray | list[int] = np.flatnonzero(step > 3 * np.median(step)) + 1 if len(step) else []
-    return np.insert(time, gaps, np.nan), np.insert(values, gaps, np.nan)
+def several(draw_on: Callable[[Any], None]) -> Figure:
+    """A figure of panels that somebody draws on it."""
+    with style.inked():
+        figure = _figure(6.4, 4.4)
+        draw_on(figure)
+    return figure
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=style.DPI, layout="constrained")
+
+
+def _titled(axis: Axes, text: str) -> Axes:
+    style.plain(axis)
+    if text:
+        axis.set_title(text, loc="left", fontsize=10.5, fontweight="bold")
+    return axis

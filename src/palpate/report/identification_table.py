@@ -8,6 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 from palpate.identification import Identification, Parameter, Verdict
+from palpate.report.identification_words import number, unit
+from palpate.report.numbers import NONE, between
 
 _STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 _MANY = 6
@@ -57,18 +59,16 @@ def _table(found: Identification) -> Table:
         table.add_column(title, justify="right" if title in ("value",) else "left", no_wrap=True)
     for name, p in found.parameters.items():
         style = _STYLES[p.verdict]
-        table.add_row(
-            name, _value(p), _interval(p), "" if p.unit == "1" else p.unit, Text(str(p.verdict), style=style)
-        )
+        table.add_row(name, _value(p), _interval(p), unit(p), Text(str(p.verdict), style=style))
     return table
 
 
 def _value(p: Parameter) -> str:
-    return "-" if p.value is None else f"{p.value:.4g}"
+    return NONE if p.value is None else number(p)
 
 
 def _interval(p: Parameter) -> str:
-    return "-" if p.ci95 is None else f"{p.ci95[0]:.4g} to {p.ci95[1]:.4g}"
+    return NONE if p.ci95 is None else between(*p.ci95)
 
 
 def _note(console: Console, label: str, text: str, style: str) -> None:

@@ -6,6 +6,9 @@ import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from palpate.report.ownership import SIGNATURE
 
 
 @dataclass(frozen=True)
@@ -28,23 +31,42 @@ def page(
     notes: Sequence[str] = (),
 ) -> str:
     """The page as HTML; `figures` are PNG files with a caption each, put into the page."""
-    from jinja2 import Environment, PackageLoader
-
-    from palpate import __version__
-
-    template = Environment(loader=PackageLoader("palpate.report", ""), autoescape=True).get_template(
-        "page.html"
-    )
-    return template.render(
+    return render(
+        "page.html",
         title=title,
         about=about,
         notes=notes,
         tables=tables,
-        figures=[
-            {"data": base64.b64encode(path.read_bytes()).decode(), "caption": caption}
-            for path, caption in figures.items()
-        ],
+        figures=[{"source": png(path), "caption": caption} for path, caption in figures.items()],
         source=source,
         command=command,
-        version=__version__,
     )
+
+
+def render(template: str, package: str = "palpate.report", **values: Any) -> str:
+    """A page from a template, which may extend `base.html`: how every page of palpate looks.
+
+    Args:
+        template: its file's name.
+        package: where it lies.
+        values: what it shows; `base.html` itself wants a `title` and the `command` that made the page, and takes
+            the `seconds` it took.
+    """
+    from jinja2 import ChoiceLoader, Environment, PackageLoader
+
+    from palpate import __version__
+
+    folders = dict.fromkeys((package, "palpate.report"))
+    loader = ChoiceLoader([PackageLoader(folder, "") for folder in folders])
+    environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return environment.get_template(template).render(version=__version__, signature=SIGNATURE, **values)
+
+
+def png(path: Path) -> str:
+    """A PNG file as the source of an image that lies in the page itself."""
+    return embedded(path.read_bytes(), "image/png")
+
+
+def embedded(data: bytes, kind: str) -> str:
+    """Anything as the source of an image that lies in the page itself; `kind` is its media type."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
+from palpate.report.numbers import NONE, plain, with_half
 from palpate.report.page import Table
-
-NONE = "-"
 
 
 def tables(summary: dict[str, Any]) -> list[Table]:
@@ -61,12 +59,12 @@ def _identified(summary: dict[str, Any]) -> Table:
         rows.append(
             (
                 label,
-                _number(found["thesis"][name]),
-                _number(found["raw"][name]),
-                _interval(found["matched"][name], half),
+                plain(found["thesis"][name]),
+                plain(found["raw"][name]),
+                with_half(found["matched"][name], half),
                 found["matched_verdict"][name],
-                _number(ratio.get(name)),
-                _number(truth[name]["value"]) if name in truth else NONE,
+                plain(ratio.get(name)),
+                plain(truth[name]["value"]) if name in truth else NONE,
             )
         )
     head = ("", "thesis", "raw", "matched, 95 %", "verdict", "f / x", "truth")
@@ -75,16 +73,3 @@ def _identified(summary: dict[str, Any]) -> Table:
         head,
         rows,
     )
-
-
-def _interval(value: float, half: float) -> str:
-    """Value and half-width, to two digits of the latter."""
-    if not half > 0.0:
-        return f"{_number(value)} ± ?"
-    decimals = max(0, 1 - math.floor(math.log10(half)))
-    return f"{value:.{decimals}f} ± {half:.{decimals}f}"
-
-
-def _number(value: float | None) -> str:
-    """Four digits where they mean something."""
-    return NONE if value is None else f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"

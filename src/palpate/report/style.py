@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +15,20 @@ if TYPE_CHECKING:
 
 INK = "#222222"
 BLUE, ORANGE, GREEN, RED, VIOLET, GREY = "#1f6fb4", "#e07b16", "#2a9254", "#c4342d", "#7b53a6", "#8a8a8a"
+SAND = "#ddaa33"
+GRID = "#e6e6e6"
+VEIL = "#d0d0d0"
 DPI = 110
+
+
+@contextmanager
+def inked() -> Iterator[None]:
+    """Letters, ticks and frames of what is drawn inside are in ink, not in black, so that a page can turn them."""
+    import matplotlib
+
+    parts = ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color")
+    with matplotlib.rc_context(dict.fromkeys(parts, INK)):
+        yield
 
 
 def figure(
@@ -31,9 +46,21 @@ def figure(
 
 def plain(axis: Axes) -> None:
     """A light grid behind the data, and no frame above and to the right."""
-    axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
+    axis.grid(visible=True, color=GRID, linewidth=0.8)
     axis.set_axisbelow(True)
     axis.spines[["top", "right"]].set_visible(False)
+
+
+def logarithmic(axis: Axes, which: str) -> None:
+    """Powers of ten along `x` or `y` as plain numbers, with steps between where they are few; limits first."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set(**{f"{which}scale": "log"})
+    own = axis.xaxis if which == "x" else axis.yaxis
+    low, high = axis.get_xlim() if which == "x" else axis.get_ylim()
+    own.set_major_locator(LogLocator(subs=(1.0,) if high > 100 * low else (1.0, 2.0, 5.0)))
+    own.set_major_formatter("{x:g}")
+    own.set_minor_formatter(NullFormatter())
 
 
 def legend(axis: Axes, **options: Any) -> None:

@@ -1,0 +1,185 @@
+"""The compiled tick against the same arithmetic written by hand in C: first that they agree, then what each costs.
+
+foam-neural: arm, contact, LuGre friction, sensors, hybrid law, a 9-12-3 network that learns, three recursive least
+squares and the row of the record. The C is built as it stands, IEEE: optimised, but no operation changed or left out.
+Bursts of the two take turns, C before and after each of the kernel's, so that both have met the same machine.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.analysis.still import exact
+from palpate.analysis.trees import vector
+from palpate.bench import build, load, start_at
+from palpate.bench.row import COLUMNS
+from palpate.bench.tick import Loop, compiled_march
+
+HERE = Path(__file__).parent
+FLAGS = "-O3 -march=native -ffp-contract=off -fno-math-errno -std=c11 -shared -fPIC"
+"""The kernel is compiled for this machine's processor as well; -fno-math-errno changes no result."""
+EXPERIMENT = "foam-neural"
+WIDTH = len(COLUMNS)
+SECONDS = 12.0
+"""Of the trajectory that both are compared on: approach, touch, and some seconds of pressing and learning."""
+AGREED = 1e-8
+TARGET, MOST = 1.3, 1.5
+TICKS, BURSTS = 2000, 41
+
+Array = NDArray[np.float64]
+March = Callable[[Array, Array], None]
+"""Marches from where it stands: one tick for each number of noise, its row into the array."""
+
+
+def main() -> int:
+    with library() as lib:
+        apart, column = disagreement(lib)
+        print(
+            f"trajectories of {SECONDS:g} s, no noise, exact instruments: {apart:.1e} apart ({column}), of the largest"
+        )
+        ratio, c, ours = bursts(lib)
+    print(
+        f"a tick in C: {1e6 * c:.2f} us; compiled by palpate: {1e6 * ours:.2f} us (medians of {BURSTS} bursts)"
+    )
+    print(f"ratio: {ratio:.2f}; the target is {TARGET}, the most that is acceptable {MOST}")
+    return 0 if apart <= AGREED and ratio <= MOST else 1
+
+
+def disagreement(lib: ctypes.CDLL) -> tuple[float, str]:
+    """The largest difference of the two trajectories, in terms of each column's largest number, and its column."""
+    bench = build(load(EXPERIMENT))
+    loop = exact(bench.loop)
+    noise = np.zeros(round(SECONDS / loop.tick))
+    ours, theirs = np.empty((2, len(noise), WIDTH))
+    in_kernel(loop, bench.q)(noise, ours)
+    in_c(lib, loop, bench.q)(noise, theirs)
+    scale = np.abs(ours).max(axis=0)
+    apart = np.abs(ours - theirs).max(axis=0) / np.where(scale > 0.0, scale, 1.0)
+    worst = int(np.argmax(apart))
+    return float(apart[worst]), list(COLUMNS)[worst]
+
+
+def bursts(lib: ctypes.CDLL) -> tuple[float, float, float]:
+    """Median ratio of kernel to the C around it, and the median times of a tick in C and in the kernel [s]."""
+    bench = build(load(EXPERIMENT))
+    noise, out = np.random.default_rng(0).standard_normal(TICKS), np.empty((TICKS, WIDTH))
+    engines = in_c(lib, bench.loop, bench.q), in_kernel(bench.loop, bench.q)
+    # Into contact and learning first, where a tick costs most.
+    for engine in engines:
+        for _ in range(round(10.0 / bench.loop.tick / TICKS)):
+            engine(noise, out)
+    times = [seconds(engines[i % 2], noise, out) / TICKS for i in range(2 * BURSTS + 1)]
+    before, ours, after = (np.array(t) for t in (times[0:-1:2], times[1::2], times[2::2]))
+    c = 0.5 * (before + after)
+    return float(np.median(ours / c)), float(np.median(c)), float(np.median(ours))
+
+
+def seconds(engine: March, noise: Array, out: Array) -> float:
+    """Of the processor, in this thread: what else runs on the machine takes its turns outside."""
+    begun = time.thread_time()
+    engine(noise, out)
+    return time.thread_time() - begun
+
+
+def in_kernel(loop: Loop, q) -> March:
+    """The bench's own compiled loop."""
+    state, done = start_at(loop, q), 0
+
+    def march(noise: Array, out: Array) -> None:
+        nonlocal state, done
+        state = compiled_march(loop, state, done, noise, out)
+        done += len(noise)
+
+    return march
+
+
+def in_c(lib: ctypes.CDLL, loop: Loop, q) -> March:
+    """The same loop by hand."""
+    numbers, weights = laid_out(loop, q)
+    assert len(numbers) == lib.bench_numbers(), (len(numbers), lib.bench_numbers())
+    bench, done = lib.bench_new(pointer(numbers), pointer(weights)), 0
+
+    def march(noise: Array, out: Array) -> None:
+        nonlocal done
+        lib.bench_march(bench, done, len(noise), pointer(noise), pointer(out), WIDTH)
+        done += len(noise)
+
+    return march
+
+
+def laid_out(loop: Loop, q) -> tuple[Array, Array]:
+    """The loop's numbers in the order of `numbers` in parts.h, and the network's weights at the start."""
+    plant, estimators, front = loop.plant, loop.estimators, loop.estimators.front
+    neural, schedule = loop.controller.first, loop.schedule
+    assert loop.controller.chosen == 1
+    assert plant.surface.kind == 0
+    assert len(schedule.wave) == 0
+    sequence = loop.sequence
+    parts = (
+        (loop.start, plant.arm, plant.friction, plant.surface.kelvin_voigt, plant.side, plant.wall),
+        loop.encoder,
+        loop.force,
+        loop.output,
+        loop.conditioning,
+        sequence,
+        tuple(schedule)[:6],
+        loop.approach,
+        (
+            neural.kp,
+            neural.kv,
+            neural.kf,
+            neural.offset,
+            neural.network.amplitude,
+            neural.network.learning_rate,
+        ),
+        loop.compensation,
+        (estimators.thesis, estimators.raw, estimators.matched, front, estimators.centring, estimators.touch),
+        (loop.tick, loop.steps, q),
+    )
+    return vector(parts), np.ascontiguousarray(neural.network.weights)
+
+
+def pointer(array: Array):
+    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+
+
+@contextmanager
+def library() -> Iterator[ctypes.CDLL]:
+    """The C, compiled by the machine's own compiler."""
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "tick.so"
+        command = [
+            os.environ.get("CC", "cc"),
+            *shlex.split(FLAGS),
+            str(HERE / "tick.c"),
+            "-o",
+            str(target),
+            "-lm",
+        ]
+        try:
+            subprocess.run(command, check=True)  # noqa: S603 - the machine's compiler on our own source
+        except FileNotFoundError:
+            sys.exit(f"no C compiler: {command[0]} is not there; install one, or name it in CC")
+        lib = ctypes.CDLL(str(target))
+        number, numbers = ctypes.c_long, ctypes.POINTER(ctypes.c_double)
+        lib.bench_new.restype, lib.bench_new.argtypes = ctypes.c_void_p, [numbers, numbers]
+        lib.bench_numbers.restype = ctypes.c_ulong
+        lib.bench_march.restype = None
+        lib.bench_march.argtypes = [ctypes.c_void_p, number, number, numbers, numbers, number]
+        yield lib
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,108 @@
+"""Options that say how an arm's wrench and pose stand to each other, and what lies between sensors and surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Group, Parameter
+
+from palpate.cli._values import span, vector, with_std
+from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from palpate.contact_frame import Arm, ContactFrame
+
+_SIGNED = Parameter(allow_leading_hyphen=True)
+
+
+@Parameter(name="*", group=Group("Wrench and pose", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class FrameOptions:
+    """Axes, points and signs of a wrench and a pose.
+
+    Parameters
+    ----------
+    wrench_frame
+        Axes of the wrench: the arm's base, the tool (those of the pose), or a sensor turned against the tool.
+    sensor_rpy
+        How the sensor is turned against the tool: roll,pitch,yaw in degrees, or with :rad.
+    tcp
+        The point that touches, in the tool's axes from the pose's origin: x,y,z in m, or with :mm.
+    wrench_at
+        The point that the torque is about, likewise; the pose's origin if not given.
+    force_sign
+        action: what the tool exerts; reaction: what the surface exerts on the tool. Found if not given.
+    normal
+        Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Found from the force if not given.
+    gravity_compensated
+        The tool's weight is already taken off the wrench.
+    free
+        BEGIN,END in seconds of a stretch in which nothing is touched; found if not given.
+    """
+
+    wrench_frame: Literal["base", "tool", "sensor"] | None = None
+    sensor_rpy: Annotated[str | None, _SIGNED] = None
+    tcp: Annotated[str | None, _SIGNED] = None
+    wrench_at: Annotated[str | None, _SIGNED] = None
+    force_sign: Literal["action", "reaction"] | None = None
+    normal: Annotated[str | None, _SIGNED] = None
+    gravity_compensated: Annotated[bool, Parameter(negative=())] = False
+    free: str | None = None
+
+    def frame(self) -> ContactFrame | None:
+        """The contact frame; None if nothing was said."""
+        from palpate.contact_frame import ContactFrame
+
+        if self == FrameOptions():
+            return None
+        axes, colon, plain = (self.normal or "").rpartition(":")
+        if colon and axes not in {"base", "tool"}:
+            raise InputError(f"--normal needs x,y,z, base:x,y,z or tool:x,y,z, got {self.normal!r}")
+        return ContactFrame(
+            wrench_frame=self.wrench_frame,
+            sensor_rpy=vector("sensor-rpy", self.sensor_rpy, "angle"),
+            tcp=vector("tcp", self.tcp, "length") or (0.0, 0.0, 0.0),
+            wrench_at=vector("wrench-at", self.wrench_at, "length") or (0.0, 0.0, 0.0),
+            force_sign=self.force_sign,
+            normal=vector("normal", plain or None, "number"),
+            normal_frame="tool" if axes == "tool" else "base",
+            gravity_compensated=self.gravity_compensated,
+            free=span("free", self.free),
+        )
+
+
+@Parameter(name="*", group=Group("The arm", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class ArmOptions:
+    """What lies between the sensors and the surface.
+
+    Parameters
+    ----------
+    tool_mass
+        Mass between force sensor and surface in kg, VALUE or VALUE:STD; it is taken out of M.
+    robot_stiffness
+        What gives way between the position sensor and the surface, N/m or N/m:STD; it is taken out of K.
+    robot_stiffness_from
+        A log of a press on a rigid wall, with the same columns or topics: all that gives way in it is the arm.
+    position_from
+        joints: the position is made from encoders in the joints, and does not show the arm give way; tip: it is not.
+    """
+
+    tool_mass: str | None = None
+    robot_stiffness: Annotated[str | None, Parameter(name=["--robot-stiffness", "--series-stiffness"])] = None
+    robot_stiffness_from: Path | None = None
+    position_from: Literal["joints", "tip"] | None = None
+
+    def arm(self) -> Arm:
+        """The arm as far as it was said; a press on a wall is another log."""
+        from palpate.contact_frame import Arm
+
+        if self.robot_stiffness is not None and self.robot_stiffness_from is not None:
+            raise InputError("give --robot-stiffness or --robot-stiffness-from, not both")
+        return Arm(
+            tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02"),
+            stiffness=with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),
+            position_from=self.position_from,
+        )

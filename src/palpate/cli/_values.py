@@ -1,0 +1,65 @@
+"""Numbers that are written together on the command line: VALUE:STD, and x,y,z with a unit."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from palpate.errors import InputError
+from palpate.units import unit
+
+
+def with_std(option: str, text: str | None, example: str = "0.0076:0.0002") -> tuple[float, float] | None:
+    """`VALUE` or `VALUE:STD` as two numbers."""
+    if text is None:
+        return None
+    value, _, std = text.partition(":")
+    found = _numbers([value, std or "0"])
+    if found is None:
+        plain = example.partition(":")[0]
+        raise InputError(f"--{option} needs VALUE or VALUE:STD, as {plain} or {example}, got {text!r}")
+    if found[1] < 0:
+        raise InputError(f"the std of --{option} must be 0 or more, got {found[1]:g}")
+    return found[0], found[1]
+
+
+def vector(option: str, text: str | None, quantity: str) -> tuple[float, float, float] | None:
+    """`x,y,z` or `x,y,z:UNIT` as three numbers in SI units.
+
+    Args:
+        option: its name.
+        text: what was given.
+        quantity: that the unit must be of; `number` for a direction.
+    """
+    if text is None:
+        return None
+    plain, _, symbol = text.partition(":")
+    found = _numbers(plain.split(","))
+    if found is None or len(found) != 3:
+        raise InputError(f"--{option} needs three numbers, as {_EXAMPLES[quantity]}, got {text!r}")
+    own = unit(symbol) if symbol else unit(_DEFAULTS[quantity])
+    if own.quantity != quantity:
+        raise InputError(f"{symbol!r} of --{option} is a unit of {own.quantity}; it needs one of {quantity}")
+    return found[0] * own.factor, found[1] * own.factor, found[2] * own.factor
+
+
+def span(option: str, text: str | None) -> tuple[float, float] | None:
+    """`BEGIN,END` as two numbers."""
+    if text is None:
+        return None
+    found = _numbers(text.split(","))
+    if found is None or len(found) != 2:
+        raise InputError(f"--{option} needs BEGIN,END in seconds, as 0,2.5, got {text!r}")
+    return found[0], found[1]
+
+
+_DEFAULTS = {"length": "m", "angle": "deg", "number": "1"}
+_EXAMPLES = {"length": "0,0,0.12 or 0,0,120:mm", "angle": "0,0,45 (degrees)", "number": "0,0,-1"}
+
+
+def _numbers(words: list[str]) -> list[float] | None:
+    """Finite numbers; None if one is none."""
+    try:
+        found = [float(word) for word in words]
+    except ValueError:
+        return None
+    return found if all(isfinite(value) for value in found) else None

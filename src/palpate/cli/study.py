@@ -1,0 +1,197 @@
+"""`palpate study`: many runs of the bench, to one table and a page."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from palpate.studies.plan import Plan
+    from palpate.studies.presenting import Findings
+    from palpate.studies.running import Runner
+
+
+def study(
+    name: str | None = None,
+    /,
+    *,
+    out: Path | None = None,
+    scheduler: str | None = None,
+    yes: Annotated[bool, Parameter(negative="")] = False,
+    force: Annotated[bool, Parameter(negative="")] = False,
+    list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
+    print_: Annotated[bool, Parameter(name="--print", negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Run an experiment many times over a grid, a range or a random choice of parameters, or search for the best.
+
+    Args:
+        name: a study (see --list), or a TOML file of your own (see --print).
+        out: folder for results.parquet, report.html and the journal of runs; runs/study-NAME when left out. An
+            unfinished study there is gone on with.
+        scheduler: address of a Dask scheduler whose workers do the runs; all cores of this machine when left out.
+        yes: begin a study that takes very long without asking.
+        force: replace the results that stand there already.
+        list_: list the studies and stop.
+        print_: print the study's file, to copy and edit, and stop.
+        json: print the summary as JSON and nothing else.
+    """
+    from palpate.studies import study as studies
+
+    if list_:
+        width = 2 + max(map(len, studies.names()))
+        for known in studies.names():
+            print(f"{known:<{width}}{studies.load(known).title}")  # noqa: T201
+        return 0
+    if name is None:
+        raise InputError("study what? Name a study (palpate study --list shows them) or a TOML file")
+    source = studies.source(name)
+    if print_:
+        sys.stdout.write(source)
+        return 0
+    folder = out if out is not None else Path("runs") / f"study-{Path(name).stem}"
+    try:
+        found = _done(name, source, folder, scheduler, yes, force)
+    except KeyboardInterrupt:
+        kept = f"what is done is saved in {folder}, and the same command goes on from there"
+        print(f"palpate: interrupted; {kept}", file=sys.stderr)  # noqa: T201
+        return 130
+    _tell(found, folder, json)
+    return 0 if found.summary["results"].get("done") else 1
+
+
+def _done(name: str, source: str, folder: Path, scheduler: str | None, yes: bool, force: bool) -> Findings:
+    """Runs what is not done, and writes table, page and summary."""
+    from rich.console import Console
+
+    from palpate.studies.plan import plan
+    from palpate.studies.presenting import present
+    from palpate.studies.running import Work, begun
+    from palpate.studies.study import parse
+
+    console = Console(stderr=True)
+    try:
+        planned = plan(parse(source, name), name)
+    except InputError as error:
+        raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
+    if not yes and (force or not begun(folder)):
+        _ask(planned, console, here=scheduler is None)
+    with _runner(scheduler, console) as runner, _progress(console, len(planned)) as show:
+        frame = Work(planned, source, folder, runner, show).done(force=force)
+    return present(frame, planned, folder, source, f"palpate study {shlex.quote(name)}")
+
+
+def _ask(plan: Plan, console: Console, *, here: bool) -> None:
+    """Asks whether to begin what takes very long on the cores here; of a cluster only the number of runs is known."""
+    from palpate.cli._waiting import COMPILING
+    from palpate.studies.cost import MANY, seconds_a_run, too_much
+
+    if not here and len(plan) < MANY:
+        return
+    warning = too_much(plan, seconds_a_run(plan, lambda: console.print(COMPILING)))
+    if not warning:
+        return
+    if not sys.stdin.isatty():
+        raise InputError(f"{warning}; make it smaller, or add --yes")
+    from rich.prompt import Confirm
+
+    if not Confirm.ask(f"{warning}. Begin?", console=console, default=False):
+        raise InputError("not begun; make the study smaller: fewer points, fewer seeds")
+
+
+@contextmanager
+def _runner(scheduler: str | None, console: Console) -> Iterator[Runner]:
+    if scheduler is None:
+        from palpate.cli._waiting import COMPILING
+        from palpate.studies.local import Local
+
+        yield Local(waiting=lambda: console.print(COMPILING))
+        return
+    from palpate.studies.cluster import Cluster
+
+    cluster = Cluster(scheduler)
+    try:
+        yield cluster
+    finally:
+        cluster.close()
+
+
+@contextmanager
+def _progress(console: Console, total: int) -> Iterator[Callable[[int], None]]:
+    """A bar with the time left; without a terminal a line now and then."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("left")
+    watched = console.is_terminal
+    with Progress(
+        *columns, console=console, transient=True, disable=not watched, speed_estimate_period=600
+    ) as bar:
+        task = bar.add_task("", total=total)
+        lines = Lines(console, total)
+
+        def show(finished: int) -> None:
+            bar.update(task, completed=finished)
+            if not watched:
+                lines.show(finished)
+
+        yield show
+
+
+class Lines:
+    """Progress where there is no terminal: a line each minute."""
+
+    EVERY = 60.0
+
+    def __init__(self, console: Console, total: int):
+        self._console, self._total = console, total
+        self._begun = self._told = time.monotonic()
+        self._first: int | None = None
+
+    def show(self, finished: int) -> None:
+        """How many runs are finished, and what is left by the pace so far."""
+        from palpate.studies.cost import told
+
+        self._first = finished if self._first is None else self._first
+        now = time.monotonic()
+        if now - self._told < self.EVERY or finished == self._first:
+            return
+        self._told = now
+        left = (now - self._begun) / (finished - self._first) * (self._total - finished)
+        self._console.print(f"{finished} of {self._total} runs, some {told(left)} left", soft_wrap=True)
+
+
+def _tell(found: Findings, folder: Path, as_json: bool) -> None:
+    import msgspec
+    from rich import box
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    if as_json:
+        sys.stdout.write(msgspec.json.encode(found.summary).decode() + "\n")
+        return
+    console = Console()
+    console.print(f"[bold]{escape(found.summary['study'])}[/bold], {found.summary['runs']} runs")
+    for content in found.tables:
+        table = Table(
+            title=escape(content.title), title_justify="left", title_style="italic", box=box.SIMPLE_HEAD
+        )
+        for i, head in enumerate(content.head):
+            table.add_column(escape(head), justify="left" if i == 0 else "right")
+        for row in content.rows:
+            table.add_row(*map(escape, row))
+        console.print(table)
+    for note in found.notes:
+        console.print(f"[yellow]{escape(note)}[/yellow]")
+    console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False)

@@ -1,0 +1,106 @@
+"""The figure of an excitation: the desired force, its spectrum, and what it will tell after how long."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.excitation import Design
+from palpate.logs import whole
+from palpate.references.waves import Multisine
+from palpate.report import style
+from palpate.report.ownership import SIGNATURE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLORS = {"K": style.BLUE, "B": style.ORANGE, "M": style.GREEN}
+_SHOWN = 4.0  # s of the desired force; more would be a block of ink
+
+
+def write_figure(found: Design, path: Path) -> Path:
+    """Draw a design and write it as a PNG, whole or not at all."""
+    figure = draw(found)
+    with whole(path) as draft:
+        figure.savefig(draft, format="png", metadata={"Software": SIGNATURE})
+    return path
+
+
+def draw(found: Design) -> Figure:
+    """The figure of a design."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.5, 6.2), dpi=style.DPI, layout="constrained")
+    axes = figure.subplot_mosaic("tt;sp", height_ratios=(1.0, 1.25))
+    for axis in axes.values():
+        style.plain(axis)
+    _force(axes["t"], found)
+    _spectrum(axes["s"], found)
+    _precision(axes["p"], found)
+    return figure
+
+
+def _force(axis: Axes, found: Design) -> None:
+    budget = found.question.budget
+    time, force = found.force()
+    shown = time <= found.settle + _SHOWN if isinstance(found.wave, Multisine) else np.full(len(time), True)
+    low = min(prediction.force[0] for prediction in found.predictions)
+    high = max(prediction.force[1] for prediction in found.predictions)
+    axis.axhspan(low, high, color=style.BLUE, alpha=0.12, linewidth=0, label="force on the surfaces")
+    axis.plot(time[shown], force[shown], color=style.INK, linewidth=0.8, label="desired force")
+    for limit in (budget.mean - budget.swing, budget.mean + budget.swing):
+        axis.axhline(limit, color=style.RED, linewidth=0.8, linestyle="--")
+    rest = "" if shown.all() else f", the first {time[shown][-1]:g} of {time[-1]:g} s"
+    axis.set(xlabel=f"time [s]{rest}", ylabel="force [N]", xlim=(0, time[shown][-1]))
+    style.legend(axis)
+
+
+def _spectrum(axis: Axes, found: Design) -> None:
+    frequencies, amplitudes = _lines(found)
+    forces = np.abs(found.question.forces(2 * np.pi * frequencies, amplitudes))
+    axis.fill_between(
+        frequencies, forces.min(axis=0), forces.max(axis=0), color=style.BLUE, alpha=0.2, linewidth=0,
+        label="on the surfaces",
+    )  # fmt: skip
+    if isinstance(found.wave, Multisine):
+        axis.vlines(frequencies, 0, amplitudes, color=style.INK, linewidth=0.7)
+        axis.plot(
+            frequencies, amplitudes, color=style.INK, marker="o", markersize=3, linestyle="", label="desired"
+        )
+    else:
+        axis.plot(frequencies, amplitudes, color=style.INK, linewidth=0.8, label="desired")
+    style.logarithmic(axis, "x")
+    axis.set(xlabel="frequency [Hz]", ylabel="amplitude [N]")
+    axis.set_ylim(bottom=0)
+    style.legend(axis)
+
+
+def _lines(found: Design) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    wave = found.wave
+    if isinstance(wave, Multisine):
+        return np.array(wave.frequencies), np.array(wave.amplitudes)
+    frequencies = np.geomspace(wave.low, wave.high, 100)
+    return frequencies, np.full(len(frequencies), wave.amplitude)
+
+
+def _precision(axis: Axes, found: Design) -> None:
+    seconds = np.geomspace(0.1 * found.seconds, 5 * found.seconds, 40)
+    for name in found.predictions[0].names:
+        widths = np.array([[p.half_widths(t)[name] for t in seconds] for p in found.predictions])
+        axis.fill_between(
+            seconds, 100 * widths.min(axis=0), 100 * widths.max(axis=0), color=COLORS[name], alpha=0.25,
+            linewidth=0,
+        )  # fmt: skip
+        axis.plot(seconds, 100 * widths.max(axis=0), color=COLORS[name], linewidth=1.6, label=name)
+        if name in found.question.precision:
+            asked = 100 * found.question.precision[name]
+            axis.plot(seconds[[0, -1]], [asked, asked], color=COLORS[name], linewidth=0.9, linestyle="--")
+    axis.axvline(found.seconds, color=style.GREY, linewidth=0.9)
+    for which in "xy":
+        style.logarithmic(axis, which)
+    axis.set(xlabel="seconds of it", ylabel="95 % half-width [%]")
+    style.legend(axis, title="widest on any surface; dashed: asked", title_fontsize=8.5)

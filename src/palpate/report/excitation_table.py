@@ -1,0 +1,94 @@
+"""A designed excitation on the terminal: what it is, what it will tell about each surface, what would help."""
+
+from __future__ import annotations
+
+from math import ceil
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from palpate.excitation import Design, Remedy
+from palpate.excitation.prediction import Prediction
+from palpate.excitation.question import LONGEST
+from palpate.references.waves import Multisine
+
+
+def show(found: Design, remedies: list[Remedy], console: Console) -> None:
+    """Print a design, and for an infeasible one what would help."""
+    console.print(_wave(found))
+    console.print(_table(found))
+    console.print(_verdict(found))
+    for remedy in remedies:
+        console.print(f"  {remedy.change}: {_told(remedy, found)}")
+
+
+def _told(remedy: Remedy, found: Design) -> str:
+    reached = _reached(remedy.reached, found)
+    if remedy.enough:
+        return f"enough, {reached}"
+    later = f"; enough after {ceil(remedy.needed)} s" if remedy.needed <= LONGEST else ""
+    return f"not enough, {reached}{later}"
+
+
+def _wave(found: Design) -> str:
+    budget, wave = found.question.budget, found.wave
+    if isinstance(wave, Multisine):
+        low, high = wave.frequencies[0], wave.frequencies[-1]
+        kind = f"multisine of {len(wave.frequencies)} sines, {low:g} to {high:.4g} Hz"
+    else:
+        how = "logarithmic" if wave.logarithmic else "linear"
+        kind = f"{how} chirp, {wave.low:.4g} to {wave.high:.4g} Hz"
+    _, force = found.force()
+    lasts = f"{found.seconds:g} s" + (f" after {found.settle:g} s to settle" if found.settle else "")
+    return f"{kind}: {force.min():.1f} to {force.max():.1f} N about {budget.mean:g} N, {lasts}"
+
+
+def _table(found: Design) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    names = found.predictions[0].names
+    units = {"K": "N/m", "B": "N s/m", "M": "kg"}
+    for title in (
+        *(f"{name} [{units[name]}]" for name in names),
+        *(f"± {name}" for name in names),
+        "force [N]",
+        "travel",
+    ):
+        table.add_column(escape(title), justify="right", no_wrap=True)
+    for prediction in found.predictions:
+        table.add_row(*_row(prediction, found))
+    return table
+
+
+def _row(prediction: Prediction, found: Design) -> list[str | Text]:
+    widths = prediction.half_widths(found.seconds)
+    values = dict(zip(("K", "B", "M"), prediction.surface.values, strict=True))
+    low, high = prediction.force
+    return [
+        *(f"{values[name]:.4g}" for name in prediction.names),
+        *(_width(widths[name], found.question.precision.get(name)) for name in prediction.names),
+        f"{low:.1f}-{high:.1f}",
+        f"{1e6 * prediction.travel:.0f} um",
+    ]
+
+
+def _width(width: float, asked: float | None) -> Text:
+    style = "" if asked is None else "green" if width <= asked else "red"
+    return Text(_percent(width), style=style)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 1 else "> 100 %"
+
+
+def _verdict(found: Design) -> str:
+    worst = found.made.worst(found.seconds)
+    asked = ", ".join(f"{name} {_percent(share)}" for name, share in found.question.precision.items())
+    if found.feasible:
+        return f"every surface to within {asked} (95 %): yes, predicted {_reached(worst, found)}"
+    return f"every surface to within {asked} (95 %): no; the best is {_reached(worst, found)}. What would change that:"
+
+
+def _reached(widths: dict[str, float], found: Design) -> str:
+    return ", ".join(f"{name} {_percent(widths[name])}" for name in found.question.precision)

@@ -1,0 +1,50 @@
+"""A figure as SVG that is read by light and by dark."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import TYPE_CHECKING
+
+from palpate.report import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_BY_DARK = {
+    style.INK: "#e6e6e6",
+    style.GRID: "#34373b",
+    style.VEIL: "#4a4d52",
+    style.BLUE: "#5ea6e6",
+    style.ORANGE: "#f0a35b",
+    style.GREEN: "#5fc98b",
+    style.RED: "#f2766d",
+    style.VIOLET: "#b79be6",
+    style.GREY: "#a0a0a0",
+}
+
+
+def svg(drawing: Figure) -> bytes:
+    """The figure without a background, its colours turned where the reader's page is dark; needs no other file.
+
+    The same figure gives the same bytes.
+    """
+    import matplotlib
+
+    buffer = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "palpate", "path.simplify_threshold": 0.3}):
+        drawing.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    names = {colour: f"--c{i}" for i, colour in enumerate(_BY_DARK)}
+    for colour, name in names.items():
+        text = text.replace(colour, f"var({name})")
+    end = text.index(">") + 1
+    return f"{text[:end]}\n{_sheet(names)}{text[end:]}".encode()
+
+
+def _sheet(names: dict[str, str]) -> str:
+    light = "".join(f"{name}:{colour};" for colour, name in names.items())
+    dark = "".join(f"{names[colour]}:{other};" for colour, other in _BY_DARK.items())
+    return f"<style>:root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}</style>"

@@ -1,0 +1,238 @@
+"""Logs and words that are wrong: one line that says what to do, exit code 2, nothing written."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from identification.synthetic_contacts import pressed
+from logs.arm_bags import a_press, topics_of
+from logs.ros_bags import joints, pose, storage, wrench, write_bag
+from palpate.cli import main
+
+TIME = np.arange(200) / 100
+ZERO = np.zeros((200, 3))
+MOVED = np.column_stack([TIME, TIME, np.sin(TIME)])
+
+
+def refused(folder, capsys, words, pattern):
+    """The command ends with code 2 and one line that matches, and leaves the folder and the log as they were."""
+    before = _state(folder, words[1])
+    assert main(list(map(str, words))) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("palpate: ")
+    assert printed.err.count("\n") == 1
+    assert re.search(pattern, printed.err), printed.err
+    assert _state(folder, words[1]) == before
+
+
+def _state(folder, log):
+    places = [*folder.rglob("*"), *Path(log).parent.rglob("*")]
+    return {path: path.stat().st_mtime_ns for path in places}
+
+
+@pytest.fixture(autouse=True)
+def inside(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def folder_without_a_bag(path):
+    path.mkdir()
+    (path / "notes.txt").write_text("nothing")
+
+
+def no_messages(path):
+    write_bag(path, "mcap", [wrench("/ft", TIME[:0], ZERO[:0])])
+
+
+def half(path, kind, size):
+    whole = storage(write_bag(path.with_name("whole"), kind, [wrench("/ft", TIME, ZERO)]))
+    path.write_bytes(whole.read_bytes()[:size])
+
+
+FILES = {
+    "missing": (lambda path: None, "there is no file"),
+    "empty": (lambda path: path.write_bytes(b""), "is empty"),
+    "folder": (folder_without_a_bag, "is a folder and no ROS 2 bag"),
+    "empty folder": (lambda path: path.mkdir(), "is a folder and no ROS 2 bag"),
+    "pipe": (os.mkfifo, "is a pipe or a device"),
+    "MATLAB 7.3": (lambda path: path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(600)), "save -v7"),
+    "half a MATLAB file": (
+        lambda path: path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(140)),
+        "cannot be read as a MATLAB",
+    ),
+    "a stub of a ROS 1 bag": (lambda path: half(path, "bag1", 100), "cannot be read as a ROS 1 bag"),
+    "a stub of an MCAP": (lambda path: half(path, "mcap", 40), "cannot be read as MCAP"),
+    "a stub of SQLite": (lambda path: half(path, "sqlite", 1000), "cannot be read as a ROS 2 bag"),
+    "an old ROS bag": (
+        lambda path: path.write_bytes(b"#ROSBAG V1.2\n" + bytes(50)),
+        "version 102 is not supported",
+    ),
+    "another database": (
+        lambda path: path.write_bytes(b"SQLite format 3\x00" + bytes(4080)),
+        "cannot be read",
+    ),
+    "a bag without messages": (no_messages, "holds no messages"),
+    "Parquet's beginning": (lambda path: path.write_bytes(b"PAR1" + bytes(50)), "cannot be read as Parquet"),
+}
+
+
+@pytest.mark.parametrize("command", ["identify", "topics"])
+@pytest.mark.parametrize("kind", FILES)
+def test_a_file_that_is_none(tmp_path, capsys, kind, command):
+    make, pattern = FILES[kind]
+    make(tmp_path / "log")
+    refused(tmp_path, capsys, [command, "log"], pattern)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+@pytest.mark.parametrize("command", ["identify", "topics"])
+def test_a_file_that_may_not_be_read(tmp_path, capsys, command):
+    path = tmp_path / "log.bag"
+    path.write_bytes(b"#ROSBAG V2.0\n")
+    path.chmod(0)
+    refused(tmp_path, capsys, [command, path], "check its permissions")
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    _, record = a_press()
+    flat = np.zeros((len(record), 1))
+    joint = joints("/joint_states", record["time"], ["lift"], flat, flat)
+    return write_bag(
+        tmp_path_factory.mktemp("bags") / "press", "mcap", [*topics_of(record), joint], extra="/grip"
+    )
+
+
+WORDS = {
+    "topic": (["--wrench", "/fz"], "unknown topic '/fz'"),
+    "a pose for a wrench": (["--wrench", "/pose"], "which palpate does not know as a wrench"),
+    "force alone": (["--force", "/ft.wrench.force.z"], "--force needs its --position"),
+    "both kinds": (["--force", "/ft.wrench.force.z", "--pose", "/pose"], "not of both"),
+    "a time": (["--time", "t"], "carry their own time"),
+    "a rate": (["--rate", "100"], "carry their own time"),
+    "field": (["--force", "/ft.force.z", "--position", "/pose.pose.position.z"], "unknown field 'force.z'"),
+    "a joint": (
+        ["--force", "/joint_states.effort.arm", "--position", "/joint_states.position.lift"],
+        r"'effort\.arm'",
+    ),
+    "too short a tcp": (["--tcp", "0,0"], "--tcp needs three numbers, as 0,0,0.12"),
+    "a tcp in newtons": (["--tcp", "0,0,1:N"], "'N' of --tcp is a unit of force"),
+    "a tcp that is no number": (["--tcp", "0,0,nan"], "--tcp needs three numbers"),
+    "a normal of nothing": (["--normal", "0,0,0"], "must have a length"),
+    "a normal of other axes": (["--normal", "world:0,0,1"], "--normal needs x,y,z, base:x,y,z or tool:x,y,z"),
+    "a sensor without turn": (["--wrench-frame", "sensor"], "needs --sensor-rpy"),
+    "an unknown frame": (["--wrench-frame", "flange"], "flange.*--help"),
+    "a sign": (["--force-sign", "reaction", "--wrench-frame", "tool"], "say --force-sign action"),
+    "free": (["--free", "1"], "--free needs BEGIN,END in seconds"),
+    "free elsewhere": (["--free", "50,60"], "rows lie in the free stretch"),
+    "tool": (["--tool-mass", "heavy"], "--tool-mass needs VALUE or VALUE:STD, as 0.8 or 0.8:0.02"),
+    "tool below zero": (["--tool-mass", "-1"], "0 kg or more|needs an argument|requires"),
+    "negative std": (["--robot-stiffness", "4e4:-1"], "must be 0 or more"),
+    "two stiffnesses": (["--robot-stiffness", "4e4", "--robot-stiffness-from", "wall"], "not both"),
+    "no wall": (["--robot-stiffness-from", "wall.mcap"], "there is no file wall.mcap"),
+    "softer than the log": (["--robot-stiffness", "1000"], "softer than the log's own"),
+    "filter": (["--force-filter", "bessel:3"], "butterworth3:120"),
+    "mass": (["--mass", "some"], "--mass needs VALUE or VALUE:STD"),
+    "report's kind": (["--report", "a.pdf"], "HTML file; name it a.html"),
+    "report's folder": (["--report", "none/a.html"], "no folder none"),
+    "a cut of nothing": (["--start", "99"], "no row of"),
+    "missing words": (["--missing", "NA"], "--missing needs numbers"),
+}
+
+
+@pytest.mark.parametrize("kind", WORDS)
+def test_words_that_are_wrong(tmp_path, bag, capsys, kind):
+    words, pattern = WORDS[kind]
+    refused(tmp_path, capsys, ["identify", bag, *words], pattern)
+
+
+def test_a_report_of_somebody_else_is_not_written_over(tmp_path, bag, capsys):
+    (tmp_path / "thesis.html").write_text("years of work")
+    refused(tmp_path, capsys, ["identify", bag, "--report", "thesis.html"], "palpate did not write it")
+
+
+def test_no_wrench_or_two(tmp_path, capsys):
+    write_bag(tmp_path / "none", "mcap", [pose("/pose", TIME, MOVED)])
+    refused(
+        tmp_path,
+        capsys,
+        ["identify", "none"],
+        r"none of its topics is a wrench.*palpate topics none lists them",
+    )
+    sent = [wrench("/ft", TIME, MOVED), wrench("/hand", TIME, MOVED), pose("/pose", TIME, MOVED)]
+    write_bag(tmp_path / "two", "mcap", sent)
+    refused(tmp_path, capsys, ["identify", "two"], "there are /ft, /hand")
+
+
+def test_a_type_that_nobody_defines(tmp_path, capsys):
+    """As a topic of another tool's in a robot's MCAP."""
+    path = write_bag(tmp_path / "other", "mcap", [wrench("/ft", TIME, MOVED)], extra="/grip")
+    file = storage(path)
+    file.write_bytes(
+        file.read_bytes().replace(
+            b"my_msgs/msg/Grip\x07\x00\x00\x00ros2msg", b"my_msgs/msg/Grip\x07\x00\x00\x00unknown"
+        )
+    )
+    words = ["--force", "/grip.grip", "--position", "/ft.wrench.force.z:1"]
+    refused(
+        tmp_path,
+        capsys,
+        ["identify", "other", *words],
+        "my_msgs/msg/Grip, is not defined in the bag, and is not guessed",
+    )
+    assert main(["topics", "other"]) == 0
+    assert "unknown type" in capsys.readouterr().out
+
+
+def test_topics_that_were_never_recorded_together(tmp_path, capsys):
+    write_bag(tmp_path / "log", "mcap", [wrench("/ft", TIME, MOVED), pose("/pose", TIME + 100, MOVED)])
+    refused(
+        tmp_path,
+        capsys,
+        ["identify", "log", "--wrench-frame", "base"],
+        r"no time in common \(/ft 0 to 1.99 s, /pose 100",
+    )
+
+
+def test_axes_that_nobody_names(tmp_path, capsys):
+    sent = [wrench("/ft", TIME, MOVED, frame=""), pose("/pose", TIME, MOVED, frame="")]
+    write_bag(tmp_path / "log", "mcap", sent)
+    refused(tmp_path, capsys, ["identify", "log"], "does not name the axes of its wrench; say --wrench-frame")
+
+
+def test_a_tool_that_never_moved(tmp_path, capsys):
+    sent = [wrench("/ft", TIME, MOVED), pose("/pose", TIME, ZERO)]
+    write_bag(tmp_path / "log", "mcap", sent)
+    refused(tmp_path, capsys, ["identify", "log"], "the position is 0 in every row")
+
+
+def test_a_wall_that_shows_nothing(tmp_path, bag, capsys):
+    rng = np.random.default_rng(0)
+    air = [wrench("/ft", TIME, rng.normal(0, 0.1, (200, 3))), pose("/pose", TIME, MOVED)]
+    write_bag(tmp_path / "air", "mcap", air)
+    words = ["--wrench-frame", "tool", "--robot-stiffness-from", "air"]
+    refused(tmp_path, capsys, ["identify", bag, *words], "air does not show the robot's stiffness")
+
+
+def test_a_wrench_of_a_log_of_one_axis(tmp_path, capsys):
+    flat = pressed()
+    savemat(
+        tmp_path / "log.mat", {"time": flat["time"], "position": flat["position"], "force": flat["force"]}
+    )
+    refused(tmp_path, capsys, ["identify", "log.mat", "--tcp", "0,0,1"], "this log has one axis")
+    refused(tmp_path, capsys, ["identify", "log.mat", "--wrench", "force"], "name the pose's columns")
+    refused(
+        tmp_path,
+        capsys,
+        ["identify", "log.mat", "--wrench", "force", "--pose", "position"],
+        "--wrench needs fx,fy,fz",
+    )
+    assert main(["identify", "log.mat", "--no-figure"]) == 0
+    capsys.readouterr()

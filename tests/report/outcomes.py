@@ -1,0 +1,53 @@
+"""One identification for every kind of outcome that a page has to tell of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.synthetic_contacts import coloured, force_of, press_path, pressed, record, shaken
+from palpate.identification import Identification, identify
+from palpate.records import Record
+
+
+def identified() -> Identification:
+    """K, B and M of a shaken contact."""
+    return identify(shaken(noise=0.05), lag=0.0)
+
+
+def not_identifiable() -> Identification:
+    """A press that shows no mass."""
+    return identify(pressed(), lag=0.0)
+
+
+def rejected() -> Identification:
+    """A contact whose stiffness grows, held to a model in which it does not."""
+    time = np.arange(6000) / 1000
+    x = press_path(time, 0.06)
+    force = force_of(x, lambda d, v: 2e6 * d**2, 1e-3)
+    noise = coloured(len(time), 0.02, 0.9, np.random.default_rng(0))
+    return identify(record(time, x, force + noise), model="kelvin-voigt", lag=0.0)
+
+
+def no_contact() -> Identification:
+    """The motion of a press, and nothing but noise of the force."""
+    log = pressed()
+    noise = coloured(len(log), 0.05, 0.9, np.random.default_rng(0))
+    return identify(record(log["time"], log["position"], noise))
+
+
+def volts() -> Identification:
+    """The same as identified, of a log in volts."""
+    log = shaken(noise=0.05)
+    return identify(Record(log.columns, {"time": "s", "position": "1", "force": "1"}, log.meta), lag=0.0)
+
+
+def many_contacts() -> Identification:
+    """Identified, over fifty contacts; their times are what the page lists."""
+    return replace(identified(), contacts=tuple((k / 10, k / 10 + 0.05) for k in range(50)))
+
+
+OUTCOMES = {
+    own.__name__: own for own in (identified, not_identifiable, rejected, no_contact, volts, many_contacts)
+}
