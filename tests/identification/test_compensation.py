@@ -1,4 +1,4 @@
-"""Noise of the position makes least squares' columns uncertain: what it pulls is taken out, and what is left is said."""
+"""Noise of the position makes least squares' columns uncertain: its pull is taken out, what is left is said."""
 
 import numpy as np
 import pytest
@@ -105,7 +105,7 @@ def fits(log):
     ("noise", "resolution"), [(1.5e-5, 0.0), (0.0, 4e-5)], ids=["noisy", "through a coarse encoder"]
 )
 def test_a_press_with_a_noisy_position(noise, resolution):
-    """Over some presses: the mass is pulled by many deviations, and compensated by none that chance does not explain."""
+    """Over some presses the mass is pulled by many deviations; compensated, by none that chance does not explain."""
     count = 16
     pairs = [fits(sensor_log("chirp", seed, noise, resolution=resolution)) for seed in range(count)]
     for name in ("B", "M"):

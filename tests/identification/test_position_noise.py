@@ -13,8 +13,8 @@ MOTION = 1e-3 * (np.sin(2 * np.pi * 0.8 * TIME) + np.sin(2 * np.pi * 30 * TIME) 
 COUNT = 5e-6
 
 
-def white(std, seed=0, n=len(TIME)):
-    return np.random.default_rng(seed).normal(0, std, n)
+def white(std, seed=0, n=None):
+    return np.random.default_rng(seed).normal(0, std, len(TIME) if n is None else n)
 
 
 @settings(max_examples=20)

@@ -22,6 +22,8 @@ _AT_FIRST = 1 << 14
 """Rows on each side of the middle in which the grid is looked for first."""
 _ROOM = 1e-9
 """Of the phase, in rows: with less a pattern only just contradicts a grid."""
+_PER_LINE = 8
+"""Bins of the spectrum from one line to the next that the log is long enough to tell from it."""
 _SHORTEST = 2.0
 """Per cent of the steps between changes that may be shorter than two samples can be apart."""
 
@@ -83,10 +85,12 @@ def _in_every_row(count: int) -> Refreshes:
 
 
 def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
-    """Periods of the strongest line that the shortest steps allow, and a place in the middle of a sample's row.
+    """Periods that may be meant, and a place in the middle of a sample's row for each.
 
-    Some samples equal the one before and show no change, but that only weakens the lines of the changes' spectrum. As
-    rows are whole, a line at f stands at 1 - f too; from periods near 2 both may be meant.
+    They are lines of the changes' spectrum: the strongest that the shortest steps allow, and the one at the changes'
+    mean step, which is the period itself where each sample shows (the lines of a short pattern are all as strong). A
+    sample that equals the one before shows no change, but that only weakens the lines. As rows are whole, a line at f
+    stands at 1 - f too; from periods near 2 both may be meant.
     """
     far = np.abs(changed - changed[len(changed) // 2])
     own = changed[far < _near(far)]
@@ -95,14 +99,26 @@ def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
     line = np.zeros(size)
     line[own - own[0]] = 1.0
     spectrum = np.fft.rfft(line)
+
+    def strongest(first: int, last: int) -> int:
+        bins = np.arange(first, last + 1)
+        return int(bins[np.argmax(np.abs(spectrum[np.minimum(bins, size - bins)]))])
+
     first = int(np.ceil(size / (least + 1)))
     last = max(int(size / max(least - 0.2, 1 / _EVERY_ROW)), first)
-    bins = np.arange(first, last + 1)
-    best = int(bins[np.argmax(np.abs(spectrum[np.minimum(bins, size - bins)]))])
-    angle = float(np.angle(spectrum[min(best, size - best)])) / (2 * np.pi)
-    angle = angle if best <= size // 2 else -angle
-    meant = [(size / best, -angle), (size / (size - best), angle)][: 2 if first <= size - best <= last else 1]
-    return [(period, own[0] + part * period) for period, part in meant]
+    best = strongest(first, last)
+    mean = round(size * (len(own) - 1) / float(own[-1] - own[0]))
+    lines = {best, strongest(mean - _PER_LINE, min(mean + _PER_LINE, size - 1))}
+    if first <= size - best <= last:
+        lines.add(size - best)
+    return [_beat(at, size, spectrum, own[0]) for at in sorted(lines)]
+
+
+def _beat(at: int, size: int, spectrum: NDArray[np.complex128], first: int) -> tuple[float, float]:
+    """Period of a line, and a place in the middle of a row that it makes of the changes from row `first` on."""
+    angle = float(np.angle(spectrum[min(at, size - at)])) / (2 * np.pi)
+    period = size / at
+    return period, first + period * (angle if at > size // 2 else -angle)
 
 
 def _near(far: NDArray[np.intp]) -> int:
