@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from identification.synthetic_contacts import pressed
+from palpate import identify, read_log
 from palpate.cli import main
 from palpate.identification.codes import Code
+from palpate.identification.estimators import METHODS
 
 SKIN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_mN:mN")
 FIELDS = {"value", "std", "ci95", "unit", "verdict", "reason"}
@@ -38,6 +41,22 @@ def log(tmp_path, monkeypatch):
     return path
 
 
+@pytest.fixture
+def shaken(log):
+    """A probe fixed to a surface and shaken from 0.5 to 40 Hz: K 5000 N/m, B 40 N s/m, M 0.5 kg."""
+    time = np.arange(4000) / 1000
+    phase = 2 * np.pi * (0.5 * time + 39.5 / 8 * time**2)
+    x, rate = 1e-3 * np.sin(phase), 2 * np.pi * (0.5 + 39.5 / 4 * time)
+    v = 1e-3 * rate * np.cos(phase)
+    a = 1e-3 * (2 * np.pi * 39.5 / 4 * np.cos(phase) - rate**2 * np.sin(phase))
+    force = 5000 * x + 40 * v + 0.5 * a + np.random.default_rng(0).normal(0, 0.02, len(time))
+    path = log.parent / "shaken.csv"
+    table = np.column_stack([time, 1e3 * x, force])
+    np.savetxt(path, table, delimiter=",", header="time_s,position_mm,force_N", comments="", fmt="%.7g")
+    return path
+
+
+COLUMNS = {"time": "time_s", "position": "position_mm:mm", "force": "force_N:N"}
 OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
 
 
@@ -137,6 +156,24 @@ def test_a_rate_stands_for_the_time(log, capsys):
     assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_the_method_is_that_of_the_library(shaken, capsys, method):
+    _, found = ask(capsys, shaken, *OWN, "--model", "kelvin-voigt-mass", "--lag", "0", "--method", method)
+    own = identify(read_log(shaken, **COLUMNS), model="kelvin-voigt-mass", lag=0.0, method=method)
+    assert {n: p["ci95"] for n, p in found["parameters"].items()} == {
+        n: p["ci95"] for n, p in own.to_json()["parameters"].items()
+    }
+    assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
+
+
+def test_another_method_is_said(shaken, capsys):
+    words = ("--model", "kelvin-voigt-mass", "--method", "output-error", "--report", "a.html", "--no-figure")
+    assert main(["identify", str(shaken), *OWN, *words]) == 0
+    line = "parameters by output-error; the models were chosen by least-squares"
+    assert line in capsys.readouterr().out
+    assert line in Path("a.html").read_text()
+
+
 def test_no_contact_is_an_answer_and_the_answer_is_no(log, capsys):
     rows = np.loadtxt(log, delimiter=",", skiprows=1)
     rows[:, 2] = np.random.default_rng(0).normal(0, 0.05, len(rows))
@@ -152,8 +189,18 @@ WRONG = {
     "unknown unit": ([*OWN[:-1], "force_N:stone"], "unknown unit 'stone'"),
     "no columns": ([], "name the columns of .*--time, --position, --force.*time_s"),
     "unknown model": ([*OWN, "--model", "hooke"], "unknown model 'hooke'"),
+    "unknown method": (
+        [*OWN, "--method", "output-eror"],
+        "'output-eror'; did you mean 'output-error'.*least-squares",
+    ),
+    "method and filter": (
+        [*OWN, "--method", "output-error", "--force-filter", "butterworth3:120"],
+        "leave --force-filter out for output-error",
+    ),
     "tolerance": ([*OWN, "--tolerance", "2"], r"tolerance must be in \(0, 1\]"),
     "lag": ([*OWN, "--lag", "late"], "--lag needs VALUE or VALUE:STD"),
+    "figure is a folder": ([*OWN, "--figure", "."], "is a folder; name a file with --figure"),
+    "report is a folder": ([*OWN, "--report", ".."], "is a folder; name a file with --report"),
     "figure kind": ([*OWN, "--figure", "a.pdf"], "PNG; name it a.png"),
     "figure folder": ([*OWN, "--figure", "none/a.png"], "no folder none"),
     "rate and time": ([*OWN, "--rate", "100"], "not both"),

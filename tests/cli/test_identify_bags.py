@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from html import unescape
 
 import numpy as np
 import pytest
@@ -69,7 +70,11 @@ def test_the_page_and_the_figure(tmp_path, capsys):
     shown = capsys.readouterr().out
     assert "figure: press.png" in shown
     assert "report: press.html" in shown
-    assert (tmp_path / "press.html").read_text().startswith("<!doctype html>")
+    text = (tmp_path / "press.html").read_text()
+    assert text.startswith("<!doctype html>")
+    told = [line for line in shown.splitlines() if line.startswith(("wrench ", "normal ", "bias ", "timed "))]
+    assert len(told) == 5
+    assert all(line in unescape(text) for line in told)
 
 
 def test_a_slower_pose(tmp_path, capsys):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from palpate.cli._places import check_folder, own_place
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -212,14 +213,7 @@ def _picture(figure: Path | None, wanted: bool) -> Path | None:
     """Where the figure goes; found wrong before any work is done."""
     if not wanted:
         return None
-    from palpate.report.ownership import check_ours
-
-    path = figure if figure is not None else Path("excite.png")
-    if path.suffix.lower() != ".png":
-        raise InputError(f"the figure is a PNG; name it {path.with_suffix('.png')} instead of {path}")
-    _check_folder(path)
-    check_ours(path)
-    return path
+    return own_place(figure if figure is not None else Path("excite.png"), ".png", "--figure")
 
 
 def _check_places(out: Path | None, experiment: Path | None, replace: bool) -> None:
@@ -230,14 +224,9 @@ def _check_places(out: Path | None, experiment: Path | None, replace: bool) -> N
     if experiment is not None and experiment.suffix.lower() != ".toml":
         raise InputError(f"{experiment}: an experiment is a .toml file; name it so")
     for path in filter(None, (out, experiment)):
-        _check_folder(path)
+        check_folder(path)
         if path.exists() and not replace:
             raise InputError(f"{path} exists; choose another place, or add --replace")
-
-
-def _check_folder(path: Path) -> None:
-    if not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no folder {path.parent}; make it first")
 
 
 def _answer(

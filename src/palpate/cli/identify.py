@@ -10,6 +10,7 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._arm_options import ArmOptions, FrameOptions
 from palpate.cli._log_options import LogOptions, read
+from palpate.cli._places import own_place
 from palpate.cli._values import with_std
 from palpate.errors import InputError
 
@@ -43,6 +44,8 @@ class ModelOptions:
         The probe is fixed to the surface, or is not; found out if neither is said.
     cutoff
         Of the filters that all channels pass through, in Hz; chosen if not given.
+    method
+        least-squares; or instrumental-variables or output-error, if noise of the position would pull it.
     """
 
     model: str | None = None
@@ -53,12 +56,15 @@ class ModelOptions:
     calibration: float = 0.0
     bonded: bool | None = None
     cutoff: float | None = None
+    method: str = "least-squares"
 
     def known(self, log: Path, options: LogOptions) -> dict[str, Any]:
         """The keywords of `palpate.identify`; a run of palpate's own says itself what measured it."""
         from palpate.logs.own_runs import is_run, measured_by
 
         known: dict[str, Any] = measured_by(log) if options.plain and is_run(log) else {}
+        if self.method != ModelOptions.method:
+            known.pop("force_filter", None)  # only least squares make use of it
         lag = with_std("lag", self.lag)
         if lag is not None:
             known |= {"lag": lag[0], "lag_std": lag[1]}
@@ -66,7 +72,7 @@ class ModelOptions:
             known["force_filter"] = None if self.force_filter == "none" else self.force_filter
         if self.mass is not None:
             known["mass"] = with_std("mass", self.mass, "0.5:0.02")
-        names = ("model", "tolerance", "calibration", "bonded", "cutoff")
+        names = ("model", "tolerance", "calibration", "bonded", "cutoff", "method")
         return known | {name: getattr(self, name) for name in names}
 
 
@@ -124,7 +130,7 @@ def identify(
     found, record = _identified(log, source, frame, arm, fitted)
     if found.traces is None:
         figure = None
-    _write(found, log, figure, page)
+    _write(found, record, log, figure, page)
     _print(found, record, log, [path for path in (figure, page) if path is not None], output.json)
     return 0 if found.found else 1
 
@@ -157,41 +163,24 @@ def _figure(log: Path, output: OutputOptions) -> Path | None:
     """Where the figure goes; found wrong before any work is done."""
     if output.no_figure or (output.figure is None and output.json):
         return None
-    path = output.figure if output.figure is not None else Path(f"{log.stem}.identify.png")
-    _check_place(path, ".png", "the figure is a PNG")
-    from palpate.report.ownership import check_ours
-
-    check_ours(path)
-    return path
+    return own_place(output.figure or Path(f"{log.stem}.identify.png"), ".png", "--figure")
 
 
 def _page(output: OutputOptions) -> Path | None:
     """Where the page goes; likewise."""
-    path = output.report
-    if path is None:
-        return None
-    _check_place(path, ".html", "the report is an HTML file")
-    if path.is_dir() or (path.exists() and b"palpate identify" not in path.read_bytes()):
-        raise InputError(f"{path} is there and palpate did not write it; name another with --report")
-    return path
+    return None if output.report is None else own_place(output.report, ".html", "--report")
 
 
-def _check_place(path: Path, suffix: str, what: str) -> None:
-    if path.suffix.lower() != suffix:
-        raise InputError(f"{what}; name it {path.with_suffix(suffix)} instead of {path}")
-    if not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no folder {path.parent}; make it first")
-
-
-def _write(found: Identification, log: Path, figure: Path | None, page: Path | None) -> None:
+def _write(found: Identification, record: Record, log: Path, figure: Path | None, page: Path | None) -> None:
     if figure is not None:
         from palpate.report.identification import write_figure
 
         write_figure(found, figure, title=log.name)
     if page is not None:
+        from palpate.contact_frame import told
         from palpate.report.identification_page import write_page
 
-        write_page(found, page, title=log.name)
+        write_page(found, page, title=log.name, notes=told(record.meta))
 
 
 def _print(found: Identification, record: Record, log: Path, written: list[Path], json: bool) -> None:

@@ -12,6 +12,7 @@ from palpate.contact_frame.declared import Arm, ContactFrame
 from palpate.contact_frame.projecting import project
 from palpate.contact_frame.signals_in_base import FORCE
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
+from palpate.identification.estimators import LEAST_SQUARES
 from palpate.records import Record
 
 
@@ -58,6 +59,7 @@ def identify_contact(
     if in_space and not record.meta["contact_frame"]["normal_shown"]:
         found = _untouched(found)
     about = _about(arm) | {"force_filter": str(options.get("force_filter") or "none")}
+    about["method"] = options.get("method", LEAST_SQUARES)
     record = replace(record, meta={**record.meta, "arm": about})
     return with_arm(found, arm, tolerance, from_pose=in_space), record
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.identification.estimators import LEAST_SQUARES
+
 _GRAVITY = 9.80665
 _FAR = 0.01
 
@@ -77,6 +79,8 @@ def _arm(arm: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"force filtered by {arm['force_filter']} before it was sampled; the position goes through the same"
         )
+    if arm.get("method", LEAST_SQUARES) != LEAST_SQUARES:
+        lines.append(f"parameters by {arm['method']}; the models were chosen by {LEAST_SQUARES}")
     return lines
 
 
