@@ -30,6 +30,15 @@ def rejected() -> Identification:
     return identify(record(time, x, force + noise), model="kelvin-voigt", lag=0.0)
 
 
+def with_its_touch() -> Identification:
+    """A power of the depth, told from before the touch on: the place of the surface is found, and no offset."""
+    time = np.arange(6000) / 1000
+    x = press_path(time, 0.06)
+    force = force_of(x, lambda d, v: 1e5 * d**1.5 * (1 + 0.5 * v), 1e-3)
+    noise = coloured(len(time), 0.02, 0.9, np.random.default_rng(0))
+    return identify(record(time, x, force + noise), model="hunt-crossley", lag=0.0)
+
+
 def no_contact() -> Identification:
     """The motion of a press, and nothing but noise of the force."""
     log = pressed()
@@ -49,5 +58,6 @@ def many_contacts() -> Identification:
 
 
 OUTCOMES = {
-    own.__name__: own for own in (identified, not_identifiable, rejected, no_contact, volts, many_contacts)
+    own.__name__: own
+    for own in (identified, not_identifiable, rejected, with_its_touch, no_contact, volts, many_contacts)
 }

@@ -54,7 +54,7 @@ def test_the_verdicts_stand_above_the_panels(found):
     assert f"{found.parameters['K'].value:.0f}" in written
 
 
-@pytest.mark.parametrize("outcome", ["not_identifiable", "no_contact", "volts"])
+@pytest.mark.parametrize("outcome", ["not_identifiable", "with_its_touch", "no_contact", "volts"])
 def test_every_outcome_has_a_picture(outcome, tmp_path):
     from matplotlib.image import imread
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.models import Motion
+from palpate.identification.position_noise import position_noise
 from palpate.identification.sensor_path import SensorPath
 
 Array = NDArray[np.float64]
@@ -15,6 +16,9 @@ FASTEST = 1 / 8
 _ABOVE_FLOOR = 10.0
 _SEGMENT = 8192
 _FEWEST_SEGMENT = 64
+_APART = 3.0
+_MOST = 0.99
+_TAPER = ("tukey", 0.1)
 
 
 def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> float:
@@ -61,8 +65,29 @@ def _smooth(power: Array) -> Array:
 
 
 def highest_motion(motion: Motion) -> float:
-    """The frequency below which the position moved while it was fitted, by where its spectrum meets its floor [Hz]."""
+    """The frequency below which the position moved while it was fitted [Hz]; infinite if all contacts are too short.
+
+    Below it lies 99 % of the power of the probe's speed, as far as that stands above the position's own noise; of
+    several contacts in the fastest. Where a clean spectrum at last meets its floor is far above that, and no motion.
+    """
     chain, rows = motion.chain, motion.rows
     rows = chain.instants[rows].astype(np.intp) if isinstance(chain, SensorPath) else rows
-    stretch = motion.position[rows[0] : rows[-1] + 1]
-    return _edge(stretch, chain.dt) if len(stretch) >= _FEWEST_SEGMENT else float("inf")
+    step = np.diff(rows)
+    contacts = np.split(rows, np.flatnonzero(step > _APART * np.median(step)) + 1)
+    stretches = [motion.position[own[0] : own[-1] + 1] for own in contacts]
+    bands = [_band(stretch, chain.dt) for stretch in stretches if len(stretch) >= _FEWEST_SEGMENT]
+    return max(bands, default=float("inf"))
+
+
+def _band(position: Array, dt: float) -> float:
+    """Of one stretch of motion."""
+    from scipy.fft import next_fast_len
+    from scipy.signal import periodogram
+
+    speed = np.diff(position)
+    frequency, power = periodogram(speed, window=_TAPER, nfft=next_fast_len(len(speed), real=True))
+    noise = position_noise([position])
+    floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
+    moved = np.cumsum(np.where(power > _ABOVE_FLOOR * floor, power, 0.0))
+    last = int(np.searchsorted(moved, _MOST * moved[-1])) if moved[-1] else 1
+    return float(frequency[max(last, 1)]) / dt

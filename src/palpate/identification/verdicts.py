@@ -106,7 +106,7 @@ _LAGS = "the force lags the position, and a lag T counts as a damping of -K T: c
 
 
 def _refused(name: str, value: float, unit: str, terms: Terms, warnings: list[Warn]) -> Parameter:
-    what = f"the fit gives {value:.3g} {_shown(unit)}, below zero: no passive surface does that".replace(
+    what = f"the fit gives {_digits(value)} {_shown(unit)}, below zero: no passive surface does that".replace(
         "  ", " "
     )
     if name == "K":
@@ -123,7 +123,9 @@ def _of_rejected(
 ) -> Parameter:
     """The model does not hold. A stiffness is still a secant through the log; damping and mass are artefacts."""
     seen = "; ".join(choice.candidate.against[:2])
-    alone = [f"{label} alone {values[name]:.3g}" for label, values in choice.halves.items() if name in values]
+    alone = [
+        f"{label} alone {_digits(values[name])}" for label, values in choice.halves.items() if name in values
+    ]
     if len(alone) == 2:
         seen = f"{', '.join(alone)} {_shown(unit)}".rstrip() + f"; {seen}"
     if name in ("K", "n"):
@@ -132,7 +134,7 @@ def _of_rejected(
         reason = f"{what} the whole contact, not a constant of the surface: {seen}"
         reason += together(choice.candidate) if name == "n" else ""
         return _reported(value, std, interval, unit, Verdict.REJECTED, reason)
-    reason = f"the fit's {value:.3g} {_shown(unit)} is an artefact of a model that does not hold: {seen}"
+    reason = f"the fit's {_digits(value)} {_shown(unit)} is an artefact of a model that does not hold: {seen}"
     return Parameter(None, None, None, unit, Verdict.REJECTED, reason)
 
 
@@ -156,7 +158,7 @@ def _why_not(
     warnings: list[Warn],
 ) -> str:
     half = (interval[1] - interval[0]) / 2
-    bounds = f"95 %: {interval[0]:.3g} to {interval[1]:.3g} {_shown(unit)}".rstrip()
+    bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_shown(unit)}".rstrip()
     if _with_hidden(name, half, terms):
         text = f"{name} cannot be told from a lag of the force that hides a mass ({bounds})"
         return _confounded(text, fitted, terms, warnings)
@@ -186,7 +188,7 @@ def _remedy(name: str, terms: Terms) -> str:
     """What would show a parameter."""
     if name in ("B", "M") and np.isfinite(terms.band):
         more = "mass needs" if name == "M" else "damping needs"
-        return f"the position moved only below {terms.band:.2g} Hz, {more} faster motion; try palpate excite"
+        return f"the position moved only below {_digits(terms.band, 2)} Hz, {more} faster motion; try palpate excite"
     return "press deeper, longer or more often; try palpate excite"
 
 
@@ -232,8 +234,6 @@ def unit_of(name: str, fitted: Fit, terms: Terms) -> str:
         return terms.force_unit
     if name == "n" or plain:
         return "1"
-    if name == "Fc":
-        return terms.force_unit
     if name in ("K2", "K3"):
         return f"{terms.force_unit}/{terms.position_unit}^{name[1]}"
     if fitted.model.name == "hunt-crossley":
@@ -247,6 +247,11 @@ def _percent(half: float, value: float) -> str:
     return (
         f"{half / abs(value):.2g}".replace("inf", "?") if value == 0 else f"{100 * half / abs(value):.2g} %"
     )
+
+
+def _digits(value: float, count: int = 3) -> str:
+    """A number rounded to some digits; with a power of ten only where it is very large or small."""
+    return f"{float(f'{value:.{count}g}'):.7g}"
 
 
 def _shown(unit: str) -> str:

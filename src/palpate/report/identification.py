@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from palpate.identification.result import Identification, Traces
 
 _WIDE, _HIGH, _HEAD = 13.0, 11.6, 1.3
+_LINE, _COLUMN, _APART = 118, 20, 3
+"""Letters in a line of the head, at least in a parameter's column, and between two of them."""
 _VERDICTS = {
     Verdict.IDENTIFIED: style.GREEN,
     Verdict.NOT_IDENTIFIABLE: style.ORANGE,
@@ -66,12 +68,18 @@ def _head(figure: Any, found: Identification, title: str) -> None:
     figure.text(0.01, 0.97, title, fontsize=13, fontweight="bold", va="top")
     figure.text(0.01, 0.75, headline(found), fontsize=11, va="top")
     figure.text(0.01, 0.56, subtitle(found), fontsize=9, va="top")
-    wide = 1.0 / max(len(found.parameters), 4)
-    for i, (name, p) in enumerate(found.parameters.items()):
-        said = f"{name}  {number(p)} {unit(p) if p.value is not None else ''}"
-        figure.text(0.01 + i * wide, 0.35, said, fontsize=12, va="top")
+    said = [
+        f"{name}  {number(p)} {unit(p) if p.value is not None else ''}"
+        for name, p in found.parameters.items()
+    ]
+    widths = [max(len(text), _COLUMN) + _APART for text in said]
+    size = min(1.0, _LINE / sum(widths))
+    left = 0.01
+    for p, text, wide in zip(found.parameters.values(), said, widths, strict=True):
+        figure.text(left, 0.35, text, fontsize=12 * size, va="top")
         verdict = f"{MARKS[p.verdict]} {p.verdict}"
-        figure.text(0.01 + i * wide, 0.14, verdict, fontsize=9.5, va="top", color=_VERDICTS[p.verdict])
+        figure.text(left, 0.14, verdict, fontsize=9.5, va="top", color=_VERDICTS[p.verdict])
+        left += wide * size / _LINE
 
 
 def _panels(figure: Any, found: Identification, traces: Traces) -> None:

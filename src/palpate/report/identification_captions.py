@@ -12,6 +12,7 @@ from palpate.report.numbers import plain
 
 DOUBTED = 1e-3
 """Probability below which residuals count as not white, as in the choice of the model."""
+_FAR = 1000.0
 _AS_LARGE = 1.3
 """Times the noise out of contact up to which a misfit is no larger than that."""
 
@@ -56,7 +57,7 @@ def residual(found: Identification, traces: Traces) -> str:
 def noise(found: Identification, traces: Traces) -> str:
     """Of the misfit's spectrum."""
     p, times = whiteness_of(found, traces), over_noise(found, traces)
-    size = f" It is {plain(times, 2)} times the usual noise out of contact." if times is not None else ""
+    size = f" It is {_times(times)} the usual noise out of contact." if times is not None else ""
     if p is None:
         return "Too few samples to test whether the misfit is white."
     chance = f"p = {p:.2g}" if p >= 1e-4 else "p < 0.0001"
@@ -69,6 +70,11 @@ def noise(found: Identification, traces: Traces) -> str:
         f"{band} The misfit is not white ({chance}): the noise is coloured, or the model lacks something. The intervals"
         f" allow for its colour, not for a wrong model.{size}"
     )
+
+
+def _times(ratio: float) -> str:
+    """A force that is rounded to nothing out of contact has a noise of nothing."""
+    return f"{plain(ratio, 2)} times" if ratio < _FAR else "far above"
 
 
 def settled() -> str:

@@ -121,7 +121,7 @@ def _length(traces: Traces) -> tuple[float, str]:
 
 def _spring_force(traces: Traces) -> Array:
     """What the spring K, curved or not, gives by itself, shape (m,)."""
-    force: Array = terms(traces)["K"] + traces.theta["offset"]
+    force: Array = terms(traces)["K"] + traces.theta.get("offset", 0.0)
     return force
 
 

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from palpate.identification import Identification, Parameter, Verdict
 from palpate.report.identification_words import number, unit
-from palpate.report.numbers import NONE, between
+from palpate.report.numbers import NONE, between, plain
 
 _STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 _MANY = 6
@@ -49,7 +49,7 @@ def _fit(found: Identification) -> str:
     text = f"{found.model}: R2 {found.r2:.4f}, rms misfit {found.rmse:.3g}, {found.n} samples"
     text += f", filters {found.cutoff:.3g} Hz"
     if found.lag:
-        text += f", lag {1e3 * found.lag[0]:.3g} ms (std {1e3 * found.lag[1]:.2g} ms)"
+        text += f", lag {plain(1e3 * found.lag[0], 3)} ms (std {plain(1e3 * found.lag[1], 2)} ms)"
     return text
 
 

@@ -18,6 +18,7 @@ CALLED = {
     "tau": "relaxation time",
     "n": "exponent",
     "Fc": "Coulomb friction",
+    "x0": "place of the surface",
 }
 MARKS = {Verdict.IDENTIFIED: "✓", Verdict.NOT_IDENTIFIABLE: "?", Verdict.REJECTED: "✕"}
 NO_NUMBER = "no number"
