@@ -73,6 +73,7 @@ def identify(
         InputError: the record or an argument is wrong, in one line.
     """
     _check(tolerance, calibration, lag, lag_std, series_stiffness, series_std, cutoff)
+    _check_mass(mass)
     _check_method(method, force_filter is not None)
     low_pass = LowPass.parse(force_filter) if isinstance(force_filter, str) else force_filter
     if low_pass is not None and not low_pass.sections:
@@ -128,6 +129,11 @@ def _check_method(method: str, matched: bool) -> None:
         raise InputError(
             f"a known force filter is for {LEAST_SQUARES}: leave --force-filter out for {method}"
         )
+
+
+def _check_mass(mass: tuple[float, float] | None) -> None:
+    if mass is not None and not all(np.isfinite(number) and number >= 0 for number in mass):
+        raise InputError(f"the mass and its std must be 0 or more, got {mass[0]:g} and {mass[1]:g}")
 
 
 def _check(
