@@ -53,10 +53,12 @@ class Line:
     Args:
         rms: of the error, over the bound.
         bias: mean of the error over the rms of the error.
-        relative: median of |error|/truth.
+        relative: rms of error/truth.
         coverage: share of 95 % intervals that hold the truth.
         width: median of the half-width over that of the bound.
         identified: share of verdicts "identified".
+        trusted: share of the 95 % intervals that hold the truth where the verdict is "identified"; None if it never is.
+        error: rms, in the parameter's unit.
     """
 
     parameter: str
@@ -67,6 +69,7 @@ class Line:
     coverage: float
     width: float
     identified: float
+    trusted: float | None
     error: float
 
 
@@ -78,15 +81,18 @@ def line(name: str, trials: list[Trial]) -> Line:
     truth = np.array([t.truth[name] for t in trials])
     scaled = error / np.maximum(bound, 1e-300)
     rms = float(np.sqrt(np.mean(scaled**2)))
+    inside = np.abs(error) <= _T * std
+    identified = np.array([t.verdict.get(name) == "identified" for t in trials])
     return Line(
         name,
         len(trials),
         rms,
         float(np.mean(scaled)) / rms,
         float(np.sqrt(np.mean((error / truth) ** 2))),
-        float(np.mean(np.abs(error) <= _T * std)),
+        float(np.mean(inside)),
         float(np.median(std / np.maximum(bound, 1e-300))),
-        float(np.mean([t.verdict.get(name) == "identified" for t in trials])),
+        float(np.mean(identified)),
+        float(np.mean(inside[identified])) if identified.any() else None,
         float(np.sqrt(np.mean(error**2))),
     )
 
@@ -108,6 +114,7 @@ def main() -> None:
     )
     print(
         f"{'':36}{'':5}{'rms':>7}{'bias/rms':>10}{'rms/truth':>11}{'cover':>8}{'width':>7}{'identified':>12}"
+        f"{'cover of those':>16}"
     )
     figures = {}
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
@@ -126,19 +133,16 @@ def _show(name: str, trials: list[Trial], seconds: float) -> dict[str, object]:
     lines = [line(parameter, trials) for parameter in parameters]
     for i, row in enumerate(lines):
         title = name if i == 0 else ""
+        trusted = "-" if row.trusted is None else f"{row.trusted:.1%}"
         print(
             f"{title:36}{row.parameter:5}{row.rms:7.2f}{row.bias:10.2f}{row.relative:11.3%}{row.coverage:8.1%}"
-            f"{row.width:7.2f}{row.identified:12.1%}"
+            f"{row.width:7.2f}{row.identified:12.1%}{trusted:>16}"
             + (f"  rms {row.error * 1e3:.3f} ms" if row.parameter == "lag" else "")
         )
     confounded = float(np.mean(["lag-damping-confounded" in t.codes for t in trials]))
     rejected = float(np.mean(["model-rejected" in t.codes for t in trials]))
     print(f"{'':36}lag-damping-confounded {confounded:.1%}, model-rejected {rejected:.1%}, {seconds:.0f} s")
     return {"lines": [vars(row) for row in lines], "confounded": confounded, "rejected": rejected}
-
-
-def _in_ms(row: Line) -> str:
-    return f"  rms {row.error * 1e3:.3f} ms" if row.parameter == "lag" else ""
 
 
 if __name__ == "__main__":
