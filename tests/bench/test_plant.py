@@ -238,16 +238,18 @@ def test_contact_never_pulls_and_nothing_blows_up(first, second, name):
     state = at_rest(plant, WALL - 5e-4)
     for wrench in (first, second, first):
         torque = push(plant, wrench, state.q)
-        energy = (
-            kinetic(plant, state)
-            + plant.surface.stored(state.surface)
-            + sum(plant.friction.stored(state.bristles))
-        )
+        before = energy(plant, state)
         state, out = after(plant, state, torque, 50e-6, 0.05)
         assert np.all(out[:, 5] >= 0.0)
         assert np.isfinite(numbers(state)).all()
-        after_it = kinetic(plant, state) + plant.surface.stored(state.surface)
-        assert after_it <= energy + out[:, 0].sum() + 0.02 * np.abs(out[:, 0]).sum() + 1e-4
+        # The centripetal part is that of half a step before: at up to 20 rad/s, a thousandth of a radian.
+        assert energy(plant, state) <= before + out[:, 0].sum() + 1e-3 * np.abs(out[:, 0]).sum() + 1e-9
+
+
+def energy(plant, state):
+    """All the energy there is [J]: of the arm, the surface, the joints' bristles and the one along the surface."""
+    bristles = sum(plant.friction.stored(state.bristles)) + plant.side.bent(state.side)
+    return kinetic(plant, state) + plant.surface.stored(state.surface) + bristles
 
 
 def test_compiled_is_plain_to_the_bit():
