@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ ONSET = 0.05
 _REACHED = 0.2
 _BLOCKS = 100
 _WIDER = 4.0
+_CLEAR = 3.0
+"""Deviations of the free force below the threshold: noise cut at its own height stays below two, however coloured."""
+_FEWEST = 20
 _FREE = 0.25
 """Share of the position's range that must be travelled without any force for contact to be sure to begin and end."""
 
@@ -33,6 +36,8 @@ class Contacts:
         resting: force without contact, after the sign [N]; 0 for a bonded contact.
         threshold: force above which contact is counted, after the sign [N].
         warnings: what was found.
+        clear: whether the force out of contact keeps well below that threshold. The contacts of mere noise are its
+            peaks, and what is left out of contact reaches up to them. Not for a bonded one: it has no such force.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -42,6 +47,7 @@ class Contacts:
     resting: float
     threshold: float
     warnings: tuple[Warn, ...]
+    clear: bool = True
 
 
 def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) -> Contacts:
@@ -58,7 +64,7 @@ def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) 
     force = chain(channels.force)
     rest, peak, sure = _extremes(force, channels.position)
     if bonded or (bonded is None and not sure and _never_free(rest, peak)):
-        return Contacts(((0, len(force)),), True, 1.0, 1.0, 0.0, -np.inf, ())
+        return Contacts(((0, len(force)),), True, 1.0, 1.0, 0.0, -np.inf, (), clear=False)
     sign = 1.0 if peak > rest else -1.0
     level, top = sign * rest, sign * peak
     threshold = _threshold(sign * force, level, top)
@@ -66,7 +72,20 @@ def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) 
     if not spans:
         text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
-    return _oriented(channels, chain, spans, sign, level, threshold)
+    clear = _clear(sign * force, spans, threshold, int(chain.settling / chain.dt))
+    return replace(_oriented(channels, chain, spans, sign, level, threshold), clear=clear)
+
+
+def _clear(force: Array, spans: list[tuple[int, int]], threshold: float, settling: int) -> bool:
+    out = np.ones(len(force), bool)
+    out[:settling] = False
+    for begin, end in spans:
+        out[begin:end] = False
+    free = force[out]
+    if len(free) < _FEWEST:
+        return False
+    middle = float(np.median(free))
+    return threshold - middle > _CLEAR * 1.4826 * float(np.median(np.abs(free - middle)))
 
 
 def _oriented(

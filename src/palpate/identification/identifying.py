@@ -11,7 +11,9 @@ from palpate.identification.bandwidth import highest_motion
 from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Choice, Question, choose, with_mass
 from palpate.identification.codes import Code, Warn
+from palpate.identification.contacts import Contacts
 from palpate.identification.estimators import LEAST_SQUARES, METHODS, estimated_by
+from palpate.identification.filters import Chain
 from palpate.identification.fitting import Fit, fit
 from palpate.identification.hidden_mass import hidden_mass
 from palpate.identification.in_series import take_out
@@ -21,14 +23,15 @@ from palpate.identification.matching import matched_question, samples_of
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
 from palpate.identification.preparing import filter_and_contacts, question_of, thinned
 from palpate.identification.reporting import nothing, report
-from palpate.identification.result import Identification
-from palpate.identification.timebase import channels_of, held_force
+from palpate.identification.result import Identification, Verdict
+from palpate.identification.timebase import Channels, channels_of, held_force
 from palpate.identification.verdicts import Terms
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 
 _MOST_SAMPLES = 2_000_000
 _FOLLOWS = 0.3
+_FOLLOWS_CLEARLY = 0.5
 
 
 def identify(
@@ -86,6 +89,7 @@ def identify(
         channels = take_out(channels, series_stiffness, bonded, cutoff)
     samples = samples_of(channels, held_force(record, channels), low_pass) if low_pass is not None else None
     channels, chain, contacts = filter_and_contacts(channels, bonded, cutoff)
+    of_time = tuple(warnings)
     warnings += contacts.warnings
     terms = Terms(
         tolerance, calibration, (series_stiffness, series_std) if series_stiffness else None,
@@ -98,7 +102,10 @@ def identify(
         question = matched_question(samples, contacts, chain, channels, known, tolerance)
         choice = with_mass(choose(question, model), model)
         terms = replace(terms, band=highest_motion(question.motion))
-        return report(channels, chain, contacts, question, choice, terms, model)
+        found = report(channels, chain, contacts, question, choice, terms, model)
+        return (
+            found if contacts.bonded else _nothing_in_noise(found, contacts, channels, chain, terms, of_time)
+        )
     question = question_of(channels, chain, contacts, known, tolerance)
     terms = replace(terms, band=highest_motion(question.motion))
     choice = choose(question, model)
@@ -119,7 +126,25 @@ def identify(
     elif not choice.rejected:
         terms = replace(terms, hidden=hidden_mass(choice.candidate.fit, question))
     candidate = estimated_by(method, choice.candidate, contacts.force_sign * channels.force)
-    return report(channels, chain, contacts, question, replace(choice, candidate=candidate), terms, model)
+    found = report(channels, chain, contacts, question, replace(choice, candidate=candidate), terms, model)
+    return _nothing_in_noise(found, contacts, channels, chain, terms, of_time)
+
+
+def _nothing_in_noise(
+    found: Identification,
+    contacts: Contacts,
+    channels: Channels,
+    chain: Chain,
+    terms: Terms,
+    of_time: tuple[Warn, ...],
+) -> Identification:
+    """What was found; or no contact, if the force hardly stands above its noise and does not follow the position."""
+    sure = any(p.verdict is Verdict.IDENTIFIED for p in found.parameters.values())
+    if contacts.clear or sure or found.r2 >= _FOLLOWS_CLEARLY:
+        return found
+    text = "the force hardly leaves its noise and does not follow the position: nothing seems to be touched"
+    channels.warnings[:] = [*of_time, Warn(Code.NO_CONTACT, text)]
+    return nothing(channels, chain, terms, found.model)
 
 
 def _check_method(method: str, matched: bool) -> None:

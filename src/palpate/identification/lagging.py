@@ -76,6 +76,7 @@ def closing_lag(motion: Motion, force: Array, start: float, spans: NDArray[np.in
         start: first guess, -B/K of a fit without a lag [s].
         spans: number of the contact that each row belongs to, shape (n,).
     """
+    start = float(np.clip(start, -motion.duration, motion.duration))  # a K of nearly nothing makes it endless
     whole = fit(
         ELASTIC, motion, force, Lag(start, max(abs(start), 2 * motion.chain.dt), False), free_lag=True
     )

@@ -48,6 +48,8 @@ def verdicts(choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> di
     names = [n for n in fitted.names if n not in ("offset", "lag", "x0")]
     found = {name: _verdict(name, choice, lag, terms, warnings) for name in names}
     place = surface(choice.candidate, choice.rejected, terms.tolerance, terms.position_unit)
+    if place and place.verdict is Verdict.IDENTIFIED and not _begins(found):
+        place = Parameter(None, None, None, place.unit, Verdict.NOT_IDENTIFIABLE, _NO_FORCE)
     if place:
         found["x0"] = place
     if terms.hidden and before_position(fitted):
@@ -64,6 +66,14 @@ def verdicts(choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> di
         text = f"the log does not show {', '.join(low)} above the noise: {_remedy(low[-1], terms)}"
         warnings.append(Warn(Code.LOW_EXCITATION, text))
     return found
+
+
+_NO_FORCE = "the log does not show the force that would begin there"
+
+
+def _begins(found: dict[str, Parameter]) -> bool:
+    """Whether there is any force of which a place could be told."""
+    return any(found[n].verdict is Verdict.IDENTIFIED for n in ("K", "K1", "n") if n in found)
 
 
 def _verdict(name: str, choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> Parameter:

@@ -1,0 +1,61 @@
+"""A log in which nothing is touched says so, whatever the sensor shows in the air; and gives no number."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from identification.synthetic_contacts import Array, pressed, record
+from palpate.identification import identify
+
+TIME = np.arange(5000) / 1000
+MOTIONS = {
+    "chirp": 3e-3 * np.sin(2 * np.pi * (0.5 * TIME + 4 * TIME**2)),
+    "sines": sum(2e-3 * np.sin(2 * np.pi * f * TIME + f) for f in (0.3, 1.7, 6.1)),
+    "steps": 5e-3 * np.floor(TIME),
+}
+
+
+def white(seed: int = 0) -> Array:
+    return np.random.default_rng(seed).normal(0, 0.1, len(TIME))
+
+
+FORCES = {
+    "noise": white(),
+    "noise of another seed": white(1),
+    "a bias": white() - 8,
+    "held": np.repeat(white()[:1250], 4),
+    "held at 480 Hz": white()[(TIME * 480).astype(int)],
+    "coarse": np.round(white() / 0.1) * 0.1,
+    "coarser than its noise": np.round(white() / 0.25) * 0.25,
+    "slow noise": lfilter([0.3], [1, -0.95], white()),
+    "a hum": white() + 0.3 * np.sin(2 * np.pi * 50 * TIME),
+    "spikes": white() + 20 * (np.arange(5000) % 997 == 1),
+}
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("force", FORCES)
+def test_nothing_is_touched(motion, force):
+    found = identify(record(TIME, MOTIONS[motion], FORCES[force]))
+    assert "no-contact" in found.codes
+    assert not found.found
+    assert not found.contacts
+    assert not {"force-sign-reversed", "position-sign-reversed", "low-excitation"} & set(found.codes)
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("filtered", [None, "butterworth3:120"])
+def test_a_force_that_drifts_shows_no_parameter(motion, filtered):
+    if motion == "steps":
+        pytest.skip("a force that rises with every step is that of a spring")
+    found = identify(record(TIME, MOTIONS[motion], white() + TIME / 5), force_filter=filtered)
+    assert all(p.verdict != "identified" for p in found.parameters.values()), found.parameters
+
+
+def test_a_press_in_as_much_noise_is_one():
+    """A tenth of a newton on fifteen: the same noise, and a contact that stands above it."""
+    found = identify(pressed(noise=0.1))
+    assert found.parameters["K"].verdict == "identified"
+    assert len(found.contacts) == 1
