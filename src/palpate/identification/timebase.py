@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from palpate.errors import InputError
 from palpate.identification.codes import Code, Warn, from_word
 from palpate.identification.held import fresh_rows
+from palpate.identification.saturation import at_limit
 from palpate.records import Record
 
 Array = NDArray[np.float64]
@@ -152,7 +153,7 @@ def _leave_saturated(
     both: Mask, use_force: Mask, position: Array, force: Array, warnings: list[Warn]
 ) -> None:
     rows = np.flatnonzero(both)
-    stuck = _saturated(force[rows], position[rows])
+    stuck = at_limit(force[rows], position[rows], _far_end(force[rows]))
     if not stuck.any():
         return
     level = force[rows[stuck]][0]
@@ -161,20 +162,11 @@ def _leave_saturated(
     use_force[rows[stuck]] = False
 
 
-def _saturated(force: Array, position: Array) -> Mask:
-    """Rows in unbroken stretches of exactly the extreme force while the position goes on moving."""
-    stuck = np.zeros(len(force), bool)
+def _far_end(force: Array) -> list[float]:
+    """The end of the range that is further from the usual force; none if that is zero: so rests a force in the air."""
     middle = float(np.median(force))
     level = max((float(force.max()), float(force.min())), key=lambda extreme: abs(extreme - middle))
-    if level == 0:
-        return stuck
-    least = max(8, len(force) // 1000)
-    travel = float(np.ptp(position))
-    edges = np.diff(np.r_[0, (force == level).astype(np.int8), 0])
-    for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
-        if end - begin >= least and np.ptp(position[begin:end]) > 0.02 * travel:
-            stuck[begin:end] = True
-    return stuck
+    return [level] if level else []
 
 
 def _rate(time: Array) -> float:

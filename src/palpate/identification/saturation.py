@@ -1,0 +1,43 @@
+"""A force that stands at the end of its range while the probe moves on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+_FEWEST = 8
+_SHARE = 1000
+_MOVED = 0.02
+
+
+def at_limit(force: Array, place: Array, levels: Iterable[float], among: Rows | None = None) -> Rows:
+    """Rows in unbroken stretches of exactly one force while the probe moves by 2 % of its travel, shape (n,).
+
+    Args:
+        force: of one axis [N], shape (n,).
+        place: of the probe [m], shape (n,) or (n, 3); NaN where there is no reading.
+        levels: the forces that may be an end of the range [N].
+        among: rows that count, shape (n,); all if not given.
+    """
+    stuck = np.zeros(len(force), bool)
+    rows = np.arange(len(force)) if among is None else np.flatnonzero(among)
+    least, far = max(_FEWEST, len(force) // _SHARE), _MOVED * _travel(place)
+    for level in levels:
+        edges = np.diff(np.r_[0, (force[rows] == level).astype(np.int8), 0])
+        for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+            own = rows[begin:end]
+            if len(own) >= least and _travel(place[own[0] : own[-1] + 1]) > far:
+                stuck[own] = True
+    return stuck
+
+
+def _travel(place: Array) -> float:
+    """How far the probe gets [m]."""
+    place = place.reshape(len(place), -1)
+    there = place[np.isfinite(place).all(axis=1)]
+    return float(np.linalg.norm(np.ptp(there, axis=0))) if len(there) else 0.0
