@@ -121,6 +121,31 @@ def test_a_hole_in_the_middle_ends_it(tmp_path):
     np.testing.assert_array_equal(values, FORCE[: len(values), 2])
 
 
+@pytest.mark.parametrize(
+    ("kind", "packed"),
+    [("bag1", False), ("bag1", True), ("sqlite", False), ("mcap", False), ("mcap", True)],
+)
+def test_damage_anywhere_is_read_around_or_refused_in_a_line(tmp_path, kind, packed):
+    """Noise, zeros or ones over a part of the file, as a failing disk leaves them."""
+    rows = slice(0, 300)
+    sent = [wrench("/ft", TIME[rows], FORCE[rows]), pose("/pose", TIME[rows], FORCE[rows])]
+    path = storage(write_bag(tmp_path / "log", kind, sent, packed=packed))
+    whole, rng, said = path.read_bytes(), np.random.default_rng(0), []
+    for k in range(30):
+        size, place = int(rng.choice([1, 8, 400, 4096])), int(rng.integers(len(whole)))
+        noise = rng.integers(0, 256, size, dtype=np.uint8).tobytes()
+        hurt = (noise, bytes(size), b"\xff" * size)[k % 3][: len(whole) - place]
+        path.write_bytes(whole[:place] + hurt + whole[place + len(hurt) :])
+        try:
+            with Bag(path, kind_of(path)) as bag:
+                bag.streams({"/ft": ["wrench.force.z"]})
+                bag.times()
+        except InputError as error:
+            said.append(str(error))
+    assert 0 < len(said) < 30
+    assert not any("\n" in text for text in said)
+
+
 @pytest.mark.parametrize("size", [16, 60, 200])
 def test_a_stub_is_refused_in_a_line(bag, tmp_path, size):
     path = tmp_path / f"stub{bag.suffix}"

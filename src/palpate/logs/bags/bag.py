@@ -129,6 +129,9 @@ class Bag:
         for name in wanted:
             self.topic(name)
         rows = self._unhurt(lambda: self._rows(wanted))
+        for name, own in rows.items():
+            if not own.received:
+                raise InputError(f"{self.path}: no message on {name} is whole; record or copy it again")
         origin = min(min(own.received) for own in rows.values())
         streams = {name: own.stream(name, origin) for name, own in rows.items()}
         for name, paths in wanted.items():

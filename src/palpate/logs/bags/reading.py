@@ -51,7 +51,7 @@ class CutReader:
         self.end = End(finished=False)
         connections: dict[int, Connection] = {}
         counts: Counter[int] = Counter()
-        for item in self._scan(path):
+        for item in self._items():
             if isinstance(item, Raw):
                 counts[item.channel] += 1
             elif isinstance(item, End):
@@ -64,9 +64,18 @@ class CutReader:
     def messages(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
         """The whole messages of some connections."""
         wanted = {c.id: c for c in connections}
-        for item in self._scan(self.path):
+        for item in self._items():
             if isinstance(item, Raw) and item.channel in wanted:
                 yield wanted[item.channel], item.received, item.data
+
+    def _items(self) -> Iterator[Connection | Raw | End]:
+        """What the file holds up to its end, or to whatever in it cannot be read."""
+        try:
+            yield from self._scan(self.path)
+        except (ImportError, PermissionError):
+            raise
+        except Exception:  # noqa: BLE001 - a damaged file fails in as many ways as there are bytes
+            return
 
     @property
     def said(self) -> str:

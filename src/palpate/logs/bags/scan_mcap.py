@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from pathlib import Path
 from struct import unpack_from
 from typing import TYPE_CHECKING, BinaryIO
@@ -48,8 +48,12 @@ def _records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
     from rosbags.rosbag2.errors import ReaderError
     from rosbags.rosbag2.storage_mcap import decompress
 
+    begin, last = file.tell(), file.seek(0, SEEK_END)
+    file.seek(begin)
     while len(head := file.read(9)) == 9:
         operation, size = head[0], unpack_from("<Q", head, 1)[0]
+        if not operation:
+            return
         if operation == _CHUNK:
             fixed = file.read(32)
             if len(fixed) < 32:
@@ -59,9 +63,9 @@ def _records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
             if not packing:
                 continue
             size -= 32 + letters + 8
-        data = file.read(size)
-        if len(data) < size:
+        if not 0 <= size <= last - file.tell():
             return
+        data = file.read(size)
         if operation != _CHUNK:
             yield operation, data
             continue
