@@ -184,6 +184,16 @@ def test_no_contact_is_an_answer_and_the_answer_is_no(log, capsys):
     assert all(p["value"] is None for p in found["parameters"].values())
 
 
+def test_a_time_in_ms_that_is_taken_for_seconds_is_suspected(log, capsys):
+    rows = np.loadtxt(log, delimiter=",", skiprows=1)
+    rows[:, 0] *= 1e3
+    np.savetxt(log, rows, delimiter=",", header="t,position_mm,force_N", comments="", fmt="%.7g")
+    _, found = ask(capsys, log, "--time", "t", *OWN[2:])
+    assert "is the time in ms? then say NAME:ms" in next(
+        w["text"] for w in found["warnings"] if w["code"] == "low-rate"
+    )
+
+
 WRONG = {
     "unknown column": ([*OWN[:-1], "f:N"], "unknown column 'f'.*position_mm"),
     "unknown unit": ([*OWN[:-1], "force_N:stone"], "unknown unit 'stone'"),
@@ -199,6 +209,14 @@ WRONG = {
     ),
     "tolerance": ([*OWN, "--tolerance", "2"], r"tolerance must be in \(0, 1\]"),
     "lag": ([*OWN, "--lag", "late"], "--lag needs VALUE or VALUE:STD"),
+    "lag in ms": (
+        [*OWN, "--lag", "7.7"],
+        "lag of 7.7 s is as long as the whole log .3 s.; give it in seconds",
+    ),
+    "one row": (
+        [*OWN, "--end", "0.0001"],
+        "has 1 row with a time of its own.*check --time, --start and --end",
+    ),
     "figure is a folder": ([*OWN, "--figure", "."], "is a folder; name a file with --figure"),
     "report is a folder": ([*OWN, "--report", ".."], "is a folder; name a file with --report"),
     "figure kind": ([*OWN, "--figure", "a.pdf"], "PNG; name it a.png"),

@@ -176,6 +176,11 @@ def test_only_free_motion(tmp_path, capsys):
     assert "no-contact" in codes(found)
     assert all(parameter["verdict"] != "identified" for parameter in found["parameters"].values())
     assert all(parameter["value"] is None for parameter in found["parameters"].values())
+    assert not {"contact-at-start", "normal-uncertain"} & set(codes(found))
+    main(["identify", "press", "--wrench-frame", "tool", "--no-figure"])
+    shown = capsys.readouterr().out
+    assert "nothing is touched" in shown
+    assert "no free motion" not in shown
 
 
 def test_fifty_short_contacts(tmp_path, capsys):

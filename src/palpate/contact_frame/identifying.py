@@ -58,6 +58,8 @@ def identify_contact(
     found = identify(record, tolerance=tolerance, calibration=scale, **options)
     if in_space and not record.meta["contact_frame"]["normal_shown"]:
         found = _untouched(found)
+    if in_space and Code.NO_CONTACT.word in found.codes:
+        found, record = _all_free(found, record)
     about = _about(arm) | {"force_filter": str(options.get("force_filter") or "none")}
     about["method"] = options.get("method", LEAST_SQUARES)
     record = replace(record, meta={**record.meta, "arm": about})
@@ -73,6 +75,15 @@ def _untouched(found: Identification) -> Identification:
     }
     warnings = [warn for warn in found.warnings if warn.code is not Code.NO_CONTACT]
     return replace(found, parameters=refused, warnings=(*warnings, Warn(Code.NO_CONTACT, reason)))
+
+
+def _all_free(found: Identification, record: Record) -> tuple[Identification, Record]:
+    """Where nothing is touched, there is no contact that the log could begin in, no normal and no side of a force."""
+    about = {**record.meta["contact_frame"], "untouched": True}
+    warnings = tuple(
+        w for w in found.warnings if w.code not in (Code.CONTACT_AT_START, Code.NORMAL_UNCERTAIN)
+    )
+    return replace(found, warnings=warnings), replace(record, meta={**record.meta, "contact_frame": about})
 
 
 def _about(arm: Arm) -> dict[str, Any]:

@@ -17,7 +17,11 @@ def told(meta: Mapping[str, Any]) -> list[str]:
     """Sentences for a user, from the metadata of a record along the normal."""
     lines = list(meta.get("facts", ()))
     about = meta.get("contact_frame")
-    if about:
+    if about and about.get("untouched"):
+        lines.append(
+            "nothing is touched: no normal, and no side that the force is of, is taken from this log"
+        )
+    elif about:
         lines += [_wrench(about), _normal(about), _load(about), *_lever(about)]
     return lines + _arm(meta.get("arm") or {})
 

@@ -82,6 +82,7 @@ def identify(
     if low_pass is not None and not low_pass.sections:
         low_pass = None
     channels = channels_of(record)
+    _check_lag(lag, channels)
     if low_pass is None:
         channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
     warnings = channels.warnings
@@ -145,6 +146,14 @@ def _nothing_in_noise(
     text = "the force hardly leaves its noise and does not follow the position: nothing seems to be touched"
     channels.warnings[:] = [*of_time, Warn(Code.NO_CONTACT, text)]
     return nothing(channels, chain, terms, found.model)
+
+
+def _check_lag(lag: float | None, channels: Channels) -> None:
+    span = len(channels.position) * channels.dt
+    if lag is not None and abs(lag) >= span:
+        raise InputError(
+            f"the lag of {lag:g} s is as long as the whole log ({span:.3g} s); give it in seconds"
+        )
 
 
 def _check_method(method: str, matched: bool) -> None:

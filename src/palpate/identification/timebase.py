@@ -20,6 +20,8 @@ _FEWEST = 20
 _JITTER = 0.05
 _GAP = 10.0
 _SLOW = 50.0
+_LONG_STEP = 0.5
+"""Between two rows [s]: so slow a log is more likely one whose time is not in seconds."""
 
 
 @dataclass
@@ -78,6 +80,7 @@ def channels_of(record: Record) -> Channels:
     rate = min(_rate(time[use_x]), _rate(time[use_f]), 1 / dt)
     if rate < _SLOW:
         text = f"only {rate:.3g} fresh readings a second: behaviour faster than about {rate / 8:.2g} Hz is not seen"
+        text += "; or is the time in ms? then say NAME:ms" if dt >= _LONG_STEP else ""
         warnings.append(Warn(Code.LOW_RATE, text))
     if even and use_x.all() and use_f.all():
         return Channels(float(time[0]), dt, position, force, np.ones(len(time), bool), rate, warnings)
@@ -98,8 +101,9 @@ def held_force(record: Record, channels: Channels) -> Array:
 
 def _check(time: Array, position: Array, force: Array) -> None:
     if len(time) < _FEWEST:
+        count = f"{len(time)} row{'s' * (len(time) != 1)} with a time of {'their' if len(time) != 1 else 'its'} own"
         raise InputError(
-            f"the log has {len(time)} rows with a time of their own; at least {_FEWEST} are needed"
+            f"the log has {count}; at least {_FEWEST} are needed: log longer, or check --time, --start and --end"
         )
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
