@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 NAMES = ("M", "B", "K", "offset")
 _FORGOTTEN = 10.0
+_ROOM = 1e-9
+"""Of a period, for the rounding of an instant that falls on a row."""
 _VAGUE = (10.0, 1e4, 1e6, 1e3)
 """Deviation of each parameter before anything is known [kg], [N s/m], [N/m], [N], in the force's noise."""
 
@@ -66,11 +68,13 @@ class Refresh:
         if not np.isfinite(self._high):
             self._low, self._high, self._last = row - 1.0, float(row), 0
             return
-        middle = (self._low + self._high) / 2
-        self._last = max(round((row - 0.5 - middle) / self.period), self._last)
+        number = floor((row - 1 - self._high) / self.period + _ROOM) + 1  # the first that may have come out since
+        if self._low + number * self.period > row:  # the clock drifts: the nearest
+            number = round((row - 0.5 - (self._low + self._high) / 2) / self.period)
+        self._last = max(number, self._last)
         start = self._last * self.period
         low, high = max(self._low, row - 1 - start), min(self._high, row - start)
-        drifted = low > high
+        drifted = low >= high - _ROOM  # it comes after `low`, and no later than `high`
         self._low, self._high = (row - 1 - start, row - start) if drifted else (low, high)
 
 

@@ -1,0 +1,353 @@
+"""On line from position and force: the same regressors and the same answer as of a log of them."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from identification.sensor_logs import SAMPLING, TRUTH, sensor_log
+from palpate.errors import InputError
+from palpate.identification import identify
+from palpate.identification.matching import samples_of
+from palpate.identification.sensor_path import SensorPath
+from palpate.identification.timebase import channels_of
+from palpate.identifiers import ContactIdentifier, RecursiveLeastSquares
+from palpate.identifiers.contact_identifier import NAMES, Refresh
+from palpate.signals.low_pass import LowPass
+
+RATE = 1000.0
+SENSOR = LowPass.parse("butterworth3:120")
+LAG = SENSOR.lag + 2.1e-3
+SETTLING = 10 / SENSOR.decay * RATE
+"""Ticks until what was before is e^-10 of itself."""
+TICKS = 1500
+
+
+class Taken:
+    """An estimator that only keeps what it is given."""
+
+    def __init__(self):
+        self.regressors, self.forces = [], []
+
+    def update(self, regressor, force):
+        self.regressors.append(np.array(regressor))
+        self.forces.append(force)
+
+    def estimate(self):
+        raise AssertionError("nobody asked")
+
+
+def moving(seed=0):
+    """A tip that wanders through 10 mm or so, and a force that never repeats; shape (TICKS,) each."""
+    rng = np.random.default_rng(seed)
+    return np.cumsum(rng.normal(0, 1e-4, TICKS)) + 0.5, 20 + rng.normal(0, 1, TICKS)
+
+
+def identifier(estimator=None, **changes):
+    given_ = {"low_pass": SENSOR, "rate": RATE, "lag": LAG, **changes}
+    return ContactIdentifier(estimator=estimator, **given_)
+
+
+def told(one):
+    estimate = one.estimate()
+    return np.concatenate([estimate.theta, estimate.covariance.ravel(), [estimate.samples]])
+
+
+@pytest.mark.parametrize("lag", [0.0, SENSOR.lag, LAG, 0.0301])
+@pytest.mark.parametrize("low_pass", ["butterworth3:120", "butterworth2:250+butterworth1:80"])
+def test_a_stream_has_the_regressors_of_a_log(lag, low_pass):
+    """Each tick's, from the first that the low-pass has settled for; and each `delay` ticks after its force."""
+    x, force = moving()
+    sees, taken = LowPass.parse(low_pass), Taken()
+    one = identifier(taken, low_pass=sees, lag=lag)
+    waited = []
+    for tick, (position, f) in enumerate(zip(x, force, strict=True)):
+        one.update(position, f)
+        waited += [tick - np.flatnonzero(force == f)[0] for f in taken.forces[len(waited) :]]
+    rows = np.flatnonzero(np.isin(force, taken.forces))
+    np.testing.assert_array_equal(taken.forces, force[rows])
+    np.testing.assert_array_equal(np.diff(rows), 1)
+    path = SensorPath(sees, 0.0, 1 / RATE, np.arange(float(TICKS)), 1 / RATE)
+    got = np.array(taken.regressors).T
+    for d, column in enumerate(got[2::-1]):
+        wanted = path.read(x - x[0], d, lag, rows)
+        # The same weights, summed in another order; instants in the middle of two places may round either way.
+        np.testing.assert_allclose(column, wanted, rtol=0, atol=1e-3 * np.abs(wanted).max(), err_msg=str(d))
+        assert np.median(np.abs(column - wanted)) < 1e-11 * np.abs(wanted).max()
+    np.testing.assert_array_equal(got[3], 1.0)
+    late = max((lag - sees.lag) * RATE, 0.0)
+    settled = 10 / sees.decay * RATE
+    assert max(settled, 0) <= rows[0] <= max(settled, path.reach[0] + late) + 2
+    assert set(waited) == {waited[0]}
+    assert waited[0] <= one.delay <= waited[0] + 1
+    assert TICKS - 1 - rows[-1] == waited[0]
+
+
+def test_its_answer_is_the_least_squares_of_these():
+    """From a start so vague that it counts for nothing: 1e6 N/m beside the 100 or so that the log leaves open."""
+    x, _ = moving()
+    path = SensorPath(SENSOR, 0.0, 1 / RATE, np.arange(float(TICKS)), 1 / RATE)
+    columns = np.column_stack([path.read(x - x[0], d, LAG, np.arange(TICKS)) for d in (2, 1, 0)])
+    noise = np.random.default_rng(1).normal(0, 0.6, TICKS)
+    force = columns @ [0.3, 60.0, 5200.0] + 30 + noise
+    taken, one = Taken(), identifier()
+    for other in (identifier(taken), one):
+        other.update_many(x, force)
+    theta = np.linalg.lstsq(np.array(taken.regressors), np.array(taken.forces), rcond=None)[0]
+    estimate = one.estimate()
+    assert estimate.names == NAMES
+    assert (np.abs(estimate.theta - theta) < 1e-4 * estimate.std).all()
+    assert (np.abs(estimate.theta - [0.3, 60.0, 5200.0, 30.0]) < 4 * estimate.std).all()
+    assert estimate.samples == len(taken.forces)
+
+
+@pytest.mark.parametrize("path", ["chirp", "steps"])
+def test_of_a_slower_sensor_it_has_the_samples_and_the_regressors_of_the_log(path):
+    """Stream and log each know the phase of the sensor's clock to a 24th of a row: a twelfth apart at most."""
+    made, taken = sensor_log(path, 1), Taken()
+    one = identifier(taken, lag=made.lag, sampling=SAMPLING, touch=3.0)
+    one.update_many(made.record["position"], made.record["force"])
+    channels = channels_of(made.record)
+    samples = samples_of(channels, made.record["force"], made.low_pass)
+    count = len(taken.forces)
+    first = next(
+        k for k in range(len(samples.force)) if np.array_equal(samples.force[k : k + count], taken.forces)
+    )
+    rows, instants = np.arange(first, first + count), samples.refreshes.instants
+    behind = SensorPath(made.low_pass, 0.0, 1 / RATE, instants, samples.refreshes.period / RATE)
+    position = channels.position - channels.position[0]
+    log = [behind.read(position, d, made.lag, rows) for d in range(3)]
+    log.append(np.gradient(log[2], behind.period))
+    stream = np.array(taken.regressors).T[2::-1]
+    for d in range(3):
+        limit = np.abs(log[d + 1]).max() / RATE / 12 + 1e-3 * np.abs(log[d]).max()
+        np.testing.assert_allclose(stream[d], log[d], rtol=0, atol=limit)
+    columns = np.column_stack([*log[2::-1], np.ones(count)])
+    one, other = (np.linalg.lstsq(phi, taken.forces, rcond=None)[0] for phi in (taken.regressors, columns))
+    std = 0.6 * np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
+    assert (np.abs(one - other) < 0.2 * std).all()
+
+
+def test_it_says_of_a_press_what_the_log_of_it_says():
+    """Half a deviation apart at most: touch and leave by a threshold here, and some samples more or less.
+
+    The deviations are measured in a dozen blocks here, which know them to a fifth, there from the noise's correlation.
+    """
+    made = sensor_log("chirp", 1)
+    one = identifier(lag=made.lag, sampling=SAMPLING, touch=3.0)
+    one.update_many(made.record["position"], made.record["force"])
+    estimate = one.estimate()
+    found = identify(
+        made.record, lag=made.lag, force_filter=made.low_pass, model="kelvin-voigt-mass"
+    ).parameters
+    for i, name in enumerate(NAMES[:3]):
+        assert abs(estimate.theta[i] - found[name].value) < 0.5 * found[name].std, name
+        assert estimate.std[i] == pytest.approx(found[name].std, rel=0.6), name
+        assert abs(estimate.theta[i] - TRUTH[name]) < 4 * estimate.std[i], name
+
+
+def test_what_is_lost_with_a_contact_comes_with_the_next():
+    """Nothing is taken out of contact, nor before the low-pass has forgotten that it was."""
+    x, _ = moving()
+    force = np.random.default_rng(2).normal(0, 0.1, TICKS)
+    force[400:800] += 20
+    force[1000:1400] += 20
+    taken = Taken()
+    one = identifier(taken, touch=2.0)
+    one.update_many(x, force)
+    rows = np.flatnonzero(np.isin(force, taken.forces))
+    waits = one.delay
+    for begin, end in ((400, 800), (1000, 1400)):
+        own = rows[(rows >= begin) & (rows < end)]
+        assert own[0] == begin + np.ceil(SETTLING)
+        # Of the last ticks, the force of leaving is in the loop before the position is read: they are left out.
+        assert end - 1 - waits <= own[-1] < end
+        assert (np.diff(own) == 1).all()
+    assert ((rows >= 400) & (rows < 800) | (rows >= 1000) & (rows < 1400)).all()
+
+
+def test_a_touch_has_hysteresis():
+    """It is lost below half of the force that it began with."""
+    x, _ = moving()
+    force = np.full(TICKS, 1.5)
+    force[100] = 2.5
+    force[900:] = 0.9
+    force += 1e-6 * np.arange(TICKS)
+    taken = Taken()
+    identifier(taken, touch=2.0).update_many(x, force)
+    rows = np.flatnonzero(np.isin(force, taken.forces))
+    assert rows[0] == 100 + np.ceil(SETTLING)
+    assert rows[-1] < 900
+
+
+def test_many_ticks_are_ticks_one_by_one():
+    x, force = moving()
+    one, many, mixed = identifier(), identifier(), identifier()
+    for position, f in zip(x, force, strict=True):
+        one.update(position, f)
+    many.update_many(x, force)
+    mixed.update_many(x[:700].tolist(), force[:700].tolist())
+    mixed.update_many(x[700:], force[700:])
+    np.testing.assert_array_equal(told(many), told(one))
+    np.testing.assert_array_equal(told(mixed), told(one))
+
+
+def test_where_the_position_counts_from_does_not_matter():
+    """The offset is the force at the first position, wherever that is."""
+    x, force = moving()
+    here, there = identifier(), identifier()
+    here.update_many(x, force)
+    there.update_many(x + 100.0, force)
+    # 100 m cost a position of a micrometre four of its ten digits.
+    np.testing.assert_allclose(there.estimate().theta, here.estimate().theta, rtol=1e-6)
+
+
+@pytest.mark.parametrize("tick", [(np.nan, 1.0), (np.inf, 1.0), (0.5, np.nan), (0.5, -np.inf)])
+def test_a_tick_that_is_not_finite_is_refused_and_changes_nothing(tick):
+    x, force = moving()
+    bad, good = identifier(), identifier()
+    for one in (bad, good):
+        one.update_many(x[:900], force[:900])
+    with pytest.raises(InputError, match="a tick must be finite, got position"):
+        bad.update(*tick)
+    for one in (bad, good):
+        one.update_many(x[900:], force[900:])
+    np.testing.assert_array_equal(told(bad), told(good))
+
+
+@pytest.mark.parametrize("shapes", [((5,), (4,)), ((2, 2), (2, 2)), ((), ())])
+def test_many_ticks_of_different_shapes_are_refused(shapes):
+    with pytest.raises(InputError, match=r"one shape \(k,\)"):
+        identifier().update_many(*(np.zeros(shape) for shape in shapes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"low_pass": "butterworth1:120"}, "second order at least, got butterworth1:120"),
+        ({"low_pass": "none"}, "second order at least, got none"),
+        ({"low_pass": "bessel3:120"}, "a force filter is given as butterworth3:120"),
+        ({"rate": 400.0}, "four times the cut-off of 120 Hz, got 400 Hz"),
+        ({"rate": np.nan}, "four times the cut-off"),
+        ({"rate": np.inf}, "four times the cut-off"),
+        ({"lag": -1e-3}, "a number of seconds from 0, got -0.001"),
+        ({"lag": np.nan}, "a number of seconds from 0"),
+        ({"sampling": 1002.0}, "above 0 and at most the rate of 1000 Hz, got 1002"),
+        ({"sampling": 0.0}, "above 0 and at most the rate"),
+        ({"touch": 0.0}, "a force above 0 N, got 0"),
+        ({"touch": np.nan}, "a force above 0 N"),
+    ],
+    ids=str,
+)
+def test_what_cannot_be_is_refused(changes, words):
+    with pytest.raises(InputError, match=words) as caught:
+        identifier(**changes)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_copy_goes_its_own_way_and_a_pickle_goes_on():
+    x, force = moving()
+    one = identifier()
+    one.update_many(x[:900], force[:900])
+    before = told(one)
+    copied, thawed = copy.deepcopy(one), pickle.loads(pickle.dumps(one))
+    for other in (copied, thawed):
+        other.update_many(x[900:], force[900:])
+    np.testing.assert_array_equal(told(one), before)
+    np.testing.assert_array_equal(told(thawed), told(copied))
+
+
+def test_any_estimator_of_four_goes_behind_it():
+    x, force = moving()
+    own = RecursiveLeastSquares(np.zeros(4), np.diag([1e2, 1e8, 1e12, 1e6]), forgetting=0.999, names=NAMES)
+    one = identifier(own)
+    one.update_many(x, force)
+    assert one.estimator is own
+    np.testing.assert_array_equal(one.estimate().theta, own.theta)
+
+
+def seen(period, phase, changes, told_period=None):
+    """True instants of a sensor's samples, and what `Refresh` says in each row that it finds one in.
+
+    Args:
+        period: of the sensor [rows].
+        phase: of the first sample, as a share of the period.
+        changes: whether each sample is another than the one before, shape (k,).
+        told_period: what it is told; None for the same.
+    """
+    instants = period * (phase + np.arange(len(changes)))
+    rows = np.ceil(instants).astype(int)
+    changed = np.zeros(rows[-1] + 1, bool)
+    changed[rows[changes]] = True
+    refresh = Refresh(told_period or period)
+    found = ((row, refresh.seen(row, bool(c))) for row, c in enumerate(changed))
+    return instants, rows, [(row, instant) for row, instant in found if instant is not None]
+
+
+periods = st.floats(1.001, 12.0) | st.sampled_from([25 / 12, 1.25, 2.0, 2.5])
+phases = st.floats(0.01, 0.99)
+"""Shares of a period."""
+
+
+def apart_from_rows(period, phase, count=300):
+    """Whether no instant falls on a row, where rounding decides which row shows it."""
+    instants = period * (phase + np.arange(count))
+    return np.abs(instants - np.round(instants)).min() > 1e-6
+
+
+@settings(max_examples=60)
+@given(periods, phases)
+def test_each_sample_is_found_in_its_row_to_half_a_row(period, phase):
+    assume(apart_from_rows(period, phase))
+    instants, rows, found = seen(period, phase, np.ones(300, bool))
+    np.testing.assert_array_equal([row for row, _ in found], rows)
+    error = np.array([instant for _, instant in found]) - instants
+    assert np.abs(error).max() <= 0.5 + 1e-6
+
+
+def test_480_of_1000_are_known_to_a_24th_of_a_row():
+    """The clock passes every twelfth of a row, so the interval it leaves is one wide, and its middle is taken."""
+    for phase in np.linspace(0.02, 0.97, 23):
+        instants, _, found = seen(25 / 12, phase, np.ones(400, bool))
+        error = np.array([instant for _, instant in found]) - instants
+        assert np.abs(error[24:]).max() <= 1 / 24 + 1e-6
+
+
+@settings(max_examples=60)
+@given(st.floats(2.0, 12.0), phases, st.lists(st.booleans(), min_size=300, max_size=300))
+def test_a_sample_that_equals_the_one_before_is_counted(period, phase, changes):
+    """From two rows a sample on, a change cannot be mistaken for that of the next sample; a row late at most."""
+    changes = np.array([True, *changes[1:]])
+    assume(apart_from_rows(period, phase))
+    instants, rows, found = seen(period, phase, changes)
+    last = int(np.flatnonzero(changes)[-1])
+    assert [round((instant - instants[0]) / period) for _, instant in found[: last + 1]] == list(
+        range(last + 1)
+    )
+    late = np.array([row for row, _ in found[: last + 1]]) - rows[: last + 1]
+    assert set(late) <= {0, 1}
+    assert (late[np.flatnonzero(changes)] == 0).all()
+    error = np.array([instant for _, instant in found[: last + 1]]) - instants[: last + 1]
+    assert np.abs(error).max() <= 0.5 + 1e-6
+
+
+@pytest.mark.parametrize("drift", [-1e-4, 1e-4])
+def test_a_clock_that_drifts_is_followed(drift):
+    """A row in ten thousand: 20 s bring it two rows away, and no sample is further off than the row it shows in."""
+    instants, rows, found = seen(25 / 12 * (1 + drift), 0.3, np.ones(9600, bool), told_period=25 / 12)
+    own = dict(found)
+    error = np.array([own[row] for row in rows]) - instants
+    assert np.abs(error).max() <= 0.5 + 1e-6
+    # Each time the clock has passed a twelfth of a row, one may be given twice.
+    assert len(found) <= 9600 + 20_000 * abs(drift) * 12 + 1
+
+
+def test_before_the_first_change_nothing_is_known():
+    refresh = Refresh(25 / 12)
+    assert [refresh.seen(row, False) for row in range(10)] == [None] * 10
+    assert refresh.seen(10, True) == 9.5
