@@ -73,6 +73,18 @@ def test_python_of_the_readme_runs(root, tmp_path, monkeypatch):
         exec(compile(code, "README.md", "exec"), {})
 
 
+def alone(page):
+    """Python of a page that reads no file of the reader's."""
+    return [code for code in blocks(ROOT, page, "python") if not re.search(r"\bread_\w+\(", code)]
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != "README.md" and alone(page)])
+def test_python_of_the_pages_runs(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for code in alone(page):
+        exec(compile(code, page, "exec"), {})
+
+
 @pytest.mark.parametrize("line", ["palpate run --list"])
 def test_cheap_commands_of_the_readme_run(root, capsys, line):
     assert line in commands(root, "README.md", "palpate")
