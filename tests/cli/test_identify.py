@@ -207,6 +207,11 @@ WRONG = {
         [*OWN, "--method", "output-error", "--force-filter", "butterworth3:120"],
         "leave --force-filter out for output-error",
     ),
+    "no mass to simulate": (
+        [*OWN, "--method", "output-error", "--model", "kelvin-voigt-mass", "--lag", "0"],
+        "this log shows none .*; take least-squares",
+    ),
+    "no mass at all": ([*OWN, "--method", "output-error"], "has no mass: ask for --model kelvin-voigt-mass"),
     "tolerance": ([*OWN, "--tolerance", "2"], r"tolerance must be in \(0, 1\]"),
     "lag": ([*OWN, "--lag", "late"], "--lag needs VALUE or VALUE:STD"),
     "lag in ms": (

@@ -76,6 +76,10 @@ def _by_simulation(fitted: Fit, time: Array, force: Array, position: Array) -> E
     if "K3" not in fitted.names:  # whatever noise has made of least squares, this is near
         found = refined_instrumental(time, force, position, lag=fitted.lag)
         start |= dict(zip(found.names, found.theta, strict=True))
+    if start["M"] <= 0:
+        raise InputError(
+            f"output error needs a mass to simulate, and this log shows none (M = {start['M']:.3g}); take least-squares"
+        )
     return output_error(time, force, position, start, free=fitted.model.linear)
 
 
