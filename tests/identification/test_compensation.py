@@ -5,7 +5,7 @@ import pytest
 
 from identification.sensor_logs import TRUTH, sensor_log
 from palpate.identification.beforehand import Lag
-from palpate.identification.compensation import compensation
+from palpate.identification.compensation import compensation, resting
 from palpate.identification.fitting import fit
 from palpate.identification.matching import matched_question, samples_of
 from palpate.identification.models import KELVIN_VOIGT_MASS, without_noise
@@ -46,8 +46,20 @@ def test_least_squares_are_pulled_towards_zero_and_the_compensated_are_not():
     mean, error = np.mean(mended, axis=0), np.std(mended, axis=0) / np.sqrt(200)
     assert (np.abs(mean - [3.0, -2.0]) < 4 * error).all()
     assert (np.abs(np.mean(pulled, axis=0)) < 0.9 * np.array([3.0, 2.0])).all()
-    # The doubt covers a wrong power of the noise by a third, not chance: a third of the step.
-    np.testing.assert_allclose(found.doubt, 0.3 * np.abs(found.step), rtol=1e-12)
+
+
+def test_the_doubt_is_what_a_wrong_power_of_the_noise_does():
+    """Of one column: the change of the step by its derivative, for a power that is off by three tenths."""
+    rng = np.random.default_rng(5)
+    clean = np.sin(np.arange(4000) / 9)[:, None]
+    columns = clean + rng.normal(0, 0.4, clean.shape)
+    theta = np.linalg.lstsq(columns, clean[:, 0] * 3.0, rcond=None)[0]
+
+    def step(power):
+        return compensation(columns, np.eye(1), theta, power * np.eye(1), np.zeros(1))
+
+    slope = (step(0.1601).step - step(0.1599).step)[0] / 0.0002
+    assert np.sqrt(step(0.16).doubt[0, 0]) == pytest.approx(0.3 * 0.16 * slope, rel=1e-4)
 
 
 def test_without_noise_nothing_is_done():
@@ -59,7 +71,7 @@ def test_without_noise_nothing_is_done():
 
 @pytest.mark.parametrize("times", [1.5, 10.0, 1e4])
 def test_noise_larger_than_all_there_is_does_not_turn_the_answer_round(times):
-    """A tenth of the information stays; all that the rest may have done is said to be open."""
+    """A tenth of the information stays; the answer is said to be open by more than itself."""
     columns, target = regression(2, 0.0)
     noise = times * float(np.sqrt((columns**2).mean()))
     theta, found = solved(columns, target, noise)
@@ -67,7 +79,7 @@ def test_noise_larger_than_all_there_is_does_not_turn_the_answer_round(times):
     left = np.linalg.eigvalsh(np.linalg.solve(gram, gram - found.less))
     assert left.min() == pytest.approx(0.1, rel=1e-6)
     assert (np.abs(theta + found.step) <= 10.001 * np.linalg.norm(theta)).all()
-    assert (found.doubt > 0.3 * np.abs(found.step)).any()
+    assert (np.sqrt(np.diag(found.doubt)) > 3 * np.abs(theta + found.step)).any()
 
 
 def test_what_is_known_beforehand_is_not_pulled():
@@ -86,7 +98,7 @@ def test_columns_of_very_different_size_are_taken_as_they_are():
     spread = 0.09 * np.diag(scale**2)
     scaled = compensation(columns * scale, np.eye(2), theta / scale, spread, np.zeros(2))
     np.testing.assert_allclose(scaled.step * scale, found.step, rtol=1e-8)
-    np.testing.assert_allclose(scaled.doubt * scale, found.doubt, rtol=1e-8)
+    np.testing.assert_allclose(scaled.doubt * np.outer(scale, scale), found.doubt, rtol=1e-8)
 
 
 def fits(log):
@@ -105,16 +117,18 @@ def fits(log):
     ("noise", "resolution"), [(1.5e-5, 0.0), (0.0, 4e-5)], ids=["noisy", "through a coarse encoder"]
 )
 def test_a_press_with_a_noisy_position(noise, resolution):
-    """Over some presses the mass is pulled by many deviations; compensated, by none that chance does not explain."""
+    """Over some presses the mass is pulled by many deviations; compensated, all stay within their intervals.
+
+    What is left is an error of the noise's measured power, the same in all presses: it does not average out.
+    """
     count = 16
     pairs = [fits(sensor_log("chirp", seed, noise, resolution=resolution)) for seed in range(count)]
     for name in ("B", "M"):
         errors = np.array([[fitted[name] - TRUTH[name] for fitted in pair] for pair in pairs])
         stated = np.array([[fitted.std(name) for fitted in pair] for pair in pairs])
         mended, pulled = (errors / stated).T
-        # Compensated: the mean of 16 numbers of deviation 1, at most; what the doubt adds makes them smaller.
-        assert abs(mended.mean()) < 3 / np.sqrt(count), name
-        assert np.sqrt(np.mean(mended**2)) < 1.5, name
+        # 95 % of intervals, of which 16 fall short by two at most in all but one case in twenty.
+        assert np.sum(np.abs(mended) > 1.96) <= 2, name
         if name == "M":
             assert abs(pulled.mean()) > 5, name
 
@@ -123,3 +137,22 @@ def test_intervals_are_wider_for_the_noise_that_was_taken_out():
     exact, noisy = (fits(sensor_log("chirp", 3, noise))[0] for noise in (0.0, 1.5e-5))
     assert noisy.std("M") > 1.2 * exact.std("M")
     assert noisy.attenuation[noisy.names.index("M")] > 0
+
+
+def test_a_resting_position_errs_by_the_same_everywhere():
+    """Two rests of many samples: their means stay uncertain by a count's error each, however long they last."""
+    for length in (50, 5000):
+        position = np.repeat([0.0, 1e-3], length)
+        columns = np.column_stack([position, np.ones_like(position)])
+        inverse = np.linalg.inv(columns.T @ columns)
+        found = inverse @ resting(columns, position, 4e-6, 2e4) @ inverse
+        # K (x2 - x1) = f2 - f1, and two encoders' errors of 4 um / sqrt(12) at either end.
+        assert np.sqrt(found[0, 0]) == pytest.approx(2e4 * 4e-6 / np.sqrt(12) * 2 / 1e-3, rel=1e-9)
+
+
+def test_a_moving_position_errs_anew_in_each_count():
+    position = np.linspace(0, 1e-3, 250 * 40, endpoint=False)
+    columns = np.ones((len(position), 1))
+    found = resting(columns, position, 4e-6, 2e4)[0, 0] / len(position) ** 2
+    assert found == pytest.approx(2 * (2e4 * 4e-6) ** 2 / 12 / 250, rel=0.01)
+    assert (resting(columns, position, 0.0, 2e4) == 0).all()

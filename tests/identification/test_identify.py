@@ -274,7 +274,7 @@ def change(log, name, values):
 
 
 WRONG = {
-    "one sample": (lambda log: record(*(log[c][:1] for c in ("time", "position", "force"))), "1 rows"),
+    "one sample": (lambda log: record(*(log[c][:1] for c in ("time", "position", "force"))), "1 row "),
     "constant position": (
         lambda log: change(log, "position", np.ones(len(log))),
         "position is 1 in every row",

@@ -16,8 +16,11 @@ Array = NDArray[np.float64]
 
 _LEAST = 0.1
 """Share of the information in any direction that must be left when the noise's is taken out."""
+_NOTHING = 0.05
+"""Share of it under which a direction is as good as unknown."""
+_ENCODERS = 2
 _DOUBT = 0.3
-"""Relative error of the noise's measured power, and of its whiteness."""
+"""Relative error of each of the noise's measured covariances."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class Compensation:
     Args:
         step: to add to the answer, shape (p,).
         less: information that was the noise's and has to be taken out, shape (p, p).
-        doubt: how far the answer may still be off, shape (p,).
+        doubt: covariance of what the answer may still be off by, shape (p, p).
     """
 
     step: Array
@@ -36,7 +39,7 @@ class Compensation:
 
 
 def compensation(jacobian: Array, noisy: Array, theta: Array, spread: Array, weight: Array) -> Compensation:
-    """Find it.
+    """Find it, in each direction of the parameters with its own share of noise in the information.
 
     Args:
         jacobian: derivatives of the prediction by the parameters, shape (n, p).
@@ -50,13 +53,39 @@ def compensation(jacobian: Array, noisy: Array, theta: Array, spread: Array, wei
     scale[scale == 0] = 1.0
     rows = len(jacobian)
     whole = rows * noisy @ spread @ noisy.T / np.outer(scale, scale)
-    score = rows * noisy @ spread @ theta / scale
+    scores = (
+        rows * noisy @ spread * theta / scale[:, None]
+    )  # what each derivative's noise pulls by, shape (p, k)
     root = np.linalg.cholesky(gram / np.outer(scale, scale) + 1e-13 * np.eye(len(scale)))
     inner = np.linalg.solve(root, np.linalg.solve(root, whole).T)
-    most = float(np.linalg.eigvalsh((inner + inner.T) / 2)[-1])
-    share = min(1.0, (1 - _LEAST) / most) if most > 0 else 1.0
-    left = root @ (np.eye(len(scale)) - share * inner) @ root.T
-    step = np.linalg.solve(left, score) / scale
-    return Compensation(
-        share * step, share * whole * np.outer(scale, scale), np.abs(step) * (1 - share + share * _DOUBT)
-    )
+    noise, ways = np.linalg.eigh((inner + inner.T) / 2)
+    share = np.minimum(1.0, (1 - _LEAST) / np.maximum(noise, 1e-300))
+    pulls = ways.T @ np.linalg.solve(root, scores)
+    step = share * pulls.sum(axis=1) / (1 - share * noise)
+    # How a pull c / (1 - n) moves with the noise's power, c and n both in proportion to it.
+    doubt = _DOUBT * np.linalg.norm(pulls, axis=1) / np.maximum(1 - noise, _NOTHING) ** 2
+    back = np.linalg.solve(root.T, ways) / scale[:, None]
+    taken = (root @ ways) * scale[:, None]
+    return Compensation(back @ step, (taken * (share * noise)) @ taken.T, (back * doubt**2) @ back.T)
+
+
+def resting(jacobian: Array, position: Array, count: float, stiffness: float) -> Array:
+    """Covariance of Phi' e, for the force e that a coarse position hides, shape (p, p).
+
+    Where the position rests it errs by the same part of a count all the time, which no number of samples averages out:
+    one error, even in a count (deviation count / sqrt(12)), for each place of a count's width. As the tip of an arm is
+    read through several encoders, two are counted that are as coarse as the one seen.
+
+    Args:
+        jacobian: Phi, shape (n, p).
+        position: shape (n,).
+        count: what it moves by when its encoder counts on.
+        stiffness: force per position.
+    """
+    if count == 0:
+        return np.zeros((jacobian.shape[1], jacobian.shape[1]))
+    _, place = np.unique(np.floor(position / count), return_inverse=True)
+    sums = np.zeros((int(place.max()) + 1, jacobian.shape[1]))
+    np.add.at(sums, place, jacobian)
+    found: Array = _ENCODERS * (stiffness * count) ** 2 / 12 * sums.T @ sums
+    return found

@@ -13,6 +13,8 @@ from math import factorial, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.identification.position_noise import PositionNoise
+
 Array = NDArray[np.float64]
 
 ORDER = 5
@@ -77,10 +79,9 @@ class Chain:
         """The same at the samples `rows` only, shape (len(rows),)."""
         return self(signal, derivative, lag)[rows]
 
-    def noise_gain(self, derivatives: tuple[int, ...]) -> Array:
-        """Covariance of the filtered derivatives of white noise of unit variance, shape (k, k)."""
-        taps = np.stack([self._taps(derivative, 0.0)[0] for derivative in derivatives])
-        return taps @ taps.T
+    def noise_spread(self, noise: PositionNoise) -> Array:
+        """Covariance of what noise of the position leaves in the derivatives 0 to 3, shape (4, 4)."""
+        return noise.spread(np.stack([self._taps(derivative, 0.0)[0] for derivative in range(4)]))
 
     def _taps(self, derivative: int, lag: float) -> tuple[Array, int]:
         """Samples of the response to one hat of a first-order hold, and the index of the first of them."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from palpate.identification.beforehand import LAG, NOTHING, Beforehand, Lag, beforehand
 from palpate.identification.models import Knob, Model, Motion
 from palpate.identification.regression import Noise, covariance, noise_of, quantile, solve
-from palpate.identification.uncertainty import attenuation, undone, with_lag
+from palpate.identification.uncertainty import hidden, undone, with_lag
 
 Array = NDArray[np.float64]
 
@@ -255,18 +255,24 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag,
     level = float(np.sqrt(point.rss / max(len(force) - len(point.theta), 1)))
     std = known.std(names, level)
     fixed = np.zeros((len(names), len(names)))
-    if motion.matched and model.of_position:
+    if model.of_position:
         by_noise = undone(model, motion, jacobian, theta, level, lag, std)
         theta, pulled, less = theta + by_noise.step, by_noise.doubt, by_noise.less
+        more = hidden(model, motion, jacobian, theta)
     else:
-        pulled, less = np.append(attenuation(model, motion, jacobian[:, :-1], point.theta), 0.0), None
-    fixed[:-1, :-1] = covariance(
-        jacobian[:, :-1],
-        motion.rows,
-        noise,
-        None if std is None else std[:-1],
-        None if less is None else less[:-1, :-1],
-    ) + np.outer(pulled[:-1], pulled[:-1])
+        pulled, less = np.zeros_like(fixed), None
+        more = None
+    fixed[:-1, :-1] = (
+        covariance(
+            jacobian[:, :-1],
+            motion.rows,
+            noise,
+            None if std is None else std[:-1],
+            None if less is None else less[:-1, :-1],
+            None if more is None else more[:-1, :-1],
+        )
+        + pulled[:-1, :-1]
+    )
     residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.knobs.values(), point.lag])
     spread = float(np.mean((force - force.mean()) ** 2))
     rmse = float(np.sqrt(np.mean(residuals**2)))
@@ -274,7 +280,7 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag,
         model=model,
         names=names,
         theta=theta,
-        cov=with_lag(jacobian, fixed, motion, noise, lag, pulled, std, less),
+        cov=with_lag(jacobian, fixed, motion, noise, lag, pulled, std, less, more),
         fixed_cov=fixed,
         predicted=force - residuals,
         residuals=residuals,
@@ -282,7 +288,7 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag,
         rmse=rmse,
         noise=noise,
         lag=float(theta[-1]),
-        attenuation=pulled,
+        attenuation=np.sqrt(np.diag(pulled)),
         matched=motion.matched,
     )
 

@@ -13,7 +13,7 @@ from palpate.identification.choosing import Question
 from palpate.identification.contacts import Contacts
 from palpate.identification.filters import Chain, white_noise
 from palpate.identification.models import Motion
-from palpate.identification.position_noise import PositionNoise, position_noise
+from palpate.identification.position_noise import noise_within
 from palpate.identification.preparing import left_at
 from palpate.identification.refreshes import Refreshes, refreshes_of
 from palpate.identification.sensor_path import SensorPath
@@ -107,7 +107,7 @@ def matched_question(
     whole = refreshes.rows[rows]
     origin = float(position[whole].mean() if contacts.bonded else position[whole].min())
     position = position - origin
-    motion = Motion(path, position, rows, contacts.bonded, own_noise=_noise(position, whole, spans))
+    motion = Motion(path, position, rows, contacts.bonded, noise=noise_within(position, whole, spans))
     force = contacts.force_sign * samples.force
     if known.known:
         lag = replace(known, std=float(np.hypot(known.std, refreshes.spread * channels.dt)))
@@ -122,12 +122,6 @@ def matched_question(
     return Question(
         motion, force[rows], spans, lag, tolerance, free_noise, touch, origin, contacts.position_sign
     )
-
-
-def _noise(position: Array, rows: NDArray[np.intp], spans: NDArray[np.intp]) -> PositionNoise:
-    """That of the position in contact."""
-    inside = [rows[spans == number] for number in np.unique(spans)]
-    return position_noise([position[own[0] : own[-1] + 1] for own in inside if len(own)])
 
 
 def _usable(samples: Samples, path: SensorPath) -> NDArray[np.bool_]:

@@ -24,16 +24,14 @@ class Motion:
         position: raw, counted into the surface from `origin`, shape (n,).
         rows: the samples that are fitted, shape (m,): of the position behind a filter, of the force behind a sensor.
         bonded: whether the probe is fixed to the surface.
-        noise: standard deviation of the position's own white noise; it makes every column of the regression uncertain.
-        own_noise: the same where the force sensor's own way is known, with the jumps of a coarse encoder.
+        noise: of the position; it makes every column of the regression uncertain.
     """
 
     chain: Chain | SensorPath
     position: Array
     rows: NDArray[np.intp]
     bonded: bool
-    noise: float = 0.0
-    own_noise: PositionNoise = NOISELESS
+    noise: PositionNoise = NOISELESS
     _kept: dict[tuple[int, float], Array] = field(default_factory=dict)
     _powers: dict[int, Array] = field(default_factory=dict)
 
@@ -79,7 +77,7 @@ def on_rows(motion: Motion, rows: NDArray[np.intp]) -> Motion:
 
 def without_noise(motion: Motion) -> Motion:
     """The same as if nothing disturbed the position: what a fit makes of its noise holds for no power of the depth."""
-    return replace(motion, noise=0.0, own_noise=NOISELESS)
+    return replace(motion, noise=NOISELESS)
 
 
 @dataclass(frozen=True)
@@ -258,7 +256,9 @@ def direction(motion: Motion) -> Array:
     dt, rate = motion.chain.dt, motion.chain.rate
     window = min(2 * max(round(1 / (rate * dt)), 2) + 1, (len(motion.position) - 1) // 2 * 2 + 1)
     speed = savgol_filter(motion.position, window, 2, deriv=1, delta=dt)
-    jitter = motion.noise * np.sqrt(12 / window**3) / dt  # of the slope of a line through that many readings
+    jitter = (
+        motion.noise.white * np.sqrt(12 / window**3) / dt
+    )  # of the slope of a line through that many readings
     least = max(_STILL * float(np.percentile(np.abs(speed), 95)), 3 * float(jitter), 1e-300)
     way: Array = np.tanh(speed / least)
     return way

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 _FROM = 0.2
 """Share of the sampling rate above which there is no motion."""
 _SEGMENT = 256
+_IN_BAND = 0.5
+_FEWEST = 10
+"""Single counts that show what one is worth."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +29,29 @@ class PositionNoise:
     Args:
         white: of a sample.
         jump: of what is added from sample to sample.
+        count: what the position moves by when its encoder counts on; 0 where single counts are not seen.
     """
 
     white: float
     jump: float
+    count: float = 0.0
+
+    def spread(self, weights: Array) -> Array:
+        """Covariance of filtered derivatives 0 to k - 1 of this noise, shape (k, k).
+
+        Jumps have no power of their own in the position itself, but a position that wanders has its acceleration
+        against it: E[e e''] = -E[e'^2]. Of their power half is counted: an encoder's error never leaves its count, so
+        its jumps undo each other, and toward the low frequencies of a motion their power falls below what it is above.
+
+        Args:
+            weights: of the filter's samples, shape (k, n), k of 3 or more.
+        """
+        steps = np.cumsum(weights, axis=1)
+        steps[0] = 0.0
+        of_jumps = steps @ steps.T
+        of_jumps[0, 2] = of_jumps[2, 0] = -of_jumps[1, 1]
+        found: Array = self.white**2 * weights @ weights.T + _IN_BAND * self.jump**2 * of_jumps
+        return found
 
 
 NOISELESS = PositionNoise(0.0, 0.0)
@@ -53,7 +75,31 @@ def position_noise(stretches: list[Array]) -> PositionNoise:
     scale = float(np.mean(power[above])) or 1.0
     found, _ = nnls(shape, power[above] / scale)
     white, jump = np.sqrt(found * scale / weight)
-    return PositionNoise(float(white), float(jump))
+    return PositionNoise(float(white), float(jump), _count(stretches))
+
+
+def noise_within(position: Array, rows: NDArray[np.intp], spans: NDArray[np.intp]) -> PositionNoise:
+    """That of a position in contact.
+
+    Args:
+        position: shape (n,).
+        rows: in contact, shape (m,).
+        spans: number of the contact that each is in, shape (m,).
+    """
+    inside = [rows[spans == number] for number in np.unique(spans)]
+    return position_noise([position[own[0] : own[-1] + 1] for own in inside if len(own)])
+
+
+def _count(stretches: list[Array]) -> float:
+    """From changes with none before and none after them. Of several encoders the coarsest counts most."""
+    alone = []
+    for stretch in stretches:
+        steps = np.abs(np.diff(stretch))
+        if len(steps) > 2:
+            still = steps == 0
+            alone.append(steps[1:-1][still[:-2] & still[2:] & ~still[1:-1]])
+    found = np.concatenate(alone) if alone else np.zeros(0)
+    return float(np.sum(found**3) / np.sum(found**2)) if len(found) >= _FEWEST else 0.0
 
 
 def _power(increments: Array) -> tuple[Array, float]:

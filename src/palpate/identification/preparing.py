@@ -14,6 +14,7 @@ from palpate.identification.contacts import Contacts, find_contacts
 from palpate.identification.filters import Chain, block_means, white_noise
 from palpate.identification.lagging import unknown_lag
 from palpate.identification.models import Motion
+from palpate.identification.position_noise import PositionNoise, noise_within
 from palpate.identification.timebase import Channels
 from palpate.identification.touch import Touch, touching
 
@@ -74,13 +75,19 @@ def question_of(
     filtered = chain(position)
     origin = _origin(filtered, rows, contacts)
     position = position - origin
-    motion = Motion(chain, position, rows, contacts.bonded, white_noise(position))
+    motion = Motion(chain, position, rows, contacts.bonded, _noise(position, rows, spans))
     lag = known if known.known else unknown_lag(motion, channels.rate, known.mass)
     touch = _touch(force, channels, chain, contacts, rows, spans)
     free_noise = _free_noise(force, channels, chain, contacts)
     return Question(
         motion, force[rows], spans, lag, tolerance, free_noise, touch, origin, contacts.position_sign
     )
+
+
+def _noise(position: Array, rows: NDArray[np.intp], spans: NDArray[np.intp]) -> PositionNoise:
+    """That of the position: white by its highest differences, and the jumps of an encoder where its counts are seen."""
+    found = noise_within(position, rows, spans)
+    return PositionNoise(white_noise(position), found.jump if found.count else 0.0, found.count)
 
 
 def _touch(

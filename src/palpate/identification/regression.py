@@ -75,6 +75,7 @@ def covariance(
     noise: Noise,
     prior: Array | None = None,
     less: Array | None = None,
+    more: Array | None = None,
 ) -> Array:
     """Covariance of the least-squares answer under coloured noise, shape (p, p).
 
@@ -86,6 +87,7 @@ def covariance(
         noise: colour of the noise.
         prior: standard deviation of each parameter known beforehand, infinite where nothing is; shape (p,).
         less: information that noise of the columns themselves only pretends, shape (p, p).
+        more: covariance of what stands in Phi' f beside the noise, shape (p, p).
     """
     place = _closed_up(place)
     scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
@@ -100,6 +102,8 @@ def covariance(
         meat = meat + level * np.diag(weight)
     if less is not None:
         gram = gram - less / np.outer(scale, scale)
+    if more is not None:
+        meat = meat + more / np.outer(scale, scale)
     bread = np.linalg.pinv(gram, rcond=1e-14, hermitian=True)
     cov: Array = bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale)
     return cov

@@ -24,7 +24,6 @@ _NEAR = 0.25
 """Steps of time within which a lag is reached by Taylor's series from one that was read before."""
 _FORGOTTEN = 10.0
 _MOST_KEPT = 6
-_IN_BAND = 0.5
 
 
 @dataclass
@@ -98,14 +97,5 @@ class SensorPath:
         return lag, stack
 
     def noise_spread(self, noise: PositionNoise) -> Array:
-        """Covariance of what noise of the position leaves in the derivatives 0 to 3 of one reading, shape (4, 4).
-
-        Jumps are left out of the position itself, where a motion is so much larger that they do not count. Of their
-        power half is counted: an encoder's error never leaves its count, so its jumps undo each other, and toward the
-        low frequencies of a motion their power falls below what it is above them.
-        """
-        weights = self._taps.weights[0, :4] / self.dt ** np.arange(4)[:, None]
-        steps = np.cumsum(weights, axis=1)
-        steps[0] = 0.0
-        spread: Array = noise.white**2 * weights @ weights.T + _IN_BAND * noise.jump**2 * steps @ steps.T
-        return spread
+        """Covariance of what noise of the position leaves in the derivatives 0 to 3 of one reading, shape (4, 4)."""
+        return noise.spread(self._taps.weights[0, :4] / self.dt ** np.arange(4)[:, None])

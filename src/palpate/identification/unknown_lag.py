@@ -111,7 +111,7 @@ def _given_lag(
     for name, d in model.derivatives.items():
         noisy[model.linear.index(name), d] = 1.0
         of_force[d] = theta[model.linear.index(name)]
-    spread = chain.noise_spread(motion.own_noise)
+    spread = chain.noise_spread(motion.noise)
     undone = compensation(columns, noisy, of_force, spread, np.zeros(len(theta)))
     theta = theta + undone.step
     gram = columns.T @ columns - undone.less
