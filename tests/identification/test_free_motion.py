@@ -59,3 +59,13 @@ def test_a_press_in_as_much_noise_is_one():
     found = identify(pressed(noise=0.1))
     assert found.parameters["K"].verdict == "identified"
     assert len(found.contacts) == 1
+
+
+@pytest.mark.parametrize("noise", [0.3, 0.6])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_noisy_press_is_no_bonded_one(noise, seed):
+    """A few samples at the noise's lower end lie close together, and are no contact whose position stands still."""
+    found = identify(pressed(noise=noise, seed=seed))
+    start, end = max(found.contacts, key=lambda span: span[1] - span[0])
+    assert start == pytest.approx(0.52, abs=0.02)
+    assert end == pytest.approx(2.03, abs=0.05)

@@ -21,6 +21,8 @@ _WIDER = 4.0
 _CLEAR = 3.0
 """Deviations of the free force below the threshold: noise cut at its own height stays below two, however coloured."""
 _FEWEST = 20
+_MOVED = 0.1
+"""Share of the position's range below which the place at one end of the force says nothing: few samples of noise."""
 _FREE = 0.25
 """Share of the position's range that must be travelled without any force for contact to be sure to begin and end."""
 
@@ -114,7 +116,7 @@ def _extremes(force: Array, position: Array) -> tuple[float, float, bool]:
     """The force at rest and at its peak, the two ends of its range; and whether the position leaves no doubt of it.
 
     Out of contact the position may go anywhere without any force, in contact it may not: so rest is the end at which
-    the position spreads wider by far, and if neither does, the end nearer to zero. The ends are those of medians over
+    the position spreads wider by far, and if it hardly does, the end nearer to zero. The ends are those of medians over
     a hundredth of the log, which a chattering probe does not reach.
     """
     width = len(force) // _BLOCKS
@@ -131,7 +133,7 @@ def _extremes(force: Array, position: Array) -> tuple[float, float, bool]:
             near = ONSET * (high - low)
             below, above = (_spread(place[end]) for end in (middle < low + near, middle > high - near))
             ratio, travelled = below / max(above, 1e-300), max(below, above) / max(_spread(place), 1e-300)
-    told = not 1 / _WIDER < ratio < _WIDER
+    told = travelled > _MOVED and not 1 / _WIDER < ratio < _WIDER
     from_low = ratio > 1 if told else abs(low) <= abs(high)
     rest, peak = (low, high) if from_low else (high, low)
     return float(rest), float(peak), told and travelled > _FREE
