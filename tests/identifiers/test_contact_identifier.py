@@ -134,7 +134,7 @@ def test_of_a_slower_sensor_it_has_the_samples_and_the_regressors_of_the_log(pat
 
 
 def test_it_says_of_a_press_what_the_log_of_it_says():
-    """Half a deviation apart at most: touch and leave by a threshold here, and some samples more or less.
+    """A deviation apart at most: touch by a mean's threshold here, which is some samples later.
 
     The deviations are measured in a dozen blocks here, which know them to a fifth, there from the noise's correlation.
     """
@@ -146,7 +146,7 @@ def test_it_says_of_a_press_what_the_log_of_it_says():
         made.record, lag=made.lag, force_filter=made.low_pass, model="kelvin-voigt-mass"
     ).parameters
     for i, name in enumerate(NAMES[:3]):
-        assert abs(estimate.theta[i] - found[name].value) < 0.5 * found[name].std, name
+        assert abs(estimate.theta[i] - found[name].value) < found[name].std, name
         assert estimate.std[i] == pytest.approx(found[name].std, rel=0.6), name
         assert abs(estimate.theta[i] - TRUTH[name]) < 4 * estimate.std[i], name
 
@@ -164,25 +164,27 @@ def test_what_is_lost_with_a_contact_comes_with_the_next():
     waits = one.delay
     for begin, end in ((400, 800), (1000, 1400)):
         own = rows[(rows >= begin) & (rows < end)]
-        assert own[0] == begin + np.ceil(SETTLING)
-        # Of the last ticks, the force of leaving is in the loop before the position is read: they are left out.
+        # A tenth of the force makes a mean over the settling a touch.
+        assert begin + SETTLING < own[0] <= begin + np.ceil(SETTLING) + np.ceil(SETTLING / 10)
+        # The last ticks wait for what comes after them: they are left out.
         assert end - 1 - waits <= own[-1] < end
         assert (np.diff(own) == 1).all()
     assert ((rows >= 400) & (rows < 800) | (rows >= 1000) & (rows < 1400)).all()
 
 
 def test_a_touch_has_hysteresis():
-    """It is lost below half of the force that it began with."""
+    """It is lost below half of the force that it began with; noise about either decides nothing."""
     x, _ = moving()
     force = np.full(TICKS, 1.5)
-    force[100] = 2.5
-    force[900:] = 0.9
-    force += 1e-6 * np.arange(TICKS)
+    force[100:200] = 2.5
+    force[900:] = 0.5
+    force += np.random.default_rng(3).normal(0, 0.6, TICKS)
     taken = Taken()
     identifier(taken, touch=2.0).update_many(x, force)
     rows = np.flatnonzero(np.isin(force, taken.forces))
-    assert rows[0] == 100 + np.ceil(SETTLING)
+    assert 100 + SETTLING < rows[0] < 100 + 2 * np.ceil(SETTLING)
     assert rows[-1] < 900
+    assert (np.diff(rows) == 1).all()
 
 
 def test_many_ticks_are_ticks_one_by_one():

@@ -137,22 +137,21 @@ class _Run:
         done, first, stop = 0, None, total
         end: Ending | None = None
         while done < stop and end is None:
-            out = np.empty((min(CHUNK, stop - done), len(COLUMNS)))
             try:
+                out = np.empty((min(CHUNK, stop - done), len(COLUMNS)))
                 state = self._march(state, done, generator.standard_normal(len(out)), out)
-            except KeyboardInterrupt:
+                if first is None and (out[:, 1] == CONTACT).any():
+                    first = done + int(np.argmax(out[:, 1] == CONTACT))
+                    stop = total if press is None else min(total, first + press)
+                # What comes after the stop is no part of the run, whatever it holds.
+                out = out[: stop - done]
+                keep, end = self.watchman.judge(out, self.loop.controller.trouble(state.controller))
+                chunks.append(out[:keep])
+                done += keep
+                if progress is not None:
+                    progress(done * self.loop.tick, "approach" if first is None else "contact")
+            except KeyboardInterrupt:  # wherever in a round it comes
                 end = Ending(INTERRUPTED, f"interrupted at {done * self.loop.tick:.3f} s")
-                break
-            if first is None and (out[:, 1] == CONTACT).any():
-                first = done + int(np.argmax(out[:, 1] == CONTACT))
-                stop = total if press is None else min(total, first + press)
-            # What comes after the stop is no part of the run, whatever it holds.
-            out = out[: stop - done]
-            keep, end = self.watchman.judge(out, self.loop.controller.trouble(state.controller))
-            chunks.append(out[:keep])
-            done += keep
-            if progress is not None:
-                progress(done * self.loop.tick, "approach" if first is None else "contact")
         rows = np.concatenate(chunks) if chunks else np.empty((0, len(COLUMNS)))
         if end is None:
             end = Ending(NO_CONTACT, "no surface was felt") if first is None else Ending(DONE, "as asked for")

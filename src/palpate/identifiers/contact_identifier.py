@@ -68,7 +68,9 @@ class Refresh:
         if not np.isfinite(self._high):
             self._low, self._high, self._last = row - 1.0, float(row), 0
             return
-        number = floor((row - 1 - self._high) / self.period + _ROOM) + 1  # the first that may have come out since
+        number = (
+            floor((row - 1 - self._high) / self.period + _ROOM) + 1
+        )  # the first that may have come out since
         if self._low + number * self.period > row:  # the clock drifts: the nearest
             number = round((row - 0.5 - (self._low + self._high) / 2) / self.period)
         self._last = max(number, self._last)
@@ -91,7 +93,8 @@ class ContactIdentifier:
             included [s].
         sampling: samples of the force sensor a second [Hz]; None if each tick has a fresh one.
         touch: force above which the tip is in contact, and half of which it is again free below [N]; None while it
-            never leaves the surface.
+            never leaves the surface. It is the mean over some samples that counts, for noise must not choose which
+            samples of a light contact are taken; so that none taken is too late to be in contact, all wait for it.
         estimator: of `NAMES`, four regressors; recursive least squares that forget nothing if None.
 
     Raises:
@@ -119,11 +122,14 @@ class ContactIdentifier:
         self._before, self._after = weights.before, weights.after
         self._late = (lag - self.low_pass.lag) * rate
         self._count = self._weights.shape[2]
-        self._room = self._count + ceil(abs(self._late)) + 2
+        self._settling = _FORGOTTEN / self.low_pass.decay * rate
+        self._held = 2 * self._settling if touch is not None else 0.0
+        self._samples = ceil(self._settling * (sampling or rate) / rate)
+        self._recent: deque[float] = deque(maxlen=self._samples)
+        self._room = self._count + ceil(abs(self._late)) + ceil(self._held) + 2
         self._ring = np.zeros(2 * self._room)
         self._phi = np.ones(4)
         self._refresh = Refresh(rate / sampling) if sampling is not None else None
-        self._settling = _FORGOTTEN / self.low_pass.decay * rate
         self._waiting: deque[tuple[float, float]] = deque()
         self._row, self._since, self._origin, self._force = -1, 0.0, 0.0, np.nan
         self._touching = touch is None
@@ -131,7 +137,7 @@ class ContactIdentifier:
     @property
     def delay(self) -> int:
         """Ticks between a reading and its part in the estimate."""
-        return max(ceil(self._after - self._late), 0) + 1
+        return max(ceil(self._after - self._late), ceil(self._held), 0) + 1
 
     def update(self, position: float, force: float) -> None:
         """Takes in a tick's position [m], growing into the surface, and force on the surface [N].
@@ -150,7 +156,7 @@ class ContactIdentifier:
         self._force = force
         if instant is not None and self._in_contact(instant, force):
             self._waiting.append((instant, force))
-        while self._waiting and floor(self._waiting[0][0] - self._late) + self._after < row:
+        while self._waiting and self._ripe(self._waiting[0][0]):
             self._take(*self._waiting.popleft())
 
     def update_many(self, positions: ArrayLike, forces: ArrayLike) -> None:
@@ -168,12 +174,18 @@ class ContactIdentifier:
     def _in_contact(self, instant: float, force: float) -> bool:
         """Whether a sample belongs to a contact that its low-pass has seen nothing else than."""
         if self.touch is not None:
-            if not self._touching and force > self.touch:
+            self._recent.append(force)
+            mean = sum(self._recent) / self._samples
+            if not self._touching and mean > self.touch:
                 self._touching, self._since = True, instant
-            elif self._touching and force < self.touch / 2:
+            elif self._touching and mean < self.touch / 2:
                 self._touching = False
                 self._waiting.clear()
         return self._touching and instant >= self._since + self._settling
+
+    def _ripe(self, instant: float) -> bool:
+        """Whether the position around a sample is there, and the tip has been in contact for long enough after it."""
+        return floor(instant - self._late) + self._after < self._row and instant + self._held <= self._row
 
     def _take(self, instant: float, force: float) -> None:
         place = round((instant - self._late) * FRACTIONS)
