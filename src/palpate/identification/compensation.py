@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _LEAST = 0.1
-"""Share of the information in any direction that must be left when the noise's is taken out."""
+"""Share of the information in any direction that must be left for the noise's to be taken out."""
 _NOTHING = 0.05
 """Share of it under which a direction is as good as unknown."""
 _ENCODERS = 2
@@ -61,7 +61,8 @@ def compensation(jacobian: Array, noisy: Array, theta: Array, spread: Array, wei
     noise, ways = np.linalg.eigh((inner + inner.T) / 2)
     share = np.minimum(1.0, (1 - _LEAST) / np.maximum(noise, 1e-300))
     pulls = ways.T @ np.linalg.solve(root, scores)
-    step = share * pulls.sum(axis=1) / (1 - share * noise)
+    # A direction that is nearly all noise is left where it is: how far to move it, nobody knows.
+    step = np.where(share == 1, pulls.sum(axis=1) / np.maximum(1 - noise, _LEAST), 0.0)
     # How a pull c / (1 - n) moves with the noise's power, c and n both in proportion to it.
     doubt = _DOUBT * np.linalg.norm(pulls, axis=1) / np.maximum(1 - noise, _NOTHING) ** 2
     back = np.linalg.solve(root.T, ways) / scale[:, None]
