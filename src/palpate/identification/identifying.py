@@ -141,7 +141,7 @@ def _nothing_in_noise(
 ) -> Identification:
     """What was found; or no contact, if the force hardly stands above its noise and does not follow the position."""
     sure = any(p.verdict is Verdict.IDENTIFIED for p in found.parameters.values())
-    if contacts.clear or sure or found.r2 >= _FOLLOWS_CLEARLY:
+    if contacts.clear or found.r2 >= (_FOLLOWS if sure else _FOLLOWS_CLEARLY):
         return found
     text = "the force hardly leaves its noise and does not follow the position: nothing seems to be touched"
     channels.warnings[:] = [*of_time, Warn(Code.NO_CONTACT, text)]
