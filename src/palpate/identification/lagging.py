@@ -107,7 +107,7 @@ def flat_between(motion: Motion, force: Array, lag: float, std: float) -> tuple[
     plain = fit(KELVIN_VOIGT, motion, force, Lag(lag))
     bottom, half = lag, max(2 * std, motion.chain.dt)
     for _ in range(_PARABOLAS):
-        if not np.isfinite(half):
+        if max(abs(bottom), half) > motion.duration:  # flat over more than the log can tell
             break
         bottom, half = _parabola(plain, motion, force, bottom, half)
     return bottom - half, bottom + half
