@@ -26,6 +26,8 @@ _ABOVE_NOISE = 3.0
 _UNEXPLAINED = 0.01
 _SLOW_UNEXPLAINED = 0.04
 _SLOW = 0.35
+_LARGER = 1.5
+"""Times the noise out of contact that a slow misfit must be: noise may be slow itself."""
 _SIGNIFICANT = 3.0
 _CHAIN_CORRELATION = 2 * 2.3
 """Integral of the autocorrelation of white noise behind the filter chain, in its time constants."""
@@ -203,7 +205,8 @@ def _not_noise(fitted: Fit, question: Question) -> list[str]:
         return [f"its misfit of {fitted.rmse:.2g} N is {times} noise out of contact"]
     chain = question.motion.chain
     white = question.motion.duration * chain.rate / _CHAIN_CORRELATION
-    if left > _SLOW_UNEXPLAINED and fitted.noise.effective < _SLOW * white:
+    slow = fitted.noise.effective < _SLOW * white and fitted.rmse > _LARGER * noise
+    if left > _SLOW_UNEXPLAINED and slow:
         return [f"its misfit ({left:.0%} of the force's variance) is too slow for noise"]
     return []
 
