@@ -1,6 +1,7 @@
 """What every test may lean on: the project's folder, the measured logs, the program."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,9 @@ settings.register_profile("palpate", deadline=None, derandomize=True, print_blob
 settings.load_profile("palpate")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+# A shell that starts the tests in the background has Ctrl-C ignored, and whatever they start would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

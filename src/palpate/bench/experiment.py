@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import resources
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -13,7 +11,8 @@ from msgspec import Meta
 from palpate.bench.controller_tables import ControllerTable, HybridController
 from palpate.bench.explaining import explained, not_finite
 from palpate.bench.part_table import NotNegative, NotNegativeTriple, Part, Positive, PositiveTriple, Triple
-from palpate.errors import InputError, unknown
+from palpate.bench.toml_files import TomlFiles
+from palpate.errors import InputError
 
 
 class Run(Part):
@@ -208,29 +207,8 @@ class Experiment(Part, kw_only=True):
     identification: Identification = Identification()
 
 
-def names() -> list[str]:
-    """The experiments that come with palpate."""
-    folder = resources.files("palpate.bench") / "experiments"
-    return sorted(p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml"))
-
-
-def source(name: str) -> str:
-    """The text of an experiment: one that comes with palpate, or a TOML file of the user's.
-
-    Raises:
-        InputError: no such experiment, no such file, or not a text.
-    """
-    if name in names():
-        return (resources.files("palpate.bench") / "experiments" / f"{name}.toml").read_text("utf-8")
-    path = Path(name)
-    if path.suffix != ".toml" and not path.exists():
-        raise unknown("experiment", name, names())
-    if not path.is_file():
-        raise InputError(f"{name}: no such file; give an experiment's name or a TOML file")
-    try:
-        return path.read_text("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{name}: not a text file ({error.reason}); give a TOML file") from error
+FILES = TomlFiles("experiment", "an", "palpate.bench", "experiments")
+names, source = FILES.names, FILES.source
 
 
 def load(name: str) -> Experiment:

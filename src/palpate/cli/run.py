@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter, Token
 
 from palpate.cli._folder import fresh_folder
+from palpate.cli._named import listed, source_of
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -53,15 +54,10 @@ def run(
     from palpate.bench import experiment as experiments
 
     if list_:
-        width = 2 + max(map(len, experiments.names()))
-        for known in experiments.names():
-            print(f"{known:<{width}}{experiments.load(known).title}")  # noqa: T201
+        listed(experiments.FILES, lambda known: experiments.load(known).title)
         return 0
-    if name is None:
-        raise InputError("run what? Name an experiment (palpate run --list shows them) or a TOML file")
-    source = experiments.source(name)
-    if print_:
-        sys.stdout.write(source)
+    source = source_of(experiments.FILES, name, "run", print_)
+    if name is None or source is None:
         return 0
     folder = out if out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
     title, summary = _run(name, source, seed, folder, force, json)

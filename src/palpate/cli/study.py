@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from palpate.cli._named import listed, source_of
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -50,15 +51,10 @@ def study(
     from palpate.studies import study as studies
 
     if list_:
-        width = 2 + max(map(len, studies.names()))
-        for known in studies.names():
-            print(f"{known:<{width}}{studies.load(known).title}")  # noqa: T201
+        listed(studies.FILES, lambda known: studies.load(known).title)
         return 0
-    if name is None:
-        raise InputError("study what? Name a study (palpate study --list shows them) or a TOML file")
-    source = studies.source(name)
-    if print_:
-        sys.stdout.write(source)
+    source = source_of(studies.FILES, name, "study", print_)
+    if name is None or source is None:
         return 0
     folder = out if out is not None else Path("runs") / f"study-{Path(name).stem}"
     try:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import resources
-from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
 from palpate.bench.explaining import explained, not_finite
+from palpate.bench.toml_files import TomlFiles
 from palpate.errors import InputError, unknown
 from palpate.studies.metrics import METRICS
 from palpate.studies.tables import Against, Curves, Map, Parameter, Study
@@ -18,29 +17,8 @@ T = TypeVar("T")
 VALUES = frozenset(Parameter.__struct_fields__)
 
 
-def names() -> list[str]:
-    """The studies that come with palpate."""
-    folder = resources.files("palpate.studies") / "shipped"
-    return sorted(p.name.removesuffix(".toml") for p in folder.iterdir() if p.name.endswith(".toml"))
-
-
-def source(name: str) -> str:
-    """The text of a study: one that comes with palpate, or a TOML file of the user's.
-
-    Raises:
-        InputError: no such study, no such file, or not a text.
-    """
-    if name in names():
-        return (resources.files("palpate.studies") / "shipped" / f"{name}.toml").read_text("utf-8")
-    path = Path(name)
-    if path.suffix != ".toml" and not path.exists():
-        raise unknown("study", name, names())
-    if not path.is_file():
-        raise InputError(f"{name}: no such file; give a study's name or a TOML file")
-    try:
-        return path.read_text("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{name}: not a text file ({error.reason}); give a TOML file") from error
+FILES = TomlFiles("study", "a", "palpate.studies", "shipped")
+names, source = FILES.names, FILES.source
 
 
 def load(name: str) -> Study:
