@@ -6,8 +6,9 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from palpate._jit.inside import inside
 from palpate._jit.overloads import operators_and_members
-from palpate._jit.registry import INSIDE, OPTIONS, laws
+from palpate._jit.registry import OPTIONS, laws
 from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
 from palpate._jit.unbroken import unbroken
 
@@ -108,4 +109,4 @@ def _hand_over() -> None:
     """Gives Numba the laws registered since the last time, and once and for all the way to ask parts."""
     operators_and_members()
     while laws:
-        importlib.import_module("numba.extending").register_jitable(**INSIDE)(laws.pop())
+        importlib.import_module("numba.extending").register_jitable(**inside())(laws.pop())

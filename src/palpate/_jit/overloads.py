@@ -7,7 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from palpate import _vector
-from palpate._jit.registry import INSIDE, OPTIONS, parts
+from palpate._jit.inside import inside
+from palpate._jit.registry import OPTIONS, parts
 
 
 @functools.cache
@@ -29,7 +30,7 @@ def _overload(function: Any) -> Callable[[Callable[..., Any]], Any]:
     """Numba's decorator for what a function means, given the types of its arguments."""
     from numba.extending import overload
 
-    return overload(function, strict=False, jit_options=INSIDE)
+    return overload(function, strict=False, jit_options=inside())
 
 
 def _operators() -> None:
@@ -53,7 +54,7 @@ def _binary(name: str) -> Callable[..., Any]:
             return _method(a, f"__{name}__")
         reflected = _method(b, f"__r{name}__")
         if reflected and isinstance(a, types.Number):
-            swapped = register_jitable(**INSIDE)(reflected)
+            swapped = register_jitable(**inside())(reflected)
             return lambda a, b: swapped(b, a)
         return None
 
@@ -162,7 +163,7 @@ def _compiled_member(function: Callable[..., Any]) -> Any:
 def _member_dispatcher(function: Callable[..., Any]) -> Any:
     import numba
 
-    return numba.njit(**OPTIONS, **INSIDE)(function)
+    return numba.njit(**OPTIONS, **inside())(function)
 
 
 @functools.cache
