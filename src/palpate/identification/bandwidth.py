@@ -15,6 +15,7 @@ FASTEST = 1 / 8
 """Highest cut-off as a share of the readings per second: above it sampling, not filtering, sets the error."""
 _ABOVE_FLOOR = 10.0
 _SEGMENT = 8192
+_CONTACTS = 32
 _FEWEST_SEGMENT = 64
 _APART = 3.0
 _MOST = 0.99
@@ -68,14 +69,16 @@ def highest_motion(motion: Motion) -> float:
     """The frequency below which the position moved while it was fitted [Hz]; infinite if all contacts are too short.
 
     Below it lies 99 % of the power of the probe's speed, as far as that stands above the position's own noise; of
-    several contacts in the fastest. Where a clean spectrum at last meets its floor is far above that, and no motion.
+    several contacts (the longest, where they are many) in the fastest. Where a clean spectrum at last meets its floor
+    is far above that, and no motion.
     """
     chain, rows = motion.chain, motion.rows
     rows = chain.instants[rows].astype(np.intp) if isinstance(chain, SensorPath) else rows
     step = np.diff(rows)
     contacts = np.split(rows, np.flatnonzero(step > _APART * np.median(step)) + 1)
     stretches = [motion.position[own[0] : own[-1] + 1] for own in contacts]
-    bands = [_band(stretch, chain.dt) for stretch in stretches if len(stretch) >= _FEWEST_SEGMENT]
+    longest = sorted(stretches, key=len)[-_CONTACTS:]
+    bands = [_band(stretch, chain.dt) for stretch in longest if len(stretch) >= _FEWEST_SEGMENT]
     return max(bands, default=float("inf"))
 
 

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 30
 _CONVERGED = 1e-6
+_ROUNDING = 1e-9
 _WALK = (-0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
 """Where the search for a lag that nobody knows starts, in its deviations."""
 
@@ -164,9 +165,9 @@ def _descend(
         jacobian, residuals = _with_rows(np.column_stack([point.columns, slopes]), point, model, outer, known)
         step = _damped(jacobian, residuals, len(point.theta), damping)
         trial = _moved(model, motion, force, point, outer, step[len(point.theta) :], known)
-        if trial.cost < point.cost:
-            gain = 1 - trial.cost / point.cost
-            point, damping = trial, max(damping / 10, 1e-9)
+        gain = 1 - trial.cost / point.cost if point.cost else 0.0
+        if gain > -_ROUNDING:
+            point, damping = (trial if gain > 0 else point), max(damping / 10, 1e-9)
             if gain < _CONVERGED:
                 break
         else:

@@ -115,7 +115,7 @@ def matched_question(
         lag = replace(known, value=low_pass.lag + path.period, std=_PROCESSING)
     touch = None
     if not contacts.bonded:
-        begins = [int(np.searchsorted(samples.time, begin)) for begin, _ in between]
+        begins = np.searchsorted(samples.time, [begin for begin, _ in between]).tolist()
         margin = int(np.ceil(path.settling / path.period))
         touch = touching(force, contacts.resting, rows, spans, begins, margin, usable)
     free_noise = _free_noise(samples, contacts, chain, coarse)
