@@ -145,7 +145,8 @@ def _rows(
     rows, spans = [], []
     for number, (span, (touched, end)) in enumerate(zip(contacts.spans, between, strict=True)):
         begin = touched + (0.0 if contacts.bonded and span[0] == 0 else path.settling)
-        own = np.flatnonzero(usable & (time >= begin) & (time < end))
+        first, last = np.searchsorted(time, [begin, end])
+        own = first + np.flatnonzero(usable[first:last])
         rows.append(own)
         spans.append(np.full(len(own), number))
     found = np.concatenate(rows)
@@ -175,9 +176,8 @@ def _free_noise(samples: Samples, contacts: Contacts, chain: Chain, coarse: Chan
     free = np.ones(len(time), bool)
     guard = chain.settling
     for begin, end in contacts.spans:
-        free &= (time < coarse.start + begin * coarse.dt - guard) | (
-            time > coarse.start + end * coarse.dt + guard
-        )
+        first = np.searchsorted(time, coarse.start + begin * coarse.dt - guard)
+        free[first : np.searchsorted(time, coarse.start + end * coarse.dt + guard, side="right")] = False
     quiet = samples.force[free]
     if len(quiet) < _FEWEST:
         return None

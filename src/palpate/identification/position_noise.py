@@ -84,9 +84,9 @@ def noise_within(position: Array, rows: NDArray[np.intp], spans: NDArray[np.intp
     Args:
         position: shape (n,).
         rows: in contact, shape (m,).
-        spans: number of the contact that each is in, shape (m,).
+        spans: number of the contact that each is in, one after the other, shape (m,).
     """
-    inside = [rows[spans == number] for number in np.unique(spans)]
+    inside = np.split(rows, np.flatnonzero(np.diff(spans)) + 1)
     return position_noise([position[own[0] : own[-1] + 1] for own in inside if len(own)])
 
 

@@ -57,8 +57,8 @@ def touching(
         usable: rows whose filter remembers only valid readings, shape (n,).
     """
     before, left = [], 0
-    for number in np.unique(spans):
-        own = rows[spans == number]
+    edges = np.flatnonzero(np.diff(spans, prepend=-1))
+    for number, own in zip(spans[edges], np.split(rows, edges[1:]), strict=True):
         first = max(begins[number] - margin, left + margin)
         if first < begins[number]:
             step = int(own[1] - own[0]) if len(own) > 1 else 1
