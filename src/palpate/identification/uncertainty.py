@@ -13,6 +13,16 @@ from palpate.identification.regression import Noise, covariance, solve
 Array = NDArray[np.float64]
 
 
+def of_derivatives(model: Model, theta: Array) -> tuple[Array, Array]:
+    """How noise of the position's derivatives 0 to 3 stands in the columns, shape (p, 4), and in the force, shape (4,)."""
+    noisy, force = np.zeros((len(theta), 4)), np.zeros(4)
+    for name, d in model.derivatives.items():
+        place = model.linear.index(name)
+        noisy[place, d] = 1.0
+        force[d] = theta[place]
+    return noisy, force
+
+
 def undone(
     model: Model, motion: Motion, jacobian: Array, theta: Array, level: float, lag: Lag, std: Array | None
 ) -> Compensation:
@@ -21,13 +31,7 @@ def undone(
     Where no sensor's way and no encoder's counts are known, the noise is only known to be no larger: nothing is taken
     out then, and all that it may have done is open.
     """
-    derivatives = model.derivatives
-    force = np.zeros(4)
-    noisy = np.zeros((len(theta), 4))
-    for name, d in derivatives.items():
-        place = model.linear.index(name)
-        force[d] = theta[place]
-        noisy[place, d] = 1.0
+    noisy, force = of_derivatives(model, theta)
     noisy[-1, 1:] = -force[:3]
     weight = np.zeros(len(theta)) if std is None else (level / std) ** 2
     asked = lag.std > 0 and (motion.matched or not lag.known)

@@ -20,6 +20,7 @@ from palpate.identification.fitting import Fit
 from palpate.identification.models import Model, Motion
 from palpate.identification.regression import solve
 from palpate.identification.sensor_path import SensorPath
+from palpate.identification.uncertainty import of_derivatives
 
 Array = NDArray[np.float64]
 
@@ -107,10 +108,7 @@ def _given_lag(
     known to a part only; the last number is how much of a misfit may be its doing.
     """
     theta = solve(columns, force)
-    noisy, of_force = np.zeros((len(theta), 4)), np.zeros(4)
-    for name, d in model.derivatives.items():
-        noisy[model.linear.index(name), d] = 1.0
-        of_force[d] = theta[model.linear.index(name)]
+    noisy, of_force = of_derivatives(model, theta)
     spread = chain.noise_spread(motion.noise)
     undone = compensation(columns, noisy, of_force, spread, np.zeros(len(theta)))
     theta = theta + undone.step

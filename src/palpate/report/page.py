@@ -37,10 +37,15 @@ def page(
         about=about,
         notes=notes,
         tables=tables,
-        figures=[{"source": png(path), "caption": caption} for path, caption in figures.items()],
+        figures=captioned(figures),
         source=source,
         command=command,
     )
+
+
+def captioned(figures: Mapping[Path, str]) -> list[dict[str, str]]:
+    """PNG files with a caption each, as a page holds them."""
+    return [{"source": png(path), "caption": caption} for path, caption in figures.items()]
 
 
 def render(template: str, package: str = "palpate.report", **values: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from palpate.report.page import Table, png, render
+from palpate.report.page import Table, captioned, render
 
 
 def study_page(
@@ -35,7 +35,7 @@ def study_page(
         about=about,
         notes=notes,
         tables=tables,
-        figures=[{"source": png(path), "caption": caption} for path, caption in figures.items()],
+        figures=captioned(figures),
         command=command,
         study=study,
     )
