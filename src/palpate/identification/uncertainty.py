@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def of_derivatives(model: Model, theta: Array) -> tuple[Array, Array]:
-    """How noise of the position's derivatives 0 to 3 stands in the columns, shape (p, 4), and in the force, shape (4,)."""
+    """How noise of the position's derivatives 0 to 3 stands in the columns, (p, 4), and in the force, (4,)."""
     noisy, force = np.zeros((len(theta), 4)), np.zeros(4)
     for name, d in model.derivatives.items():
         place = model.linear.index(name)
