@@ -131,6 +131,22 @@ def score_log(log: Log) -> Score:
     )
 
 
+def judge_found(log: Log, found: Any) -> list[str]:
+    """What is wrong with an answer to a log: intervals that miss the truth, a false lag; one sentence each."""
+    answers = (*_parameters(log, found, {}), *_working_point(log, found))
+    missed = [
+        f"{a.name} {a.low:.4g} .. {a.high:.4g} misses {_named(a.truth)}" for a in answers if not a.holds
+    ]
+    _, false, _ = _lag(log, found)
+    low, high = log.lag
+    return missed + ([f"lag is {_named((1e3 * low, 1e3 * high))} ms"] if false else [])
+
+
+def _named(truth: Range) -> str:
+    low, high = truth
+    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+
+
 def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, ...]:
     own = of_model(log.plan.surface, found.model)
     answers = []
