@@ -28,7 +28,7 @@ from foreign.on_line import streamed
 from foreign.recording import Recording
 from foreign.scoring import judge_found, record_of
 from foreign.surfaces import Surface, touch
-from palpate.contact_frame import identify_contact
+from palpate.contact_frame import ContactFrame, identify_contact
 from palpate.errors import InputError
 from palpate.identification import identify
 from palpate.logs import read_log
@@ -153,9 +153,10 @@ def moving_surface(data: Path | None) -> Iterator[Trial]:
     """2 Hz of 1.5 mm on a surface that drifts, which the probe follows: 65 Hz, K 470."""
     for seed, drift in enumerate((0.4e-3, 0.7e-3, 1.0e-3)):
         recording = Recording(65.0, 0.03, position_noise=2e-5)
-        yield Press(
-            kelvin_voigt(470, 0.4), sine(4e-3, 1.5e-3, 2.0), recording, 25.0, (2.5, 25.0), drift=drift
-        ).trial(seed)
+        press = Press(kelvin_voigt(470, 0.4), sine(4e-3, 1.5e-3, 2.0), recording, 25.0, drift=drift)
+        yield press.trial(seed, "from the air,")
+        yield replace(press, span=(2.5, 25.0)).trial(seed, "in contact,")
+        yield replace(press, span=(2.5, 25.0)).trial(seed, "said bonded,", bonded=True)
 
 
 def relaxing(data: Path | None) -> Iterator[Trial]:
@@ -215,7 +216,11 @@ def poor_fit(data: Path | None) -> Iterator[Trial]:
 
 def step_in_contact(data: Path | None) -> Iterator[Trial]:
     """One step between two rows while in contact, the lag told."""
-    for seed, rate in enumerate((100.0, 250.0, 1000.0)):
+    for seed, rate in enumerate((100.0, 250.0, 500.0)):
+        into = lambda t: np.where(t < 2.0, -1e-3, 5e-3)  # noqa: E731 - a shape in one line
+        told = {"lag": 0.004}
+        press = Press(kelvin_voigt(1000, 2.0), into, Recording(rate, 0.4, lag=0.004), 5.0, None, told, 300.0)
+        yield press.trial(seed, f"from the air, {rate:g} Hz, with mass,", model="kelvin-voigt-mass")
         shape = lambda t: np.where(t < 2.5, 5e-3, 5.5e-3)  # noqa: E731 - a shape in one line
         recording = Recording(rate, 0.4, lag=0.004)
         told = {"lag": 0.004}
@@ -341,21 +346,22 @@ def long_log(data: Path | None) -> Iterator[Trial]:
     recording = Recording(125.0, 0.03, position_noise=2e-6)
     press = Press(kelvin_voigt(2000, 8.0), trapezoids(3e-3, 0.25, 0.7, 0.4), recording, 180 * 1.6)
     log = press.log(0)
-    record = record_of(log)
 
-    def counted(wanted: int, log: Log = log) -> Callable[[Any], list[str]]:
+    def counted(log: Log, seen: int) -> Callable[[Any], list[str]]:
         def judge(found: Any) -> list[str]:
-            missed = abs(len(found.contacts) - wanted) > 0.02 * wanted
-            said = [f"{len(found.contacts)} contacts, there are {wanted}"] if missed else []
-            return said + judge_found(log, found)
+            missed = abs(len(found.contacts) - seen) > 0.02 * seen
+            faults = [f"{len(found.contacts)} contacts, there are {seen}"] if missed else []
+            return faults + judge_found(log, found)
 
         return judge
 
-    yield Trial("180 presses, one axis", lambda: identify(record), counted(180))
-    yield Trial("180 presses, three axes", lambda: identify_contact(in_space(record))[0], counted(180))
-    one = Press(kelvin_voigt(2000, 8.0), broadband(3e-3, 1.5e-3, 4.0), recording, 12.0, (3.1, 12.0))
-    started = one.log(1)
-    yield Trial("begins inside a contact", lambda: identify(record_of(started)), counted(1, started))
+    record, space = record_of(log), in_space(record_of(log))
+    frame = ContactFrame(wrench_frame="base")
+    yield Trial("180 presses, one axis", lambda: identify(record), counted(log, 180))
+    yield Trial("180 presses, three axes", lambda: identify_contact(space, frame)[0], counted(log, 180))
+    one = Press(kelvin_voigt(2000, 8.0), broadband(4e-3, 1.5e-3, 4.0), recording, 12.0, (3.1, 12.0)).log(1)
+    assert one.dense.contact.all()
+    yield Trial("begins inside a contact", lambda: identify(record_of(one)), counted(one, 1))
 
 
 def in_space(record: Record, normal: tuple[float, float, float] = (0.36, -0.48, -0.8)) -> Record:

@@ -96,14 +96,14 @@ def _level(line: Array, values: Array) -> Array:
 
 
 def press_stiffness(dense: Dense, low: float = 0.4) -> float | None:
-    """Slope of force over depth of the loading above `low` of the largest force, a level for each stretch [N/m]."""
+    """Slope of force over depth of the loading above `low` of the forces' range, a level for each stretch [N/m]."""
     short = dense.thinned(1000.0)
     if not short.contact.any():
         return None
-    top = np.percentile(short.force[short.contact], 99.5)
+    bottom, top = np.percentile(short.force[short.contact], [0.5, 99.5])
     speed = np.gradient(short.depth, short.dt)
     moving = speed > 0.05 * np.percentile(np.abs(speed[short.contact]), 95)
-    inside = short.contact & moving & (short.force > low * top)
+    inside = short.contact & moving & (short.force > bottom + low * (top - bottom))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.view(np.int8), [0]])))
     xx = xf = 0.0
     for begin, end in pairwise(edges):
