@@ -21,6 +21,7 @@ FAR = 0.25
 """An identified value further off than this share is confidently wrong."""
 HALVES, SMALL = 3.0, 0.02
 """So is one that is off by more half-widths than this and by more than this share."""
+WORKING_POINT = "working point"
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Answer:
     """One identified parameter against its truth.
 
     Args:
-        name: K, B, M, or another of the model's own; "working point".
+        name: K, B, M, or another of the model's own; WORKING_POINT.
         value, low, high: of the answer, its 95 % interval.
         truth: lowest and highest true value.
         defined: whether the surface has it as one number; else the range of what a linear model may call so.
@@ -51,7 +52,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Score:
-    """What was made of one log.
+    """What was made of one log. The working point is an answer also where it is not called identified.
 
     Args:
         cell, motion, seed: what makes the log again.
@@ -224,21 +225,22 @@ def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:
     p = getattr(point, "stiffness", None)
     if p is None or p.value is None or p.ci95 is None:
         return ()
-    truth = working_truth(log, str(point.source), point.frequency_Hz)
+    truth = working_truth(log, str(point.source), point.frequency)
     if truth is None:
         return ()
-    return (judged("working point", p.value, p.ci95, truth),)
+    answer = judged(WORKING_POINT, p.value, p.ci95, truth)
+    return (replace(answer, wrong=answer.wrong and str(p.verdict) == "identified"),)
 
 
 def _lag(log: Log, found: Any) -> tuple[bool, bool, bool]:
-    """Whether a lag was reported that nobody told, whether it is false by its own bound, whether there is none."""
+    """Whether a lag is reported that nobody told, whether it is false by its own bound, whether there is none."""
     lag = found.lag
     if lag is None or "lag" in log.options:
         return False, False, False
-    value, std = lag if isinstance(lag, tuple) else (lag.value, lag.std)
-    kind = str(getattr(lag, "kind", "measured"))
-    reach = getattr(lag, "bound", None)
-    reach = 1.96 * std if reach is None else reach
+    if isinstance(lag, tuple):
+        value, reach, kind = lag[0], 1.96 * lag[1], "measured"
+    else:
+        value, reach, kind = lag.value, lag.bound, str(lag.kind)
     low, high = log.lag
     false = max(low - value, value - high, 0.0) > reach
-    return kind != "prior", bool(false), bool(false and high <= 0.0 and value > 0)
+    return kind != "prior", bool(false), bool(false and low >= 0.0 >= high)
