@@ -24,7 +24,7 @@ def half_widths(log: Log) -> dict[str, float]:
     if plan.surface.name not in _KNOWN:
         return {}
     names = ["K", "B"] + (["M"] if plan.surface["M"] or r.payload else [])
-    columns, rows = _columns(log, names)
+    columns, rows = columns_of(log, names)
     if len(rows) < 2 * columns.shape[1]:
         return {}
     stiff = plan.surface["K"]
@@ -50,7 +50,7 @@ def half_widths(log: Log) -> dict[str, float]:
     }
 
 
-def _columns(log: Log, names: list[str]) -> tuple[Array, NDArray[np.intp]]:
+def columns_of(log: Log, names: list[str]) -> tuple[Array, NDArray[np.intp]]:
     """What a unit of each parameter adds to the fresh readings in contact, an offset and the rest that is not known."""
     plan, r, dense = log.plan, log.plan.recording, log.dense
     v = np.gradient(dense.depth, dense.dt)

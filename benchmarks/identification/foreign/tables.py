@@ -19,7 +19,7 @@ def row(name: str, scores: list[Score]) -> dict[str, Any]:
 
     Args:
         name: of the row.
-        scores: of its logs, at least one.
+        scores: of its logs.
     """
     answers = [a for s in scores for a in s.answers]
     sure = [a for a in answers if a.defined and a.name != WORKING_POINT]
@@ -114,8 +114,8 @@ def summary(scores: list[Score]) -> list[str]:
         return []
     total = row("all", scores)
     every, point = total["all"], total[WORKING_POINT]
-    alone = row("", [s for s in scores if "/mixture/" not in s.cell] or scores)["all"]
-    mixed = row("", [s for s in scores if "/mixture/" in s.cell] or scores)["all"]
+    alone = row("", [s for s in scores if "/mixture/" not in s.cell])["all"]
+    mixed = row("", [s for s in scores if "/mixture/" in s.cell])["all"]
     narrow = [a for s in scores for a in s.answers if a.name == WORKING_POINT]
     narrow = [a for a in narrow if a.high - a.low <= 2 * FAR * abs(a.value)]
     lines = [
