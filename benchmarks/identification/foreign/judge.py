@@ -71,12 +71,16 @@ def main() -> None:
     if asked.json:
         found = {"command": command, "scores": [s.to_json() for s in scores], "tables": every}
         asked.json.write_text(json.dumps(found, indent=1))
-    if asked.markdown and len(scores) == len(cells) * asked.trials:
+    if len(scores) < len(cells) * asked.trials:
+        sys.exit(130)
+    if asked.markdown:
         asked.markdown.write_text(in_page(asked.markdown.read_text("utf-8"), scores, command), "utf-8")
 
 
 def judged(cells: list[Cell], seeds: range, workers: int) -> list[Score]:
-    """The scores of all logs, in their order; of those done, if the user interrupts."""
+    """The scores of all logs, in their order; of those done, if the user interrupts or ends the program."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     order = {(str(c), s): i for i, (c, s) in enumerate((c, s) for s in seeds for c in cells)}
     done: list[Score] = []
@@ -95,6 +99,7 @@ def judged(cells: list[Cell], seeds: range, workers: int) -> list[Score]:
 def _deaf() -> None:
     """Workers leave an interrupt to the process that started them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def show(what: str, save: Path | None) -> None:

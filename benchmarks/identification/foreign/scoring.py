@@ -225,7 +225,7 @@ def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:
     p = getattr(point, "stiffness", None)
     if p is None or p.value is None or p.ci95 is None:
         return ()
-    truth = working_truth(log, str(point.source), point.frequency)
+    truth = working_truth(log, str(point.source), point.frequency_Hz)
     if truth is None:
         return ()
     answer = judged(WORKING_POINT, p.value, p.ci95, truth)
