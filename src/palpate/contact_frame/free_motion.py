@@ -9,7 +9,7 @@ from palpate.contact_frame.air import air_level
 from palpate.contact_frame.vectors import read_rows
 from palpate.errors import InputError
 from palpate.identification.preparing import filter_and_contacts
-from palpate.identification.timebase import channels_of
+from palpate.identification.sampling import channels_of
 from palpate.records import Record
 
 Array = NDArray[np.float64]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import unknown
-from palpate.identification.fitting import Fit, fit
+from palpate.identification.estimators.fit import Fit, fit
+from palpate.identification.estimators.least_squares import solve
 from palpate.identification.judging import (
     MUCH_BETTER,
     NEGLIGIBLE,
@@ -36,9 +37,8 @@ from palpate.identification.models import (
     without_noise,
 )
 from palpate.identification.parts import halves
-from palpate.identification.regression import solve
+from palpate.identification.residuals import whiteness
 from palpate.identification.unknown_lag import over_all_lags
-from palpate.identification.whiteness import whiteness
 
 __all__ = ["Candidate", "Choice", "Question", "choose", "with_mass"]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.codes import Code, Warn
-from palpate.identification.filters import Chain
-from palpate.identification.timebase import Channels
+from palpate.identification.filters.state_variable import Chain
+from palpate.identification.sampling import Channels
+from palpate.identification.warning_codes import Code, Warn
 
 Array = NDArray[np.float64]
 

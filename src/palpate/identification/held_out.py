@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.beforehand import Lag
-from palpate.identification.fitting import Fit, fit
+from palpate.identification.estimators.fit import Fit, fit
 from palpate.identification.models import Motion, on_rows
+from palpate.identification.prior import Lag
 
 Array = NDArray[np.float64]
 

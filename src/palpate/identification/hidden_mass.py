@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Question
-from palpate.identification.fitting import Fit, fit, profile
+from palpate.identification.estimators.fit import Fit, fit, profile
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
+from palpate.identification.prior import Lag
 
 _TOLD = 0.5
 _HALVINGS = 6

@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.errors import InputError, unknown
-from palpate.identification.bandwidth import highest_motion
-from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Choice, Question, choose, with_mass
-from palpate.identification.codes import Code, Warn
 from palpate.identification.contacts import Contacts
-from palpate.identification.estimators import LEAST_SQUARES, METHODS, estimated_by
-from palpate.identification.filters import Chain
-from palpate.identification.fitting import Fit, fit
+from palpate.identification.estimators.fit import Fit, fit
+from palpate.identification.estimators.methods import LEAST_SQUARES, METHODS, estimated_by
+from palpate.identification.filters.bandwidth import highest_motion
+from palpate.identification.filters.state_variable import Chain
 from palpate.identification.hidden_mass import hidden_mass
 from palpate.identification.in_series import take_out
 from palpate.identification.judging import below_zero
@@ -22,10 +20,12 @@ from palpate.identification.lagging import closing_lag, flat_between
 from palpate.identification.matching import matched_question, samples_of
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
 from palpate.identification.preparing import filter_and_contacts, question_of, thinned
+from palpate.identification.prior import Lag
 from palpate.identification.reporting import nothing, report
 from palpate.identification.result import Identification, Verdict
-from palpate.identification.timebase import Channels, channels_of, held_force
+from palpate.identification.sampling import Channels, channels_of, held_force
 from palpate.identification.verdicts import Terms
+from palpate.identification.warning_codes import Code, Warn
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 

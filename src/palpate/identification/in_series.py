@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from palpate.errors import InputError
-from palpate.identification.beforehand import Lag
-from palpate.identification.fitting import fit
+from palpate.identification.estimators.fit import fit
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
 from palpate.identification.preparing import filter_and_contacts, question_of
-from palpate.identification.timebase import Channels
+from palpate.identification.prior import Lag
+from palpate.identification.sampling import Channels
 
 
 def take_out(channels: Channels, stiffness: float, bonded: bool | None, cutoff: float | None) -> Channels:

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.beforehand import Lag
-from palpate.identification.fitting import Fit
+from palpate.identification.estimators.fit import Fit
 from palpate.identification.held_out import foretold, held_out
 from palpate.identification.models import Motion, on_rows
 from palpate.identification.parts import Disagreement, compare_parts
+from palpate.identification.prior import Lag
+from palpate.identification.residuals import Whiteness, whiteness
 from palpate.identification.touch import Touch
-from palpate.identification.whiteness import Whiteness, whiteness
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.beforehand import Lag
-from palpate.identification.fitting import Fit, fit, profile
+from palpate.identification.estimators.fit import Fit, fit, profile
 from palpate.identification.models import KELVIN_VOIGT, Model, Motion
+from palpate.identification.prior import Lag
 
 Array = NDArray[np.float64]
 

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Question
 from palpate.identification.contacts import Contacts
-from palpate.identification.filters import Chain, white_noise
+from palpate.identification.filters.position_noise import noise_within
+from palpate.identification.filters.sensor_path import SensorPath
+from palpate.identification.filters.state_variable import Chain, white_noise
 from palpate.identification.models import Motion
-from palpate.identification.position_noise import noise_within
 from palpate.identification.preparing import left_at
-from palpate.identification.refreshes import Refreshes, refreshes_of
-from palpate.identification.sensor_path import SensorPath
-from palpate.identification.timebase import Channels
+from palpate.identification.prior import Lag
+from palpate.identification.sample_clock import Refreshes, refreshes_of
+from palpate.identification.sampling import Channels
 from palpate.identification.touch import touching
 from palpate.signals.low_pass import LowPass
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.fitting import Fit, part_of
+from palpate.identification.estimators.fit import Fit, part_of
+from palpate.identification.estimators.least_squares import solve
 from palpate.identification.models import Motion
-from palpate.identification.regression import solve
 
 Array = NDArray[np.float64]
 

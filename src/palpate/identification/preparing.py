@@ -6,17 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.bandwidth import FASTEST, choose_cutoff
-from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Question
-from palpate.identification.codes import Code
 from palpate.identification.contacts import Contacts, find_contacts
-from palpate.identification.filters import Chain, block_means, white_noise
+from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
+from palpate.identification.filters.position_noise import PositionNoise, noise_within
+from palpate.identification.filters.state_variable import Chain, block_means, white_noise
 from palpate.identification.lagging import unknown_lag
 from palpate.identification.models import Motion
-from palpate.identification.position_noise import PositionNoise, noise_within
-from palpate.identification.timebase import Channels
+from palpate.identification.prior import Lag
+from palpate.identification.sampling import Channels
 from palpate.identification.touch import Touch, touching
+from palpate.identification.warning_codes import Code
 
 Array = NDArray[np.float64]
 

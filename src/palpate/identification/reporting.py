@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.identification.choosing import Choice, Question
-from palpate.identification.codes import Code, Warn
 from palpate.identification.contacts import Contacts
-from palpate.identification.filters import Chain, block_means
-from palpate.identification.fitting import fit
+from palpate.identification.estimators.fit import fit
+from palpate.identification.filters.sensor_path import SensorPath
+from palpate.identification.filters.state_variable import Chain, block_means
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.result import Comparison, Identification, Parameter, Traces, Verdict
-from palpate.identification.sensor_path import SensorPath
-from palpate.identification.timebase import Channels
+from palpate.identification.sampling import Channels
 from palpate.identification.verdicts import Terms, unit_of, verdicts
+from palpate.identification.warning_codes import Code, Warn
 from palpate.signals import Estimate
 from palpate.units import impedance_units
 

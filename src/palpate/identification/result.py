@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.codes import Warn
+from palpate.identification.warning_codes import Warn
 from palpate.signals import Estimate
 
 

@@ -14,13 +14,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.beforehand import Lag
-from palpate.identification.compensation import compensation
-from palpate.identification.fitting import Fit
+from palpate.identification.estimators.errors_in_variables import compensation
+from palpate.identification.estimators.fit import Fit
+from palpate.identification.estimators.lag_uncertainty import of_derivatives
+from palpate.identification.estimators.least_squares import solve
+from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.models import Model, Motion
-from palpate.identification.regression import solve
-from palpate.identification.sensor_path import SensorPath
-from palpate.identification.uncertainty import of_derivatives
+from palpate.identification.prior import Lag
 
 Array = NDArray[np.float64]
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Choice
-from palpate.identification.codes import Code, Warn
-from palpate.identification.fitting import Fit
+from palpate.identification.estimators.fit import Fit
 from palpate.identification.hidden_mass import HiddenMass, before_position
+from palpate.identification.prior import Lag
 from palpate.identification.result import Parameter, Verdict
 from palpate.identification.surface import surface, together
+from palpate.identification.warning_codes import Code, Warn
 from palpate.units import impedance_units
 
 

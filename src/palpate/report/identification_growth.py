@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.regression import covariance, noise_of, quantile, solve
+from palpate.identification.estimators.least_squares import covariance, noise_of, quantile, solve
 from palpate.identification.result import Identification, Parameter, Traces
 
 Array = NDArray[np.float64]

@@ -8,10 +8,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.beforehand import LAG, NOTHING, Beforehand, Lag, beforehand
+from palpate.identification.estimators.lag_uncertainty import hidden, undone, with_lag
+from palpate.identification.estimators.least_squares import Noise, covariance, noise_of, quantile, solve
 from palpate.identification.models import Knob, Model, Motion
-from palpate.identification.regression import Noise, covariance, noise_of, quantile, solve
-from palpate.identification.uncertainty import hidden, undone, with_lag
+from palpate.identification.prior import LAG, NOTHING, Beforehand, Lag, beforehand
 
 Array = NDArray[np.float64]
 

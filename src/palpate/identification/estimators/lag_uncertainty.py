@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.beforehand import Lag
-from palpate.identification.compensation import Compensation, compensation, resting
+from palpate.identification.estimators.errors_in_variables import Compensation, compensation, resting
+from palpate.identification.estimators.least_squares import Noise, covariance, solve
 from palpate.identification.models import Model, Motion
-from palpate.identification.regression import Noise, covariance, solve
+from palpate.identification.prior import Lag
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from math import factorial, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.position_noise import PositionNoise
+from palpate.identification.filters.position_noise import PositionNoise
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.codes import Code, Warn, from_word
 from palpate.identification.held import fresh_rows
 from palpate.identification.saturation import at_limit
+from palpate.identification.warning_codes import Code, Warn, from_word
 from palpate.records import Record
 
 Array = NDArray[np.float64]

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
-from palpate.identification.fitting import Fit
-from palpate.identification.instrumental import ORDERS, refined_instrumental
+from palpate.identification.estimators.fit import Fit
+from palpate.identification.estimators.instrumental_variables import ORDERS, refined_instrumental
+from palpate.identification.estimators.least_squares import noise_of
+from palpate.identification.estimators.output_error import output_error
 from palpate.identification.judging import Candidate, Question
-from palpate.identification.output_error import output_error
-from palpate.identification.regression import noise_of
 from palpate.signals.types import Estimate
 
 Array = NDArray[np.float64]
