@@ -32,6 +32,10 @@ class Noise:
         return float(self.autocovariance[0] + 2 * self.autocovariance[1:].sum())
 
 
+_SINGULAR = 1e-13
+"""Eigenvalue of a scaled normal matrix, over the largest, below which rounding alone makes it."""
+
+
 def solve(columns: Array, target: Array) -> Array:
     """Least squares for columns, shape (n, p), of very different size. Returns shape (p,)."""
     scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
@@ -104,9 +108,21 @@ def covariance(
         gram = gram - less / np.outer(scale, scale)
     if more is not None:
         meat = meat + more / np.outer(scale, scale)
-    bread = np.linalg.pinv(gram, rcond=1e-14, hermitian=True)
+    bread = inverse(gram)
     cov: Array = bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale)
     return cov
+
+
+def inverse(normal: Array) -> Array:
+    """Of a symmetric matrix; a direction that it says nothing of has a variance beyond all bounds."""
+    size = np.sqrt(np.abs(np.diag(normal)))
+    size[size == 0] = 1.0
+    scaled = normal / np.outer(size, size)
+    values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
+    floor = _SINGULAR * max(float(values[-1]), 1e-300)
+    gain = np.where(values > floor, 1 / np.maximum(values, floor), 1 / (_SINGULAR * floor))
+    found: Array = (vectors * gain) @ vectors.T / np.outer(size, size)
+    return found
 
 
 def quantile(effective: float, parameters: int, level: float = 0.975) -> float:

@@ -69,6 +69,15 @@ class SensorPath:
         """How many samples of the position before and after an instant are needed."""
         return self._taps.before, self._taps.after
 
+    def times(self, rows: NDArray[np.intp]) -> Array:
+        """Of rows [s] from the position's first sample."""
+        found: Array = self.instants[rows] * self.dt
+        return found
+
+    def gain(self, frequency: Array) -> Array:
+        """Of the amplitude of the readings' own noise: they are taken as they are."""
+        return np.ones_like(frequency)
+
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
         """The filtered signal or a derivative of it at the samples `rows` of the force, shape (len(rows),).
 

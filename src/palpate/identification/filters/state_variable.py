@@ -42,6 +42,21 @@ class Chain:
         return 2 * pi * self.cutoff
 
     @property
+    def period(self) -> float:
+        """From row to row [s]."""
+        return self.dt
+
+    def times(self, rows: NDArray[np.intp]) -> Array:
+        """Of rows [s] from the first sample, less the chain's own delay."""
+        found: Array = rows * self.dt - self.delay
+        return found
+
+    def gain(self, frequency: Array) -> Array:
+        """Of its amplitude at frequencies [Hz]."""
+        found: Array = (1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2)
+        return found
+
+    @property
     def delay(self) -> float:
         """Delay of slow signals, the same on every channel [s]."""
         return ORDER / self.rate
