@@ -106,7 +106,9 @@ class Problem:
         if self.touch is None:
             return None
         motion = replace(self.motion, rows=self.touch.rows, _kept={})
-        return replace(self, motion=motion, force=self.touch.force, spans=self.touch.spans, touch=None, counted=True)
+        return replace(
+            self, motion=motion, force=self.touch.force, spans=self.touch.spans, touch=None, counted=True
+        )
 
 
 def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Options) -> Problem:

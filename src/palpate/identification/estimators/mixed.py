@@ -170,14 +170,14 @@ def solve(system: System, levels: Levels, use: NDArray[np.bool_] | None = None) 
     return Solution(cov @ right, cov)
 
 
-def estimate(system: System) -> tuple[Solution, Levels]:
-    """Estimate variances and parameters together."""
+def estimate(system: System, begin: Levels | None = None) -> tuple[Solution, Levels]:
+    """Estimate variances and parameters together, from a guess of the variances if there is one."""
     force = system.products[:, -1, -1]
     mean = float(force.sum() / max(system.lines.sum(), 1))
     start = 0.01 * mean
     noise = np.maximum(0.1 * force / np.maximum(system.lines, 1), 1e-6 * mean) + 1e-280
     effects = {name: start / max(_power(system, places), 1e-300) for name, places in system.effects.items()}
-    levels = Levels(noise, effects)
+    levels = begin or Levels(noise, effects)
     solution = solve(system, levels)
     for _ in range(_ROUNDS):
         new = _updated(system, levels, solution)

@@ -17,7 +17,15 @@ from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.effects import effect_columns
 from palpate.identification.estimators.fit import Fit, fit
-from palpate.identification.estimators.mixed import Design, Levels, Solution, System, estimate, expanded, solve
+from palpate.identification.estimators.mixed import (
+    Design,
+    Levels,
+    Solution,
+    System,
+    estimate,
+    expanded,
+    solve,
+)
 from palpate.identification.estimators.octaves import (
     Octaves,
     Segment,
@@ -96,9 +104,10 @@ def answer(problem: Problem, model: Model) -> Answer:
     if not segments:
         raise InputError("every stretch in contact is too short; log longer or faster")
     lag = problem.lag.value
+    levels = None
     for _ in range(_ROUNDS):
         question = _Question.of(problem, model, lag, segments)
-        solution, levels = estimate(question.system)
+        solution, levels = estimate(question.system, levels)
         if problem.lag.std == 0:
             break
         moved = float(solution.theta[question.names.index(LAG)])
@@ -107,6 +116,7 @@ def answer(problem: Problem, model: Model) -> Answer:
         if abs(moved - lag) < _RESTS * problem.lag.std:
             break
         lag = moved
+    assert levels is not None
     return question.answered(solution, levels)
 
 
@@ -177,7 +187,7 @@ class _Question:
         else:
             halves = [h for s in self.segments for h in _halves(s)]
             if len({h.group for h in halves}) < 2:
-                return Spread(np.zeros(self.system.parameters), 1.0)
+                return Spread(np.zeros(self.system.parameters))
             octaves = octaves_of(self.columns, halves, self.dt, self.lowest)
             one, other = [0], [1]
         p = self.system.parameters
@@ -190,7 +200,7 @@ class _Question:
         speed = self.problem.motion.moved(1, self.fit.lag)
         pieces = _strokes(speed, self.segments)
         if not pieces:
-            return Spread(np.zeros(p), 2.0)
+            return Spread(np.zeros(p))
         octaves = octaves_of(self.columns, pieces, self.dt, self.lowest)
         ways = sorted({piece.group for piece in pieces})
         part = solve(expanded(octaves.of_groups(ways), self.design), levels)
@@ -198,7 +208,7 @@ class _Question:
         if len(ways) == 2:
             both = [solve(expanded(octaves.of_groups([w]), self.design), levels) for w in ways]
             apart = causes.of_halves(both[0], both[1], p)
-            spread = Spread(np.maximum(spread.variance, apart.variance), 2.0)
+            spread = Spread(np.maximum(spread.variance, apart.variance))
         return spread
 
     def _sensor(self, levels: Levels) -> Array:

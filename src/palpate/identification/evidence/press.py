@@ -138,7 +138,11 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
     tangent = [t for level in _LEVELS if (t := _tangent(strokes, level)) is not None]
     way_out, loss = _unloading(problem, lag, segments)
     return Press(
-        tuple(tangent), _thin(loading.depth, loading.force), way_out, loss, _relaxation(problem, lag, segments)
+        tuple(tangent),
+        _thin(loading.depth, loading.force),
+        way_out,
+        loss,
+        _relaxation(problem, lag, segments),
     )
 
 

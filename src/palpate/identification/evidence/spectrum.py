@@ -71,7 +71,9 @@ def _blocks(position: Array, force: Array, segments: list[Segment], length: int)
         if s.last - s.first < length:
             continue
         for channel, values in enumerate((position, force)):
-            own = np.lib.stride_tricks.sliding_window_view(values[s.first : s.last], length)[:: max(length // 2, 1)]
+            own = np.lib.stride_tricks.sliding_window_view(values[s.first : s.last], length)[
+                :: max(length // 2, 1)
+            ]
             own = own - (own @ window / window.sum())[:, None]
             lines[channel].append(own @ phase)
     return _Blocks(np.concatenate(lines[0]), np.concatenate(lines[1]))
@@ -85,7 +87,9 @@ def _octave(
     cross = (np.conj(blocks.position) * blocks.force).sum(axis=1)
     stiffness = complex(cross.sum() / total)
     count = total**2 / float((power**2).sum() or 1e-300)
-    independent = max(count * (1.0 if len(power) < 2 else 0.75), 1.0)  # half-overlapping Hann blocks: Welch 1967
+    independent = max(
+        count * (1.0 if len(power) < 2 else 0.75), 1.0
+    )  # half-overlapping Hann blocks: Welch 1967
     spread = cross - stiffness * power
     left = blocks.force - stiffness * blocks.position
     within = float((np.abs(left) ** 2).sum()) / max(6 * len(power) - 2, 1) / total / 0.75
