@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 from palpate.errors import InputError
-from palpate.identification.codes import Code, Warn
+from palpate.identification.warning_codes import Code, Warn
 from palpate.report.identification_page import page, write_page
 from palpate.report.identification_words import ADVICE, headline
 from palpate.report.ownership import check_ours

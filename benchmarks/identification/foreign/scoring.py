@@ -12,7 +12,7 @@ import numpy as np
 
 from foreign.bound import half_widths
 from foreign.logs import Cell, Log, make_log
-from foreign.truth import Range, octave_stiffness, of_model, press_stiffness
+from foreign.truth import Range, dynamic_stiffness, octave_stiffness, of_model, press_stiffness
 from palpate.errors import InputError
 from palpate.identification import identify
 from palpate.records import Record
@@ -207,17 +207,17 @@ def working_truth(log: Log, source: str, frequency: float | None) -> Range | Non
     An arm in series that is not told may be in it or not, and so may the inertia of a payload.
     """
     dense, r = log.dense, log.plan.recording
-    as_seen = dense
-    if "series_stiffness" not in log.options:
-        as_seen = replace(dense, depth=dense.depth + dense.force / r.series)
+    arm = r.series if "series_stiffness" not in log.options else np.inf
     if source == "octave" and frequency:
-        octaves = [octave_stiffness(each, frequency) for each in (dense, as_seen)]
-        if octaves[0] is not None and octaves[1] is not None:
+        surface = log.plan.surface
+        own = dynamic_stiffness(surface, frequency, 0.0, 0.0) if surface.linear else None
+        own = octave_stiffness(dense, frequency) if own is None else own
+        if own is not None:
             inertia = (2 * np.pi * frequency) ** 2 * r.payload
-            ends = [z.real - more for z in octaves if z for more in (0.0, inertia)]
+            ends = [z.real - more for z in (own, own / (1 + own / arm)) for more in (0.0, inertia)]
             return min(ends), max(ends)
-    slopes = [slope for slope in map(press_stiffness, (dense, as_seen)) if slope is not None]
-    return (min(slopes), max(slopes)) if slopes else None
+    slope = press_stiffness(dense)
+    return None if slope is None else tuple(sorted((slope, slope / (1 + slope / arm))))
 
 
 def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:

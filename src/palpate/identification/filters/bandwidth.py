@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.identification.filters.position_noise import position_noise
+from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.models import Motion
-from palpate.identification.position_noise import position_noise
-from palpate.identification.sensor_path import SensorPath
 
 Array = NDArray[np.float64]
 

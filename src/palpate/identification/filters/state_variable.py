@@ -13,7 +13,7 @@ from math import factorial, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.position_noise import PositionNoise
+from palpate.identification.filters.position_noise import PositionNoise
 
 Array = NDArray[np.float64]
 
@@ -40,6 +40,25 @@ class Chain:
     def rate(self) -> float:
         """w of F(s) [rad/s]."""
         return 2 * pi * self.cutoff
+
+    @property
+    def period(self) -> float:
+        """From row to row [s]."""
+        return self.dt
+
+    def times(self, rows: NDArray[np.intp]) -> Array:
+        """Of rows [s] from the first sample, less the chain's own delay."""
+        found: Array = rows * self.dt - self.delay
+        return found
+
+    def force_gain(self, frequency: Array) -> Array:
+        """Of its amplitude at frequencies [Hz]."""
+        found: Array = (1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2)
+        return found
+
+    def position_gain(self, frequency: Array) -> Array:
+        """The same: both channels go the same way."""
+        return self.force_gain(frequency)
 
     @property
     def delay(self) -> float:

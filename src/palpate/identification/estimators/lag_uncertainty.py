@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.beforehand import Lag
-from palpate.identification.compensation import Compensation, compensation, resting
+from palpate.identification.estimators.errors_in_variables import Compensation, compensation, resting
+from palpate.identification.estimators.least_squares import Noise, covariance
 from palpate.identification.models import Model, Motion
-from palpate.identification.regression import Noise, covariance, solve
+from palpate.identification.prior import Lag
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def undone(
     noisy, force = of_derivatives(model, theta)
     noisy[-1, 1:] = -force[:3]
     weight = np.zeros(len(theta)) if std is None else (level / std) ** 2
-    asked = lag.std > 0 and (motion.matched or not lag.known)
+    asked = lag.std > 0
     free = np.arange(len(theta)) < len(theta) - (not asked)
     spread = motion.chain.noise_spread(motion.noise)
     part = compensation(jacobian[:, free], noisy[free], force, spread, weight[free])
@@ -56,18 +56,12 @@ def with_lag(
     less: Array | None,
     more: Array | None,
 ) -> Array:
-    """The covariance with the lag's own uncertainty, be it calibrated (the log is not asked) or found in the log."""
+    """The covariance with the lag's own uncertainty, a prior that the log may sharpen."""
     if lag.std == 0:
         return fixed
-    if not lag.known or motion.matched:
-        prior = np.full(jacobian.shape[1], np.inf) if std is None else std
-        prior[-1] = lag.std
-        return covariance(jacobian, motion.rows, noise, prior, less, more) + pulled
-    shift = -solve(jacobian[:, :-1], jacobian[:, -1])  # how the answer moves with the lag
-    grown = fixed + np.pad(np.outer(shift, shift), (0, 1)) * lag.std**2
-    grown[-1, :-1] = grown[:-1, -1] = shift * lag.std**2
-    grown[-1, -1] = lag.std**2
-    return grown
+    prior = np.full(jacobian.shape[1], np.inf) if std is None else std
+    prior[-1] = lag.std
+    return covariance(jacobian, motion.rows, noise, prior, less, more) + pulled
 
 
 def hidden(model: Model, motion: Motion, jacobian: Array, theta: Array) -> Array:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.codes import Code, Warn, from_word
+from palpate.identification.filters.state_variable import block_means
 from palpate.identification.held import fresh_rows
 from palpate.identification.saturation import at_limit
+from palpate.identification.warning_codes import Code, Warn, from_word
 from palpate.records import Record
 
 Array = NDArray[np.float64]
@@ -24,17 +25,36 @@ _LONG_STEP = 0.5
 """Between two rows [s]: so slow a log is more likely one whose time is not in seconds."""
 
 
-@dataclass
+@dataclass(frozen=True)
+class Raw:
+    """The rows of a log as they stand, on its even grid.
+
+    Args:
+        start, dt: first time and period [s].
+        position: shape (n,) [m].
+        held_force: the force as it stands in the log, held from row to row, shape (n,) [N].
+        valid: where both channels have readings near by, shape (n,).
+    """
+
+    start: float
+    dt: float
+    position: Array
+    held_force: Array
+    valid: Mask
+
+
+@dataclass(frozen=True)
 class Channels:
-    """Position and force on an even grid.
+    """Position and force on one even grid of time, both sampled at the same instants before.
 
     Args:
         start: time of the first sample [s].
         dt: sampling period [s].
-        position, force: shape (n,), in the record's SI units.
+        position, force: shape (n,), SI units.
         valid: where both channels have readings near by, shape (n,).
         rate: fresh readings per second of the slower channel [1/s].
-        warnings: what was found and done.
+        raw: the rows behind it.
+        warnings: of this stage.
     """
 
     start: float
@@ -43,7 +63,13 @@ class Channels:
     force: Array
     valid: Mask
     rate: float
-    warnings: list[Warn] = field(default_factory=list)
+    raw: Raw
+    warnings: tuple[Warn, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Of the log [s]."""
+        return len(self.position) * self.dt
 
     @property
     def time(self) -> Array:
@@ -82,19 +108,49 @@ def channels_of(record: Record) -> Channels:
         text = f"only {rate:.3g} fresh readings a second: behaviour faster than about {rate / 8:.2g} Hz is not seen"
         text += "; or is the time in ms? then say NAME:ms" if dt >= _LONG_STEP else ""
         warnings.append(Warn(Code.LOW_RATE, text))
+    grid = time if even else np.arange(time[0], time[-1] + dt / 2, dt)
+    x, f, valid = _common(grid, time, (position, use_x), (force, use_f), even)
+    own_x, near_x = _bridge(grid, time[use_x], position[use_x])
+    raw = Raw(float(time[0]), dt, own_x, _held(grid + dt / 4, time, force), near_x & valid)
+    return Channels(float(time[0]), dt, x, f, valid, rate, raw, tuple(warnings))
+
+
+def thinned(channels: Channels, size: int) -> Channels:
+    """Average `size` neighbouring samples, in the same way on both channels."""
+    if size < 2:
+        return channels
+    position, force = block_means(channels.position, size), block_means(channels.force, size)
+    valid = block_means(channels.valid.astype(float), size) == 1
+    start = channels.start + (size - 1) / 2 * channels.dt
+    dt = channels.dt * size
+    rate = min(channels.rate, 1 / dt)
+    return replace(channels, start=start, dt=dt, position=position, force=force, valid=valid, rate=rate)
+
+
+def _common(
+    grid: Array, time: Array, position: tuple[Array, Mask], force: tuple[Array, Mask], even: bool
+) -> tuple[Array, Array, Mask]:
+    """Both channels at the instants of the slower one, joined by straight lines at the grid.
+
+    A force of 125 Hz joined by straight lines beside a position of 500 Hz looks like a mass of -K T^2/12. Read at the
+    same instants, both lose the same to the lines between them.
+    """
+    (x, use_x), (f, use_f) = position, force
     if even and use_x.all() and use_f.all():
-        return Channels(float(time[0]), dt, position, force, np.ones(len(time), bool), rate, warnings)
-    grid = np.arange(time[0], time[-1] + dt / 2, dt)
-    x, near_x = _bridge(grid, time[use_x], position[use_x])
-    f, near_f = _bridge(grid, time[use_f], force[use_f])
-    return Channels(float(time[0]), dt, x, f, near_x & near_f, rate, warnings)
+        return x, f, np.ones(len(grid), bool)
+    slow, fast = (use_f, use_x) if use_f.sum() < use_x.sum() else (use_x, use_f)
+    instants = time[slow]
+    bridged, near = _bridge(grid, instants, (f if slow is use_f else x)[slow])
+    other, near_other = _bridge(instants, time[fast], (x if slow is use_f else f)[fast])
+    own, near_own = _bridge(grid, instants[near_other], other[near_other])
+    valid = near & near_own
+    return (own, bridged, valid) if slow is use_f else (bridged, own, valid)
 
 
-def held_force(record: Record, channels: Channels) -> Array:
-    """The force as it stood in the log at the channels' times, held from row to row, shape (n,)."""
-    time, force = record["time"], record["force"]
+def _held(at: Array, time: Array, force: Array) -> Array:
+    """The force as it stood in the log, held from row to row."""
     there = np.isfinite(force)
-    rows = np.searchsorted(time[there], channels.time + channels.dt / 4, side="right") - 1
+    rows = np.searchsorted(time[there], at, side="right") - 1
     held: Array = force[there][np.maximum(rows, 0)]
     return held
 

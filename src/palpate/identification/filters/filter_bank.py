@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.signals.low_pass import LowPass
+
 Array = NDArray[np.float64]
 
 
@@ -51,3 +53,13 @@ class FilterBank:
 
         out: Array = lfilter(self.numerators[derivative], self.denominator, signal - signal[0])
         return out / self.dt**derivative + (signal[0] if derivative == 0 else 0.0)
+
+
+def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
+    """A signal, shape (n,), behind Butterworth low-passes, exact for straight lines between the samples."""
+    from scipy.signal import butter
+
+    for order, cutoff in low_pass.sections:
+        _, denominator = butter(order, 2 * np.pi * cutoff, analog=True)
+        signal = FilterBank(np.asarray(denominator[::-1]), dt)(signal, 0)
+    return signal

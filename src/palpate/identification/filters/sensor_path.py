@@ -13,7 +13,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.position_noise import PositionNoise
+from palpate.identification.filters.position_noise import PositionNoise
 from palpate.signals.low_pass import LowPass
 from palpate.signals.taps import Taps, read, taps
 
@@ -68,6 +68,19 @@ class SensorPath:
     def reach(self) -> tuple[int, int]:
         """How many samples of the position before and after an instant are needed."""
         return self._taps.before, self._taps.after
+
+    def times(self, rows: NDArray[np.intp]) -> Array:
+        """Of rows [s] from the position's first sample."""
+        found: Array = self.instants[rows] * self.dt
+        return found
+
+    def force_gain(self, frequency: Array) -> Array:
+        """Of the amplitude of the readings' own noise: they are taken as they are."""
+        return np.ones_like(frequency)
+
+    def position_gain(self, frequency: Array) -> Array:
+        """Of the amplitude of the position at frequencies [Hz]."""
+        return np.abs(self.low_pass.at(2 * pi * frequency))
 
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
         """The filtered signal or a derivative of it at the samples `rows` of the force, shape (len(rows),).

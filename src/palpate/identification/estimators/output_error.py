@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.evenly import even_period
-from palpate.identification.regression import covariance, noise_of
-from palpate.identification.simulation import (
+from palpate.identification.estimators.least_squares import covariance, noise_of
+from palpate.identification.estimators.simulation import (
     COLUMNS,
     PARAMETERS,
     Drive,
@@ -25,6 +24,7 @@ from palpate.identification.simulation import (
     fastest_mode,
     simulated,
 )
+from palpate.identification.evenly import even_period
 from palpate.signals.types import Estimate
 
 Array = NDArray[np.float64]

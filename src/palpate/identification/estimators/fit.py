@@ -8,10 +8,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.beforehand import LAG, NOTHING, Beforehand, Lag, beforehand
+from palpate.identification.estimators.lag_uncertainty import hidden, undone, with_lag
+from palpate.identification.estimators.least_squares import Noise, covariance, noise_of, quantile, solve
 from palpate.identification.models import Knob, Model, Motion
-from palpate.identification.regression import Noise, covariance, noise_of, quantile, solve
-from palpate.identification.uncertainty import hidden, undone, with_lag
+from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Fit:
         noise: colour of the residuals.
         lag: the lag used [s].
         attenuation: how far noise of the position may have pulled each parameter, shape (p,); part of `cov`.
-        matched: behind a force sensor whose own way is known, where the lag is one of the parameters.
+        jacobian: of the predicted force by all of them, shape (n, p).
     """
 
     model: Model
@@ -52,7 +52,7 @@ class Fit:
     noise: Noise
     lag: float
     attenuation: Array
-    matched: bool = False
+    jacobian: Array
 
     def __getitem__(self, name: str) -> float:
         return float(self.theta[self.names.index(name)])
@@ -86,7 +86,7 @@ class _Point:
     cost: float  # rss, and what the knowledge from before has against it
 
 
-def fit(model: Model, motion: Motion, force: Array, lag: Lag, free_lag: bool = False) -> Fit:
+def fit(model: Model, motion: Motion, force: Array, lag: Lag) -> Fit:
     """Fit a model.
 
     Args:
@@ -94,24 +94,42 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag, free_lag: bool = F
         motion: the position.
         force: filtered, at the motion's rows, shape (n,).
         lag: what is known about it; if it is not known, its uncertainty is part of every interval.
-        free_lag: look for the lag in this log. Where the force sensor's own way is known, that is always done, within
-            the deviation given.
+        The lag is looked for in the log within its prior.
     """
-    asks = motion.matched and lag.std > 0
+    asks = lag.std > 0
     lags = lag.value + lag.std * np.array(_WALK if asks and not lag.known else (0.0,))
     best = min((_best_start(model, motion, force, float(at)) for at in lags), key=lambda point: point.rss)
     known = NOTHING
     for _ in range(2 if asks or lag.mass else 1):
-        best = _descend(model, motion, force, best, lag, free_lag or asks, known)
+        best = _descend(model, motion, force, best, lag, asks, known)
         noise = float(np.sqrt(best.rss / max(len(force) - len(best.theta), 1)))
-        known = beforehand(lag, noise, asks)
+        known = prior_of(lag, noise, asks)
     if known.known:
-        best = _descend(model, motion, force, best, lag, free_lag or asks, known)
+        best = _descend(model, motion, force, best, lag, asks, known)
     return _finish(model, motion, force, best, lag, known)
 
 
+def relinearised(fitted: Fit, motion: Motion, force: Array, theta: dict[str, float]) -> Fit:
+    """The same about other values of the parameters, for a model without nonlinear ones."""
+    values = np.array([theta.get(name, fitted[name]) for name in fitted.names])
+    lag = theta[LAG]
+    columns = np.column_stack(fitted.model.columns(motion, {}, lag))
+    count = columns.shape[1]
+    values[:count] += np.eye(count)[-1] * float(np.mean(force - columns @ values[:count]))  # of the offset
+    predicted = columns @ values[:count]
+    point = _Point({}, lag, columns, values[:count], force - predicted, 0.0, 0.0)
+    slope = _slopes(fitted.model, motion, point, [_lag_knob(motion, Lag(lag))])
+    jacobian = np.column_stack([columns, slope])
+    rmse = float(np.sqrt(np.mean((force - predicted) ** 2)))
+    spread = float(np.mean((force - force.mean()) ** 2))
+    return replace(
+        fitted, theta=values, jacobian=jacobian, residuals=force - predicted, predicted=predicted, lag=lag,
+        rmse=rmse, r2=1 - rmse**2 / spread if spread else 0.0,
+    )  # fmt: skip
+
+
 def _evaluate(
-    model: Model, motion: Motion, force: Array, knobs: dict[str, float], lag: float, known: Beforehand
+    model: Model, motion: Motion, force: Array, knobs: dict[str, float], lag: float, known: Prior
 ) -> _Point:
     columns = np.column_stack(model.columns(motion, knobs, lag))
     rows, targets = known.rows(model.linear)
@@ -127,12 +145,6 @@ def _evaluate(
         value, weight = known.known[LAG]
         against += (weight * (lag - value)) ** 2
     return _Point(knobs, lag, columns, theta, residuals, rss, rss + against)
-
-
-def profile(fitted: Fit, motion: Motion, force: Array, lag: float) -> float:
-    """Sum of squared residuals of the same model and knobs at another lag."""
-    knobs = {knob.name: fitted[knob.name] for knob in fitted.model.knobs}
-    return _evaluate(fitted.model, motion, force, knobs, lag, NOTHING).rss
 
 
 def _best_start(model: Model, motion: Motion, force: Array, lag: float) -> _Point:
@@ -152,7 +164,7 @@ def _descend(
     point: _Point,
     lag: Lag,
     free_lag: bool,
-    known: Beforehand,
+    known: Prior,
 ) -> _Point:
     """Levenberg and Marquardt over the knobs and the lag, the linear parameters solved for at every step."""
     outer = [*model.knobs, *([_lag_knob(motion, lag)] if free_lag else [])]
@@ -178,7 +190,7 @@ def _descend(
 
 
 def _with_rows(
-    jacobian: Array, point: _Point, model: Model, outer: list[Knob], known: Beforehand
+    jacobian: Array, point: _Point, model: Model, outer: list[Knob], known: Prior
 ) -> tuple[Array, Array]:
     """The rows of what is known beforehand under those of the log."""
     names = (*model.linear, *(knob.name for knob in outer))
@@ -228,7 +240,7 @@ def _moved(
     point: _Point,
     outer: list[Knob],
     step: Array,
-    known: Beforehand,
+    known: Prior,
 ) -> _Point:
     knobs, lag = dict(point.knobs), point.lag
     for knob, change in zip(outer, step, strict=True):
@@ -242,7 +254,7 @@ def _moved(
     return _evaluate(model, motion, force, knobs, lag, known)
 
 
-def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag, known: Beforehand) -> Fit:
+def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag, known: Prior) -> Fit:
     knob = _lag_knob(motion, lag)
     outer = [*model.knobs, knob]
     slopes = _slopes(model, motion, point, outer)
@@ -251,7 +263,7 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag,
             slopes[:, i] /= point.knobs[own.name]
     jacobian = np.column_stack([point.columns, slopes])
     names = (*model.linear, *(k.name for k in model.knobs), LAG)
-    noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.known))
+    noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.std == 0))
     theta = np.array([*point.theta, *(point.knobs[k.name] for k in model.knobs), point.lag])
     level = float(np.sqrt(point.rss / max(len(force) - len(point.theta), 1)))
     std = known.std(names, level)
@@ -290,27 +302,5 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag,
         noise=noise,
         lag=float(theta[-1]),
         attenuation=np.sqrt(np.diag(pulled)),
-        matched=motion.matched,
+        jacobian=jacobian,
     )
-
-
-def part_of(fitted: Fit, motion: Motion, force: Array, inside: NDArray[np.bool_]) -> tuple[Fit, Array]:
-    """Refit only the linear parameters on some of the rows, knobs and lag left as they are.
-
-    Returns:
-        The fit with parameters and covariance of this part, and its residuals.
-    """
-    knobs = {k.name: fitted[k.name] for k in fitted.model.knobs}
-    columns = np.column_stack(fitted.model.columns(motion, knobs, fitted.lag))[inside]
-    theta = solve(columns, force[inside])
-    residuals = force[inside] - columns @ theta
-    noise = noise_of(residuals, motion.rows[inside], len(theta))
-    cov = covariance(columns, motion.rows[inside], noise)
-    names = fitted.model.linear
-    rmse = float(np.sqrt(np.mean(residuals**2)))
-    spread = float(np.var(force[inside])) or 1.0
-    part = replace(
-        fitted, names=names, theta=theta, cov=cov, fixed_cov=cov, residuals=residuals, noise=noise,
-        predicted=columns @ theta, rmse=rmse, r2=1 - rmse**2 / spread,
-    )  # fmt: skip
-    return part, residuals

@@ -32,6 +32,10 @@ class Noise:
         return float(self.autocovariance[0] + 2 * self.autocovariance[1:].sum())
 
 
+_SINGULAR = 1e-13
+"""Eigenvalue of a scaled normal matrix, over the largest, below which rounding alone makes it."""
+
+
 def solve(columns: Array, target: Array) -> Array:
     """Least squares for columns, shape (n, p), of very different size. Returns shape (p,)."""
     scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
@@ -104,9 +108,29 @@ def covariance(
         gram = gram - less / np.outer(scale, scale)
     if more is not None:
         meat = meat + more / np.outer(scale, scale)
-    bread = np.linalg.pinv(gram, rcond=1e-14, hermitian=True)
+    bread = inverse(gram)
     cov: Array = bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale)
     return cov
+
+
+def inverse(normal: Array) -> Array:
+    """Of a symmetric matrix; a direction that it says nothing of has a variance beyond all bounds, not none."""
+    size = np.sqrt(np.abs(np.diag(normal)))
+    size[size == 0] = 1.0
+    scaled = normal / np.outer(size, size)
+    try:
+        root = np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        root = None
+    if root is not None and float(np.diag(root).min()) ** 2 > 10 * _SINGULAR:
+        half = np.linalg.inv(root)
+        found: Array = half.T @ half / np.outer(size, size)
+        return found
+    values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
+    floor = _SINGULAR * max(float(values[-1]), 1e-300)
+    gain = np.where(values > floor, 1 / np.maximum(values, floor), 1 / (_SINGULAR * floor))
+    wide: Array = (vectors * gain) @ vectors.T / np.outer(size, size)
+    return wide
 
 
 def quantile(effective: float, parameters: int, level: float = 0.975) -> float:

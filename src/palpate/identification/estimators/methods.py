@@ -7,50 +7,47 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.errors import InputError, unknown
-from palpate.identification.fitting import Fit
-from palpate.identification.instrumental import ORDERS, refined_instrumental
-from palpate.identification.judging import Candidate, Question
-from palpate.identification.output_error import output_error
-from palpate.identification.regression import noise_of
+from palpate.errors import InputError
+from palpate.identification.estimators.fit import Fit, fit
+from palpate.identification.estimators.instrumental_variables import ORDERS, refined_instrumental
+from palpate.identification.estimators.least_squares import noise_of
+from palpate.identification.estimators.output_error import output_error
+from palpate.identification.models import Model
+from palpate.identification.options import LEAST_SQUARES
+from palpate.identification.problem import Problem
+from palpate.identification.sampling import Channels
 from palpate.signals.types import Estimate
 
 Array = NDArray[np.float64]
 
-LEAST_SQUARES = "least-squares"
-METHODS = (LEAST_SQUARES, "instrumental-variables", "output-error")
-"""Least squares on the force; refined instrumental variables, where the position is the noisier channel; output error,
-the same by simulation, which takes a curved spring too."""
 
-
-def estimated_by(method: str, candidate: Candidate, force: Array) -> Candidate:
-    """The candidate with the parameters that another estimator finds in the longest of its contacts.
+def estimated_by(method: str, model: Model, problem: Problem, channels: Channels) -> Fit:
+    """The fit that holds if the model does.
 
     Args:
-        method: of `METHODS`.
-        candidate: fitted by least squares, which is where output error starts.
-        force: as read, at the samples of the motion's position, shape (n,) [N].
+        method: of `METHODS`; all but least squares work on the longest of the contacts.
+        model: which.
+        problem: what it is fitted to.
+        channels: as read; the force at the samples of the motion's position.
 
     Raises:
-        InputError: no such method, or one that cannot fit this model.
+        InputError: a method that cannot fit this model.
     """
-    if method not in METHODS:
-        raise unknown("method", method, METHODS)
+    fitted = fit(model, problem.motion, problem.force, problem.lag)
     if method == LEAST_SQUARES:
-        return candidate
-    if len(force) != len(candidate.question.motion.position):
-        raise ValueError(f"force and position must be of one grid, got {len(force)} readings for the force")
-    inside = _longest(candidate.question)
-    position = candidate.question.motion.position[inside]
-    time: Array = np.arange(len(position), dtype=np.float64) * candidate.question.motion.chain.dt
+        return fitted
+    force = problem.contacts.force_sign * channels.force
+    inside = _longest(problem)
+    position = problem.motion.position[inside]
+    time: Array = np.arange(len(position), dtype=np.float64) * problem.motion.chain.period
     by = _by_instruments if method == "instrumental-variables" else _by_simulation
-    return replace(candidate, fit=_with(candidate, by(candidate.fit, time, force[inside], position)))
+    return _with(fitted, problem, by(fitted, time, force[inside], position))
 
 
-def _longest(question: Question) -> slice:
+def _longest(problem: Problem) -> slice:
     """The samples of the longest contact."""
-    numbers, counts = np.unique(question.spans, return_counts=True)
-    own = question.motion.rows[question.spans == numbers[np.argmax(counts)]]
+    numbers, counts = np.unique(problem.spans, return_counts=True)
+    own = problem.motion.rows[problem.spans == numbers[np.argmax(counts)]]
     return slice(int(own[0]), int(own[-1]) + 1)
 
 
@@ -83,20 +80,19 @@ def _by_simulation(fitted: Fit, time: Array, force: Array, position: Array) -> E
     return output_error(time, force, position, start, free=fitted.model.linear)
 
 
-def _with(candidate: Candidate, estimate: Estimate) -> Fit:
+def _with(fitted: Fit, problem: Problem, estimate: Estimate) -> Fit:
     """The fit with another's parameters, and what they leave of the filtered force."""
-    fitted, question = candidate.fit, candidate.question
     theta, cov = fitted.theta.copy(), fitted.cov.copy()
     places = [fitted.names.index(name) for name in estimate.names]
     theta[places] = estimate.theta
     cov[np.ix_(places, places)] = estimate.covariance
     knobs = {knob.name: float(theta[fitted.names.index(knob.name)]) for knob in fitted.model.knobs}
-    columns = np.column_stack(fitted.model.columns(question.motion, knobs, fitted.lag))
+    columns = np.column_stack(fitted.model.columns(problem.motion, knobs, fitted.lag))
     predicted = columns @ theta[: len(fitted.model.linear)]
-    residuals = question.force - predicted
+    residuals = problem.force - predicted
     rmse = float(np.sqrt(np.mean(residuals**2)))
     return replace(
         fitted, theta=theta, cov=cov, fixed_cov=cov, predicted=predicted, residuals=residuals, rmse=rmse,
-        r2=1 - rmse**2 / float(np.var(question.force)), attenuation=np.zeros(len(theta)),
-        noise=replace(noise_of(residuals, question.motion.rows, len(theta)), effective=estimate.samples),
+        r2=1 - rmse**2 / float(np.var(problem.force)), attenuation=np.zeros(len(theta)),
+        noise=replace(noise_of(residuals, problem.motion.rows, len(theta)), effective=estimate.samples),
     )  # fmt: skip
