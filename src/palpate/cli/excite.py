@@ -169,7 +169,7 @@ def _sensors(
 ) -> Sensors:
     from palpate.excitation import Sensors
     from palpate.excitation.quantities import quantity
-    from palpate.identification.information import ForceChain, phase_std
+    from palpate.excitation.fisher_information import ForceChain, phase_std
     from palpate.signals.low_pass import LowPass
 
     for option, value in (("--sampling", sampling), ("--rate", rate)):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.excitation.surfaces import Surface
-from palpate.identification.information import ForceChain, phase_std
+from palpate.excitation.fisher_information import ForceChain, phase_std
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]

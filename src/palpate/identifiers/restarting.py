@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from palpate._jit import Kernel, kernel, law
 from palpate.errors import InputError
-from palpate.identifiers.changes import (
+from palpate.identifiers.kernels.change_detection import (
     COUNTERS,
     EXTRA,
     Watch,
@@ -15,10 +15,10 @@ from palpate.identifiers.changes import (
     looked_back,
     noticed,
 )
-from palpate.identifiers.flat import known_first, length, statistics_at
+from palpate.identifiers.kernels.state_layout import known_first, length, statistics_at
 from palpate.identifiers.forgetting import Forgetting, policy_of
 from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorb
-from palpate.identifiers.streaming import checked
+from palpate.identifiers.estimator import checked
 
 
 class RestartingLeastSquares(LeastSquaresEstimator):

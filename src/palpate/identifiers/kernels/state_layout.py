@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate._jit import law
-from palpate.identifiers.doubt import Doubt
-from palpate.identifiers.square_root import held
+from palpate.identifiers.kernels.error_covariance import Doubt
+from palpate.identifiers.kernels.square_root import held
 
 _STATISTICS = 6
 
