@@ -205,40 +205,49 @@ def _refusal(blocks: Array, n: Array, A: Array, b: Array, theta: Array, prior: A
     inner[:4, :4] += prior
     gain = np.linalg.lstsq(inner / np.outer(_scale(inner), _scale(inner)), total[:own, sums.EXTRA :] / _scale(inner)[:, None])[0]
     extra = scores[:, sums.EXTRA :] - scores[:, :own] @ (gain / _scale(inner)[:, None])
-    if _improbable(extra, extra.sum(axis=0, keepdims=True), 1.0):
+    if _pulled(extra):
         return "the force does what no mass, damping and stiffness make of the position"
     return ""
 
 
 def _changed(scores: Array) -> bool:
-    """Whether the parameters became others at some instant between the blocks (Andrews, 1993)."""
-    count = len(scores)
-    first = max(int(np.ceil(_TRIMMED * count)), 2)
-    after = np.arange(first, count - first + 1)
-    if not len(after):
-        return False
-    summed = np.cumsum(scores - scores.mean(axis=0), axis=0)[after - 1]
-    return _improbable(scores, summed, after / count * (1 - after / count), _LOOKS)
+    """Whether the parameters became others at some instant between the blocks (Andrews, 1993).
 
-
-def _improbable(scores: Array, totals: Array, shares: Array | float, looks: float = 1.0) -> bool:
-    """Whether a sum of scores is too large for blocks that know nothing of one another (Hotelling, 1931).
-
-    Args:
-        scores: of the blocks, shape (b, k).
-        totals: sums, shape (m, k).
-        shares: the variance of each, over that of the sum of all, shape (m,).
-        looks: how many independent sums these are.
+    The scores before an instant against those after it, the spread about the mean of each side: a change would make
+    the spread about one mean for all as large as itself.
     """
     count, k = scores.shape
-    scale = np.sqrt(np.mean(scores**2, axis=0))
-    if count < 2 * k + 2 or not (scale > 0).all():
+    first = max(int(np.ceil(_TRIMMED * count)), 2)
+    sizes = np.arange(first, count - first + 1)
+    if not len(sizes) or not (scale := _scale(scores.T @ scores)).all():
         return False
-    around = (scores - scores.mean(axis=0)) / scale
-    spread = around.T @ around / (count - 1) + 1e-9 * np.eye(k)
-    x = totals / scale
-    square = np.max(np.einsum("mi,im->m", x, np.linalg.solve(spread, x.T)) / shares) / count
-    f = float(square) * (count - k) / (k * (count - 1))
+    x = scores / scale
+    before = np.cumsum(x, axis=0)[sizes - 1]
+    after = x.sum(axis=0) - before
+    outer = np.einsum("mi,mj->mij", before, before) / sizes[:, None, None]
+    outer += np.einsum("mi,mj->mij", after, after) / (count - sizes)[:, None, None]
+    spread = (x.T @ x - outer + 1e-12 * np.eye(k)) / (count - 2)
+    apart = before / sizes[:, None] - after / (count - sizes)[:, None]
+    square = np.einsum("mi,mi->m", apart, np.linalg.solve(spread, apart[..., None])[..., 0])
+    return _improbable(float(np.max(sizes * (count - sizes) / count * square)), k, count - 1, _LOOKS)
+
+
+def _pulled(scores: Array) -> bool:
+    """Whether scores have another mean than zero, for blocks that know nothing of one another."""
+    count, k = scores.shape
+    if not (scale := _scale(scores.T @ scores)).all():
+        return False
+    x = scores / scale
+    mean = x.mean(axis=0)
+    spread = (x.T @ x - count * np.outer(mean, mean) + 1e-12 * np.eye(k)) / (count - 1)
+    return _improbable(float(count * mean @ np.linalg.solve(spread, mean)), k, count, 1.0)
+
+
+def _improbable(square: float, k: int, count: int, looks: float) -> bool:
+    """Whether Hotelling's T^2 (1931) of k scores in `count` blocks is too large, the largest of so many looks."""
+    if count < 2 * k + 2:
+        return False
+    f = square * (count - k) / (k * (count - 1))
     return _normal_of_f(f, k, count - k) > NormalDist().inv_cdf(1 - FALSE_ALARM / looks)
 
 

@@ -178,15 +178,15 @@ def _left(contact, phi, force, instant):
             contact[SUM], contact[SPREAD] = 0.0, noise
             return True
         contact[SUM] = 0.0 if slope > 0.0 else ALARM
-    _SIZE.put_vector(contact, KNOWN, after)
-    _SIZE.put_matrix(contact, KNOWN + 4, S)
-    e = e / a**0.5
-    e = max(min(e, 3.0 * noise**0.5), -3.0 * noise**0.5)
-    keep = 1.0 - 1.0 / _MEMORY
-    contact[WEIGHT] = keep * contact[WEIGHT] + 1.0
-    contact[SQUARES] = keep * contact[SQUARES] + e * e
-    contact[PRODUCTS] = keep * contact[PRODUCTS] + e * contact[LAST]
-    contact[LAST] = e
+    if contact[SUM] == 0.0 or a > 2.0:  # while it is not told whether it is one of a contact, it teaches nothing
+        _SIZE.put_vector(contact, KNOWN, after)
+        _SIZE.put_matrix(contact, KNOWN + 4, S)
+    if contact[SUM] == 0.0:
+        e, keep = e / a**0.5, 1.0 - 1.0 / _MEMORY
+        contact[WEIGHT] = keep * contact[WEIGHT] + 1.0
+        contact[SQUARES] = keep * contact[SQUARES] + e * e
+        contact[PRODUCTS] = keep * contact[PRODUCTS] + e * contact[LAST]
+        contact[LAST] = e
     return False
 
 
