@@ -16,7 +16,7 @@ from palpate._jit import Kernel, kernel
 from palpate.errors import InputError
 from palpate.identifiers.block_fit import BlockFit, block_fit
 from palpate.identifiers.estimator import entry
-from palpate.identifiers.kernels import block_sums, contact_state, contact_stream, sample_clock
+from palpate.identifiers.kernels import block_sums, contact_state, contact_stream, positions, sample_clock
 from palpate.identifiers.kernels.contact_stream import ticked
 from palpate.signals.low_pass import LowPass
 from palpate.signals.taps import FRACTIONS, taps
@@ -230,9 +230,10 @@ def _state(settings: Array) -> Array:
     """The state before the first tick."""
     s = contact_stream
     room, queue = int(settings[s.ROOM]), int(settings[s.QUEUE])
-    own, clock, track = np.zeros(s.OWN), np.array(sample_clock.UNSET), np.zeros(8)
+    own, clock, track = np.zeros(s.OWN), np.array(sample_clock.UNSET), np.zeros(positions.NUMBERS)
     own[[s.ORIGIN, s.FORCE]], own[s.FRESH] = np.nan, -2.0
-    track[[0, 1, 2]], track[4] = -1.0, np.nan
+    track[[positions.ROW, positions.RESOLVED, positions.GOOD, positions.OPEN]] = -1.0
+    track[positions.LAST_SIXTH] = np.nan
     contact = np.zeros(contact_state.FIELDS)
     for at in (contact_state.KNOWN, contact_state.CERTAIN):
         contact[at + 4 : at + 20] = np.diag(_VAGUE).ravel()

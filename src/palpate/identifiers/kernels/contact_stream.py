@@ -19,7 +19,7 @@ from palpate.identifiers.kernels.contact_state import (
     pending,
     told,
 )
-from palpate.identifiers.kernels.positions import COUNT, POWER, PRODUCT, RESOLVED, ROW, Positions, placed
+from palpate.identifiers.kernels.positions import COUNT, NUMBERS, POWER, PRODUCT, RESOLVED, ROW, Positions, placed
 from palpate.identifiers.kernels.sample_clock import sampled_at
 from palpate.signals.taps import FRACTIONS
 
@@ -34,7 +34,7 @@ OWN = 6
 AT_OWN = SETTINGS
 AT_CLOCK = AT_OWN + OWN
 AT_POSITIONS = AT_CLOCK + 3
-AT_CONTACT = AT_POSITIONS + 8
+AT_CONTACT = AT_POSITIONS + NUMBERS
 AT_SUMS = AT_CONTACT + FIELDS
 AT_RING = AT_SUMS + LENGTH
 

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from palpate._jit import law, part
 
 NAN = float("nan")
-ROW, RESOLVED, GOOD, RUN, LAST_SIXTH, POWER, PRODUCT, COUNT = range(8)
-"""Last row; last row that is final; last row with a reading; readings in a row; and of the sixth differences the last
-one, the sum of squares, of products of neighbours, and how many."""
+ROW, RESOLVED, GOOD, RUN, LAST_SIXTH, POWER, PRODUCT, COUNT, OPEN = range(9)
+"""Last row; last row that is final; last row with a reading; readings in a row; of the sixth differences the last one,
+the sum of squares, of products of neighbours, and how many; and the row before a gap to be filled, -1 if there is none."""
+NUMBERS = 9
 _SIXTH = (1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0)
 
 
@@ -42,11 +43,14 @@ class Positions(NamedTuple):
 
 @law
 def placed(positions, x):
-    """Takes a tick's position in, NaN where it is missing, and fills what a gap before it has left open."""
+    """Takes a tick's position in, NaN where it is missing; a gap is filled a tick after its end."""
     s = positions.numbers
     s[ROW] += 1.0
     row = s[ROW]
     positions.put(row, x)
+    if s[OPEN] >= 0.0:
+        _fill(positions, s[OPEN], row - 1.0, x)
+        s[OPEN], s[RESOLVED] = -1.0, row - 1.0
     if x != x:
         s[RUN] = 0.0
         if row - s[GOOD] > positions.gap or s[GOOD] < 0.0:
@@ -55,23 +59,27 @@ def placed(positions, x):
     s[RUN] += 1.0
     missing = row - s[GOOD] - 1.0
     if 0.0 < missing <= positions.gap and s[GOOD] > 0.0:
-        _fill(positions, s[GOOD], row)
-    s[GOOD], s[RESOLVED] = row, row
+        s[OPEN] = s[GOOD]
+    else:
+        s[RESOLVED] = row
+    s[GOOD] = row
     _heard(positions)
 
 
 @law
-def _fill(positions, before, after):
-    """Fills a gap by the parabola through its ends and the reading before it; a line where there is none."""
-    x0, x1, x2 = positions.at(before - 1.0), positions.at(before), positions.at(after)
+def _fill(positions, before, after, following):
+    """Fills a gap by the cubic through two readings on each side; through as many of them as there are."""
     gap = after - before
-    bend = 0.0
-    if before >= 1.0 and x0 == x0:
-        bend = ((x2 - x1) / gap - (x1 - x0)) / (gap + 1.0)
+    x0, x1, x2 = positions.at(before - 1.0), positions.at(before), positions.at(after)
+    slope = (x2 - x1) / gap
+    bend = (slope - (x1 - x0)) / (gap + 1.0) if x0 == x0 else 0.0
+    twist = 0.0
+    if x0 == x0 and following == following:
+        twist = ((following - x2 - slope) / (gap + 1.0) - bend) / (gap + 2.0)
     row = before + 1.0
     while row < after:
         u = row - before
-        positions.put(row, x1 + u * (x2 - x1) / gap + bend * u * (u - gap))
+        positions.put(row, x1 + u * (slope + (u - gap) * (bend + (u + 1.0) * twist)))
         row += 1.0
 
 
