@@ -123,16 +123,14 @@ def _contact(t: Array, x: Array, K: Array, B: float, M: float, arm: float, tau: 
     dt = t[1] - t[0]
     v = np.gradient(x, dt)
     a = np.gradient(v, dt)
-    plain = K * x + B * v + M * a + np.concatenate([[0.0], np.cumsum(-np.diff(K) * x[1:])])
-    force, q, touching = np.empty_like(t), max(x[0], 0.0), x[0] > 0
-    keep = np.exp(-dt / tau)
-    for k in range(len(t)):
-        if arm:
-            q = keep * q + (1 - keep) * max(x[k], 0.0)
-        pushed = plain[k] + arm * (x[k] - q)
-        touching = x[k] > 0 if not touching else (pushed > 0 and x[k] > 0)
-        force[k] = max(pushed, 0.0) if touching else 0.0
-    return force
+    pushed = K * x + B * v + M * a + np.concatenate([[0.0], np.cumsum(-np.diff(K) * x[1:])])
+    if arm:
+        q, keep, behind = max(x[0], 0.0), np.exp(-dt / tau), np.empty_like(x)
+        for k, depth in enumerate(np.maximum(x, 0.0).tolist()):
+            q = keep * q + (1 - keep) * depth
+            behind[k] = q
+        pushed += arm * (x - behind)
+    return np.where(x > 0, np.maximum(pushed, 0.0), 0.0)
 
 
 def _filtered(force: Array, order: int, cutoff: float) -> Array:

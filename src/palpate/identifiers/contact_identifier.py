@@ -82,6 +82,8 @@ class ContactIdentifier:
         self._weights = np.ascontiguousarray(window.weights[:, ::-1] / np.array([dt**2, dt, 1.0])[:, None])
         settings = _settings(self.low_pass, rate, lag, sampling, touch)
         settings[[contact_stream.BEFORE, contact_stream.AFTER]] = window.before, window.after
+        if settings[contact_stream.HOLD] > 0:  # contact is decided when the regressor is there
+            settings[contact_stream.HOLD] += max(window.after - settings[contact_stream.LATE], 0.0)
         room = self._weights.shape[2] + ceil(abs(settings[contact_stream.LATE])) + ceil(settings[contact_stream.HOLD])
         settings[contact_stream.ROOM] = room = 2 * room + int(settings[contact_stream.GAP]) + 8
         settings[contact_stream.QUEUE] = 2 * room
@@ -94,7 +96,7 @@ class ContactIdentifier:
         """Ticks between a reading and its part in the estimate, where none is missing."""
         s = self._state
         waits = s[contact_stream.AFTER] - s[contact_stream.LATE]
-        return max(ceil(waits), ceil(s[contact_stream.HOLD]), 0) + 1
+        return max(ceil(waits), ceil(s[contact_stream.HOLD]), 0)
 
     @property
     def in_contact(self) -> bool:
@@ -219,7 +221,7 @@ def _settings(low_pass: LowPass, rate: float, lag: float, sampling: float | None
     settings[contact_stream.PERIOD] = 0.0 if sampling is None else rate / sampling
     settings[contact_stream.LATE] = (lag - low_pass.lag) * rate
     settings[contact_stream.SETTLING] = settling
-    settings[contact_stream.HOLD] = 0.0 if touch == 0 else 2 * settling
+    settings[contact_stream.HOLD] = 0.0 if touch == 0 else 2 * settling if touch else settling
     settings[contact_stream.TOUCH] = -1.0 if touch is None else touch
     settings[contact_stream.AVERAGED] = ceil(settling * (sampling or rate) / rate)
     settings[contact_stream.DT] = 1 / rate
