@@ -65,7 +65,11 @@ def main() -> None:
                 counts[name] += known * np.array([1, holds, wrong])
                 if asked.show and known and not holds:
                     i = found.names.index(name)
-                    print(f"   {seed} {name} {found.theta[i]:.5g} +- {1.96 * found.std[i]:.3g}, true {made.truth[name]}, {far:.1f}", made.recipe)
+                    half = 1.96 * found.std[i]
+                    print(
+                        f"   {seed} {name} {found.theta[i]:.5g} +- {half:.3g}, {far:.1f} half-widths off",
+                        made.recipe,
+                    )
         row = f"{fault:18}"
         for name in NAMES:
             known, holds, wrong = counts[name]
@@ -73,7 +77,10 @@ def main() -> None:
             row += f"{int(known):>14}, {100 * holds / max(known, 1):5.1f} %, {int(wrong):4}"
         print(f"{row}   {refused}", flush=True)
     known, holds, wrong = total
-    print(f"all: {int(known)} identified, {100 * holds / max(known, 1):.1f} % hold, {100 * wrong / max(known, 1):.2f} % confidently wrong")
+    shares = (
+        f"{100 * holds / max(known, 1):.1f} % hold, {100 * wrong / max(known, 1):.2f} % confidently wrong"
+    )
+    print(f"all: {int(known)} identified, {shares}")
 
 
 if __name__ == "__main__":

@@ -70,11 +70,11 @@ def press(seed: int, fault: str = "none", seconds: float = 4.0) -> Press:
     noise = float(10 ** rng.uniform(-2, -0.5)) * float(np.std(force))
     delay = rng.uniform(0, 3e-3)
     felt = _filtered(force, order, cutoff)
-    limit = (
-        rng.uniform(0.6, 0.85) * float(np.quantile(felt, 0.999)) if fault == "saturation" else np.inf
-    )
+    limit = rng.uniform(0.6, 0.85) * float(np.quantile(felt, 0.999)) if fault == "saturation" else np.inf
     ticks = np.arange(round((seconds - 0.05) * rate)) / rate
-    samples = np.arange(0, seconds, 1 / (sampling or rate)) + (rng.uniform(0, 1 / sampling) if sampling else 0.0)
+    samples = np.arange(0, seconds, 1 / (sampling or rate)) + (
+        rng.uniform(0, 1 / sampling) if sampling else 0.0
+    )
     values = np.interp(samples - delay, t, felt) + rng.normal(0, noise, len(samples))
     bias = rng.uniform(-2, 2)
     step = 10 ** rng.uniform(-4, -2.5) * float(np.ptp(values))
@@ -102,8 +102,13 @@ def press(seed: int, fault: str = "none", seconds: float = 4.0) -> Press:
 
 def _motion(rng: np.random.Generator, t: Array, depth: float, fault: str) -> tuple[Array, list[float]]:
     """Penetration [m] and the frequencies in it [Hz]; below zero is free space."""
-    tones = sorted(rng.uniform(0.5, 3, 1).tolist() + rng.uniform(3, 12, 1).tolist() + rng.uniform(12, 35, 1).tolist())
-    parts = [a * depth * np.sin(2 * pi * f * t + rng.uniform(0, 2 * pi)) for a, f in zip((0.4, 0.15, 0.05), tones, strict=True)]
+    tones = sorted(
+        rng.uniform(0.5, 3, 1).tolist() + rng.uniform(3, 12, 1).tolist() + rng.uniform(12, 35, 1).tolist()
+    )
+    parts = [
+        a * depth * np.sin(2 * pi * f * t + rng.uniform(0, 2 * pi))
+        for a, f in zip((0.4, 0.15, 0.05), tones, strict=True)
+    ]
     x = depth + sum(parts)
     if fault == "chatter":
         tones = [float(rng.uniform(8, 25))]

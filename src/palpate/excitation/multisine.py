@@ -106,7 +106,9 @@ def _within_budget(
         moved = summed(force / surface.impedance(omega) * start, harmonics, _POINTS)
         between = float(felt_there.min()), float(felt_there.max())
         names, prior = question.surfaces.names, question.prior
-        predictions.append(Prediction(surface, names, information, prior, pull, between, float(np.ptp(moved))))
+        predictions.append(
+            Prediction(surface, names, information, prior, pull, between, float(np.ptp(moved)))
+        )
     frequencies = omega / (2 * np.pi)
     wave = Multisine(tuple(frequencies.tolist()), tuple(amplitudes.tolist()), tuple(phases.tolist()))
     return Made(wave, tuple(predictions), gap)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.excitation.surfaces import Surface
 from palpate.excitation.fisher_information import ForceChain, phase_std
+from palpate.excitation.surfaces import Surface
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]

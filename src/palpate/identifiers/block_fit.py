@@ -1,7 +1,7 @@
 """What block sums tell: the fit, how far it may be off whatever the cause, and whether the model holds.
 
 - Noise of the position pulls least squares towards zero. Its part of the information is taken out (Soderstrom,
-  Errors-in-Variables Methods in System Identification, 2018, ch. 7), and how well that part is known is in the interval.
+  Errors-in-Variables Methods in System Identification, 2018, ch. 7); the interval holds how well it is known.
 - The covariance is that of leaving one block out at a time (the jackknife; Shao and Wu, 1989): noise of any colour that
   a block outlasts, and a block that says something else than the others, widen it by themselves.
 - The scores of regressors that the model lacks, and of the parameters over time, are tested block against block
@@ -65,6 +65,7 @@ def block_fit(blocks: Array, weights: Array, deviations: Array, lag_std: float) 
     """The fit of blocks of `block_sums`, shape (b, WIDTH); None where they are too few to say how far it holds.
 
     Args:
+        blocks: the newest last.
         weights: by which a, v and x are read from the position, shape (3, taps).
         deviations: of M, B, K and offset before anything is known, shape (4,).
         lag_std: standard deviation of the lag between force and position [s].
@@ -100,8 +101,8 @@ def noise_spread(blocks: Array, weights: Array) -> Array:
 
     Two kinds of noise count: white noise of the position, and jumps of it, white noise of its increments, as a slow
     motion through a coarse encoder makes them. The power of the sixth differences and the product of neighbours tell
-    both. Half of the jumps' power is counted: an error never leaves its count, so towards the low frequencies of a motion
-    it falls below what it is above.
+    both. Half of the jumps' power is counted: an error never leaves its count, so towards the low frequencies of a
+    motion it falls below what it is above.
     """
     power, product, count = blocks[:, [sums.NOISE_POWER, sums.NOISE_PRODUCT, sums.NOISE_COUNT]].sum(axis=0)
     spread = np.zeros((4, 4))
@@ -203,7 +204,9 @@ def _refusal(blocks: Array, n: Array, A: Array, b: Array, theta: Array, prior: A
     own = 5 if lag_std > 0 else 4
     inner = total[:own, :own].copy()
     inner[:4, :4] += prior
-    gain = np.linalg.lstsq(inner / np.outer(_scale(inner), _scale(inner)), total[:own, sums.EXTRA :] / _scale(inner)[:, None])[0]
+    gain = np.linalg.lstsq(
+        inner / np.outer(_scale(inner), _scale(inner)), total[:own, sums.EXTRA :] / _scale(inner)[:, None]
+    )[0]
     extra = scores[:, sums.EXTRA :] - scores[:, :own] @ (gain / _scale(inner)[:, None])
     if _pulled(extra):
         return "the force does what no mass, damping and stiffness make of the position"
@@ -256,4 +259,3 @@ def _normal_of_f(f: float, k: int, free: int) -> float:
     u, w = 2 / (9 * k), 2 / (9 * free)
     root = float(np.cbrt(f))
     return ((1 - w) * root - (1 - u)) / float(np.sqrt(w * root**2 + u))
-

@@ -12,9 +12,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palpate._jit import Kernel, kernel
+from palpate._jit import kernel
 from palpate.errors import InputError
-from palpate.identifiers.block_fit import BlockFit, block_fit
+from palpate.identifiers.block_fit import block_fit
 from palpate.identifiers.estimator import entry
 from palpate.identifiers.kernels import block_sums, contact_state, contact_stream, positions, sample_clock
 from palpate.identifiers.kernels.contact_stream import ticked
@@ -84,7 +84,11 @@ class ContactIdentifier:
         settings[[contact_stream.BEFORE, contact_stream.AFTER]] = window.before, window.after
         if settings[contact_stream.HOLD] > 0:  # contact is decided when the regressor is there
             settings[contact_stream.HOLD] += max(window.after - settings[contact_stream.LATE], 0.0)
-        room = self._weights.shape[2] + ceil(abs(settings[contact_stream.LATE])) + ceil(settings[contact_stream.HOLD])
+        room = (
+            self._weights.shape[2]
+            + ceil(abs(settings[contact_stream.LATE]))
+            + ceil(settings[contact_stream.HOLD])
+        )
         settings[contact_stream.ROOM] = room = 2 * room + int(settings[contact_stream.GAP]) + 8
         settings[contact_stream.QUEUE] = 2 * room
         self._state = _state(settings)
@@ -116,8 +120,8 @@ class ContactIdentifier:
     def update(self, position: float, force: float) -> None:
         """Takes in a tick's position [m], growing into the surface, and force on the surface [N].
 
-        A reading that is missing is NaN, and keeps its place: short gaps of the position are filled, longer ones cost the
-        samples about them.
+        A reading that is missing is NaN, and keeps its place: short gaps of the position are filled, longer ones cost
+        the samples about them.
 
         Raises:
             InputError: an infinite number; the estimate is unchanged.
@@ -213,7 +217,9 @@ class ContactIdentifier:
         self._bind()
 
 
-def _settings(low_pass: LowPass, rate: float, lag: float, sampling: float | None, touch: float | None) -> Array:
+def _settings(
+    low_pass: LowPass, rate: float, lag: float, sampling: float | None, touch: float | None
+) -> Array:
     """The settings of `contact_stream`, but for those of the taps and the room."""
     settings = np.zeros(contact_stream.SETTINGS)
     settling = _FORGOTTEN / low_pass.decay * rate

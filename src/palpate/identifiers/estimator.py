@@ -20,6 +20,9 @@ HUGE = 1e300
 class Streaming(ABC):
     """Estimates theta in ``force = regressor . theta``; the update is compiled in the constructor.
 
+    An estimator belongs to one thread at a time: updates change its state in place without a lock of their own, which
+    would cost as much as they do. Threads that share one hold a lock around each call, or samples are lost.
+
     Args:
         state: all that is known, flat; the first n values are theta.
         n: number of parameters.

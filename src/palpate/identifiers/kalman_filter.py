@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from palpate._jit import Kernel, kernel, law, part
 from palpate._vector import sqrt
 from palpate.errors import InputError
+from palpate.identifiers.estimator import HUGE, Streaming, checked
+from palpate.identifiers.kernels.dimension import AnyNumber
 from palpate.identifiers.kernels.error_covariance import carried
+from palpate.identifiers.kernels.square_root import drifted, measured
 from palpate.identifiers.kernels.state_layout import (
     bounded,
     covariance_in,
@@ -20,9 +23,6 @@ from palpate.identifiers.kernels.state_layout import (
     put,
     statistics_at,
 )
-from palpate.identifiers.kernels.dimension import AnyNumber
-from palpate.identifiers.kernels.square_root import drifted, measured
-from palpate.identifiers.estimator import HUGE, Streaming, checked
 from palpate.signals.types import Estimate
 
 MEMORY = 10_000.0

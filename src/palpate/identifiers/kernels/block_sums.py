@@ -1,7 +1,7 @@
 """Sums of the normal equations in blocks of samples: bounded memory from which a fit and its doubts are read.
 
-There are `BLOCKS` at most. When they are full neighbours are joined, and from then on blocks are twice as long: so noise
-that is correlated over less than a block, which is a share of all, is always covered.
+There are `BLOCKS` at most. When they are full neighbours are joined, and from then on blocks are twice as long: noise
+that is correlated over less than a block, a share of all the samples, is covered.
 """
 
 from math import sqrt
@@ -15,8 +15,8 @@ BLOCKS = 64
 FIRST = 16
 """Samples in a block at first."""
 JERK, EXTRA = 4, 5
-"""Behind a, v, x and 1 the rate of a, which tells what an error of the lag does; from then on those that tell whether the
-model holds: two relaxations, x^2, x v, and friction."""
+"""Behind a, v, x and 1 the rate of a, which tells what an error of the lag does; then those that tell whether the model
+holds: two relaxations, x^2, x v, and friction."""
 COLUMNS = 10
 RELAXATIONS = (0.03, 0.3)
 """Time constants of the two [s]; one tells of all from a third to three times its own."""
@@ -43,13 +43,8 @@ def no_sums() -> NDArray[np.float64]:
 def added(sums, a, v, x, force, contact, instant, dt, power, product, count):
     """Takes a sample in.
 
-    Args:
-        sums: changed in place.
-        a, v, x: regressor.
-        force: of the sample [N].
-        contact: its number; a new one starts the relaxations afresh.
-        instant: in ticks, `dt` seconds each.
-        power, product, count: of the position's sixth differences so far.
+    a, v, x are its regressor; the number of its contact starts the relaxations afresh where it is a new one; its
+    instant is in ticks of `dt` seconds; power, product and count are those of the position's sixth differences.
     """
     w = HEADER + BLOCKS * WIDTH
     _columns(sums, w, a, v, x, contact, instant, dt)

@@ -38,8 +38,8 @@ _FOURTH = 70.0
 SAMPLE = 6
 """A sample on its way: instant [ticks], force [N], a, v, x, and the number of its contact, 0 for none."""
 TOUCHING, SINCE, CONTACTS, LOST, LEVEL, LEVELS, SPREAD, SUM, START = range(9)
-"""In contact; since which instant; contacts so far, and how many ended; level of the force [N], of how many samples, and
-its variance; the sum under test and the instant at which it was last zero."""
+"""In contact; since which instant; contacts so far, and how many ended; level of the force [N], of how many samples,
+and its variance; the sum under test and the instant at which it was last zero."""
 WEIGHT, SQUARES, PRODUCTS, LAST, POWER, HEARD, PAST = range(10, 17)
 """Of the innovations, as in `Doubt`; squares of the force's fourth differences, how many, and the last four forces."""
 COUNT, QUANTUM, HIGHEST, STUCK, FROM, PAIRS, EQUAL, BEFORE, WHERE, LIMITED = range(20, 30)
@@ -157,9 +157,9 @@ def _touched(contact, force, instant):
 def _left(contact, phi, force, instant):
     """Whether the force has stopped following the position, one sample further on; the fit learns the sample.
 
-    The surface never pulls: once the fit knows better than the noise, only a lower force than there is, foretold, speaks
-    for free space. And a surface that has become another is no free space: the level must not follow the position, not
-    even as a surface of `SOFTEST` would; until that is told, the samples wait.
+    The surface never pulls: once the fit knows better than the noise, only a foretold force below the measured one
+    speaks for free space. A surface that has become another is no free space: the level must not follow the position,
+    not even as a surface of `SOFTEST` would; until that is told, the samples wait.
     """
     theta, S = _SIZE.vector(contact, KNOWN), _SIZE.matrix(contact, KNOWN + 4)
     after, S, _, e, a = measured(theta, S, phi, force, 1.0)
@@ -178,7 +178,9 @@ def _left(contact, phi, force, instant):
             contact[SUM], contact[SPREAD] = 0.0, noise
             return True
         contact[SUM] = 0.0 if slope > 0.0 else ALARM
-    if contact[SUM] == 0.0 or a > 2.0:  # while it is not told whether it is one of a contact, it teaches nothing
+    if (
+        contact[SUM] == 0.0 or a > 2.0
+    ):  # while it is not told whether it is one of a contact, it teaches nothing
         _SIZE.put_vector(contact, KNOWN, after)
         _SIZE.put_matrix(contact, KNOWN + 4, S)
     if contact[SUM] == 0.0:

@@ -4,7 +4,7 @@ A flat array holds all of it: settings, the sensor's clock, the contact, the las
 and the sums of those that came through.
 """
 
-from math import floor, inf
+from math import floor, inf, isnan
 
 from palpate._jit import law
 from palpate.identifiers.kernels.block_sums import LENGTH, added
@@ -19,7 +19,16 @@ from palpate.identifiers.kernels.contact_state import (
     pending,
     told,
 )
-from palpate.identifiers.kernels.positions import COUNT, NUMBERS, POWER, PRODUCT, RESOLVED, ROW, Positions, placed
+from palpate.identifiers.kernels.positions import (
+    COUNT,
+    NUMBERS,
+    POWER,
+    PRODUCT,
+    RESOLVED,
+    ROW,
+    Positions,
+    placed,
+)
 from palpate.identifiers.kernels.sample_clock import sampled_at
 from palpate.signals.taps import FRACTIONS
 
@@ -45,7 +54,7 @@ def ticked(state, weights, x, force, out):
     room, own = int(state[ROOM]), state[AT_OWN:AT_CLOCK]
     ring = state[AT_RING : AT_RING + 2 * room]
     track = Positions(ring, state[AT_POSITIONS:AT_CONTACT], room, int(state[GAP]))
-    if own[ORIGIN] != own[ORIGIN]:
+    if isnan(own[ORIGIN]):
         own[ORIGIN] = x
     placed(track, x - own[ORIGIN])
     row = track.numbers[ROW]
@@ -69,7 +78,7 @@ def ticked(state, weights, x, force, out):
 @law
 def _begun(state, own, row, force):
     """Sends a sample on its way, if this row shows one."""
-    if force != force:
+    if isnan(force):
         return
     certain = own[FRESH] == row - 1.0
     changed = force != own[FORCE]
@@ -119,9 +128,7 @@ def _in_contact(state, queue, own):
     if state[TOUCH] < 0.0:
         found(contact, queue, state[QUEUE], own[READ], state[SETTLING])
     elif state[TOUCH] > 0.0:
-        told(
-            contact, queue, state[QUEUE], own[READ], state[SETTLING], state[TOUCH], state[AVERAGED]
-        )
+        told(contact, queue, state[QUEUE], own[READ], state[SETTLING], state[TOUCH], state[AVERAGED])
     elif queue[k] >= state[SETTLING]:
         contact[TOUCHING] = contact[CONTACTS] = queue[k + 5] = 1.0
 

@@ -94,8 +94,8 @@ class Doubt(NamedTuple):
 def fed(W, phi, gain):
     """Root of the covariance of an error after a sample with noise of variance 1; W is that before it.
 
-    (I - gain phi^T) W W^T (I - gain phi^T)^T + gain gain^T, whose difference would lose its sign to rounding in the end;
-    of a root each sample makes a root.
+    (I - gain phi^T) W W^T (I - gain phi^T)^T + gain gain^T, whose difference would lose its sign to rounding in the
+    end; of a root each sample makes a root.
     """
     z = (1.0 / max(1.0 - phi @ gain, 1e-16)) * solve(W, gain)
     q = z @ z

@@ -1,5 +1,6 @@
 """The last positions of a loop, tick by tick: missing readings keep their place, and short gaps are filled."""
 
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from palpate._jit import law, part
 NAN = float("nan")
 ROW, RESOLVED, GOOD, RUN, LAST_SIXTH, POWER, PRODUCT, COUNT, OPEN = range(9)
 """Last row; last row that is final; last row with a reading; readings in a row; of the sixth differences the last one,
-the sum of squares, of products of neighbours, and how many; and the row before a gap to be filled, -1 if there is none."""
+the sum of squares, of products of neighbours, and how many; and the row before a gap to be filled, -1 for none."""
 NUMBERS = 9
 _SIXTH = (1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0)
 
@@ -51,7 +52,7 @@ def placed(positions, x):
     if s[OPEN] >= 0.0:
         _fill(positions, s[OPEN], row - 1.0, x)
         s[OPEN], s[RESOLVED] = -1.0, row - 1.0
-    if x != x:
+    if isnan(x):
         s[RUN] = 0.0
         if row - s[GOOD] > positions.gap or s[GOOD] < 0.0:
             s[RESOLVED] = row
@@ -72,9 +73,9 @@ def _fill(positions, before, after, following):
     gap = after - before
     x0, x1, x2 = positions.at(before - 1.0), positions.at(before), positions.at(after)
     slope = (x2 - x1) / gap
-    bend = (slope - (x1 - x0)) / (gap + 1.0) if x0 == x0 else 0.0
+    bend = (slope - (x1 - x0)) / (gap + 1.0) if not isnan(x0) else 0.0
     twist = 0.0
-    if x0 == x0 and following == following:
+    if not isnan(x0 + following):
         twist = ((following - x2 - slope) / (gap + 1.0) - bend) / (gap + 2.0)
     row = before + 1.0
     while row < after:
@@ -97,7 +98,7 @@ def _heard(positions):
     for k in range(7):
         sixth += _SIXTH[k] * positions.at(s[ROW] - k)
     s[POWER] += sixth * sixth
-    if s[LAST_SIXTH] == s[LAST_SIXTH]:
+    if not isnan(s[LAST_SIXTH]):
         s[PRODUCT] += sixth * s[LAST_SIXTH]
         s[COUNT] += 1.0
     else:
