@@ -134,7 +134,9 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
     frequency = PERIODS / (lengths * dt)
     frequency[0] = 2 / (longest * dt)
     seen = products.any(axis=(1, 2, 3))
-    return Octaves(products[seen], lines[seen], frequency) if seen.any() else Octaves(products, lines, frequency)
+    return (
+        Octaves(products[seen], lines[seen], frequency) if seen.any() else Octaves(products, lines, frequency)
+    )
 
 
 def _sums(
@@ -162,7 +164,9 @@ def _sums(
     return [(g, (np.asarray(part[0]), int(part[1]))) for g, part in found.items()]  # type: ignore[call-overload]
 
 
-def _phase(length: int, numbers: Array) -> tuple[NDArray[np.complex128], tuple[Array, NDArray[np.complex128]]]:
+def _phase(
+    length: int, numbers: Array
+) -> tuple[NDArray[np.complex128], tuple[Array, NDArray[np.complex128]]]:
     """The transform of a block, and that of its mean and slope; the power of white noise stays what it is."""
     time = np.arange(length)
     window = np.hanning(length + 2)[1:-1]
