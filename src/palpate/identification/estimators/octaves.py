@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 SHORTEST = 16
 """Rows of a segment, at least: one block."""
 GROUPS = 8
-"""Stretches of the log whose stiffness may differ: enough for a variance between them, few enough for a small system."""
+"""Stretches of the log that are held against each other: enough for a variance, few enough to be quick."""
 PERIODS = 4
 """Periods in a block."""
 _LINES = np.array([3.0, 4.0, 5.0])
@@ -161,7 +161,7 @@ def _sums(
                 found[int(g)][1] += len(flat)  # type: ignore[operator]
             else:
                 found[int(g)] = [flat.T @ flat, len(flat)]
-    return [(g, (np.asarray(part[0]), int(part[1]))) for g, part in found.items()]  # type: ignore[call-overload]
+    return [(g, (np.asarray(part[0]), int(part[1]))) for g, part in found.items()]
 
 
 def _phase(

@@ -123,7 +123,8 @@ def pooled(values: Array, variances: Array) -> tuple[float, float, float]:
     """Mean of effects that differ, its deviation and degrees of freedom (Paule-Mandel, Hartung-Knapp).
 
     Args:
-        values, variances: of each, shape (n,).
+        values: of each, shape (n,).
+        variances: of each about its own truth, shape (n,).
     """
     n = len(values)
     if n == 1:
