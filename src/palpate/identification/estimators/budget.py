@@ -112,7 +112,8 @@ def half_widths(budget: Budget) -> Array:
     variance = np.array([part.variance for part in budget.values()])
     freedom = np.array([part.freedom for part in budget.values()])
     total = variance.sum(axis=0)
-    loss = (variance**2 / freedom[:, None]).sum(axis=0)
-    dof = np.where(loss > 0, total**2 / np.maximum(loss, 1e-300), 1e9)
+    scale = np.maximum(total, 1e-300)
+    loss = ((variance / scale) ** 2 / freedom[:, None]).sum(axis=0)
+    dof = 1 / np.maximum(loss, 1e-9)
     found: Array = stdtrit(np.clip(dof, 1.0, 1e9), 0.975) * np.sqrt(total)
     return found
