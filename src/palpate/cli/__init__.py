@@ -17,5 +17,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     from palpate.cli._edge import guarded
     from palpate.cli._program import program
+    from palpate.cli._streams import prepare
 
+    if argv is None:
+        prepare()
     return guarded(lambda: program()(argv))
