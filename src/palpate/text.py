@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import unicodedata
 
-_UNSAFE = {"Cc", "Cf", "Cs", "Zl", "Zp"}  # controls, formats (they turn the direction of a line), halves of letters
+_UNSAFE = {
+    "Cc",
+    "Cf",
+    "Cs",
+    "Zl",
+    "Zp",
+}  # controls, formats (they turn the direction of a line), halves of letters
 _KEPT = "\n\t\u200c\u200d"  # the last two join letters of several scripts
 
 

@@ -138,7 +138,7 @@ def test_a_finished_measurement_is_replaced_only_by_force(tmp_path):
 def test_a_folder_of_something_else_is_never_touched(tmp_path, force):
     (tmp_path / "letters.txt").write_text("dear")
     done = []
-    with pytest.raises(InputError, match="no measurement"):
+    with pytest.raises(InputError, match="palpate did not write" if force else "holds other files"):
         measured([toy("1.1", done)], tmp_path, force=force)
     assert names(tmp_path) == {"letters.txt"}
     assert not done
@@ -147,6 +147,15 @@ def test_a_folder_of_something_else_is_never_touched(tmp_path, force):
 @pytest.mark.parametrize("content", ["", "{}", "[1, 2]", "\x00\xff"])
 def test_a_broken_state_is_no_measurement(tmp_path, content):
     (tmp_path / STATE).write_text(content, encoding="latin-1")
+    with pytest.raises(InputError, match="palpate did not write it"):
+        measured([toy("1.1", [])], tmp_path)
+
+
+@pytest.mark.parametrize(
+    "rest", ["", ', "stamp": 3', ', "stamp": "s", "wanted": [], "command": "", "done": [1]']
+)
+def test_a_spoiled_state_is_no_measurement(tmp_path, rest):
+    (tmp_path / STATE).write_text(f'{{"written_by": "palpate 0.1.0"{rest}}}')
     with pytest.raises(InputError, match="another --out"):
         measured([toy("1.1", [])], tmp_path)
 

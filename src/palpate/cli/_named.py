@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from palpate.cli._terminal import write
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ def listed(files: TomlFiles, title: Callable[[str], str]) -> None:
     """Prints the names of all that come with palpate, each with its title."""
     width = 2 + max(map(len, files.names()))
     for name in files.names():
-        print(f"{name:<{width}}{title(name)}")  # noqa: T201
+        write(f"{name:<{width}}{title(name)}")
 
 
 def source_of(files: TomlFiles, name: str | None, verb: str, printed: bool) -> str | None:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from palpate.cli._places import check_folder, own_place
+from palpate.cli._terminal import console, place, write_json
 from palpate.errors import InputError
+from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.excitation import Design, ForceLoop, Question, Remedy, Sensors
@@ -213,7 +214,9 @@ def _picture(figure: Path | None, wanted: bool) -> Path | None:
     """Where the figure goes; found wrong before any work is done."""
     if not wanted:
         return None
-    return own_place(figure if figure is not None else Path("excite.png"), ".png", "--figure")
+    path = figure if figure is not None else Path("excite.png")
+    check_place(path, "--figure", ending=".png")
+    return path
 
 
 def _check_places(out: Path | None, experiment: Path | None, replace: bool) -> None:
@@ -221,10 +224,10 @@ def _check_places(out: Path | None, experiment: Path | None, replace: bool) -> N
 
     if out is not None:
         check_ending(out)
-    if experiment is not None and experiment.suffix.lower() != ".toml":
-        raise InputError(f"{experiment}: an experiment is a .toml file; name it so")
+        check_place(out, "--out")
+    if experiment is not None:
+        check_place(experiment, "--experiment", ending=".toml")
     for path in filter(None, (out, experiment)):
-        check_folder(path)
         if path.exists() and not replace:
             raise InputError(f"{path} exists; choose another place, or add --replace")
 
@@ -247,31 +250,27 @@ def _answer(
 
 
 def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
-    from palpate.logs import whole
+    from palpate.files import write_text
     from palpate.report import excitation_files as files
 
     if out is not None:
         files.write_force(found, out, float(rate))
     if experiment is not None:
-        with whole(experiment) as draft:
-            draft.write_text(files.experiment(found), encoding="utf-8")
+        write_text(experiment, files.experiment(found))
 
 
 def _print(
     found: Design, helps: list[Remedy], written: list[Path | None], picture: Path | None, json: bool
 ) -> None:
     if json:
-        from json import dumps
-
         from palpate.report.excitation_files import summary
 
-        print(dumps(summary(found, helps), allow_nan=False))  # noqa: T201
+        write_json(summary(found, helps))
         return
-    from rich.console import Console
-
     from palpate.report.excitation_table import show
 
-    console = Console(highlight=False, soft_wrap=True)
-    show(found, helps, console)
+    screen = console()
+    screen.soft_wrap = True
+    show(found, helps, screen)
     for path in (*filter(None, written), *([picture] if picture else [])):
-        console.print(f"written: {path}")
+        place(screen, "written:", path)

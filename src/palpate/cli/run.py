@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from palpate.cli._folder import fresh_folder
 from palpate.cli._named import listed, source_of
+from palpate.cli._terminal import STYLE, console, head, place, show_table, write_json
 from palpate.errors import InputError
+from palpate.files import fresh_folder, signed
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -71,17 +72,15 @@ def _run(
     name: str, source: str, seed: int, folder: Path, force: bool, as_json: bool
 ) -> tuple[str, dict[str, Any]]:
     """Runs and writes the folder of results; the experiment's title, and the summary."""
-    from rich.console import Console
-
     from palpate.bench import summarise
     from palpate.bench.experiment import parse
 
     with fresh_folder(folder, force=force) as fresh:
         experiment = parse(source, name)
-        command = f"palpate run {shlex.quote(name)} --seed {seed}"
-        record = _record(Console(stderr=as_json), name, experiment, seed)
+        command = shown(f"palpate run {shlex.quote(name)} --seed {seed}")
+        record = _record(console(stderr=as_json), name, experiment, seed)
         record = replace(record, meta={**record.meta, "command": command})
-        summary = {"experiment": Path(name).stem, "command": command, **summarise(record)}
+        summary = signed({"experiment": shown(Path(name).stem), "command": command, **summarise(record)})
         _write(record, summary, experiment.title, experiment.about, source, fresh)
     return experiment.title, summary
 
@@ -99,7 +98,7 @@ def _write(
         _report(record, title, about, source, summary, folder)
 
 
-def _record(console: Console, name: str, experiment: Any, seed: int) -> Record:
+def _record(screen: Console, name: str, experiment: Any, seed: int) -> Record:
     from rich.progress import BarColumn, Progress, TextColumn
 
     from palpate.bench import build
@@ -111,8 +110,8 @@ def _record(console: Console, name: str, experiment: Any, seed: int) -> Record:
         raise InputError(f"{name}: {error}") from error
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
     # Without a terminal there is nobody to watch it, and it would leave an empty line.
-    watched = console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=not watched) as progress:
+    watched = screen.is_terminal
+    with Progress(*columns, console=screen, transient=True, disable=not watched) as progress:
         bar = progress.add_task("starting", total=None, time="")
 
         def waiting() -> None:
@@ -147,30 +146,19 @@ def _report(
 
 
 def _tell(title: str, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    import msgspec
-    from rich import box
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
     from palpate.report.run_tables import notes, tables
 
     if as_json:
-        sys.stdout.write(msgspec.json.encode(summary).decode() + "\n")
+        write_json(summary)
         return
-    console = Console()
-    console.print(
-        f"[bold]{escape(title)}[/bold], seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
-    )
+    screen = console()
+    head(screen, title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
     for content in tables(summary):
-        table = Table(title=content.title, title_justify="left", title_style="italic", box=box.SIMPLE_HEAD)
-        for i, head in enumerate(content.head):
-            table.add_column(escape(head), justify="left" if i == 0 else "right")
-        for row in content.rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
+        show_table(screen, content)
     for note in notes(summary):
-        console.print(f"[yellow]{escape(note)}[/yellow]")
+        screen.print(note, style=STYLE)
     report = folder / "report.html"
-    place = f"report: {report}" if report.exists() else f"nothing to draw; the record is in {folder}"
-    console.print(place, soft_wrap=True, highlight=False)
+    if report.exists():
+        place(screen, "report:", report)
+    else:
+        place(screen, "nothing to draw; the record is in", folder)

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from palpate.cli._named import listed, source_of
+from palpate.cli._terminal import STYLE, console, head, place, say, show_table, write_json
 from palpate.errors import InputError
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -61,7 +63,7 @@ def study(
         found = _done(name, source, folder, scheduler, yes, force)
     except KeyboardInterrupt:
         kept = f"what is done is saved in {folder}, and the same command goes on from there"
-        print(f"palpate: interrupted; {kept}", file=sys.stderr)  # noqa: T201
+        say(f"interrupted; {kept}")
         return 130
     _tell(found, folder, json)
     return 0 if found.summary["results"].get("done") else 1
@@ -69,50 +71,48 @@ def study(
 
 def _done(name: str, source: str, folder: Path, scheduler: str | None, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
-    from rich.console import Console
-
     from palpate.studies.plan import plan
     from palpate.studies.presenting import present
     from palpate.studies.running import Work, begun
     from palpate.studies.study import parse
 
-    console = Console(stderr=True)
+    screen = console(stderr=True)
     try:
         planned = plan(parse(source, name), name)
     except InputError as error:
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
     if not yes and (force or not begun(folder)):
-        _ask(planned, console, here=scheduler is None)
-    with _runner(scheduler, console) as runner, _progress(console, len(planned)) as show:
+        _ask(planned, screen, here=scheduler is None)
+    with _runner(scheduler, screen) as runner, _progress(screen, len(planned)) as show:
         frame = Work(planned, source, folder, runner, show).done(force=force)
-    return present(frame, planned, folder, source, f"palpate study {shlex.quote(name)}")
+    return present(frame, planned, folder, source, shown(f"palpate study {shlex.quote(name)}"))
 
 
-def _ask(plan: Plan, console: Console, *, here: bool) -> None:
+def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
     """Asks whether to begin what takes very long on the cores here; of a cluster only the number of runs is known."""
     from palpate.cli._waiting import COMPILING
     from palpate.studies.cost import MANY, seconds_a_run, too_much
 
     if not here and len(plan) < MANY:
         return
-    warning = too_much(plan, seconds_a_run(plan, lambda: console.print(COMPILING)))
+    warning = too_much(plan, seconds_a_run(plan, lambda: screen.print(COMPILING)))
     if not warning:
         return
     if not sys.stdin.isatty():
         raise InputError(f"{warning}; make it smaller, or add --yes")
     from rich.prompt import Confirm
 
-    if not Confirm.ask(f"{warning}. Begin?", console=console, default=False):
+    if not Confirm.ask(f"{warning}. Begin?", console=screen, default=False):
         raise InputError("not begun; make the study smaller: fewer points, fewer seeds")
 
 
 @contextmanager
-def _runner(scheduler: str | None, console: Console) -> Iterator[Runner]:
+def _runner(scheduler: str | None, screen: Console) -> Iterator[Runner]:
     if scheduler is None:
         from palpate.cli._waiting import COMPILING
         from palpate.studies.local import Local
 
-        yield Local(waiting=lambda: console.print(COMPILING))
+        yield Local(waiting=lambda: screen.print(COMPILING))
         return
     from palpate.studies.cluster import Cluster
 
@@ -124,17 +124,17 @@ def _runner(scheduler: str | None, console: Console) -> Iterator[Runner]:
 
 
 @contextmanager
-def _progress(console: Console, total: int) -> Iterator[Callable[[int], None]]:
+def _progress(screen: Console, total: int) -> Iterator[Callable[[int], None]]:
     """A bar with the time left; without a terminal a line now and then."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("left")
-    watched = console.is_terminal
+    watched = screen.is_terminal
     with Progress(
-        *columns, console=console, transient=True, disable=not watched, speed_estimate_period=600
+        *columns, console=screen, transient=True, disable=not watched, speed_estimate_period=600
     ) as bar:
         task = bar.add_task("", total=total)
-        lines = Lines(console, total)
+        lines = Lines(screen, total)
 
         def show(finished: int) -> None:
             bar.update(task, completed=finished)
@@ -149,8 +149,8 @@ class Lines:
 
     EVERY = 60.0
 
-    def __init__(self, console: Console, total: int):
-        self._console, self._total = console, total
+    def __init__(self, screen: Console, total: int):
+        self._screen, self._total = screen, total
         self._begun = self._told = time.monotonic()
         self._first: int | None = None
 
@@ -164,30 +164,17 @@ class Lines:
             return
         self._told = now
         left = (now - self._begun) / (finished - self._first) * (self._total - finished)
-        self._console.print(f"{finished} of {self._total} runs, some {told(left)} left", soft_wrap=True)
+        self._screen.print(f"{finished} of {self._total} runs, some {told(left)} left", soft_wrap=True)
 
 
 def _tell(found: Findings, folder: Path, as_json: bool) -> None:
-    import msgspec
-    from rich import box
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
     if as_json:
-        sys.stdout.write(msgspec.json.encode(found.summary).decode() + "\n")
+        write_json(found.summary)
         return
-    console = Console()
-    console.print(f"[bold]{escape(found.summary['study'])}[/bold], {found.summary['runs']} runs")
+    screen = console()
+    head(screen, found.summary["study"], f", {found.summary['runs']} runs")
     for content in found.tables:
-        table = Table(
-            title=escape(content.title), title_justify="left", title_style="italic", box=box.SIMPLE_HEAD
-        )
-        for i, head in enumerate(content.head):
-            table.add_column(escape(head), justify="left" if i == 0 else "right")
-        for row in content.rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
+        show_table(screen, content)
     for note in found.notes:
-        console.print(f"[yellow]{escape(note)}[/yellow]")
-    console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False)
+        screen.print(note, style=STYLE)
+    place(screen, "report:", folder / "report.html")

@@ -63,7 +63,7 @@ class Scale:
         """Ticks and label of `axis.xaxis` or `axis.yaxis`."""
         which.set_label_text(self.label)
         if not self.numeric:
-            which.set_ticks(self.places, [str(v).replace(", ", "\n") for v in self.values])
+            which.set_ticks(self.places, [style.literal(str(v)).replace(", ", "\n") for v in self.values])
         elif self.log:
             (axis.set_xscale if which is axis.xaxis else axis.set_yscale)("log")
             self._ticks(which)

@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.logs import whole
+from palpate.files import SIGNATURE, whole
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,8 +70,27 @@ def legend(axis: Axes, **options: Any) -> None:
     axis.legend(fontsize=8.5, borderaxespad=0.2, **options)
 
 
+def literal(text: str) -> str:
+    """A text from outside as it is to be drawn: dollars are dollars, not formulas."""
+    return shown(text).replace("$", r"\$")
+
+
 def save(drawing: Figure, path: Path) -> Path:
     """Writes the figure as PNG, the file there whole or not at all."""
+    _spell_out(drawing)
     with whole(path) as draft:
-        drawing.savefig(draft, format="png")
+        drawing.savefig(draft, format="png", metadata={"Software": SIGNATURE})
     return path
+
+
+def _spell_out(drawing: Figure) -> None:
+    """A label of the user's that is no formula is drawn as it is written."""
+    from matplotlib.mathtext import MathTextParser
+    from matplotlib.text import Text
+
+    for text in drawing.findobj(Text):
+        if isinstance(text, Text) and text.get_text().count("$") > 1:
+            try:
+                MathTextParser("path").parse(text.get_text())
+            except ValueError:
+                text.set_parse_math(False)
