@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.identification.beforehand import Lag
 from palpate.identification.choosing import Question
 from palpate.identification.preparing import filter_and_contacts, question_of
-from palpate.identification.timebase import channels_of
+from palpate.identification.prior import Lag
+from palpate.identification.sampling import channels_of
 from palpate.identification.touch import touching
 from palpate.records import Record
 

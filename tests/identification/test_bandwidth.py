@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification.synthetic_contacts import Array
-from palpate.identification.bandwidth import highest_motion
-from palpate.identification.filters import Chain
+from palpate.identification.filters.bandwidth import highest_motion
+from palpate.identification.filters.state_variable import Chain
 from palpate.identification.models import Motion
 
 DT = 1e-3

@@ -7,8 +7,8 @@ from identification.questions import question
 from identification.synthetic_contacts import coloured, force_of, press_path, pressed, record, shaken
 from palpate.identification import Verdict, identify
 from palpate.identification.choosing import choose
-from palpate.identification.filters import low_pass_once
-from palpate.identification.fitting import fit
+from palpate.identification.estimators.fit import fit
+from palpate.identification.filters.state_variable import low_pass_once
 from palpate.identification.models import (
     KELVIN_VOIGT,
     at_rest_before,

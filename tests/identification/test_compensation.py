@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from identification.sensor_logs import TRUTH, sensor_log
-from palpate.identification.beforehand import Lag
-from palpate.identification.compensation import compensation, resting
-from palpate.identification.fitting import fit
+from palpate.identification.estimators.errors_in_variables import compensation, resting
+from palpate.identification.estimators.fit import fit
 from palpate.identification.matching import matched_question, samples_of
 from palpate.identification.models import KELVIN_VOIGT_MASS, without_noise
 from palpate.identification.preparing import filter_and_contacts
-from palpate.identification.timebase import channels_of, held_force
+from palpate.identification.prior import Lag
+from palpate.identification.sampling import channels_of, held_force
 
 
 def regression(seed, noise, count=400):

@@ -6,7 +6,7 @@ from identification.questions import question
 from identification.synthetic_contacts import pressed, shaken
 from palpate.errors import InputError
 from palpate.identification.choosing import choose
-from palpate.identification.estimators import LEAST_SQUARES, METHODS, estimated_by
+from palpate.identification.estimators.methods import LEAST_SQUARES, METHODS, estimated_by
 
 LOG = shaken(n=3000, noise=1e-3, position_noise=1e-4)
 CHOSEN = choose(question(LOG, bonded=True, cutoff=60.0), "kelvin-voigt-mass").candidate

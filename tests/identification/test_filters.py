@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from palpate.identification.filters import ORDER, Chain, low_pass_once, white_noise
+from palpate.identification.filters.state_variable import ORDER, Chain, low_pass_once, white_noise
 
 CHAIN = Chain(cutoff=60.0, dt=1e-3)
 

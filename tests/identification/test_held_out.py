@@ -5,7 +5,7 @@ import pytest
 
 from identification.questions import question
 from identification.synthetic_contacts import pressed
-from palpate.identification.fitting import fit, part_of
+from palpate.identification.estimators.fit import fit, part_of
 from palpate.identification.held_out import foretold, held_out
 from palpate.identification.models import KELVIN_VOIGT, standard_linear_solid
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.identification.filters import Chain
-from palpate.identification.instrumental import refined_instrumental
+from palpate.identification.estimators.instrumental_variables import refined_instrumental
+from palpate.identification.filters.state_variable import Chain
 
 N = 2000
 TIME = np.arange(N) / 1000

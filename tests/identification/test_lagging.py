@@ -5,10 +5,10 @@ import pytest
 
 from identification.questions import question
 from identification.synthetic_contacts import pressed
-from palpate.identification.beforehand import Lag
-from palpate.identification.fitting import fit
+from palpate.identification.estimators.fit import fit
 from palpate.identification.lagging import flat_between
 from palpate.identification.models import KELVIN_VOIGT
+from palpate.identification.prior import Lag
 
 
 def test_the_misfit_is_flat_where_it_is_said_to_be():

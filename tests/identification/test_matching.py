@@ -9,12 +9,12 @@ import pytest
 
 from identification.sensor_logs import SAMPLING, TRUTH, log, press_and_chirp, rig, sensor_log
 from palpate.errors import InputError
-from palpate.identification.beforehand import Lag
-from palpate.identification.fitting import fit
+from palpate.identification.estimators.fit import fit
 from palpate.identification.matching import matched_question, samples_of
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.preparing import filter_and_contacts
-from palpate.identification.timebase import channels_of, held_force
+from palpate.identification.prior import Lag
+from palpate.identification.sampling import channels_of, held_force
 from palpate.signals.low_pass import LowPass
 
 DT = 1e-3

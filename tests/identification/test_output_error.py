@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.identification.output_error import CURVED, LINEAR, output_error, simulation_error
-from palpate.identification.simulation import COLUMNS, drive_of, simulated
+from palpate.identification.estimators.output_error import CURVED, LINEAR, output_error, simulation_error
+from palpate.identification.estimators.simulation import COLUMNS, drive_of, simulated
 
 SILVERBOX = Path(__file__).parents[3] / "shared/data/silverbox/schroeder_80mV.csv"
 N = 3000

@@ -9,9 +9,9 @@ from identification.questions import question
 from identification.synthetic_contacts import pressed, shaken
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify
-from palpate.identification.beforehand import LAG, NOTHING, Beforehand, Lag, beforehand
-from palpate.identification.fitting import fit
+from palpate.identification.estimators.fit import fit
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
+from palpate.identification.prior import LAG, NOTHING, Beforehand, Lag, beforehand
 
 NAMES = ("K", "B", "M", "offset", LAG)
 NOISE = 0.6

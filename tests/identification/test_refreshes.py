@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.refreshes import refreshes_of
+from palpate.identification.sample_clock import refreshes_of
 
 STEP = 1 / 12
 """Of the grid that the instants of 480 samples a second fall on, between 1000 rows a second [rows]."""

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from identification.sensor_logs import SAMPLING, TRUTH, sensor_log
 from palpate.errors import InputError
 from palpate.identification import identify
+from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.matching import samples_of
-from palpate.identification.sensor_path import SensorPath
-from palpate.identification.timebase import channels_of
+from palpate.identification.sampling import channels_of
 from palpate.identifiers import ContactIdentifier, RecursiveLeastSquares
 from palpate.identifiers.contact_identifier import NAMES, Refresh
 from palpate.signals.low_pass import LowPass

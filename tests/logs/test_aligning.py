@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.identification.refreshes import refreshes_of
-from palpate.identification.timebase import channels_of
+from palpate.identification.sample_clock import refreshes_of
+from palpate.identification.sampling import channels_of
 from palpate.logs.aligning import align
 from palpate.logs.stamps import Timed
 from palpate.records import Record

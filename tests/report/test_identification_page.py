@@ -11,7 +11,7 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.files import check_place
-from palpate.identification.codes import Code, Warn
+from palpate.identification.warning_codes import Code, Warn
 from palpate.report.identification_page import page, write_page
 from palpate.report.identification_words import ADVICE, headline
 from report.outcomes import OUTCOMES

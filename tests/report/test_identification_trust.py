@@ -7,7 +7,7 @@ import pytest
 
 from identification.synthetic_contacts import shaken
 from palpate.identification import identify
-from palpate.identification.filters import Chain
+from palpate.identification.filters.state_variable import Chain
 from palpate.report.identification_growth import growth
 from palpate.report.identification_spectra import (
     leaving,

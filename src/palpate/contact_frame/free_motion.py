@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from palpate.contact_frame.air import air_level
 from palpate.contact_frame.vectors import read_rows
 from palpate.errors import InputError
-from palpate.identification.preparing import filter_and_contacts
-from palpate.identification.timebase import channels_of
+from palpate.identification.contacts import contacts_of
+from palpate.identification.sampling import channels_of
 from palpate.records import Record
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ def contact_rows(time: Array, force: Array, place: Array) -> tuple[Rows, Rows]:
     position, strength = _along_axis(place), _along_axis(force)
     columns = {"time": time, "position": position, "force": strength - (air_level(strength, position) or 0.0)}
     channels = channels_of(Record(columns, {"time": "s", "position": "m", "force": "N"}))
-    channels, chain, contacts = filter_and_contacts(channels, None, None)
+    channels, chain, contacts = contacts_of(channels)
     inside, free = np.zeros(len(time), bool), np.full(len(time), not contacts.bonded)
     delay = 0.0 if contacts.bonded else chain.delay
     guard = _GUARD * chain.settling

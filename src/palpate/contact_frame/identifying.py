@@ -12,7 +12,7 @@ from palpate.contact_frame.declared import Arm, ContactFrame
 from palpate.contact_frame.projecting import project
 from palpate.contact_frame.signals_in_base import FORCE
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
-from palpate.identification.estimators import LEAST_SQUARES
+from palpate.identification.options import LEAST_SQUARES
 from palpate.records import Record
 
 

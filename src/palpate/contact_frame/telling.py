@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.identification.estimators import LEAST_SQUARES
+from palpate.identification.options import LEAST_SQUARES
 
 _GRAVITY = 9.80665
 _FAR = 0.01

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from palpate.identification.codes import Code, Warn
-from palpate.identification.identifying import identify
+from palpate.identification.identify import identify
 from palpate.identification.result import Comparison, Identification, Parameter, Verdict
+from palpate.identification.warning_codes import Code, Warn
 
 __all__ = ["Code", "Comparison", "Identification", "Parameter", "Verdict", "Warn", "identify"]

@@ -7,9 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.codes import Code, Warn
-from palpate.identification.filters import Chain
-from palpate.identification.timebase import Channels
+from palpate.errors import InputError
+from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
+from palpate.identification.filters.state_variable import Chain
+from palpate.identification.options import NOTHING_SAID, Options
+from palpate.identification.sampling import Channels, thinned
+from palpate.identification.warning_codes import Code, Warn
 
 Array = NDArray[np.float64]
 
@@ -18,6 +21,8 @@ ONSET = 0.05
 _REACHED = 0.2
 _BLOCKS = 100
 _WIDER = 4.0
+_OVERSAMPLED = 32.0
+"""Samples in a period of the cut-off that are kept: what lies between straight lines is then nothing."""
 _CLEAR = 3.0
 """Deviations of the free force below the threshold: noise cut at its own height stays below two, however coloured."""
 _FEWEST = 20
@@ -50,6 +55,39 @@ class Contacts:
     threshold: float
     warnings: tuple[Warn, ...]
     clear: bool = True
+
+
+def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
+    """Find the contacts with the widest filter, choose the filter from them, and find them again with it.
+
+    Raises:
+        InputError: a cut-off that the readings are too rare for.
+    """
+    bonded, cutoff = options.bonded, options.cutoff
+    highest = FASTEST * channels.rate
+    if cutoff is not None and cutoff > 2 * highest:
+        raise InputError(
+            f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
+        )
+    chain = Chain(cutoff or highest, channels.dt)
+    contacts = find_contacts(channels, chain, bonded)
+    if not contacts.spans:
+        return channels, chain, contacts
+    chosen = cutoff or _chosen_cutoff(channels, contacts)
+    if chosen > 0.9 * highest:
+        return channels, chain, contacts
+    fewer = thinned(channels, int(1 / (_OVERSAMPLED * chosen * channels.dt)))
+    narrow = Chain(chosen, fewer.dt)
+    again = find_contacts(fewer, narrow, bonded)
+    return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
+
+
+def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
+    """From the longest contact with what is before and after it, so that its rise and fall are in the picture."""
+    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
+    margin = (end - begin) // 2
+    around = slice(max(begin - margin, 0), end + margin)
+    return choose_cutoff(channels.position[around], channels.force[around], channels.dt, channels.rate)
 
 
 def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) -> Contacts:

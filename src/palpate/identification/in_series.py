@@ -1,39 +1,119 @@
-"""What lies between the position sensor and the surface, and gives way with it."""
+"""What lies between the position sensor and the surface, and gives way with it: taken out of what was identified.
+
+An arm of stiffness k in series with a surface of impedance Z is seen as Z k / (Z + k). Both channels pass through the
+same filters first, and the surface is found from what they say together: nothing is subtracted from a position that
+the force's lag and noise would come with.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from palpate.errors import InputError
-from palpate.identification.beforehand import Lag
-from palpate.identification.fitting import fit
-from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
-from palpate.identification.preparing import filter_and_contacts, question_of
-from palpate.identification.timebase import Channels
+from palpate.identification.estimators.budget import Spread
+from palpate.identification.estimators.robust import Answer
+from palpate.identification.result import DynamicStiffness, Press, Tangent
+
+Array = NDArray[np.float64]
 
 
-def take_out(channels: Channels, stiffness: float, bonded: bool | None, cutoff: float | None) -> Channels:
-    """The channels with the position of the surface instead of the sensor's.
-
-    Args:
-        channels: position [m] and force [N] as read.
-        stiffness: of what is in series with the surface [N/m].
-        bonded: whether the probe is fixed to the surface; None to find out.
-        cutoff: of the filter chain [Hz]; None to choose.
+def check(apparent: float, series: float) -> None:
+    """Two springs in series are softer than either.
 
     Raises:
-        InputError: the log as a whole is stiffer than that, which nothing in series with another spring can be.
+        InputError: the log is as stiff as what is said to be in series with the surface.
     """
-    fewer, chain, contacts = filter_and_contacts(channels, bonded, cutoff)
-    if not contacts.spans:
-        return channels
-    question = question_of(fewer, chain, contacts, Lag(), 1.0)
-    model = KELVIN_VOIGT_MASS if contacts.bonded else KELVIN_VOIGT
-    apparent = fit(model, question.motion, question.force, Lag())["K"]
-    if abs(apparent) >= stiffness:
+    if abs(apparent) >= series:
         raise InputError(
-            f"the series stiffness of {stiffness:.4g} N/m is softer than the log's own {abs(apparent):.4g} N/m, but two"
+            f"the series stiffness of {series:.4g} N/m is softer than the log's own {abs(apparent):.4g} N/m, but two"
             " springs in series are softer than either: check its value and unit (N/m), or leave it out"
         )
-    sign = contacts.position_sign * contacts.force_sign * (1 if apparent > 0 else -1)
-    return replace(channels, position=channels.position - sign * channels.force / stiffness)
+
+
+def without_series(found: Answer, series: float, series_std: float) -> Answer:
+    """Parameters of the surface from those of both, to the second order of the frequency.
+
+    With Z = K + B s + M s^2 seen as K_a + B_a s + M_a s^2: K = K_a k/(k - K_a), B = B_a r^2, M = M_a r^2 + B_a^2 r^3/k,
+    r = k/(k - K_a). The covariance goes through the derivatives of these.
+    """
+    names = found.names
+    place = {name: names.index(name) for name in ("K", "B", "M") if name in names}
+    theta = found.theta.copy()
+    check(theta[place["K"]], series)
+    new = _seen_through(theta, place, series)
+    jacobian = np.eye(len(theta))
+    for name in place:
+        i = place[name]
+        step = 1e-6 * max(abs(theta[i]), 1e-9)
+        moved = theta.copy()
+        moved[i] += step
+        jacobian[:, i] = (_seen_through(moved, place, series) - new) / step
+    by_series = (_seen_through(theta, place, series + series_std) - new) ** 2 if series_std else 0 * new
+    budget = {
+        cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
+        for cause, part in found.budget.items()
+    }
+    budget["series stiffness"] = Spread(by_series)
+    return replace(found, theta=new, cov=jacobian @ found.cov @ jacobian.T, budget=budget)
+
+
+def _seen_through(theta: Array, place: dict[str, int], series: float) -> Array:
+    new = theta.copy()
+    stiffness = theta[place["K"]]
+    r = series / (series - stiffness)
+    new[place["K"]] = stiffness * r
+    if "B" in place:
+        new[place["B"]] = theta[place["B"]] * r**2
+    if "M" in place:
+        damping = theta[place["B"]] if "B" in place else 0.0
+        new[place["M"]] = theta[place["M"]] * r**2 + damping**2 * r**3 / series
+    return new
+
+
+def spectrum_without_series(
+    spectrum: tuple[DynamicStiffness, ...], series: float, series_std: float
+) -> tuple[DynamicStiffness, ...]:
+    """Dynamic stiffness of the surface, Z k / (k - Z), with k's own deviation in the half-widths."""
+    found = []
+    for octave in spectrum:
+        seen = complex(octave.storage, octave.loss)
+        own = seen * series / (series - seen)
+        gain = abs(series / (series - seen)) ** 2
+        more = 1.96 * series_std * abs(own / series) ** 2
+        found.append(
+            replace(
+                octave,
+                storage=own.real,
+                loss=own.imag,
+                storage_half=float(np.hypot(gain * octave.storage_half, more)),
+                loss_half=float(np.hypot(gain * octave.loss_half, more)),
+            )
+        )
+    return tuple(found)
+
+
+def slope_without_series(value: float, half: float, series: float, series_std: float) -> tuple[float, float]:
+    """A slope and its half-width."""
+    check(value, series)
+    gain = series / (series - value)
+    own = value * gain
+    return own, float(np.hypot(gain**2 * half, 1.96 * series_std * (own / series) ** 2))
+
+
+def press_without_series(press: Press, series: float, series_std: float) -> Press:
+    """The press over the depth of the surface alone."""
+    tangent = [
+        Tangent(t.force, *slope_without_series(t.stiffness, t.half, series, series_std))
+        for t in press.tangent
+        if t.stiffness < series
+    ]
+    curves = []
+    for curve in (press.loading, press.unloading):
+        own = curve.copy()
+        if own.size:
+            own[0] -= (own[1] - own[1][0]) / series
+        curves.append(own)
+    return replace(press, tangent=tuple(tangent), loading=curves[0], unloading=curves[1])

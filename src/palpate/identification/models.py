@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.filters import Chain, low_pass_once
-from palpate.identification.position_noise import NOISELESS, PositionNoise
-from palpate.identification.sensor_path import SensorPath
+from palpate.identification.filters.position_noise import NOISELESS, PositionNoise
+from palpate.identification.filters.sensor_path import SensorPath
+from palpate.identification.filters.state_variable import Chain, low_pass_once
 
 Array = NDArray[np.float64]
 

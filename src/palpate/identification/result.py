@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from math import pi, sqrt
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.codes import Warn
+from palpate.identification.warning_codes import Warn
 from palpate.signals import Estimate
 
 
@@ -28,10 +28,12 @@ class Parameter:
 
     Args:
         value, std: None where the log carries no number worth printing.
-        ci95: 95 % interval, with the lag, coloured noise and calibration included.
         unit: in SI.
         verdict: identified, not identifiable or rejected.
+        ci95: 95 % interval that holds whatever the model; verdicts rest on it.
         reason: why.
+        ci95_if_model_holds: 95 % interval of least squares on this model, were it exactly true.
+        budget: half-width of `ci95` by cause, largest first.
     """
 
     value: float | None
@@ -40,6 +42,146 @@ class Parameter:
     unit: str
     verdict: Verdict
     reason: str
+    ci95_if_model_holds: tuple[float, float] | None = None
+    budget: dict[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "value": self.value,
+            "std": self.std,
+            "ci95": list(self.ci95) if self.ci95 else None,
+            "ci95_if_model_holds": list(self.ci95_if_model_holds) if self.ci95_if_model_holds else None,
+            "budget": self.budget,
+            "unit": self.unit,
+            "verdict": str(self.verdict),
+            "reason": self.reason,
+        }
+
+
+@dataclass(frozen=True)
+class DynamicStiffness:
+    """Force over position about one frequency: storage in phase with the position, loss in quadrature.
+
+    Args:
+        frequency: middle of the octave [Hz].
+        storage, loss: [N/m].
+        storage_half, loss_half: 95 % half-widths [N/m], from the variance between blocks.
+        blocks: how many there are.
+        share: of the position's variance in contact.
+    """
+
+    frequency: float
+    storage: float
+    storage_half: float
+    loss: float
+    loss_half: float
+    blocks: int
+    share: float
+
+    def to_json(self) -> dict[str, float]:
+        """Plain values."""
+        return {
+            "Hz": self.frequency,
+            "storage": self.storage,
+            "storage_half": self.storage_half,
+            "loss": self.loss,
+            "loss_half": self.loss_half,
+            "blocks": self.blocks,
+        }
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """What a hold shows.
+
+    Args:
+        share: of the force at the begin of the hold that is gone at its end.
+        half_time: after which half of that is gone [s].
+        duration: of the hold [s].
+    """
+
+    share: float
+    half_time: float
+    duration: float
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Slope of force over depth on the way in at one force.
+
+    Args:
+        force: [N].
+        stiffness, half: slope and its 95 % half-width [N/m].
+    """
+
+    force: float
+    stiffness: float
+    half: float
+
+
+@dataclass(frozen=True)
+class Press:
+    """Force over depth.
+
+    Args:
+        tangent: on the way in, by force.
+        loading, unloading: depth [m] and force [N] on the way in and out, shape (2, n); empty if it is not there.
+        hysteresis_loss: share of the work of the way in that does not come back; None without a way out.
+        relaxation: None without a hold.
+    """
+
+    tangent: tuple[Tangent, ...]
+    loading: NDArray[np.float64]
+    unloading: NDArray[np.float64]
+    hysteresis_loss: float | None = None
+    relaxation: Relaxation | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        relaxed = self.relaxation
+        return {
+            "tangent": [{"force_N": t.force, "stiffness": t.stiffness, "half": t.half} for t in self.tangent],
+            "hysteresis_loss": self.hysteresis_loss,
+            "relaxation": None
+            if relaxed is None
+            else {
+                "share": relaxed.share,
+                "half_time_s": relaxed.half_time,
+                "duration_s": relaxed.duration,
+            },
+        }
+
+
+@dataclass(frozen=True)
+class WorkingPoint:
+    """The stiffness that the log shows, whatever the model, and what it belongs to.
+
+    Args:
+        stiffness: storage of an octave, or slope of the way in.
+        force, depth: mean in contact [N], [m].
+        frequency: middle of the octave; of a press, one over four times its rise [Hz].
+        source: octave or press.
+        prediction95: interval for the same measured once more; None if it was measured once.
+    """
+
+    stiffness: Parameter
+    force: float
+    depth: float
+    frequency: float
+    source: str
+    prediction95: tuple[float, float] | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        again = list(self.prediction95) if self.prediction95 else None
+        return {
+            "stiffness": self.stiffness.to_json() | {"prediction95": again},
+            "force_N": self.force,
+            "depth_m": self.depth,
+            "frequency_Hz": self.frequency,
+            "source": self.source,
+        }
 
 
 @dataclass(frozen=True)
@@ -49,17 +191,13 @@ class Comparison:
     Args:
         model: what it is called.
         r2, rmse: of the fit.
-        note: what speaks against it.
-        held_out: rms of what it misses of the rows in contact when it is fitted to the others.
-        whiteness: probability of residuals no whiter than these, were they white.
+        note: what speaks for or against it.
     """
 
     model: str
     r2: float
     rmse: float
     note: str
-    held_out: float = float("nan")
-    whiteness: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -72,7 +210,7 @@ class Traces:
         predicted: the force by the model [N].
         columns: by linear parameter, what one unit of it adds to the predicted force, shape (m,).
         theta: the fit's own number of each of them, also where no number is given to the user.
-        beforehand: standard deviation of what was known of some of them before the log.
+        prior: standard deviation of the prior of some of them.
         matched: whether the samples are the force sensor's own, with noise as white as its; else all have passed a
             filter chain.
         position_unit, force_unit: of the log.
@@ -86,10 +224,26 @@ class Traces:
     predicted: NDArray[np.float64]
     columns: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     theta: dict[str, float] = field(default_factory=dict)
-    beforehand: dict[str, float] = field(default_factory=dict)
+    prior: dict[str, float] = field(default_factory=dict)
     matched: bool = False
     position_unit: str = "m"
     force_unit: str = "N"
+
+
+@dataclass(frozen=True)
+class LagFound:
+    """How much later the force is read than the position.
+
+    Args:
+        value, std: [s].
+        bound: half-width of its 95 % interval, whatever the model [s].
+        kind: told (calibrated), measured (the log narrows the prior to half or less) or prior.
+    """
+
+    value: float
+    std: float
+    bound: float
+    kind: str
 
 
 @dataclass(frozen=True)
@@ -100,19 +254,23 @@ class Identification:
         model: name of the contact model that the parameters belong to.
         parameters: by name.
         contacts: start and end of each contact [s], on the log's clock from its first row.
-        lag: how much later the force is read than the position, and its standard deviation [s]; None if not known.
+        lag: how much later the force is read than the position; None if nothing is known of it.
         r2, rmse, n: of the fit to the filtered force [N], and the number of samples fitted.
         warnings: what was seen on the way.
         comparison: all the models that were tried.
         cutoff: of the filter chain [Hz].
         traces: for the figure.
         estimate: the fit's own parameters with their covariance, before any verdict; offset and lag among them.
+        working_point: the stiffness that the log shows whatever the model; None without a contact.
+        dynamic_stiffness: by octave, lowest first.
+        press: force over depth; None if the log does not show one.
+        options: what was told, as plain values.
     """
 
     model: str
     parameters: dict[str, Parameter]
     contacts: tuple[tuple[float, float], ...]
-    lag: tuple[float, float] | None
+    lag: LagFound | None
     r2: float
     rmse: float
     n: int
@@ -121,6 +279,10 @@ class Identification:
     cutoff: float = float("nan")
     traces: Traces | None = field(default=None, repr=False)
     estimate: Estimate | None = field(default=None, repr=False)
+    working_point: WorkingPoint | None = None
+    dynamic_stiffness: tuple[DynamicStiffness, ...] = ()
+    press: Press | None = field(default=None, repr=False)
+    options: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def codes(self) -> tuple[str, ...]:
@@ -129,8 +291,9 @@ class Identification:
 
     @property
     def found(self) -> bool:
-        """Whether there is any parameter with a number."""
-        return any(parameter.value is not None for parameter in self.parameters.values())
+        """Whether there is anything with a number."""
+        numbers = [parameter.value for parameter in self.parameters.values()]
+        return self.working_point is not None or any(value is not None for value in numbers)
 
     @property
     def resonance(self) -> tuple[float, float] | None:
@@ -145,21 +308,16 @@ class Identification:
         """The plain values that `palpate identify --json` prints."""
         return {
             "model": self.model,
-            "parameters": {
-                name: {
-                    "value": p.value,
-                    "std": p.std,
-                    "ci95": list(p.ci95) if p.ci95 else None,
-                    "unit": p.unit,
-                    "verdict": str(p.verdict),
-                    "reason": p.reason,
-                }
-                for name, p in self.parameters.items()
-            },
+            "parameters": {name: p.to_json() for name, p in self.parameters.items()},
+            "working_point": self.working_point.to_json() if self.working_point else None,
+            "dynamic_stiffness": [octave.to_json() for octave in self.dynamic_stiffness],
+            "press": self.press.to_json() if self.press else None,
             "contacts": [{"start_s": start, "end_s": end} for start, end in self.contacts],
-            "lag_s": {"value": self.lag[0], "std": self.lag[1]} if self.lag else None,
+            "lag_s": None if self.lag is None else asdict(self.lag),
             "fit": {"r2": _plain(self.r2), "rmse_N": _plain(self.rmse), "n": self.n},
             "warnings": [{"code": warn.code.word, "text": warn.text} for warn in self.warnings],
+            "models": [{"model": c.model, "r2": _plain(c.r2), "note": c.note} for c in self.comparison],
+            "options": self.options,
         }
 
 

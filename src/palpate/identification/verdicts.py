@@ -1,197 +1,202 @@
-"""From a fit to verdicts: what of it may be believed, and why not the rest."""
+"""From an answer to verdicts: what of it may be believed, and why not the rest."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.identification.beforehand import Lag
-from palpate.identification.choosing import Choice
-from palpate.identification.codes import Code, Warn
-from palpate.identification.fitting import Fit
-from palpate.identification.hidden_mass import HiddenMass, before_position
-from palpate.identification.result import Parameter, Verdict
-from palpate.identification.surface import surface, together
+from palpate.identification.estimators.fit import Fit
+from palpate.identification.estimators.robust import Answer
+from palpate.identification.prior import LAG, Lag
+from palpate.identification.result import Parameter, Verdict, WorkingPoint
+from palpate.identification.selection import Choice
+from palpate.identification.warning_codes import Code, Warn
 from palpate.units import impedance_units
+
+_FAR = 2.0
+"""Prior deviations from its prior beyond which a lag nobody calibrated is a sign of another cause (5 % by chance)."""
+_SHAPE = ("n", "tau", "x0")
+"""Parameters without force in their unit: no calibration of force or position scales them."""
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What a verdict is passed on, besides the fit.
+    """What a verdict is passed on, besides the answer.
 
     Args:
         tolerance: largest half-width of an identified parameter's interval, as a share of its value.
         calibration: relative standard deviation of the force's and position's scales together.
-        series: stiffness in series with the surface and its standard deviation [N/m]; None if it is not given.
         force_unit, position_unit: of the record.
-        lags: the force was found to lag the position although no lag is calibrated.
-        bent: how far that lag, which may be longer, has moved K [N/m].
         band: frequency below which the probe moved [Hz].
-        hidden: the mass that an uncalibrated lag may hide; None if there is none.
     """
 
     tolerance: float
     calibration: float
-    series: tuple[float, float] | None
     force_unit: str
     position_unit: str
-    lags: bool
-    bent: float = 0.0
     band: float = np.inf
-    hidden: HiddenMass | None = None
+
+    @property
+    def stiffness_unit(self) -> str:
+        """Of force over position."""
+        return impedance_units(self.force_unit, self.position_unit)["K"]
 
 
-def verdicts(choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> dict[str, Parameter]:
-    """Pass a verdict on each parameter of the chosen model; warnings are added to the list given."""
-    fitted = choice.candidate.fit
-    names = [n for n in fitted.names if n not in ("offset", "lag", "x0")]
-    found = {name: _verdict(name, choice, lag, terms, warnings) for name in names}
-    place = surface(choice.candidate, choice.rejected, terms.tolerance, terms.position_unit)
-    if place and place.verdict is Verdict.IDENTIFIED and not _begins(found):
-        place = Parameter(None, None, None, place.unit, Verdict.NOT_IDENTIFIABLE, _NO_FORCE)
-    if place:
-        found["x0"] = place
-    if terms.hidden and before_position(fitted):
-        text = (
-            f"the force seems to be read {-fitted.lag * 1e3:.2g} ms before the position, which no sensor's lag does: a"
-            f" mass of up to {terms.hidden.mass:.2g} kg looks like this; calibrate the lag and give it with --lag"
-        )
-        warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
-    if fitted.matched and not lag.known and _lag_rules(fitted):
-        _confounded("B cannot be told from a lag of the force", fitted, terms, warnings)
-    low = [n for n, p in found.items() if p.verdict is Verdict.NOT_IDENTIFIABLE and "lag" not in p.reason]
-    low = [n for n in low if n in ("K", "B", "M", "K1", "tau", "n")]
-    if low:
-        text = f"the log does not show {', '.join(low)} above the noise: {_remedy(low[-1], terms)}"
-        warnings.append(Warn(Code.LOW_EXCITATION, text))
-    return found
+def verdicts(
+    choice: Choice, holds: Fit, point: WorkingPoint | None, terms: Terms
+) -> tuple[dict[str, Parameter], tuple[Warn, ...]]:
+    """Pass a verdict on each parameter.
+
+    Args:
+        choice: the model chosen.
+        holds: least squares on it, for the interval that holds if the model does.
+        point: the working point, with which K must agree.
+        terms: how.
+    """
+    found = choice.answer
+    lag = choice.problem.lag
+    names = [n for n in found.names if n not in (LAG, "x0")]
+    parameters = {name: _parameter(name, choice, holds, terms) for name in names}
+    if point is not None and {"K", "M"} <= set(found.names):
+        parameters = _agreeing(parameters, found, point)
+    parameters = _of_lag(parameters, found, lag, terms)
+    return parameters, _warnings(parameters, found, lag, terms)
 
 
-_NO_FORCE = "the log does not show the force that would begin there"
+def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter:
+    found = choice.answer
+    value, unit = found[name], unit_of(name, found.fit, terms)
+    scale = 0.0 if name in _SHAPE else 1.96 * terms.calibration * abs(value)
+    half = float(np.hypot(found.half_of(name), scale))
+    budget = {cause: part for cause, part in found.parts(name).items() if part > 1e-3 * half}
+    if scale:
+        budget = dict(sorted({**budget, "calibration": scale}.items(), key=lambda item: -item[1]))
+    interval = (value - half, value + half)
+    own = None
+    if name in holds.names:
+        reach = float(np.hypot(holds.t * holds.std(name), scale))
+        own = (holds[name] - reach, holds[name] + reach)
 
+    def said(verdict: Verdict, reason: str, number: bool = True) -> Parameter:
+        if not number:
+            return Parameter(None, None, None, unit, verdict, reason, None, budget)
+        return Parameter(value, half / 1.96, interval, unit, verdict, reason, own, budget)
 
-def _begins(found: dict[str, Parameter]) -> bool:
-    """Whether there is any force of which a place could be told."""
-    return any(found[n].verdict is Verdict.IDENTIFIED for n in ("K", "K1", "n") if n in found)
-
-
-def _verdict(name: str, choice: Choice, lag: Lag, terms: Terms, warnings: list[Warn]) -> Parameter:
-    fitted = choice.candidate.fit
-    value = fitted[name]
-    std = _whole_std(name, choice, terms)
-    unit = unit_of(name, fitted, terms)
-    interval = _interval(name, value, fitted.t * std, terms.hidden)
-    half = (interval[1] - interval[0]) / 2
-    std = half / fitted.t
-    if name in fitted.model.positive and interval[1] < 0:
-        return _refused(name, value, unit, terms, warnings)
-    if terms.lags and name in ("B", "M"):
-        return Parameter(None, None, None, unit, Verdict.REJECTED, _LAGS.format(fit=value, unit=unit))
-    if choice.rejected:
-        return _of_rejected(name, choice, value, std, interval, unit)
-    clear = interval[0] > 0 or interval[1] < 0
-    if half <= terms.tolerance * abs(value) and clear:
-        reason = f"known to {_percent(half, value)} (95 %){_with_hidden(name, half, terms)}"
-        return Parameter(value, std, interval, unit, Verdict.IDENTIFIED, reason)
-    reason = _why_not(name, fitted, lag, terms, interval, value, unit, warnings)
-    return _reported(value, std, interval, unit, Verdict.NOT_IDENTIFIABLE, reason)
-
-
-def _interval(name: str, value: float, half: float, hidden: HiddenMass | None) -> tuple[float, float]:
-    """The 95 % interval; it reaches further to the side that a hidden mass would move the parameter to."""
-    shift = hidden.shifts.get(name, 0.0) if hidden else 0.0
-    further = float(np.hypot(half, shift))
-    return (value - half, value + further) if shift > 0 else (value - further, value + half)
-
-
-def _with_hidden(name: str, half: float, terms: Terms) -> str:
-    """Say so if a hidden mass makes most of an interval."""
-    if terms.hidden is None or abs(terms.hidden.shifts.get(name, 0.0)) < half:
-        return ""
-    return f", a mass of up to {terms.hidden.mass:.2g} kg included that would look like a lag"
-
-
-_LAGS = "the force lags the position, and a lag T counts as a damping of -K T: calibrate it and give --lag"
-
-
-def _refused(name: str, value: float, unit: str, terms: Terms, warnings: list[Warn]) -> Parameter:
-    what = f"the fit gives {_digits(value)} {_shown(unit)}, below zero: no passive surface does that".replace(
-        "  ", " "
-    )
-    if name == "K":
-        warnings.append(Warn(Code.NEGATIVE_STIFFNESS, f"K: {what}; a channel's sign or column may be wrong"))
-    elif not terms.lags:
-        warnings.append(Warn(Code.FORCE_LAGS_POSITION, f"{name}: {what}; {_LAGS}"))
-    return Parameter(
-        None, None, None, unit, Verdict.REJECTED, f"{what}; {_LAGS if name != 'K' else 'check the signs'}"
-    )
-
-
-def _of_rejected(
-    name: str, choice: Choice, value: float, std: float, interval: tuple[float, float], unit: str
-) -> Parameter:
-    """The model does not hold. A stiffness is still a secant through the log; damping and mass are artefacts."""
-    seen = "; ".join(choice.candidate.against[:2])
-    alone = [
-        f"{label} alone {_digits(values[name])}" for label, values in choice.halves.items() if name in values
-    ]
-    if len(alone) == 2:
-        seen = f"{', '.join(alone)} {_shown(unit)}".rstrip() + f"; {seen}"
-    if name in ("K", "n"):
-        curved = "n" in choice.candidate.fit.names
-        what = "of the curve through" if curved else "a secant through"
-        reason = f"{what} the whole contact, not a constant of the surface: {seen}"
-        reason += together(choice.candidate) if name == "n" else ""
-        return _reported(value, std, interval, unit, Verdict.REJECTED, reason)
-    reason = f"the fit's {_digits(value)} {_shown(unit)} is an artefact of a model that does not hold: {seen}"
-    return Parameter(None, None, None, unit, Verdict.REJECTED, reason)
-
-
-def _reported(
-    value: float, std: float, interval: tuple[float, float], unit: str, verdict: Verdict, reason: str
-) -> Parameter:
-    """A number only if its interval excludes zero."""
-    if interval[0] <= 0 <= interval[1]:
-        return Parameter(None, None, None, unit, verdict, reason)
-    return Parameter(value, std, interval, unit, verdict, reason)
-
-
-def _why_not(
-    name: str,
-    fitted: Fit,
-    lag: Lag,
-    terms: Terms,
-    interval: tuple[float, float],
-    value: float,
-    unit: str,
-    warnings: list[Warn],
-) -> str:
-    half = (interval[1] - interval[0]) / 2
+    positive = name in found.fit.model.positive
+    if positive and interval[1] < 0:
+        reason = f"the fit gives {_digits(value)} {_shown(unit)}, below zero: no passive surface does that"
+        return said(Verdict.REJECTED, " ".join(reason.split()), number=False)
     bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_shown(unit)}".rstrip()
-    if _with_hidden(name, half, terms):
-        text = f"{name} cannot be told from a lag of the force that hides a mass ({bounds})"
-        return _confounded(text, fitted, terms, warnings)
-    alone = fitted.t * fitted.std(name, lag_known=True)
-    if lag.std and half > 1.5 * alone and alone <= max(terms.tolerance * abs(value), 0.67 * half):
-        known = f"{fitted.std('lag') * 1e3:.2g} ms"
-        text = f"{name} cannot be told from a lag of the force, which is known to {known} only ({bounds})"
-        return _confounded(text, fitted, terms, warnings)
-    pulled = abs(float(fitted.attenuation[fitted.names.index(name)]))
-    if fitted.t * pulled > 0.7 * half:
-        return (
-            f"noise of the position may have pulled it by {pulled:.2g} ({bounds}); filter lower with --cutoff"
-        )
-    inside = interval[0] <= 0 <= interval[1]
-    limit = "zero is within it" if inside else f"wider than {terms.tolerance:.0%}"
-    return f"the log does not show it above the noise ({bounds}; {limit}): {_remedy(name, terms)}"
+    clear = interval[0] > 0 or interval[1] < 0
+    if not choice.explains:
+        left = float(np.sqrt(1 - found.explained))
+        reason = f"the model leaves {left:.0%} of the force's amplitude unexplained ({bounds})"
+        return said(Verdict.REJECTED, reason, number=clear and name == "K")
+    if half <= terms.tolerance * abs(value) and clear:
+        return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %)")
+    limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
+    main = next(iter(budget), "noise")
+    reason = f"{bounds}; {limit}. Most of it is {main}: {_REMEDY.get(main, _REMEDY['noise'])}"
+    return said(Verdict.NOT_IDENTIFIABLE, reason, number=clear)
 
 
-def _lag_rules(fitted: Fit) -> bool:
-    """Whether what is not known of the lag makes most of what is not known of the damping."""
-    if not {"K", "B"} <= set(fitted.names):
-        return False
-    return abs(fitted["K"]) * fitted.std("lag") > 2 * fitted.std("B", lag_known=True)
+_REMEDY = {
+    "noise": "press deeper, longer or more often; try palpate excite",
+    "lag": "calibrate the lag of the force and give it with --lag",
+    "other forces": "let the log begin and end in the air, and press more often",
+    "octaves": "the answer differs from octave to octave; excite a wider band (palpate excite)",
+    "repetition": "two parts of the log differ; press more often",
+    "strokes": "the ways in and out differ; press slower, or more often",
+    "unexplained": "the model leaves force that is no noise; keep the motion near one working point",
+    "position noise": "measure the position finer, or move further",
+    "calibration": "calibrate force and position",
+    "series stiffness": "measure the position nearer to the surface",
+}
+
+
+def _agreeing(
+    parameters: dict[str, Parameter], found: Answer, point: WorkingPoint
+) -> dict[str, Parameter]:
+    """K and M that foretell another stiffness at the working point than the log shows are not identified."""
+    own = point.stiffness
+    if own.ci95 is None or own.value is None or point.source != "octave":
+        return parameters
+    omega2 = (2 * np.pi * point.frequency) ** 2
+    i, j = found.names.index("K"), found.names.index("M")
+    foretold = found.theta[i] - omega2 * found.theta[j]
+    half = float(np.hypot(found.half[i], omega2 * found.half[j]))
+    shown = (own.ci95[1] - own.ci95[0]) / 2
+    if abs(foretold - own.value) <= np.hypot(half, shown):
+        return parameters
+    reason = (
+        f"the model's stiffness at {point.frequency:.3g} Hz is {_digits(foretold)} {own.unit}, the log's dynamic"
+        f" stiffness there {_digits(own.value)}"
+    )
+    return {
+        name: replace(p, verdict=Verdict.REJECTED, reason=reason)
+        if p.verdict is Verdict.IDENTIFIED and name in ("K", "M")
+        else p
+        for name, p in parameters.items()
+    }
+
+
+def _of_lag(
+    parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms
+) -> dict[str, Parameter]:
+    """No B or M rests on a lag that nobody calibrated and that is far from any sensor's."""
+    if lag.known or LAG not in found.names or abs(found[LAG] - lag.value) <= _FAR * lag.std:
+        return parameters
+    reason = (
+        f"it rests on a lag of {1e3 * found[LAG]:.2g} ms that the fit asks for and no calibration tells:"
+        " calibrate it and give it with --lag"
+    )
+    refused = {
+        name: Parameter(None, None, None, p.unit, Verdict.REJECTED, reason, None, p.budget)
+        for name, p in parameters.items()
+        if name in ("B", "M")
+    }
+    return parameters | refused
+
+
+def _warnings(
+    parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms
+) -> tuple[Warn, ...]:
+    warnings = []
+    if LAG in found.names and not lag.known:
+        low = lag.value - _FAR * lag.std
+        at = found[LAG]
+        if abs(at - lag.value) > _FAR * lag.std or at + found.half_of(LAG) < low:
+            text = (
+                f"the fit asks for a lag of {1e3 * at:.3g} ms of the force, farther than sensors have:"
+                " something else moves the force in time; B and M are refused"
+            )
+            warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
+    damping = parameters.get("B")
+    if damping is not None and damping.verdict is not Verdict.IDENTIFIED:
+        main = next(iter(damping.budget), "")
+        if "below zero" in damping.reason:
+            text = f"B: {damping.reason}; a lag T of the force counts as -K T: calibrate it and give --lag"
+            warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
+        elif main == "lag" and not lag.known:
+            reach = 1.96 * lag.std * abs(found["K"]) if "K" in found.names else 0.0
+            text = (
+                f"a lag T of the force counts as a damping of -K T, and nobody has calibrated it: B is known to"
+                f" {_digits(reach, 2)} {_shown(damping.unit)} only; give --lag"
+            )
+            warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
+    stiffness = parameters.get("K")
+    if stiffness is not None and "below zero" in stiffness.reason:
+        text = f"K: {stiffness.reason}; a channel's sign or column may be wrong (--force-sign)"
+        warnings.append(Warn(Code.NEGATIVE_STIFFNESS, text))
+    low_names = [
+        n for n, p in parameters.items()
+        if p.verdict is Verdict.NOT_IDENTIFIABLE and next(iter(p.budget), "noise") != "lag"
+    ]  # fmt: skip
+    if low_names:
+        text = f"the log does not show {', '.join(low_names)}: {_remedy(low_names[-1], terms)}"
+        warnings.append(Warn(Code.LOW_EXCITATION, text))
+    return tuple(warnings)
 
 
 def _remedy(name: str, terms: Terms) -> str:
@@ -200,38 +205,6 @@ def _remedy(name: str, terms: Terms) -> str:
         more = "mass needs" if name == "M" else "damping needs"
         return f"the position moved only below {_digits(terms.band, 2)} Hz, {more} faster motion; try palpate excite"
     return "press deeper, longer or more often; try palpate excite"
-
-
-def _confounded(text: str, fitted: Fit, terms: Terms, warnings: list[Warn]) -> str:
-    """Warn once for all parameters that a lag looks like one of them, and say what is known of them together."""
-    if not any(w.code is Code.LAG_DAMPING_CONFOUNDED for w in warnings):
-        whole = f"{text}{_together(fitted, terms)}; calibrate the lag T and give it with --lag"
-        warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, whole))
-    return text
-
-
-def _together(fitted: Fit, terms: Terms) -> str:
-    """The combination of damping and lag that a narrow band shows: B - K T, for (M s^2 + B s + K) e^(-sT)."""
-    if not {"K", "B", "lag"} <= set(fitted.names):
-        return ""
-    own = [fitted.names.index(name) for name in ("B", "K", "lag")]
-    slope = np.array([1.0, -fitted.lag, -fitted["K"]])
-    std = float(np.sqrt(max(slope @ fitted.cov[np.ix_(own, own)] @ slope, 0.0)))
-    value = fitted["B"] - fitted["K"] * fitted.lag
-    return f"; what is known is B - K T = {value:.4g} +- {fitted.t * std:.2g} {_shown(unit_of('B', fitted, terms))}"
-
-
-def _whole_std(name: str, choice: Choice, terms: Terms) -> float:
-    fitted = choice.candidate.fit
-    value = fitted[name]
-    parts = [fitted.std(name), terms.calibration * value if name not in ("n", "tau") else 0.0]
-    if choice.rejected:
-        parts += [d.spread for d in choice.candidate.disagreements if d.name == name]
-    if name == "K":
-        parts.append(terms.bent / fitted.t)
-    if terms.series and name == "K":
-        parts.append(terms.series[1] * (value / terms.series[0]) ** 2)
-    return float(np.sqrt(np.sum(np.square(parts))))
 
 
 def unit_of(name: str, fitted: Fit, terms: Terms) -> str:
@@ -254,9 +227,7 @@ def unit_of(name: str, fitted: Fit, terms: Terms) -> str:
 
 
 def _percent(half: float, value: float) -> str:
-    return (
-        f"{half / abs(value):.2g}".replace("inf", "?") if value == 0 else f"{100 * half / abs(value):.2g} %"
-    )
+    return f"{100 * half / abs(value):.2g} %" if value else "?"
 
 
 def _digits(value: float, count: int = 3) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.regression import covariance, noise_of, quantile, solve
+from palpate.identification.estimators.least_squares import covariance, noise_of, quantile, solve
 from palpate.identification.result import Identification, Parameter, Traces
 
 Array = NDArray[np.float64]
@@ -61,7 +61,7 @@ def _refits(traces: Traces) -> tuple[Array, Array, Array]:
     residuals = traces.fitted_force - traces.predicted
     place = _place(traces.fitted_time)
     noise = noise_of(residuals, place, len(names))
-    known = np.array([traces.beforehand.get(name, np.inf) for name in names])
+    known = np.array([traces.prior.get(name, np.inf) for name in names])
     known[known == 0] = _EXACT * np.abs(theta[known == 0])
     # What was known beforehand stands as observations beside the log's, about the estimate that it led to.
     rows, targets = np.diag(np.sqrt(noise.variance) / known), np.zeros(len(names))

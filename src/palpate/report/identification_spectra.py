@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.filters import ORDER
+from palpate.identification.filters.state_variable import ORDER
+from palpate.identification.residuals import whiteness
 from palpate.identification.result import Identification, Traces
-from palpate.identification.whiteness import whiteness
 
 Array = NDArray[np.float64]
 

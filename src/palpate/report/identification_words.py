@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from palpate.identification.codes import Code
 from palpate.identification.result import Identification, Parameter, Verdict
+from palpate.identification.warning_codes import Code
 from palpate.report.numbers import plain, with_half
 
 CALLED = {

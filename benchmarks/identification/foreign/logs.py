@@ -1,0 +1,362 @@
+"""Logs to be judged on: a surface, a nuisance and a motion are a cell; a cell and a seed are a log."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foreign.motions import BY_FORCE, MOTIONS, course, drifting, tracked
+from foreign.recording import Recording, recorded
+from foreign.surfaces import SURFACES, Surface, press, random_surface, touch
+from foreign.truth import Dense, Range, parameters
+
+Array = NDArray[np.float64]
+Rng = np.random.Generator
+
+_DENSE = 8000.0
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a log is about, by name."""
+
+    surface: str
+    nuisance: str
+    motion: str = "any"
+
+    def __str__(self) -> str:
+        return f"{self.surface}/{self.nuisance}/{self.motion}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that is decided before the press is simulated.
+
+    Args:
+        surface, motion: what is pressed on, and how.
+        recording: how it is written down.
+        told: what `identify` is told.
+        largest: force that a depth of one stands for [N].
+        starts: air, rest or midst.
+        leaves: whether the log goes on until the probe is in the air again.
+        moving: how far the surface's height wanders, over the depth.
+        repeats: by how much the force of one stretch differs from the next's, relative.
+    """
+
+    surface: Surface
+    motion: str
+    recording: Recording
+    told: Mapping[str, Any] = field(default_factory=dict)
+    largest: float = 10.0
+    starts: str = "air"
+    leaves: bool = True
+    moving: float = 0.0
+    repeats: float = 0.0
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log, its truth, and what is told of it.
+
+    Args:
+        cell, seed: what makes it again.
+        plan: what was decided.
+        time, position, force: columns [s], [m], [N], shape (n,).
+        options: keyword arguments of `identify`.
+        truth: lowest and highest of K, B, M.
+        defined: those of them that the surface has as one number.
+        lag: lowest and highest of the force's delay [s].
+        dense: the press without sensors, within the span of the log.
+    """
+
+    cell: Cell
+    seed: int
+    plan: Plan
+    time: Array
+    position: Array
+    force: Array
+    options: dict[str, Any]
+    truth: dict[str, Range]
+    defined: frozenset[str]
+    lag: Range
+    dense: Dense
+
+
+def make_log(cell: Cell, seed: int) -> Log:
+    """The log of a cell and a seed: the same every time."""
+    rng = np.random.default_rng([seed, zlib.crc32(str(cell).encode())])
+    return log_of_plan(planned(cell, rng), rng, cell, seed)
+
+
+def planned(cell: Cell, rng: Rng) -> Plan:
+    """What is decided of a log, drawn at random within its cell."""
+    surface = random_surface(cell.surface, rng)
+    largest = float(np.exp(rng.uniform(np.log(3), np.log(25)))) * float(
+        np.clip(surface_stiffness(surface) / 5e3, 1, 4)
+    )
+    largest = min(largest, float(np.max(surface.static(np.linspace(0, 0.015, 500)))))
+    if surface.name == "falling":
+        largest = float(surface.static(np.array([-2.0 * surface["K2"] / (2.35 * surface["K3"]) * 0.98]))[0])
+    rate = float(rng.choice([250, 500, 1000, 1000, 2000]))
+    noise = largest * float(np.exp(rng.uniform(np.log(3e-4), np.log(5e-3))))
+    fine = surface.depth_of(largest) * float(np.exp(rng.uniform(np.log(2e-5), np.log(3e-4))))
+    recording = Recording(rate, noise, position_noise=fine, bias=float(rng.normal()) * 0.05 * largest)
+    motion = cell.motion if cell.motion != "any" else str(rng.choice(MOTIONS))
+    told = {"lag": 0.0} if rng.uniform() < 0.5 else {}
+    plan = Plan(surface, motion, recording, told, largest)
+    if cell.nuisance == "mixture":
+        chosen = rng.choice(len(MIXED), int(rng.integers(2, 5)), replace=False)
+        for i in sorted(chosen):
+            plan = NUISANCES[MIXED[i]](plan, rng)
+        if cell.motion != "any":
+            plan = replace(plan, motion=cell.motion)
+        return plan
+    plan = NUISANCES[cell.nuisance](plan, rng)
+    return plan if cell.motion == "any" else replace(plan, motion=cell.motion)
+
+
+def surface_stiffness(surface: Surface) -> float:
+    """A number that says how stiff it is [N/m]: secant at 3 N."""
+    depth = surface.depth_of(3.0)
+    return float(surface.static(np.array([depth]))[0] / depth)
+
+
+def log_of_plan(plan: Plan, rng: Rng, cell: Cell, seed: int) -> Log:
+    """Simulate the press, write it down, cut it, and say what is true of it."""
+    r = plan.recording
+    dt = 1 / (r.rate * np.ceil(_DENSE / r.rate))
+    deep = plan.surface.depth_of(plan.largest)
+    gap = float(rng.uniform(0.1, 0.5)) + 0.3e-3 / deep * float(rng.uniform(0, 1))
+    way = course(plan.motion, rng, dt, r.rate, gap)
+    t = np.arange(len(way.command)) * dt
+    if way.by_force:
+        gain = float(rng.uniform(6, 15)) * deep / plan.largest
+        x, _, a, touched = press(plan.surface, plan.largest * way.command, -0.1 * deep, gain, dt)
+        height = np.zeros_like(x)
+    else:
+        x, v, a = tracked(deep * way.command, float(rng.uniform(15, 40)), dt)
+        height = drifting(t, plan.moving * deep, rng) if plan.moving else np.zeros_like(x)
+        touched = touch(plan.surface, x, v, a, dt)
+    force = touched.force * _repeats(t, plan.repeats, rng)
+    times, position, newton = recorded(r, x + height + float(rng.uniform(-0.05, 0.3)), a, force, dt, rng)
+    begin, end = _cut(plan, way.base, way.begin, way.end, t[-1], rng)
+    rows = (times + 0.025 >= begin) & (times + 0.025 <= end)
+    inside = (t >= begin) & (t <= end)
+    dense = Dense(dt, touched.depth[inside], force[inside], touched.contact[inside])
+    truth, defined = parameters(plan.surface, dense, r.payload)
+    if isfinite(r.series) and "series_stiffness" not in plan.told:
+        truth = {**truth, "K": (1 / (1 / truth["K"][0] + 1 / r.series), truth["K"][1])}
+    held = (r.hold_force - 1) / r.rate, (r.hold_position - 1) / r.rate
+    lag = r.whole_lag - held[1], r.whole_lag + held[0]
+    return Log(
+        cell, seed, plan, times[rows] - times[rows][0], position[rows], newton[rows], dict(plan.told), truth,
+        defined, lag, dense,
+    )  # fmt: skip
+
+
+def _repeats(t: Array, spread: float, rng: Rng) -> Array:
+    """A factor that goes smoothly from one level to the next about every second, shape (n,)."""
+    if not spread:
+        return np.ones_like(t)
+    knots = np.arange(0, t[-1] + 2, 1.0)
+    return 1 + np.interp(t, knots, spread * rng.normal(size=len(knots)))
+
+
+def _cut(plan: Plan, base: float, begin: float, end: float, last: float, rng: Rng) -> tuple[float, float]:
+    first = {"air": 0.0, "rest": base + 0.1, "midst": begin + float(rng.uniform(0.1, 0.35)) * (end - begin)}
+    stop = last if plan.leaves else end - float(rng.uniform(0.0, 0.1)) * (end - begin)
+    return first[plan.starts], stop
+
+
+def _record(plan: Plan, **changes: Any) -> Plan:
+    return replace(plan, recording=replace(plan.recording, **changes))
+
+
+def _tell(plan: Plan, **told: Any) -> Plan:
+    """What is told, None for what is not."""
+    return replace(plan, told={k: v for k, v in {**plan.told, **told}.items() if v is not None})
+
+
+def _moves(plan: Plan, rng: Rng, *motions: str) -> Plan:
+    return plan if plan.motion in motions else replace(plan, motion=str(rng.choice(motions)))
+
+
+def _clean(plan: Plan, rng: Rng) -> Plan:
+    return plan
+
+
+def _low_rate(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, rate=float(rng.choice([65, 80, 100, 125])))
+
+
+def _high_rate(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, rate=4000.0)
+
+
+def _jitter(plan: Plan, rng: Rng) -> Plan:
+    size = float(rng.uniform(0.1, 0.8))
+    return _record(plan, jitter=size) if rng.uniform() < 0.5 else _record(plan, stamp_noise=0.5 * size)
+
+
+def _stamps(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, stamp_count=1e-3)
+
+
+def _held_force(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, hold_force=int(rng.integers(2, 9)))
+
+
+def _held_position(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, hold_position=int(rng.integers(2, 9)))
+
+
+def _held_steady(plan: Plan, rng: Rng) -> Plan:
+    return _moves(_record(plan, hold_force=int(rng.integers(3, 9))), rng, "ramps", "ramp-hold")
+
+
+def _lag_told(plan: Plan, rng: Rng) -> Plan:
+    lag = float(rng.uniform(0.001, 0.02))
+    return _tell(_record(plan, lag=lag), lag=lag)
+
+
+def _lag_std(plan: Plan, rng: Rng) -> Plan:
+    lag = float(rng.uniform(0.002, 0.02))
+    std = float(rng.uniform(0.05, 0.3)) * lag
+    return _tell(_record(plan, lag=lag), lag=float(rng.normal(lag, std)), lag_std=std)
+
+
+def _lag_unknown(plan: Plan, rng: Rng) -> Plan:
+    return _tell(_record(plan, lag=float(rng.uniform(0.001, 0.02))), lag=None)
+
+
+def _filter(plan: Plan, rng: Rng) -> Plan:
+    order = int(rng.integers(1, 5))
+    cutoff = float(np.exp(rng.uniform(np.log(15), np.log(0.2 * plan.recording.rate))))
+    return _record(
+        plan, low_pass=(order, round(cutoff, 1)), lag=float(rng.choice([0.0, rng.uniform(0, 0.01)]))
+    )
+
+
+def _filter_told(plan: Plan, rng: Rng) -> Plan:
+    plan = _filter(plan, rng)
+    order, cutoff = plan.recording.low_pass
+    return _tell(plan, force_filter=f"butterworth{order}:{cutoff:g}", lag=plan.recording.whole_lag)
+
+
+def _filter_unknown(plan: Plan, rng: Rng) -> Plan:
+    plan = _filter(plan, rng)
+    return _tell(plan, lag=plan.recording.whole_lag if rng.uniform() < 0.5 else None)
+
+
+def _coloured(plan: Plan, rng: Rng) -> Plan:
+    noise = plan.largest * float(rng.uniform(2e-3, 1.5e-2))
+    return _record(plan, colour=float(np.exp(rng.uniform(np.log(2e-3), np.log(0.2)))), force_noise=noise)
+
+
+def _encoder(plan: Plan, rng: Rng) -> Plan:
+    counts = float(np.exp(rng.uniform(np.log(4), np.log(60))))
+    return _record(plan, position_count=plan.surface.depth_of(plan.largest) / counts)
+
+
+def _drift(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, drift=float(rng.choice([-1, 1]) * rng.uniform(0.02, 0.25)) * plan.largest)
+
+
+def _bias(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, bias=float(rng.choice([-1, 1]) * rng.uniform(0.2, 2)) * plan.largest)
+
+
+def _spikes(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, spikes=float(np.exp(rng.uniform(np.log(5e-4), np.log(1e-2)))))
+
+
+def _saturation(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, range=plan.largest * float(rng.uniform(0.55, 0.85)), bias=0.0)
+
+
+def _payload(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, payload=float(rng.choice([-1, 1]) * rng.uniform(0.1, 1.0)))
+
+
+def _series_told(plan: Plan, rng: Rng) -> Plan:
+    arm = surface_stiffness(plan.surface) * float(rng.uniform(1.5, 15))
+    return _tell(
+        _record(plan, series=arm), series_stiffness=arm, series_std=float(rng.choice([0, 0.03])) * arm
+    )
+
+
+def _series_untold(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, series=surface_stiffness(plan.surface) * float(rng.uniform(8, 40)))
+
+
+def _varying(plan: Plan, rng: Rng) -> Plan:
+    return replace(plan, repeats=float(rng.uniform(0.01, 0.05)))
+
+
+def _start_rest(plan: Plan, rng: Rng) -> Plan:
+    return _steady(replace(plan, starts="rest"), rng)
+
+
+def _start_midst(plan: Plan, rng: Rng) -> Plan:
+    return replace(plan, starts="midst")
+
+
+def _never_leaves(plan: Plan, rng: Rng) -> Plan:
+    return _steady(replace(plan, starts=str(rng.choice(["rest", "midst"])), leaves=False), rng)
+
+
+def _steady(plan: Plan, rng: Rng) -> Plan:
+    away = ("taps", "ramps", "ramp-hold")
+    return plan if plan.motion not in away else _moves(plan, rng, *[m for m in MOTIONS if m not in away])
+
+
+def _moving(plan: Plan, rng: Rng) -> Plan:
+    plan = _moves(plan, rng, "dither", "dither", "sine", "multisine")
+    rate = float(rng.choice([65, 125, 500]))
+    return replace(_record(plan, rate=rate), moving=float(rng.uniform(0.1, 0.5)))
+
+
+def _glued(plan: Plan, rng: Rng) -> Plan:
+    plan = _steady(replace(plan, surface=replace(plan.surface, glued=True)), rng)
+    return _tell(replace(plan, starts="rest", leaves=False), bonded=True)
+
+
+NUISANCES: dict[str, Callable[[Plan, Rng], Plan]] = {
+    "clean": _clean,
+    "low-rate": _low_rate,
+    "high-rate": _high_rate,
+    "jitter": _jitter,
+    "ms-stamps": _stamps,
+    "held-force": _held_force,
+    "held-position": _held_position,
+    "held-steady": _held_steady,
+    "lag-told": _lag_told,
+    "lag-std": _lag_std,
+    "lag-unknown": _lag_unknown,
+    "filter-told": _filter_told,
+    "filter-unknown": _filter_unknown,
+    "coloured": _coloured,
+    "encoder": _encoder,
+    "drift": _drift,
+    "bias": _bias,
+    "spikes": _spikes,
+    "saturation": _saturation,
+    "payload": _payload,
+    "series-told": _series_told,
+    "series-untold": _series_untold,
+    "repeats": _varying,
+    "start-rest": _start_rest,
+    "start-midst": _start_midst,
+    "never-leaves": _never_leaves,
+    "moving": _moving,
+    "glued": _glued,
+}
+MIXED = tuple(name for name in NUISANCES if name not in ("clean", "glued"))
+CELLS = tuple(Cell(s, n) for s in SURFACES for n in (*NUISANCES, "mixture"))
+assert set(BY_FORCE) <= set(MOTIONS)

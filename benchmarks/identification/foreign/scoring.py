@@ -1,0 +1,219 @@
+"""One log, identified: each answer against the truth."""
+
+from __future__ import annotations
+
+import resource
+import time
+import traceback
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from foreign.bound import half_widths
+from foreign.logs import Cell, Log, make_log
+from foreign.truth import Range, octave_stiffness, of_model, press_stiffness
+from palpate.errors import InputError
+from palpate.identification import identify
+from palpate.records import Record
+
+FAR = 0.25
+"""An identified value further off than this share is confidently wrong."""
+HALVES, SMALL = 3.0, 0.02
+"""So is one that is off by more half-widths than this and by more than this share."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One identified parameter against its truth.
+
+    Args:
+        name: K, B, M, or another of the model's own; "working point".
+        value, low, high: of the answer, its 95 % interval.
+        truth: lowest and highest true value.
+        defined: whether the surface has it as one number; else the range of what a linear model may call so.
+        holds: whether the interval holds the truth; holds_model: the interval that holds if the model does.
+        wrong: whether it is confidently wrong.
+        bound: least half-width that the log carries, where it is known.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    truth: Range
+    defined: bool
+    holds: bool
+    holds_model: bool | None
+    wrong: bool
+    bound: float | None
+
+
+@dataclass(frozen=True)
+class Score:
+    """What was made of one log.
+
+    Args:
+        cell, motion, seed: what makes the log again.
+        outcome: answered, refused (an input error) or crashed; text: of the error.
+        answers: the identified parameters.
+        known: parameters that a knowing estimator has to 5 %, which the answer should have too.
+        working: the working point was given.
+        lag_given, lag_false: a lag nobody told was reported; the truth is beyond its own bound.
+        lag_invented: the same where there is no lag at all.
+        seconds, megabytes: what it took; the memory is the most that the worker had until then.
+    """
+
+    cell: str
+    motion: str
+    seed: int
+    outcome: str
+    text: str = ""
+    model: str = ""
+    contacts: int = 0
+    answers: tuple[Answer, ...] = ()
+    known: tuple[str, ...] = ()
+    working: bool = False
+    lag_given: bool = False
+    lag_false: bool = False
+    lag_invented: bool = False
+    seconds: float = 0.0
+    megabytes: float = 0.0
+    codes: tuple[str, ...] = field(default=())
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self)
+
+
+def record_of(log: Log) -> Record:
+    """The log as `identify` takes it."""
+    columns = {"time": log.time, "position": log.position, "force": log.force}
+    return Record(columns, {"time": "s", "position": "m", "force": "N"})
+
+
+def score(cell: Cell, seed: int) -> Score:
+    """Make a log, identify it and score the answer. A crash is a score too."""
+    return score_log(make_log(cell, seed))
+
+
+def score_log(log: Log) -> Score:
+    """Identify a log and score the answer."""
+    begin = time.perf_counter()
+    about = {"cell": str(log.cell), "motion": log.plan.motion, "seed": log.seed}
+    bound = half_widths(log)
+    known = tuple(n for n in bound if bound[n] <= 0.05 * abs(log.truth[n][0]))
+    begin = time.perf_counter()
+    try:
+        found = identify(record_of(log), **log.options)
+    except InputError as error:
+        return Score(**about, outcome="refused", text=str(error), known=known)
+    except Exception:  # noqa: BLE001 - a judge has to survive what it judges
+        text = traceback.format_exc(limit=-3)
+        return Score(**about, outcome="crashed", text=text, known=known)
+    seconds = time.perf_counter() - begin
+    point = _working_point(log, found)
+    given, false, invented = _lag(log, found)
+    return Score(
+        **about,
+        outcome="answered",
+        model=found.model,
+        contacts=len(found.contacts),
+        answers=(*_parameters(log, found, bound), *point),
+        known=known,
+        working=bool(point),
+        lag_given=given,
+        lag_false=false,
+        lag_invented=invented,
+        seconds=seconds,
+        megabytes=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        codes=found.codes,
+    )
+
+
+def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, ...]:
+    own = of_model(log.plan.surface, found.model)
+    answers = []
+    for name, p in found.parameters.items():
+        if str(p.verdict) != "identified" or p.value is None or p.ci95 is None:
+            continue
+        if name in own:
+            truth, defined = (own[name], own[name]), True
+        elif name in log.truth and (name == "M" or found.model != "hunt-crossley"):
+            truth, defined = log.truth[name], name in log.defined
+        else:
+            continue
+        model_ci = getattr(p, "ci95_if_model_holds", None)
+        answers.append(judged(name, p.value, p.ci95, truth, defined, model_ci, bound.get(name)))
+    return tuple(answers)
+
+
+def judged(
+    name: str,
+    value: float,
+    ci95: tuple[float, float],
+    truth: Range,
+    defined: bool = True,
+    model_ci: tuple[float, float] | None = None,
+    bound: float | None = None,
+) -> Answer:
+    """An answer against its truth.
+
+    Args:
+        name: of the parameter.
+        value: what was said.
+        ci95: its 95 % interval.
+        truth: lowest and highest true value.
+        defined: whether it is one number.
+        model_ci: the interval that holds if the model does, where one is given.
+        bound: least half-width possible.
+    """
+    low, high = (float(end) for end in ci95)
+    miss = max(truth[0] - value, value - truth[1], 0.0)
+    size = abs(truth[0] if value < truth[0] else truth[1])
+    off = miss / size if size > 0 else (np.inf if miss > 0 else 0.0)
+    half = (high - low) / 2
+    wrong = off > FAR or (miss > HALVES * half and off > SMALL)
+    return Answer(
+        name, float(value), low, high, (float(truth[0]), float(truth[1])), defined, _holds((low, high), truth),
+        None if model_ci is None else _holds(model_ci, truth), bool(wrong), bound,
+    )  # fmt: skip
+
+
+def _holds(interval: tuple[float, float], truth: Range) -> bool:
+    return bool(interval[0] <= truth[1] and interval[1] >= truth[0])
+
+
+def working_truth(log: Log, source: str, frequency: float | None) -> float | None:
+    """The true stiffness at a working point [N/m], from the press without sensors; None where it has none."""
+    if source == "octave" and frequency:
+        octave = octave_stiffness(log.dense, frequency)
+        return octave.real if octave is not None else None
+    return press_stiffness(log.dense)
+
+
+def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:
+    point = getattr(found, "working_point", None)
+    p = getattr(point, "stiffness", None)
+    if p is None or p.value is None or p.ci95 is None:
+        return ()
+    truth = working_truth(log, str(point.source), point.frequency_Hz)
+    if truth is None:
+        truth = press_stiffness(log.dense)
+    if truth is None:
+        return ()
+    return (judged("working point", p.value, p.ci95, (truth, truth), True),)
+
+
+def _lag(log: Log, found: Any) -> tuple[bool, bool, bool]:
+    """Whether a lag was reported that nobody told, whether it is false by its own bound, whether there is none."""
+    lag = found.lag
+    if lag is None or "lag" in log.options:
+        return False, False, False
+    value, std = lag if isinstance(lag, tuple) else (lag.value, lag.std)
+    kind = str(getattr(lag, "kind", "measured"))
+    reach = getattr(lag, "bound", None)
+    reach = 1.96 * std if reach is None else reach
+    low, high = log.lag
+    false = max(low - value, value - high, 0.0) > reach
+    return kind != "prior", bool(false), bool(false and high <= 0.0 and value > 0)

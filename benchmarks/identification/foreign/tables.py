@@ -1,0 +1,153 @@
+"""Scores into tables: by surface and nuisance, by either alone, and of all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from foreign.scoring import Answer, Score
+
+NAMES = ("K", "B", "M")
+ENOUGH, LEAST = 40, 0.88
+"""A row with this many answers of which fewer than this share hold the truth is flagged."""
+
+
+def row(name: str, scores: list[Score]) -> dict[str, Any]:
+    """The figures of some logs.
+
+    Args:
+        name: of the row.
+        scores: of its logs, at least one.
+    """
+    answers = [a for s in scores for a in s.answers]
+    sure = [a for a in answers if a.defined and a.name != "working point"]
+    known = [s for s in scores if "K" in s.known]
+    seconds = [s.seconds for s in scores if s.outcome == "answered"]
+    figures: dict[str, Any] = {"name": name, "logs": len(scores), "all": counts(sure)}
+    for parameter in NAMES:
+        figures[parameter] = counts([a for a in sure if a.name == parameter])
+    figures["other"] = counts([a for a in sure if a.name not in NAMES])
+    figures["apparent"] = counts([a for a in answers if not a.defined])
+    figures["working point"] = counts([a for a in answers if a.name == "working point"])
+    figures["K known"] = len(known)
+    figures["K known and given"] = sum(any(a.name == "K" for a in s.answers) for s in known)
+    figures["lag given"] = sum(s.lag_given for s in scores)
+    figures["lag false"] = sum(s.lag_false for s in scores)
+    figures["lag invented"] = sum(s.lag_invented for s in scores)
+    figures["no contact"] = sum(s.outcome == "answered" and not s.contacts for s in scores)
+    figures["refused"] = sum(s.outcome == "refused" for s in scores)
+    figures["crashed"] = sum(s.outcome == "crashed" for s in scores)
+    figures["seconds"] = float(np.mean(seconds)) if seconds else None
+    figures["megabytes"] = max((s.megabytes for s in scores), default=0.0)
+    every = figures["all"]
+    figures["flag"] = every["answers"] >= ENOUGH and every["hold"] < LEAST * every["answers"]
+    return figures
+
+
+def counts(answers: list[Answer]) -> dict[str, Any]:
+    """How many answers, how many hold, are wrong, hold if the model does, and their width over the bound."""
+    by_model = [a.holds_model for a in answers if a.holds_model is not None]
+    widths = [(a.high - a.low) / 2 / a.bound for a in answers if a.bound]
+    return {
+        "answers": len(answers),
+        "hold": sum(a.holds for a in answers),
+        "wrong": sum(a.wrong for a in answers),
+        "by model": len(by_model),
+        "hold by model": sum(by_model),
+        "width": float(np.median(widths)) if widths else None,
+    }
+
+
+def tables(scores: list[Score]) -> dict[str, list[dict[str, Any]]]:
+    """All tables, in the order in which they are printed: cells, nuisances, surfaces, motions, total."""
+
+    def grouped(key: Callable[[Score], str]) -> list[dict[str, Any]]:
+        keys = dict.fromkeys(key(s) for s in scores)
+        return [row(name, [s for s in scores if key(s) == name]) for name in keys]
+
+    return {
+        "surface x nuisance": grouped(lambda s: "/".join(s.cell.split("/")[:2])),
+        "nuisance": grouped(lambda s: s.cell.split("/")[1]),
+        "surface": grouped(lambda s: s.cell.split("/")[0]),
+        "motion": grouped(lambda s: s.motion),
+        "total": [row("all", scores)] if scores else [],
+    }
+
+
+HEAD = (
+    f"{'':28}{'logs':>5} {'K id hold wrong':>17} {'B id hold wrong':>17} {'M id hold wrong':>17} "
+    f"{'all id hold wrong':>19} {'apparent':>15} {'working point':>17} {'K known':>9} {'width':>6} {'lag':>5} "
+    f"{'none':>5} {'err':>4} {'s':>6}"
+)
+
+
+def line(figures: dict[str, Any]) -> str:
+    """One row of a table, in plain text."""
+    known = figures["K known"]
+    given = f"{figures['K known and given'] / known:.0%}" if known else "-"
+    width = figures["K"]["width"]
+    seconds = figures["seconds"]
+    return (
+        f"{figures['name']:28.28}{figures['logs']:5} {_three(figures['K']):>17} {_three(figures['B']):>17} "
+        f"{_three(figures['M']):>17} {_three(figures['all']):>19} {_three(figures['apparent']):>15} "
+        f"{_three(figures['working point']):>17} {given + f' of {known}':>9} {_short(width):>6} "
+        f"{figures['lag invented']:>5} {figures['no contact'] + figures['refused']:5} {figures['crashed']:4} "
+        f"{_short(seconds):>6}{'  < 88 %' if figures['flag'] else ''}"
+    )
+
+
+def _three(c: dict[str, Any]) -> str:
+    if not c["answers"]:
+        return "-"
+    return f"{c['answers']} {c['hold'] / c['answers']:.0%} {c['wrong']}"
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2g}" if value < 100 else f"{value:.0f}"
+
+
+def summary(scores: list[Score]) -> list[str]:
+    """The figures that the table How good asks for, one a line."""
+    if not scores:
+        return []
+    total = row("all", scores)
+    every, point = total["all"], total["working point"]
+    alone = row("", [s for s in scores if "/mixture/" not in s.cell] or scores)["all"]
+    mixed = row("", [s for s in scores if "/mixture/" in s.cell] or scores)["all"]
+    touched = len(scores)
+    lines = [
+        _share("ci95 of everything identified holds the truth", every["hold"], every["answers"]),
+        _share("  one nuisance at a time", alone["hold"], alone["answers"]),
+        _share("  random mixtures", mixed["hold"], mixed["answers"]),
+        _share("confidently wrong", every["wrong"], every["answers"]),
+        *(
+            _share(f"{n}: ci95 holds", total[n]["hold"], total[n]["answers"])
+            for n in (*NAMES, "other", "apparent")
+        ),
+        *(
+            _share(f"{n}: confidently wrong", total[n]["wrong"], total[n]["answers"])
+            for n in (*NAMES, "apparent")
+        ),
+        _share("stiffness at the working point given", point["answers"], touched),
+        _share("stiffness at the working point holds", point["hold"], point["answers"]),
+        _share(
+            "K given where a knowing estimator has it to 5 %", total["K known and given"], total["K known"]
+        ),
+        _share("ci95_if_model_holds holds", every["hold by model"], every["by model"]),
+        _share("lags false by their own bound, of those given", total["lag false"], total["lag given"]),
+        f"{'lags invented where there is none':55}{total['lag invented']:6}",
+        f"{'crashes':55}{total['crashed']:6}",
+        f"{'seconds a log, mean; MB at most':55}{total['seconds'] or 0:6.2f}  {total['megabytes']:.0f} MB",
+    ]
+    return lines
+
+
+def _share(name: str, part: int, whole: int) -> str:
+    return f"{name:55}{part:6} of {whole:6}  {part / whole:7.1%}" if whole else f"{name:55}{'not given':>6}"
+
+
+def flagged(figures: Iterable[dict[str, Any]]) -> list[str]:
+    """Names of the rows that are flagged."""
+    return [f["name"] for f in figures if f["flag"]]

@@ -1,0 +1,153 @@
+"""What is true of a press: parameters, dynamic stiffness at any frequency, and the stiffness at a working point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foreign.surfaces import Surface, touch
+
+Array = NDArray[np.float64]
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Dense:
+    """A press without sensors.
+
+    Args:
+        dt: step [s].
+        depth, force: of the surface [m], [N]; contact: whether it is touched; shape (n,) each.
+    """
+
+    dt: float
+    depth: Array
+    force: Array
+    contact: NDArray[np.bool_]
+
+    def thinned(self, rate: float) -> Dense:
+        """Every so many samples, for slow questions."""
+        every = max(int(1 / (rate * self.dt)), 1)
+        return Dense(
+            self.dt * every, self.depth[::every], self.force[::every], self.contact[::every]
+        )  # fmt: skip
+
+
+def dynamic_stiffness(surface: Surface, frequency: float, depth: float, amplitude: float) -> complex:
+    """Force over depth of a small sine about a depth, storage + 1j loss [N/m].
+
+    Linear surfaces by their formula; others by integrating the law until the arms have relaxed. One that yields has
+    then yielded: it is its elastic stiffness.
+
+    Args:
+        surface: what is pressed on.
+        frequency: of the sine [Hz].
+        depth: about which [m].
+        amplitude: of the sine [m].
+    """
+    omega = 2 * np.pi * frequency
+    if surface.linear:
+        arms = sum(k * 1j * omega * tau / (1 + 1j * omega * tau) for k, tau in surface.arms)
+        return surface["K"] + 1j * omega * surface["B"] - omega**2 * surface["M"] + arms
+    points = 4000
+    dt = 1 / (frequency * points)
+    periods = 5 + int(8 * frequency * max((tau for _, tau in surface.arms), default=0.0))
+    t = np.arange(periods * points) * dt
+    rise = np.clip(t * frequency, 0, 1)
+    swing = amplitude * np.sin(omega * t)
+    x = depth * rise**2 * (3 - 2 * rise) + np.where(t * frequency >= 1, swing, 0.0)
+    v = np.gradient(x, dt)
+    glued = Surface(surface.name, surface.elements, surface.arms, glued=True)
+    force = touch(glued, x, v, np.gradient(v, dt), dt).force
+    last = slice(-points, None)
+    wave = np.exp(-1j * omega * t[last])
+    return complex((force[last] * wave).sum() / (x[last] * wave).sum())
+
+
+def octave_stiffness(dense: Dense, frequency: float) -> complex | None:
+    """Best linear approximation of force by depth in the octave about a frequency, over blocks in contact [N/m].
+
+    Hann blocks of four periods, half overlapping; one regression over all of them (Pintelon and Schoukens 2012, 3.4).
+    None where no block lies in contact.
+    """
+    low, high = frequency / np.sqrt(2), frequency * np.sqrt(2)
+    short = dense.thinned(max(60 * frequency, 50.0))
+    size = int(4 / (frequency * short.dt))
+    top = bottom = 0.0 + 0j
+    line = np.arange(size)
+    bins = np.fft.rfftfreq(size, short.dt)
+    inside = (bins >= low) & (bins <= high)
+    window = np.hanning(size)
+    for begin in range(0, len(short.depth) - size + 1, max(size // 2, 1)):
+        block = slice(begin, begin + size)
+        if not short.contact[block].all():
+            continue
+        x, f = (np.fft.rfft(window * _level(line, s[block]))[inside] for s in (short.depth, short.force))
+        top += (f * x.conj()).sum()
+        bottom += (np.abs(x) ** 2).sum()
+    return complex(top / bottom) if abs(bottom) > 0 else None
+
+
+def _level(line: Array, values: Array) -> Array:
+    return values - np.polyval(np.polyfit(line, values, 1), line)
+
+
+def press_stiffness(dense: Dense, low: float = 0.4) -> float | None:
+    """Slope of force over depth of the loading above `low` of the largest force, a level for each stretch [N/m]."""
+    short = dense.thinned(1000.0)
+    if not short.contact.any():
+        return None
+    top = np.percentile(short.force[short.contact], 99.5)
+    speed = np.gradient(short.depth, short.dt)
+    moving = speed > 0.05 * np.percentile(np.abs(speed[short.contact]), 95)
+    inside = short.contact & moving & (short.force > low * top)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.view(np.int8), [0]])))
+    xx = xf = 0.0
+    for begin, end in pairwise(edges):
+        if inside[begin : begin + 1].any() and end - begin >= 5:
+            x, f = short.depth[begin:end], short.force[begin:end]
+            xx += float(((x - x.mean()) ** 2).sum())
+            xf += float(((x - x.mean()) * (f - f.mean())).sum())
+    return xf / xx if xx > 0 else None
+
+
+def parameters(surface: Surface, dense: Dense, payload: float) -> tuple[dict[str, Range], frozenset[str]]:
+    """What K, B and M may be, and which of them the surface defines.
+
+    One number where the surface has the parameter; for the others the range of what a linear model may call so: K what
+    the storage comes to over the depths touched, B what the loss does over the frequency. A payload that is left in the
+    force may count as mass or not.
+
+    Returns:
+        Lowest and highest, by name; names of those that are one parameter of the surface.
+    """
+    contact = dense.contact
+    deep = np.linspace(0, float(np.percentile(dense.depth[contact], 99)), 60)[1:]
+    slope = np.gradient(surface.static(deep), deep)
+    slope = np.append(slope, surface.static(deep) / deep)
+    arm = sum(k for k, _ in surface.arms)
+    late = sum(k * tau for k, tau in surface.arms)
+    plain = not any(surface[name] for name in ("K2", "K3", "C", "Kp")) and not surface.arms
+    k = (surface["K"],) * 2 if plain else (float(slope.min()), float(slope.max()) + arm)
+    if surface["Kp"]:
+        k = min(k[0], surface["H"] * surface["Kp"] / (surface["H"] + surface["Kp"])), max(k[1], surface["Kp"])
+    rate = surface["C"] * surface["D"] * float(deep[-1]) ** surface["n"] if surface["C"] else 0.0
+    b = (surface["B"], surface["B"] + late + rate)
+    m = min(surface["M"], surface["M"] + payload), max(surface["M"], surface["M"] + payload)
+    defined = {"M"} | ({"K"} if k[0] == k[1] else set()) | ({"B"} if b[0] == b[1] else set())
+    return {"K": k, "B": b, "M": m}, frozenset(defined)
+
+
+def of_model(surface: Surface, model: str) -> dict[str, float]:
+    """Parameters that a model gives as its own where the surface is of its kind, by the names of the answer."""
+    if model == "standard-linear-solid" and len(surface.arms) == 1:
+        (stiffness, tau), *_ = surface.arms
+        return {"K": surface["K"], "K1": stiffness, "tau": tau}
+    if model == "hunt-crossley" and surface["C"]:
+        return {"K": surface["C"], "n": surface["n"], "B": surface["C"] * surface["D"]}
+    if surface["Fc"] and model.startswith("kelvin-voigt"):
+        return {"Fc": surface["Fc"]}
+    return {}

@@ -1,0 +1,1 @@
+"""Estimators: from a problem and a model to a fit."""

@@ -1,0 +1,287 @@
+"""Fitting one model to one log: least squares inside, its knobs and the force's lag by Gauss and Newton outside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.estimators.lag_uncertainty import hidden, undone, with_lag
+from palpate.identification.estimators.least_squares import Noise, covariance, noise_of, quantile, solve
+from palpate.identification.models import Knob, Model, Motion
+from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 30
+_CONVERGED = 1e-6
+_ROUNDING = 1e-9
+_WALK = (-0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
+"""Where the search for a lag that nobody knows starts, in its deviations."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to a log.
+
+    Args:
+        model: which.
+        names: of the parameters: the linear ones, then the knobs, then the lag.
+        theta: their values, shape (p,).
+        cov: their covariance, coloured noise and the lag's uncertainty included, shape (p, p).
+        fixed_cov: the same as if the lag were known exactly, shape (p, p).
+        predicted, residuals: of the filtered force, shape (n,).
+        r2, rmse: of the fit.
+        noise: colour of the residuals.
+        lag: the lag used [s].
+        attenuation: how far noise of the position may have pulled each parameter, shape (p,); part of `cov`.
+        jacobian: of the predicted force by all of them, shape (n, p).
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    theta: Array
+    cov: Array
+    fixed_cov: Array
+    predicted: Array
+    residuals: Array
+    r2: float
+    rmse: float
+    noise: Noise
+    lag: float
+    attenuation: Array
+    jacobian: Array
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.theta[self.names.index(name)])
+
+    def std(self, name: str, lag_known: bool = False) -> float:
+        """Standard deviation of a parameter; as if the lag were known exactly if asked so."""
+        i = self.names.index(name)
+        cov = self.fixed_cov if lag_known else self.cov
+        return float(np.sqrt(max(cov[i, i], 0.0)))
+
+    @property
+    def t(self) -> float:
+        """What a standard deviation is multiplied with for a 95 % interval."""
+        return quantile(self.noise.effective, len(self.names))
+
+    def score(self, effective: float) -> float:
+        """Schwarz's criterion for a common number of effective samples: smaller is better."""
+        mean_square = max(self.rmse**2, 1e-300)
+        return effective * float(np.log(mean_square)) + len(self.names) * float(np.log(effective))
+
+
+@dataclass
+class _Point:
+    knobs: dict[str, float]
+    lag: float
+    columns: Array
+    theta: Array
+    residuals: Array
+
+    rss: float
+    cost: float  # rss, and what the knowledge from before has against it
+
+
+def fit(model: Model, motion: Motion, force: Array, lag: Lag) -> Fit:
+    """Fit a model.
+
+    Args:
+        model: which.
+        motion: the position.
+        force: filtered, at the motion's rows, shape (n,).
+        lag: what is known about it; if it is not known, its uncertainty is part of every interval.
+        The lag is looked for in the log within its prior.
+    """
+    asks = lag.std > 0
+    lags = lag.value + lag.std * np.array(_WALK if asks and not lag.known else (0.0,))
+    best = min((_best_start(model, motion, force, float(at)) for at in lags), key=lambda point: point.rss)
+    known = NOTHING
+    for _ in range(2 if asks or lag.mass else 1):
+        best = _descend(model, motion, force, best, lag, asks, known)
+        noise = float(np.sqrt(best.rss / max(len(force) - len(best.theta), 1)))
+        known = prior_of(lag, noise, asks)
+    if known.known:
+        best = _descend(model, motion, force, best, lag, asks, known)
+    return _finish(model, motion, force, best, lag, known)
+
+
+def _evaluate(
+    model: Model, motion: Motion, force: Array, knobs: dict[str, float], lag: float, known: Prior
+) -> _Point:
+    columns = np.column_stack(model.columns(motion, knobs, lag))
+    rows, targets = known.rows(model.linear)
+    theta = (
+        solve(np.vstack([columns, rows]), np.concatenate([force, targets]))
+        if len(rows)
+        else solve(columns, force)
+    )
+    residuals = force - columns @ theta
+    rss = float(residuals @ residuals)
+    against = float(np.sum((targets - rows @ theta) ** 2)) if len(rows) else 0.0
+    if LAG in known.known:
+        value, weight = known.known[LAG]
+        against += (weight * (lag - value)) ** 2
+    return _Point(knobs, lag, columns, theta, residuals, rss, rss + against)
+
+
+def _best_start(model: Model, motion: Motion, force: Array, lag: float) -> _Point:
+    points = (
+        _evaluate(
+            model, motion, force, dict(zip([k.name for k in model.knobs], values, strict=True)), lag, NOTHING
+        )
+        for values in product(*(knob.starts for knob in model.knobs))
+    )
+    return min(points, key=lambda point: point.rss)
+
+
+def _descend(
+    model: Model,
+    motion: Motion,
+    force: Array,
+    point: _Point,
+    lag: Lag,
+    free_lag: bool,
+    known: Prior,
+) -> _Point:
+    """Levenberg and Marquardt over the knobs and the lag, the linear parameters solved for at every step."""
+    outer = [*model.knobs, *([_lag_knob(motion, lag)] if free_lag else [])]
+    point = _evaluate(model, motion, force, point.knobs, point.lag, known) if known.known else point
+    if not outer:
+        return point
+    damping = 1e-3
+    for _ in range(_ROUNDS):
+        slopes = _slopes(model, motion, point, outer)
+        jacobian, residuals = _with_rows(np.column_stack([point.columns, slopes]), point, model, outer, known)
+        step = _damped(jacobian, residuals, len(point.theta), damping)
+        trial = _moved(model, motion, force, point, outer, step[len(point.theta) :], known)
+        gain = 1 - trial.cost / point.cost if point.cost else 0.0
+        if gain > -_ROUNDING:
+            point, damping = (trial if gain > 0 else point), max(damping / 10, 1e-9)
+            if gain < _CONVERGED:
+                break
+        else:
+            damping *= 10
+            if damping > 1e6:
+                break
+    return point
+
+
+def _with_rows(
+    jacobian: Array, point: _Point, model: Model, outer: list[Knob], known: Prior
+) -> tuple[Array, Array]:
+    """The rows of what is known beforehand under those of the log."""
+    names = (*model.linear, *(knob.name for knob in outer))
+    rows, targets = known.rows(names)
+    if not len(rows):
+        return jacobian, point.residuals
+    now = np.array([*point.theta, *(point.knobs.get(knob.name, point.lag) for knob in outer)])
+    return np.vstack([jacobian, rows]), np.concatenate([point.residuals, targets - rows @ now])
+
+
+def _lag_knob(motion: Motion, lag: Lag) -> Knob:
+    limit = 3 * lag.std
+    return Knob(LAG, (lag.value,), lag.value - limit, lag.value + limit, 0.02 / motion.chain.rate)
+
+
+def _slopes(model: Model, motion: Motion, point: _Point, outer: list[Knob]) -> Array:
+    """Derivatives of the predicted force by each knob in its own scale, shape (n, len(outer))."""
+    found = []
+    for knob in outer:
+        if knob.name == LAG:
+            up = model.columns(motion, point.knobs, point.lag + knob.step)
+            down = model.columns(motion, point.knobs, point.lag - knob.step)
+            found.append((np.column_stack(up) - np.column_stack(down)) @ point.theta / (2 * knob.step))
+            continue
+        value = point.knobs[knob.name]
+        step = knob.step * value if knob.logarithmic else knob.step
+        moved = np.column_stack(model.columns(motion, {**point.knobs, knob.name: value + step}, point.lag))
+        found.append((moved - point.columns) @ point.theta / knob.step)
+    return np.column_stack(found)
+
+
+def _damped(jacobian: Array, residuals: Array, linear: int, damping: float) -> Array:
+    """One step; only the outer parameters are damped, because the linear ones are solved for exactly."""
+    scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
+    scale[scale == 0] = 1.0
+    gram = jacobian.T @ jacobian / np.outer(scale, scale)
+    gram[np.arange(linear, len(scale)), np.arange(linear, len(scale))] += damping
+    vector = jacobian.T @ residuals / scale
+    step: Array = np.linalg.lstsq(gram, vector, rcond=1e-13)[0] / scale
+    return step
+
+
+def _moved(
+    model: Model,
+    motion: Motion,
+    force: Array,
+    point: _Point,
+    outer: list[Knob],
+    step: Array,
+    known: Prior,
+) -> _Point:
+    knobs, lag = dict(point.knobs), point.lag
+    for knob, change in zip(outer, step, strict=True):
+        if knob.name == LAG:
+            lag = float(np.clip(lag + change, knob.low, knob.high))
+        elif knob.logarithmic:
+            value = knobs[knob.name] * np.exp(np.clip(change, -1.0, 1.0))
+            knobs[knob.name] = float(np.clip(value, knob.low, knob.high))
+        else:
+            knobs[knob.name] = float(np.clip(knobs[knob.name] + change, knob.low, knob.high))
+    return _evaluate(model, motion, force, knobs, lag, known)
+
+
+def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag, known: Prior) -> Fit:
+    knob = _lag_knob(motion, lag)
+    outer = [*model.knobs, knob]
+    slopes = _slopes(model, motion, point, outer)
+    for i, own in enumerate(model.knobs):
+        if own.logarithmic:
+            slopes[:, i] /= point.knobs[own.name]
+    jacobian = np.column_stack([point.columns, slopes])
+    names = (*model.linear, *(k.name for k in model.knobs), LAG)
+    noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.std == 0))
+    theta = np.array([*point.theta, *(point.knobs[k.name] for k in model.knobs), point.lag])
+    level = float(np.sqrt(point.rss / max(len(force) - len(point.theta), 1)))
+    std = known.std(names, level)
+    fixed = np.zeros((len(names), len(names)))
+    if model.of_position:
+        by_noise = undone(model, motion, jacobian, theta, level, lag, std)
+        theta, pulled, less = theta + by_noise.step, by_noise.doubt, by_noise.less
+        more = hidden(model, motion, jacobian, theta)
+    else:
+        pulled, less = np.zeros_like(fixed), None
+        more = None
+    fixed[:-1, :-1] = (
+        covariance(
+            jacobian[:, :-1],
+            motion.rows,
+            noise,
+            None if std is None else std[:-1],
+            None if less is None else less[:-1, :-1],
+            None if more is None else more[:-1, :-1],
+        )
+        + pulled[:-1, :-1]
+    )
+    residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.knobs.values(), point.lag])
+    spread = float(np.mean((force - force.mean()) ** 2))
+    rmse = float(np.sqrt(np.mean(residuals**2)))
+    return Fit(
+        model=model,
+        names=names,
+        theta=theta,
+        cov=with_lag(jacobian, fixed, motion, noise, lag, pulled, std, less, more),
+        fixed_cov=fixed,
+        predicted=force - residuals,
+        residuals=residuals,
+        r2=1 - rmse**2 / spread if spread else 0.0,
+        rmse=rmse,
+        noise=noise,
+        lag=float(theta[-1]),
+        attenuation=np.sqrt(np.diag(pulled)),
+        jacobian=jacobian,
+    )

@@ -1,0 +1,181 @@
+"""Least squares whose intervals stay honest when the noise is coloured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_LONGEST = 20_000  # lags of the autocovariance that are ever looked at
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What the residuals say about the noise.
+
+    Args:
+        autocovariance: of the residuals, tapered, shape (n_lags,).
+        effective: number of independent samples that the residuals are worth.
+        variance: of one residual.
+    """
+
+    autocovariance: Array
+    effective: float
+    variance: float
+
+    @property
+    def long_run(self) -> float:
+        """Variance of a mean of n residuals, times n."""
+        return float(self.autocovariance[0] + 2 * self.autocovariance[1:].sum())
+
+
+_SINGULAR = 1e-13
+"""Eigenvalue of a scaled normal matrix, over the largest, below which rounding alone makes it."""
+
+
+def solve(columns: Array, target: Array) -> Array:
+    """Least squares for columns, shape (n, p), of very different size. Returns shape (p,)."""
+    scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    scale[scale == 0] = 1.0
+    gram = columns.T @ columns / np.outer(scale, scale)
+    vector = (columns.T @ target) / scale
+    if np.linalg.cond(gram) > 1e10:
+        theta: Array = np.linalg.lstsq(columns / scale, target, rcond=1e-12)[0] / scale
+        return theta
+    theta = np.linalg.solve(gram, vector) / scale
+    return theta
+
+
+def noise_of(residuals: Array, place: NDArray[np.intp], parameters: int) -> Noise:
+    """Measure the colour of the noise from residuals at the rows `place` of an even grid, both of shape (n,).
+
+    The autocovariance is tapered (Parzen), which keeps it a valid one, over eight times the residuals' own correlation
+    time; it is raised by what the fit has taken out of it.
+    """
+    place = _closed_up(place)
+    line = _spread(residuals, place)
+    there = _spread(np.ones_like(residuals), place)
+    most = int(min(len(line) // 3, _LONGEST)) + 1
+    raw = _autocorrelation(line, most)
+    pairs = np.maximum(_autocorrelation(there, most), 1.0)
+    variance = float(raw[0] / pairs[0])
+    if variance <= 0:
+        return Noise(np.zeros(1), float(len(residuals)), 0.0)
+    shape = raw / pairs / variance
+    width = _width(shape, most)
+    taper = _parzen(width)
+    curve = variance * shape[: len(taper)] * taper
+    inflation = max(1.0, float(1 + 2 * (shape[1 : len(taper)] * taper[1:]).sum()))
+    effective = max(len(residuals) / inflation, parameters + 2.0)
+    return Noise(curve * effective / (effective - parameters), effective, variance)
+
+
+def covariance(
+    columns: Array,
+    place: NDArray[np.intp],
+    noise: Noise,
+    prior: Array | None = None,
+    less: Array | None = None,
+    more: Array | None = None,
+) -> Array:
+    """Covariance of the least-squares answer under coloured noise, shape (p, p).
+
+    (A + L)^-1 (Phi' Gamma Phi + prior part) (A + L)^-1 with A = Phi' Phi: the sandwich with the noise's own Gamma.
+
+    Args:
+        columns: Phi, shape (n, p).
+        place: rows of the even grid, shape (n,).
+        noise: colour of the noise.
+        prior: standard deviation of each parameter known beforehand, infinite where nothing is; shape (p,).
+        less: information that noise of the columns themselves only pretends, shape (p, p).
+        more: covariance of what stands in Phi' f beside the noise, shape (p, p).
+    """
+    place = _closed_up(place)
+    scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    scale[scale == 0] = 1.0
+    scaled = columns / scale
+    gram = scaled.T @ scaled
+    meat = scaled.T @ _smooth(scaled, place, noise.autocovariance)
+    if prior is not None:
+        level = max(noise.long_run, noise.variance)
+        weight = level / (prior * scale) ** 2
+        gram = gram + np.diag(weight)
+        meat = meat + level * np.diag(weight)
+    if less is not None:
+        gram = gram - less / np.outer(scale, scale)
+    if more is not None:
+        meat = meat + more / np.outer(scale, scale)
+    bread = inverse(gram)
+    cov: Array = bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale)
+    return cov
+
+
+def inverse(normal: Array) -> Array:
+    """Of a symmetric matrix; a direction that it says nothing of has a variance beyond all bounds."""
+    size = np.sqrt(np.abs(np.diag(normal)))
+    size[size == 0] = 1.0
+    scaled = normal / np.outer(size, size)
+    values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
+    floor = _SINGULAR * max(float(values[-1]), 1e-300)
+    gain = np.where(values > floor, 1 / np.maximum(values, floor), 1 / (_SINGULAR * floor))
+    found: Array = (vectors * gain) @ vectors.T / np.outer(size, size)
+    return found
+
+
+def quantile(effective: float, parameters: int, level: float = 0.975) -> float:
+    """Student's t for what is left of the effective samples after the parameters."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(effective - parameters, 1.0), level))
+
+
+def _closed_up(place: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Rows counted in steps of the finest spacing between them, so that a thinned grid has no holes."""
+    step = int(np.gcd.reduce(np.diff(place)))
+    closed: NDArray[np.intp] = (place - place[0]) // max(step, 1)
+    return closed
+
+
+def _spread(values: Array, place: NDArray[np.intp]) -> Array:
+    first = int(place[0])
+    line = np.zeros(int(place[-1]) - first + 1)
+    line[place - first] = values
+    return line
+
+
+def _autocorrelation(line: Array, count: int) -> Array:
+    size = 1 << (len(line) + count).bit_length()
+    power = np.abs(np.fft.rfft(line, size)) ** 2
+    return np.fft.irfft(power, size)[:count]
+
+
+def _width(shape: Array, most: int) -> int:
+    """Eight times the correlation time: where the autocorrelation has first come down to a tenth."""
+    below = np.flatnonzero(np.abs(shape) < 0.1)
+    first = int(below[0]) if len(below) else most
+    return int(np.clip(8 * first, 4, most))
+
+
+def _parzen(width: int) -> Array:
+    u = np.arange(width) / width
+    inner = 1 - 6 * u**2 + 6 * u**3
+    outer = 2 * (1 - u) ** 3
+    return np.where(u < 0.5, inner, outer)
+
+
+def _smooth(columns: Array, place: NDArray[np.intp], autocovariance: Array) -> Array:
+    """Gamma times each column."""
+    kernel = np.concatenate([autocovariance[:0:-1], autocovariance])
+    reach = len(autocovariance) - 1
+    first = int(place[0])
+    n = int(place[-1]) - first + 1
+    size = 1 << (n + len(kernel)).bit_length()
+    spectrum = np.fft.rfft(kernel, size)
+    out = np.empty_like(columns)
+    for i in range(columns.shape[1]):
+        full = np.fft.irfft(np.fft.rfft(_spread(columns[:, i], place), size) * spectrum, size)
+        out[:, i] = full[reach : reach + n][place - first]
+    return out

@@ -1,0 +1,5 @@
+"""What a log shows before any model: dynamic stiffness, the press, the stiffness at the working point."""
+
+from palpate.identification.evidence.evidence import evidence_of
+
+__all__ = ["evidence_of"]

@@ -1,0 +1,211 @@
+"""The press: force over depth on the way in and out, its tangent, the work that is lost, and what a hold relaxes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.estimators.least_squares import noise_of
+from palpate.identification.estimators.octaves import Segment
+from palpate.identification.problem import Problem
+from palpate.identification.result import Press, Relaxation, Tangent
+
+Array = NDArray[np.float64]
+
+UPPER = 0.4
+"""Share of the force above which a way in counts for its stiffness: below, a surface is still being met."""
+_LEVELS = (0.3, 0.5, 0.7, 0.9)
+_WIDE = 0.15
+_FEWEST = 6
+_STILL = 0.02
+"""Share of the highest speed below which a probe rests: encoders and loops leave a per cent or so."""
+_SHOWN = 400
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One way in: depth [m], force [N] and time [s], shape (n,)."""
+
+    depth: Array
+    force: Array
+    time: Array
+
+
+@dataclass(frozen=True)
+class Slope:
+    """Slope of the upper part of all ways in.
+
+    Args:
+        stiffness, half: [N/m].
+        rise: mean duration of a way in [s].
+        each: slope of each way in [N/m].
+    """
+
+    stiffness: float
+    half: float
+    rise: float
+    each: tuple[float, ...]
+
+
+def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[Stroke]:
+    """The way in of each contact: up to its deepest row, at least half of the range of all."""
+    depth, force, time = problem.motion.moved(0, lag), problem.force, problem.time
+    found = []
+    reach = max((float(np.ptp(depth[s.first : s.last])) for s in segments), default=0.0)
+    for s in segments:
+        own = depth[s.first : s.last]
+        top = s.first + int(np.argmax(own))
+        if top - s.first < _FEWEST or depth[top] - depth[s.first] < 0.5 * reach:
+            continue
+        begin = s.first + int(np.argmin(depth[s.first : top]))
+        if top - begin >= _FEWEST:
+            found.append(Stroke(depth[begin:top], force[begin:top], time[begin:top]))
+    return found
+
+
+def slope_of(strokes: list[Stroke]) -> Slope | None:
+    """Slope in the upper part of the force; None without a way in that rises.
+
+    Its interval has the scatter of each way in, the change of the slope over the range, and the variance between ways
+    in (a random effect, Student's t).
+    """
+    slopes, variances, rises, changes = [], [], [], []
+    for stroke in strokes:
+        low, high = np.percentile(stroke.force, [2, 98])
+        upper = stroke.force > low + UPPER * (high - low)
+        first = int(np.argmax(upper))
+        rows = np.arange(first, len(stroke.force))
+        if len(rows) < _FEWEST or np.ptp(stroke.depth[rows]) <= 0:
+            continue
+        slope, variance, change = _line(stroke.depth[rows], stroke.force[rows])
+        slopes.append(slope)
+        variances.append(variance)
+        changes.append(change)
+        rises.append(float(stroke.time[-1] - stroke.time[0]))
+    if not slopes:
+        return None
+    value, std, freedom = pooled(np.array(slopes), np.array(variances))
+    half = float(np.hypot(_student(freedom) * std, float(np.mean(changes))))
+    return Slope(value, half, float(np.mean(rises)), tuple(slopes))
+
+
+def _line(x: Array, f: Array) -> tuple[float, float, float]:
+    """Slope, its variance under coloured noise, and half of what the slope changes by over the range."""
+    middle, reach = float(x.mean()), float(np.ptp(x))
+    u = (x - middle) / reach
+    columns = np.column_stack([np.ones_like(u), u, u**2 - (u**2).mean()])
+    theta, *_ = np.linalg.lstsq(columns, f, rcond=None)
+    left = f - columns @ theta
+    noise = noise_of(left, np.arange(len(f)), 3)
+    gram = np.linalg.pinv(columns.T @ columns)
+    variance = noise.variance * len(f) / max(noise.effective, 4.0) * np.diag(gram)
+    curve = abs(float(theta[2]))
+    return float(theta[1] / reach), float(variance[1] / reach**2), curve / reach
+
+
+def pooled(values: Array, variances: Array) -> tuple[float, float, float]:
+    """Mean of effects that differ, its deviation and degrees of freedom (Paule-Mandel, Hartung-Knapp).
+
+    Args:
+        values, variances: of each, shape (n,).
+    """
+    n = len(values)
+    if n == 1:
+        return float(values[0]), float(np.sqrt(variances[0])), 4.0
+    own = np.maximum(variances, 1e-300)
+    between = 0.0
+    for _ in range(50):
+        weight = 1 / (own + between)
+        mean = float(weight @ values / weight.sum())
+        excess = float(weight @ (values - mean) ** 2) - (n - 1)
+        if excess <= 1e-9:
+            break
+        between += excess / float(weight**2 @ (values - mean) ** 2 or 1e-300)
+    weight = 1 / (own + between)
+    mean = float(weight @ values / weight.sum())
+    spread = float(weight @ (values - mean) ** 2) / (n - 1) / float(weight.sum())
+    return mean, float(np.sqrt(max(spread, 1 / float(weight.sum())))), float(n - 1)
+
+
+def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | None:
+    """The press of a log; None without a way in."""
+    strokes = strokes_in(problem, lag, segments)
+    if not strokes:
+        return None
+    loading = max(strokes, key=lambda stroke: len(stroke.depth))
+    tangent = [t for level in _LEVELS if (t := _tangent(strokes, level)) is not None]
+    way_out, loss = _unloading(problem, lag, segments)
+    return Press(
+        tuple(tangent), _thin(loading.depth, loading.force), way_out, loss, _relaxation(problem, lag, segments)
+    )
+
+
+def _tangent(strokes: list[Stroke], level: float) -> Tangent | None:
+    slopes, variances, forces = [], [], []
+    for stroke in strokes:
+        low, high = np.percentile(stroke.force, [2, 98])
+        share = (stroke.force - low) / (high - low or 1.0)
+        rows = np.flatnonzero(np.abs(share - level) < _WIDE)
+        if len(rows) < _FEWEST or np.ptp(stroke.depth[rows]) <= 0:
+            continue
+        slope, variance, _ = _line(stroke.depth[rows], stroke.force[rows])
+        slopes.append(slope)
+        variances.append(variance)
+        forces.append(float(low + level * (high - low)))
+    if not slopes:
+        return None
+    value, std, freedom = pooled(np.array(slopes), np.array(variances))
+    return Tangent(float(np.mean(forces)), value, _student(freedom) * std)
+
+
+def _unloading(problem: Problem, lag: float, segments: list[Segment]) -> tuple[Array, float | None]:
+    """The way out of the deepest contact, and the share of the work that does not come back on it."""
+    depth, force = problem.motion.moved(0, lag), problem.force
+    s = max(segments, key=lambda s: float(np.ptp(depth[s.first : s.last])))
+    x, f = depth[s.first : s.last], force[s.first : s.last]
+    top = int(np.argmax(x))
+    if top < _FEWEST or len(x) - top < _FEWEST or x[top] - x[-1] < 0.5 * (x[top] - x[0]):
+        return np.empty((2, 0)), None
+    start = max(x[0], x[top:].min())
+    into = float(np.trapezoid(f[: top + 1], x[: top + 1]))
+    first = int(np.argmax(x[: top + 1] >= start))
+    into = float(np.trapezoid(f[first : top + 1], x[first : top + 1]))
+    out = x[top:]
+    last = top + (int(np.argmax(out <= start)) if (out <= start).any() else len(out) - 1)
+    back = -float(np.trapezoid(f[top : last + 1], x[top : last + 1]))
+    loss = 1 - back / into if into > 0 else None
+    return _thin(x[top:], f[top:]), loss
+
+
+def _relaxation(problem: Problem, lag: float, segments: list[Segment]) -> Relaxation | None:
+    """Of the longest hold after a way in."""
+    speed, force, time = problem.motion.moved(1, lag), problem.force, problem.time
+    still = np.abs(speed) < _STILL * float(np.percentile(np.abs(speed), 98))
+    best: tuple[int, int] | None = None
+    for s in segments:
+        edges = np.diff(np.r_[0, still[s.first : s.last].astype(np.int8), 0])
+        for a, b in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+            if b - a >= 4 * _FEWEST and a > 0 and (best is None or b - a > best[1] - best[0]):
+                best = (s.first + int(a), s.first + int(b))
+    if best is None:
+        return None
+    f, t = force[best[0] : best[1]], time[best[0] : best[1]]
+    few = max(len(f) // 20, 2)
+    begin, end = float(np.median(f[:few])), float(np.median(f[-few:]))
+    if begin <= 0 or begin <= end:
+        return None
+    gone = (begin - f) / (begin - end)
+    return Relaxation(1 - end / begin, float(t[int(np.argmax(gone >= 0.5))] - t[0]), float(t[-1] - t[0]))
+
+
+def _thin(x: Array, f: Array) -> Array:
+    step = max(len(x) // _SHOWN, 1)
+    return np.stack([x[::step], f[::step]])
+
+
+def _student(freedom: float) -> float:
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(freedom, 1.0), 0.975))

@@ -1,0 +1,100 @@
+"""The stiffness at the working point: one number that the log shows, whatever the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.estimators.octaves import Segment
+from palpate.identification.evidence.press import Slope, slope_of, strokes_in
+from palpate.identification.in_series import slope_without_series
+from palpate.identification.options import Options
+from palpate.identification.problem import Problem
+from palpate.identification.result import DynamicStiffness, Parameter, Verdict, WorkingPoint
+
+Array = NDArray[np.float64]
+
+_EXCITED = 0.05
+"""Share of the position's variance that makes an octave worth a headline: one part in twenty of the motion."""
+
+
+def working_point(
+    problem: Problem,
+    spectrum: Sequence[DynamicStiffness],
+    segments: list[Segment],
+    options: Options,
+    unit: str,
+) -> WorkingPoint | None:
+    """The most excited octave whose interval is within the tolerance; else the press; else the narrower of them.
+
+    An octave whose storage falls below a lower one's by more than both half-widths shows something other than the
+    surface (a probe that follows it, an inertia), and is passed over.
+    """
+    lag, tolerance = problem.lag.value, options.tolerance
+    slope = slope_of(strokes_in(problem, lag, segments))
+    if slope is not None and options.series_stiffness is not None:
+        series = options.series_stiffness, options.series_std
+        value, half = slope_without_series(slope.stiffness, slope.half, *series)
+        each = tuple(slope_without_series(own, 0.0, *series)[0] for own in slope.each)
+        slope = replace(slope, stiffness=value, half=half, each=each)
+    octave = _octave(spectrum)
+    if octave is None and slope is None:
+        return None
+    use_press = octave is None or (
+        slope is not None
+        and octave.storage_half > tolerance * abs(octave.storage)
+        and slope.half / abs(slope.stiffness or 1e-300) < octave.storage_half / abs(octave.storage or 1e-300)
+    )
+    if use_press and slope is not None:
+        value, half, frequency, again = slope.stiffness, slope.half, 0.25 / slope.rise, _again(slope)
+    else:
+        assert octave is not None
+        value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
+    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
+    force, depth = problem.force[inside], problem.motion.moved(0, lag)[inside]
+    rest = problem.contacts.resting
+    return WorkingPoint(
+        _judged(value, half, tolerance, unit),
+        float(force.mean() - rest),
+        float(depth.mean()),
+        float(frequency),
+        "press" if use_press else "octave",
+        again,
+    )
+
+
+def _octave(spectrum: Sequence[DynamicStiffness]) -> DynamicStiffness | None:
+    kept = []
+    for i, own in enumerate(spectrum):
+        lower = [o for o in spectrum[:i] if o.share >= _EXCITED]
+        falls = any(own.storage + own.storage_half < o.storage - o.storage_half for o in lower)
+        if own.share >= _EXCITED and own.storage > 0 and not falls:
+            kept.append(own)
+    return max(kept, key=lambda own: own.share, default=None)
+
+
+def _again(slope: Slope) -> tuple[float, float] | None:
+    """Where the slope of the next way in falls: t(n - 2) sqrt(between + own)."""
+    n = len(slope.each)
+    if n < 3:
+        return None
+    from scipy.special import stdtrit
+
+    half = float(stdtrit(n - 2, 0.975)) * float(np.std(slope.each, ddof=1)) * float(np.sqrt(1 + 1 / n))
+    return slope.stiffness - half, slope.stiffness + half
+
+
+def _judged(value: float, half: float, tolerance: float, unit: str) -> Parameter:
+    share = half / abs(value) if value else np.inf
+    interval = (value - half, value + half)
+    if share <= tolerance:
+        reason = f"known to {100 * share:.2g} % (95 %), whatever the model"
+        return Parameter(value, half / 1.96, interval, unit, Verdict.IDENTIFIED, reason)
+    if share < 1:
+        reason = f"known to {100 * share:.2g} % only (95 %)"
+        return Parameter(value, half / 1.96, interval, unit, Verdict.NOT_IDENTIFIABLE, reason)
+    reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g} {unit}; zero is within it"
+    return Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)

@@ -1,0 +1,96 @@
+"""How fast the signals of a log are, and so where the filters cut off."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.filters.position_noise import position_noise
+from palpate.identification.filters.sensor_path import SensorPath
+from palpate.identification.models import Motion
+
+Array = NDArray[np.float64]
+
+FASTEST = 1 / 8
+"""Highest cut-off as a share of the readings per second: above it sampling, not filtering, sets the error."""
+_ABOVE_FLOOR = 10.0
+_SEGMENT = 8192
+_CONTACTS = 32
+_FEWEST_SEGMENT = 64
+_APART = 3.0
+_MOST = 0.99
+_TAPER = ("tukey", 0.1)
+
+
+def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> float:
+    """The cut-off [Hz] that passes what stands above the noise in both channels.
+
+    Args:
+        position: of the stretch that will be fitted, shape (n,).
+        force: likewise.
+        dt: their sampling period [s].
+        rate: fresh readings per second of the slower channel [1/s].
+    """
+    highest = FASTEST * rate
+    if len(position) < _FEWEST_SEGMENT:
+        return highest
+    edge = 2 * min(
+        _edge(position, dt), _edge(force, dt)
+    )  # five lags in a row halve the power at 0.39 of their cut-off
+    lowest = min(highest, 10 / (len(position) * dt))
+    return float(np.clip(edge, max(lowest, highest / 50), highest))
+
+
+def _edge(signal: Array, dt: float) -> float:
+    """The highest frequency at which the spectrum stands well above its own floor near the end of the band [Hz]."""
+    size = min(len(signal), _SEGMENT)
+    window = np.hanning(size)
+    hop = max(size // 2, 1)
+    starts = range(0, len(signal) - size + 1, hop)
+    power = np.zeros(size // 2 + 1)
+    line = np.linspace(0, 1, size)
+    for begin in starts:
+        part = signal[begin : begin + size]
+        part = part - part[0] - line * (part[-1] - part[0])
+        power += np.abs(np.fft.rfft(part * window)) ** 2
+    frequency = np.fft.rfftfreq(size, dt)
+    power = _smooth(power)
+    floor = float(np.median(power[-len(power) // 4 :]))
+    above = np.flatnonzero(power > _ABOVE_FLOOR * floor)
+    return float(frequency[above[-1]]) if len(above) else 0.0
+
+
+def _smooth(power: Array) -> Array:
+    width = max(len(power) // 100, 1)
+    return np.convolve(power, np.ones(width) / width, mode="same")
+
+
+def highest_motion(motion: Motion) -> float:
+    """The frequency below which the position moved while it was fitted [Hz]; infinite if all contacts are too short.
+
+    Below it lies 99 % of the power of the probe's speed, as far as that stands above the position's own noise; of
+    several contacts (the longest, where they are many) in the fastest. Where a clean spectrum at last meets its floor
+    is far above that, and no motion.
+    """
+    chain, rows = motion.chain, motion.rows
+    rows = chain.instants[rows].astype(np.intp) if isinstance(chain, SensorPath) else rows
+    step = np.diff(rows)
+    contacts = np.split(rows, np.flatnonzero(step > _APART * np.median(step)) + 1)
+    stretches = [motion.position[own[0] : own[-1] + 1] for own in contacts]
+    longest = sorted(stretches, key=len)[-_CONTACTS:]
+    bands = [_band(stretch, chain.dt) for stretch in longest if len(stretch) >= _FEWEST_SEGMENT]
+    return max(bands, default=float("inf"))
+
+
+def _band(position: Array, dt: float) -> float:
+    """Of one stretch of motion."""
+    from scipy.fft import next_fast_len
+    from scipy.signal import periodogram
+
+    speed = np.diff(position)
+    frequency, power = periodogram(speed, window=_TAPER, nfft=next_fast_len(len(speed), real=True))
+    noise = position_noise([position])
+    floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
+    moved = np.cumsum(np.where(power > _ABOVE_FLOOR * floor, power, 0.0))
+    last = int(np.searchsorted(moved, _MOST * moved[-1])) if moved[-1] else 1
+    return float(frequency[max(last, 1)]) / dt

@@ -1,0 +1,181 @@
+"""The one filter chain that every channel of an identification passes through.
+
+A state-variable filter: five equal first-order lags in a row, F(s) = (w / (s + w))^5, whose inner states give the
+filtered signal and its first four derivatives without ever taking a difference. f = M a + B v + K x holds for the
+filtered channels exactly as for the raw ones, because F is the same on all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.filters.position_noise import PositionNoise
+
+Array = NDArray[np.float64]
+
+ORDER = 5
+_LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak
+
+
+@dataclass(frozen=True)
+class Chain:
+    """State-variable filters of one cut-off for evenly sampled signals.
+
+    The response to the straight lines between the samples is exact (a first-order hold), also between the samples:
+    a channel can be read at any `t - lag`. So there is no warping of frequencies, unlike with a bilinear filter.
+
+    Args:
+        cutoff: of each of the five lags [Hz].
+        dt: sampling period [s].
+    """
+
+    cutoff: float
+    dt: float
+
+    @property
+    def rate(self) -> float:
+        """w of F(s) [rad/s]."""
+        return 2 * pi * self.cutoff
+
+    @property
+    def period(self) -> float:
+        """From row to row [s]."""
+        return self.dt
+
+    def times(self, rows: NDArray[np.intp]) -> Array:
+        """Of rows [s] from the first sample, less the chain's own delay."""
+        found: Array = rows * self.dt - self.delay
+        return found
+
+    def gain(self, frequency: Array) -> Array:
+        """Of its amplitude at frequencies [Hz]."""
+        found: Array = (1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2)
+        return found
+
+    @property
+    def delay(self) -> float:
+        """Delay of slow signals, the same on every channel [s]."""
+        return ORDER / self.rate
+
+    @property
+    def settling(self) -> float:
+        """Time after which a disturbance has left the filtered signal but for 1 % [s]."""
+        return 11.6 / self.rate
+
+    @property
+    def thorough_settling(self) -> float:
+        """The same, but for 2e-5 of it [s]."""
+        return 20.0 / self.rate
+
+    def __call__(self, signal: Array, derivative: int = 0, lag: float = 0.0) -> Array:
+        """The filtered signal, or one of its derivatives, at the times t - lag.
+
+        Args:
+            signal: shape (n,); before its first and after its last sample it is taken to rest there.
+            derivative: 0 to 4.
+            lag: how much earlier the signal is read [s]; may be negative.
+
+        Returns:
+            Shape (n,).
+        """
+        taps, first = self._taps(derivative, lag)
+        reach = len(taps) + abs(first)
+        level = float(signal[0])
+        padded = np.pad(signal - level, reach, mode="edge")
+        start = reach - first
+        full = _convolve(padded, taps)
+        return full[start : start + len(signal)] + (level if derivative == 0 else 0.0)
+
+    def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
+        """The same at the samples `rows` only, shape (len(rows),)."""
+        return self(signal, derivative, lag)[rows]
+
+    def noise_spread(self, noise: PositionNoise) -> Array:
+        """Covariance of what noise of the position leaves in the derivatives 0 to 3, shape (4, 4)."""
+        return noise.spread(np.stack([self._taps(derivative, 0.0)[0] for derivative in range(4)]))
+
+    def _taps(self, derivative: int, lag: float) -> tuple[Array, int]:
+        """Samples of the response to one hat of a first-order hold, and the index of the first of them."""
+        first = int(np.floor(lag / self.dt)) - 1
+        count = int(np.ceil(_LENGTH / (self.rate * self.dt))) + 3
+        time = (first + np.arange(count)) * self.dt - lag
+        curve = self._integrated(derivative, time[:, None] + np.array([self.dt, 0.0, -self.dt]))
+        taps = (curve[:, 0] - 2 * curve[:, 1] + curve[:, 2]) / self.dt
+        if derivative == 0:
+            taps /= taps.sum()  # the cut-off tail would otherwise cost 1e-9 of the level
+        return taps, first
+
+    def _integrated(self, derivative: int, time: Array) -> Array:
+        """The impulse response integrated twice and then differentiated `derivative` times."""
+        w = self.rate
+        tau = w * np.maximum(time, 0.0)
+        if derivative == 0:
+            return (tau * _erlang_cdf(ORDER, tau) - ORDER * _erlang_cdf(ORDER + 1, tau)) / w
+        if derivative == 1:
+            return _erlang_cdf(ORDER, tau)
+        if derivative == 2:
+            return w * _erlang(ORDER, tau)
+        if derivative == 3:
+            return w**2 * (_erlang(ORDER - 1, tau) - _erlang(ORDER, tau))
+        if derivative == 4:
+            return w**3 * (_erlang(ORDER - 2, tau) - 2 * _erlang(ORDER - 1, tau) + _erlang(ORDER, tau))
+        raise ValueError(f"the chain gives derivatives 0 to 4, not {derivative}")
+
+
+def _erlang(order: int, tau: Array) -> Array:
+    """Impulse response of `order` unit lags in a row."""
+    return tau ** (order - 1) * np.exp(-tau) / factorial(order - 1)
+
+
+def _erlang_cdf(order: int, tau: Array) -> Array:
+    """Step response of `order` unit lags in a row."""
+    total = np.zeros_like(tau)
+    term = np.ones_like(tau)
+    for k in range(order):
+        if k:
+            term = term * tau / k
+        total += term
+    return 1.0 - total * np.exp(-tau)
+
+
+def _convolve(signal: Array, taps: Array) -> Array:
+    if len(taps) <= 256:
+        return np.convolve(signal, taps)
+    size = 1 << (len(signal) + len(taps) - 2).bit_length()
+    product = np.fft.rfft(signal, size) * np.fft.rfft(taps, size)
+    return np.fft.irfft(product, size)[: len(signal) + len(taps) - 1]
+
+
+def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
+    """One lag 1/(1 + s T), exact for straight lines between the samples, starting from rest at 0. Shape (n,)."""
+    decay = np.exp(-dt / time_constant)
+    b1 = 1 - time_constant / dt * (1 - decay)
+    b0 = time_constant / dt * (1 - decay) - decay
+    count = min(len(signal), int(np.ceil(36 * time_constant / dt)) + 1)
+    powers = decay ** np.arange(count)
+    taps = b1 * powers
+    taps[1:] += b0 * powers[:-1]
+    return _convolve(signal, taps)[: len(signal)]
+
+
+def white_noise(signal: Array) -> float:
+    """Standard deviation of the white part of a signal, from its eighth differences.
+
+    An upper bound: what is left of the motion itself in the differences counts as noise.
+    """
+    differences = np.diff(signal, 8)
+    if not len(differences):
+        return 0.0
+    gain = float(np.sqrt(12870))  # root of the sum of the squared weights of an eighth difference
+    return float(1.4826 * np.median(np.abs(differences)) / gain)
+
+
+def block_means(signal: Array, size: int) -> Array:
+    """Means of neighbouring blocks of `size` samples, shape (n // size,); the rest at the end is dropped."""
+    count = len(signal) // size
+    means: Array = signal[: count * size].reshape(count, size).mean(axis=1)
+    return means

@@ -1,0 +1,95 @@
+"""From a record to an Identification: the stages one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from palpate.identification import in_series
+from palpate.identification.contacts import contacts_of
+from palpate.identification.estimators.methods import estimated_by
+from palpate.identification.evidence import evidence_of
+from palpate.identification.filters.bandwidth import highest_motion
+from palpate.identification.options import LEAST_SQUARES, Options
+from palpate.identification.outcome import nothing, outcome
+from palpate.identification.problem import problem_of
+from palpate.identification.result import Identification
+from palpate.identification.sampling import channels_of, thinned
+from palpate.identification.selection import choose
+from palpate.identification.verdicts import Terms, verdicts
+from palpate.identification.warning_codes import Code, Warn
+from palpate.records import Record
+from palpate.signals.low_pass import LowPass
+
+_MOST_SAMPLES = 2_000_000
+_FOLLOWS = 0.3
+
+
+def identify(
+    record: Record,
+    *,
+    model: str | None = None,
+    lag: float | None = None,
+    lag_std: float = 0.0,
+    tolerance: float = 0.25,
+    calibration: float = 0.0,
+    series_stiffness: float | None = None,
+    series_std: float = 0.0,
+    bonded: bool | None = None,
+    cutoff: float | None = None,
+    force_filter: LowPass | str | None = None,
+    mass: tuple[float, float] | None = None,
+    method: str = LEAST_SQUARES,
+    force_sign: int | None = None,
+) -> Identification:
+    """Find what a probe touched, and how far to trust it.
+
+    First what the log shows without a model: dynamic stiffness by octave, the press, the stiffness at the working
+    point. Then f = M a + B v + K x + offset or one of its relatives, beside other causes of force whose size the log
+    tells. Each parameter gets a verdict; a number that the log does not carry is not given.
+
+    Args:
+        record: with the columns `time` [s], `position` [m] and `force` [N], of shape (n,); NaN means no reading.
+        model: kelvin-voigt, kelvin-voigt-mass, standard-linear-solid or hunt-crossley; None to choose.
+        lag: how much later the force is read than the position [s], if it is calibrated.
+        lag_std: standard deviation of that [s].
+        tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
+        calibration: relative standard deviation of the scales of force and position together.
+        series_stiffness: of what lies between the position sensor and the surface [N/m]; it is taken out.
+        series_std: standard deviation of that [N/m].
+        bonded: True if the probe is fixed to the surface, False if it is not, None to find out.
+        cutoff: of the filter chain [Hz]; None to choose.
+        force_filter: what the force sensor low-passes the force with before it is sampled, as `butterworth3:120`.
+            The position then goes through the same, and is read at the sensor's own samples. The lag, if it is given,
+            is that of a fresh reading, this low-pass included.
+        mass: prior of the mass, value and standard deviation [kg]; 0 fixes it.
+        method: least-squares; instrumental-variables or output-error, where noise of the position would pull it.
+        force_sign: 1 if the force grows as the probe presses, -1 if it falls; None to find out.
+
+    Raises:
+        InputError: the record or an argument is wrong, in one line.
+    """
+    options = Options.of(
+        model=model, lag=lag, lag_std=lag_std, tolerance=tolerance, calibration=calibration,
+        series_stiffness=series_stiffness, series_std=series_std, bonded=bonded, cutoff=cutoff,
+        force_filter=force_filter, mass=mass, method=method, force_sign=force_sign,
+    )  # fmt: skip
+    channels = channels_of(record)
+    options.check_lag(channels.duration)
+    channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
+    channels, chain, contacts = contacts_of(channels, options)
+    warnings = (*channels.warnings, *contacts.warnings)
+    terms = Terms(tolerance, calibration, record.units["force"], record.units["position"])
+    if not contacts.spans:
+        return nothing(channels, chain, options, terms, warnings)
+    problem = problem_of(channels, chain, contacts, options)
+    terms = replace(terms, band=highest_motion(problem.motion))
+    choice = choose(problem, options)
+    if not contacts.clear and choice.answer.explained < _FOLLOWS:
+        text = f"the force (rms {choice.answer.unexplained:.3g} N) does not follow the position: nothing seems touched"
+        return nothing(channels, chain, options, terms, (*warnings, Warn(Code.NO_CONTACT, text)))
+    holds = estimated_by(method, choice.answer.fit.model, choice.problem, channels)
+    evidence = evidence_of(problem, options, terms.stiffness_unit)
+    if series_stiffness is not None:
+        choice = replace(choice, answer=in_series.without_series(choice.answer, series_stiffness, series_std))
+    parameters, told = verdicts(choice, holds, evidence[2], terms)
+    return outcome(channels, chain, choice, holds, evidence, parameters, (*warnings, *told), options, terms)

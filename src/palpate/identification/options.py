@@ -1,0 +1,90 @@
+"""What a caller says about a log, checked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from palpate.errors import InputError, unknown
+from palpate.identification.models import NAMES
+from palpate.signals.low_pass import LowPass
+
+LEAST_SQUARES = "least-squares"
+METHODS = (LEAST_SQUARES, "instrumental-variables", "output-error")
+"""Least squares on the force; refined instrumental variables, where the position is the noisier channel; output error,
+the same by simulation, which takes a curved spring too. They differ in `ci95_if_model_holds` alone."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Everything that `palpate.identify` is told beside the record; see there."""
+
+    model: str | None = None
+    lag: float | None = None
+    lag_std: float = 0.0
+    tolerance: float = 0.25
+    calibration: float = 0.0
+    series_stiffness: float | None = None
+    series_std: float = 0.0
+    bonded: bool | None = None
+    cutoff: float | None = None
+    force_filter: LowPass | None = None
+    mass: tuple[float, float] | None = None
+    method: str = LEAST_SQUARES
+    force_sign: int | None = None
+
+    @classmethod
+    def of(cls, **said: Any) -> Options:
+        """Check what was said.
+
+        Raises:
+            InputError: a value out of its range, in one line.
+        """
+        told = said.get("force_filter")
+        low_pass = LowPass.parse(told) if isinstance(told, str) else told
+        options = cls(**(said | {"force_filter": low_pass if low_pass and low_pass.sections else None}))
+        _check(options)
+        return options
+
+
+    def check_lag(self, duration: float) -> None:
+        """Refuse a lag in other units than seconds."""
+        if self.lag is not None and abs(self.lag) >= duration:
+            raise InputError(
+                f"the lag of {self.lag:g} s is as long as the whole log ({duration:.3g} s); give it in seconds"
+            )
+
+
+def _check(o: Options) -> None:
+    if o.model is not None and o.model not in NAMES:
+        raise unknown("model", o.model, NAMES)
+    if o.method not in METHODS:
+        raise unknown("method", o.method, METHODS)
+    if o.method != LEAST_SQUARES and o.force_filter is not None:
+        raise InputError(
+            f"a known force filter is for {LEAST_SQUARES}: leave --force-filter out for {o.method}"
+        )
+    if not 0 < o.tolerance <= 1:
+        raise InputError(f"the tolerance must be in (0, 1], got {o.tolerance:g}; 0.25 means 25 %")
+    if o.calibration >= 1:
+        raise InputError(f"the calibration must be below 1, got {o.calibration:g}; 0.01 means 1 %")
+    if o.lag is not None and not isfinite(o.lag):
+        raise InputError(f"the lag must be a number of seconds, got {o.lag:g}")
+    if o.force_sign not in (None, 1, -1):
+        raise InputError(f"the force sign must be +1 or -1, got {o.force_sign}")
+    if o.mass is not None and not all(isfinite(number) and number >= 0 for number in o.mass):
+        raise InputError(f"the mass and its std must be 0 or more, got {o.mass[0]:g} and {o.mass[1]:g}")
+    for name, value in (
+        ("calibration", o.calibration),
+        ("lag's std", o.lag_std),
+        ("series stiffness' std", o.series_std),
+    ):
+        if not (isfinite(value) and value >= 0):
+            raise InputError(f"the {name} must be 0 or more, got {value:g}")
+    for name, positive in (("series stiffness", o.series_stiffness), ("cut-off", o.cutoff)):
+        if positive is not None and not (isfinite(positive) and positive > 0):
+            raise InputError(f"the {name} must be above 0, got {positive:g}")
+
+
+NOTHING_SAID = Options()

@@ -1,0 +1,187 @@
+"""What a user gets: an Identification of all that the stages have found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.identification.contacts import Contacts
+from palpate.identification.estimators.fit import Fit
+from palpate.identification.filters.state_variable import Chain, block_means
+from palpate.identification.options import Options
+from palpate.identification.prior import LAG
+from palpate.identification.problem import Problem
+from palpate.identification.result import (
+    DynamicStiffness,
+    Identification,
+    LagFound,
+    Parameter,
+    Press,
+    Traces,
+    Verdict,
+    WorkingPoint,
+)
+from palpate.identification.sampling import Channels
+from palpate.identification.selection import Choice
+from palpate.identification.verdicts import Terms
+from palpate.identification.warning_codes import Code, Warn
+from palpate.signals import Estimate
+from palpate.units import impedance_units
+
+_SOFTEST, _STIFFEST = 1.0, 1e8
+_DEEPEST = 0.5
+"""No press goes deeper [m]."""
+_SHOWN = 50_000
+"""Samples of each trace: what is more is thinned, and averaged where it was fitted."""
+_NARROWER = 0.5
+"""Share of the prior's interval at or below which the log has told a lag something."""
+
+
+def outcome(
+    channels: Channels,
+    chain: Chain,
+    choice: Choice,
+    holds: Fit,
+    evidence: tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None],
+    parameters: dict[str, Parameter],
+    warnings: tuple[Warn, ...],
+    options: Options,
+    terms: Terms,
+) -> Identification:
+    """Put everything together."""
+    problem, found = choice.problem, choice.answer
+    spectrum, press, point = evidence
+    mass = parameters.get("M")
+    name = found.fit.model.name
+    if name == "kelvin-voigt-mass" and options.model is None and (mass is None or mass.verdict is not Verdict.IDENTIFIED):
+        name = "kelvin-voigt"
+    return Identification(
+        model=name,
+        parameters=parameters,
+        contacts=tuple(_clock(channels, chain, problem.contacts, span) for span in problem.contacts.spans),
+        lag=_lag(choice),
+        r2=found.fit.r2,
+        rmse=found.fit.rmse,
+        n=len(problem.force),
+        warnings=(*warnings, *_doubts(parameters, problem, options, terms)),
+        comparison=choice.tried,
+        cutoff=problem.motion.chain.cutoff,
+        traces=_traces(channels, chain, choice, terms),
+        estimate=Estimate(holds.names, holds.theta, holds.cov, holds.noise.effective),
+        working_point=point,
+        dynamic_stiffness=spectrum,
+        press=press,
+        options=_plain_options(options),
+    )
+
+
+def nothing(channels: Channels, chain: Chain, options: Options, terms: Terms, warnings: tuple[Warn, ...]) -> Identification:
+    """There is no contact: every parameter without a number."""
+    reason = "there is no contact in this log"
+    units = impedance_units(terms.force_unit, terms.position_unit)
+    parameters = {
+        name: Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)
+        for name, unit in units.items()
+    }
+    nan = float("nan")
+    return Identification(
+        options.model or "kelvin-voigt",
+        parameters,
+        (),
+        None,
+        nan,
+        nan,
+        0,
+        warnings,
+        cutoff=chain.cutoff,
+        traces=_untouched(channels, chain, terms),
+        options=_plain_options(options),
+    )
+
+
+def _plain_options(options: Options) -> dict[str, object]:
+    told = {name: getattr(options, name) for name in options.__dataclass_fields__}
+    told["force_filter"] = str(options.force_filter) if options.force_filter else None
+    return {name: value for name, value in told.items() if value not in (None, 0.0)}
+
+
+def _lag(choice: Choice) -> LagFound | None:
+    prior, found = choice.problem.lag, choice.answer
+    if prior.known:
+        told = prior.value != 0 or prior.std > 0
+        return LagFound(prior.value, prior.std, 1.96 * prior.std, "told") if told else None
+    half = found.half_of(LAG) if LAG in found.names else 1.96 * prior.std
+    if half <= _NARROWER * 1.96 * prior.std and choice.explains:
+        return LagFound(found[LAG], half / 1.96, half, "measured")
+    return LagFound(prior.value, prior.std, 1.96 * prior.std, "prior")
+
+
+def _doubts(
+    parameters: dict[str, Parameter], problem: Problem, options: Options, terms: Terms
+) -> list[Warn]:
+    warnings = []
+    stiffness = parameters["K"].value if "K" in parameters else None
+    if stiffness is not None and parameters["K"].unit == "N/m" and not _SOFTEST <= stiffness <= _STIFFEST:
+        text = (
+            f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: is a unit off, as by a factor of 1000?"
+        )
+        warnings.append(Warn(Code.UNIT_GUESS, text))
+    series = options.series_stiffness
+    if stiffness is not None and series and stiffness > series / 3:
+        text = f"K = {stiffness:.3g} against {series:.3g} N/m in series with it: K rests on that calibration"
+        warnings.append(Warn(Code.SERIES_COMPLIANCE, text))
+    deep = float(np.ptp(problem.motion.position[_samples(problem)]))
+    if terms.position_unit == "m" and deep > _DEEPEST:
+        text = f"the probe moves by {deep:.3g} m in contact: is the position in mm? then say NAME:mm"
+        warnings.append(Warn(Code.UNIT_GUESS, text))
+    return warnings
+
+
+def _samples(problem: Problem) -> np.ndarray:
+    """Rows of the position nearest to those that were fitted."""
+    chain, rows = problem.motion.chain, problem.motion.rows
+    at = rows if isinstance(chain, Chain) else np.round(chain.instants[rows]).astype(np.intp)
+    return np.clip(at, 0, len(problem.motion.position) - 1)
+
+
+def _clock(
+    channels: Channels, chain: Chain, contacts: Contacts, span: tuple[int, int]
+) -> tuple[float, float]:
+    """Times of a contact on the log's own clock: the filter's delay is taken off."""
+    delay = 0.0 if contacts.bonded else chain.delay
+    begin, end = (channels.start + i * channels.dt - delay for i in span)
+    return max(float(begin), channels.start), float(end)
+
+
+def _untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
+    """The force of a log in which nothing is touched: seen, it says why."""
+    step = max(len(channels.force) // _SHOWN, 1)
+    none = np.empty(0)
+    time, force = channels.time - chain.delay, chain(channels.force)
+    return Traces(
+        time[::step], force[::step], none, none, none, none,
+        position_unit=terms.position_unit, force_unit=terms.force_unit,
+    )  # fmt: skip
+
+
+def _traces(channels: Channels, chain: Chain, choice: Choice, terms: Terms) -> Traces:
+    problem, fitted = choice.problem, choice.answer.fit
+    step = max(len(channels.position) // _SHOWN, 1)
+    size = max(len(problem.force) // _SHOWN, 1)
+    linear = fitted.model.linear
+    knobs = {knob.name: fitted[knob.name] for knob in fitted.model.knobs}
+    columns = fitted.model.columns(problem.motion, knobs, fitted.lag)
+    lag = problem.lag
+    return Traces(
+        time=(channels.time - chain.delay)[::step],
+        force=chain(problem.contacts.force_sign * channels.force)[::step] - problem.resting,
+        fitted_time=block_means(channels.start + problem.time, size),
+        fitted_position=block_means(problem.motion.moved(0, fitted.lag), size),
+        fitted_force=block_means(problem.force, size),
+        predicted=block_means(fitted.predicted, size),
+        columns={name: block_means(c, size) for name, c in zip(linear, columns, strict=True)},
+        theta={name: fitted[name] for name in linear},
+        prior={"M": lag.mass[1]} if lag.mass and "M" in linear else {},
+        matched=problem.motion.matched,
+        position_unit=terms.position_unit,
+        force_unit=terms.force_unit,
+    )

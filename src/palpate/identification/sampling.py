@@ -1,0 +1,246 @@
+"""From the columns of a record to two channels on one even grid of time, with what was found on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError
+from palpate.identification.filters.state_variable import block_means
+from palpate.identification.held import fresh_rows
+from palpate.identification.saturation import at_limit
+from palpate.identification.warning_codes import Code, Warn, from_word
+from palpate.records import Record
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_FEWEST = 20
+_JITTER = 0.05
+_GAP = 10.0
+_SLOW = 50.0
+_LONG_STEP = 0.5
+"""Between two rows [s]: so slow a log is more likely one whose time is not in seconds."""
+
+
+@dataclass(frozen=True)
+class Raw:
+    """The rows of a log as they stand, on its even grid.
+
+    Args:
+        start, dt: first time and period [s].
+        position: shape (n,) [m].
+        held_force: the force as it stands in the log, held from row to row, shape (n,) [N].
+        valid: where both channels have readings near by, shape (n,).
+    """
+
+    start: float
+    dt: float
+    position: Array
+    held_force: Array
+    valid: Mask
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Position and force on one even grid of time, both sampled at the same instants before.
+
+    Args:
+        start: time of the first sample [s].
+        dt: sampling period [s].
+        position, force: shape (n,), SI units.
+        valid: where both channels have readings near by, shape (n,).
+        rate: fresh readings per second of the slower channel [1/s].
+        raw: the rows behind it.
+        warnings: of this stage.
+    """
+
+    start: float
+    dt: float
+    position: Array
+    force: Array
+    valid: Mask
+    rate: float
+    raw: Raw
+    warnings: tuple[Warn, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Of the log [s]."""
+        return len(self.position) * self.dt
+
+    @property
+    def time(self) -> Array:
+        """Of each sample [s], shape (n,)."""
+        time: Array = self.start + np.arange(len(self.position), dtype=np.float64) * self.dt
+        return time
+
+
+def channels_of(record: Record) -> Channels:
+    """Check the time base of a record with `time`, `position` and `force`, and resample where it asks for it.
+
+    Raises:
+        InputError: too few rows, time that runs backwards, a channel that never changes.
+    """
+    time, position, force = record["time"], record["position"], record["force"]
+    warnings = [Warn(from_word(note["code"]), note["text"]) for note in record.meta.get("notes", ())]
+    _check(time, position, force)
+    step = np.diff(time)
+    twice = int((step == 0).sum())
+    if twice:
+        row = int(np.flatnonzero(step == 0)[0]) + 2
+        text = (
+            f"{twice} rows repeat the time of the row before (first in row {row}); the first of each is kept"
+        )
+        warnings.append(Warn(Code.IRREGULAR_TIME, text))
+        keep = np.r_[True, step > 0]
+        time, position, force = time[keep], position[keep], force[keep]
+        step = np.diff(time)
+        _check(time, position, force)
+    dt, even = _period(time, step, warnings)
+    use_x = _usable("position", position, dt, warnings)
+    use_f = _usable("force", force, dt, warnings)
+    _leave_saturated(use_f & use_x, use_f, position, force, warnings)
+    rate = min(_rate(time[use_x]), _rate(time[use_f]), 1 / dt)
+    if rate < _SLOW:
+        text = f"only {rate:.3g} fresh readings a second: behaviour faster than about {rate / 8:.2g} Hz is not seen"
+        text += "; or is the time in ms? then say NAME:ms" if dt >= _LONG_STEP else ""
+        warnings.append(Warn(Code.LOW_RATE, text))
+    grid = time if even else np.arange(time[0], time[-1] + dt / 2, dt)
+    x, f, valid = _common(grid, time, (position, use_x), (force, use_f), even)
+    own_x, near_x = _bridge(grid, time[use_x], position[use_x])
+    raw = Raw(float(time[0]), dt, own_x, _held(grid + dt / 4, time, force), near_x & valid)
+    return Channels(float(time[0]), dt, x, f, valid, rate, raw, tuple(warnings))
+
+
+def thinned(channels: Channels, size: int) -> Channels:
+    """Average `size` neighbouring samples, in the same way on both channels."""
+    if size < 2:
+        return channels
+    position, force = block_means(channels.position, size), block_means(channels.force, size)
+    valid = block_means(channels.valid.astype(float), size) == 1
+    start = channels.start + (size - 1) / 2 * channels.dt
+    dt = channels.dt * size
+    rate = min(channels.rate, 1 / dt)
+    return replace(
+        channels, start=start, dt=dt, position=position, force=force, valid=valid, rate=rate
+    )
+
+
+def _common(
+    grid: Array, time: Array, position: tuple[Array, Mask], force: tuple[Array, Mask], even: bool
+) -> tuple[Array, Array, Mask]:
+    """Both channels at the instants of the slower one, joined by straight lines at the grid.
+
+    A force of 125 Hz joined by straight lines beside a position of 500 Hz looks like a mass of -K T^2/12. Read at the
+    same instants, both lose the same to the lines between them.
+    """
+    (x, use_x), (f, use_f) = position, force
+    if even and use_x.all() and use_f.all():
+        return x, f, np.ones(len(grid), bool)
+    slow, fast = (use_f, use_x) if use_f.sum() < use_x.sum() else (use_x, use_f)
+    instants = time[slow]
+    bridged, near = _bridge(grid, instants, (f if slow is use_f else x)[slow])
+    other, near_other = _bridge(instants, time[fast], (x if slow is use_f else f)[fast])
+    own, near_own = _bridge(grid, instants[near_other], other[near_other])
+    valid = near & near_own
+    return (own, bridged, valid) if slow is use_f else (bridged, own, valid)
+
+
+def _held(at: Array, time: Array, force: Array) -> Array:
+    """The force as it stood in the log, held from row to row."""
+    there = np.isfinite(force)
+    rows = np.searchsorted(time[there], at, side="right") - 1
+    held: Array = force[there][np.maximum(rows, 0)]
+    return held
+
+
+def _check(time: Array, position: Array, force: Array) -> None:
+    if len(time) < _FEWEST:
+        count = f"{len(time)} row{'s' * (len(time) != 1)} with a time of {'their' if len(time) != 1 else 'its'} own"
+        raise InputError(
+            f"the log has {count}; at least {_FEWEST} are needed: log longer, or check --time, --start and --end"
+        )
+    back = np.flatnonzero(np.diff(time) < 0)
+    if len(back):
+        row = int(back[0]) + 2
+        text = f"time runs backwards at row {row} (from {time[row - 2]:.6g} to {time[row - 1]:.6g} s)"
+        raise InputError(f"{text}; sort the log or cut it there with --start and --end")
+    for name, values in (("position", position), ("force", force)):
+        seen = values[np.isfinite(values)]
+        if len(seen) < _FEWEST:
+            raise InputError(f"the {name} has {len(seen)} readings; at least {_FEWEST} are needed")
+        if np.ptp(seen) == 0:
+            raise InputError(
+                f"the {name} is {seen[0]:.6g} in every row; is it the right column, did anything move?"
+            )
+
+
+def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool]:
+    """The grid's period, and whether the rows lie on it."""
+    middle = float(np.median(step))
+    gaps = step > 3 * middle
+    dt = float(step[~gaps].mean())
+    even = not gaps.any() and abs(time[-1] - time[0] - dt * len(step)) < dt
+    even = even and float(np.abs(step - dt).max()) <= _JITTER * dt
+    if not even:
+        text = f"steps of time between {step.min():.4g} and {step.max():.4g} s; resampled every {dt:.4g} s"
+        if gaps.any():
+            text += f"; {int(gaps.sum())} gaps longer than three steps"
+        warnings.append(Warn(Code.IRREGULAR_TIME, text))
+    return dt, even
+
+
+def _usable(name: str, values: Array, dt: float, warnings: list[Warn]) -> Mask:
+    """Rows whose reading is there and is fresh."""
+    usable = np.isfinite(values)
+    if not usable.all() and not any(w.code is Code.MISSING_SAMPLES for w in warnings):
+        count = int((~usable).sum())
+        first = int(np.argmin(usable)) + 1
+        text = f"{count} of {len(values)} rows have no {name} (first: row {first}); they are bridged"
+        warnings.append(Warn(Code.MISSING_SAMPLES, text))
+    rows = np.flatnonzero(usable)
+    fresh = fresh_rows(values[rows])
+    if fresh is not None:
+        every = len(fresh) / max(int(fresh.sum()), 1)
+        text = f"the {name} is fresh in one of {every:.3g} rows, every {every * dt:.4g} s; the others are left out"
+        warnings.append(Warn(Code.HELD_SAMPLES, text))
+        usable[rows[~fresh]] = False
+    return usable
+
+
+def _leave_saturated(
+    both: Mask, use_force: Mask, position: Array, force: Array, warnings: list[Warn]
+) -> None:
+    rows = np.flatnonzero(both)
+    stuck = at_limit(force[rows], position[rows], _far_end(force[rows]))
+    if not stuck.any():
+        return
+    level = force[rows[stuck]][0]
+    text = f"the force rests at its extreme value {level:.6g} for {int(stuck.sum())} rows; they are left out"
+    warnings.append(Warn(Code.SATURATED, text))
+    use_force[rows[stuck]] = False
+
+
+def _far_end(force: Array) -> list[float]:
+    """The end of the range that is further from the usual force; none if that is zero: so rests a force in the air."""
+    middle = float(np.median(force))
+    level = max((float(force.max()), float(force.min())), key=lambda extreme: abs(extreme - middle))
+    return [level] if level else []
+
+
+def _rate(time: Array) -> float:
+    """Readings per second, long gaps left aside."""
+    step = np.diff(time)
+    usual = step[step <= 3 * np.median(step)]
+    return float(1 / usual.mean())
+
+
+def _bridge(grid: Array, time: Array, values: Array) -> tuple[Array, Mask]:
+    """Straight lines between readings; not valid within gaps longer than ten usual steps."""
+    usual = float(np.median(np.diff(time)))
+    after = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
+    near = (time[after] - time[after - 1]) <= _GAP * usual
+    return np.interp(grid, time, values), near & (grid >= time[0]) & (grid <= time[-1])

@@ -1,0 +1,100 @@
+"""Which contact model's parameters are given: the plain one, unless a richer one earns its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.errors import InputError
+from palpate.identification.estimators.robust import Answer, answer
+from palpate.identification.models import (
+    KELVIN_VOIGT,
+    KELVIN_VOIGT_MASS,
+    Model,
+    at_rest_before,
+    hunt_crossley,
+    standard_linear_solid,
+)
+from palpate.identification.options import Options
+from palpate.identification.problem import Problem
+from palpate.identification.result import Comparison
+
+THIRD = 1 / 3
+"""Share of the force's amplitude in contact that a model may leave unexplained and still identify anything."""
+_ADDED = {"standard-linear-solid": ("K1", "tau"), "hunt-crossley": ("n",)}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The model chosen.
+
+    Args:
+        answer: its parameters.
+        problem: the rows that it was fitted to.
+        tried: every model, and what was said of it.
+    """
+
+    answer: Answer
+    problem: Problem
+    tried: tuple[Comparison, ...]
+
+    @property
+    def explains(self) -> bool:
+        """Whether less than a third of the force's amplitude is left."""
+        return 1 - self.answer.explained < THIRD**2
+
+
+def choose(problem: Problem, options: Options) -> Choice:
+    """Answer the plain model, and a richer one if it is asked for or earns its place.
+
+    A richer model earns it by explaining at least half of what the plain one leaves, with everything that it has more
+    of identified: what a log cannot tell of it never hides what the plain model shows.
+    """
+    name, tolerance = options.model, options.tolerance
+    if name in (None, KELVIN_VOIGT.name, KELVIN_VOIGT_MASS.name):
+        plain = answer(problem, KELVIN_VOIGT if name == KELVIN_VOIGT.name else KELVIN_VOIGT_MASS)
+        best, at = plain, problem
+        tried = [_compared(plain, "")]
+        if name is None and options.series_stiffness is None and plain.unexplained > _sensor_rms(plain):
+            for make in (standard_linear_solid, hunt_crossley):
+                rich, own = _one_sided(make, problem)
+                why = _against(rich, best, tolerance)
+                tried.append(_compared(rich, why))
+                if not why:
+                    best, at = rich, own
+        return Choice(best, at, tuple(tried))
+    if options.series_stiffness is not None:
+        raise InputError(f"{name} behind a series stiffness is not offered: take --model kelvin-voigt-mass")
+    make = standard_linear_solid if name == "standard-linear-solid" else hunt_crossley
+    rich, own = _one_sided(make, problem)
+    return Choice(rich, own, (_compared(rich, "asked for"),))
+
+
+def _one_sided(make: Callable[..., Model], problem: Problem) -> tuple[Answer, Problem]:
+    """A model with the place of the surface in it, fitted to the touches too where the log has them."""
+    wider = problem.with_touches
+    if wider is None:
+        return answer(problem, make(problem.motion)), problem
+    return answer(wider, at_rest_before(make(wider.motion))), wider
+
+
+def _against(rich: Answer, plain: Answer, tolerance: float) -> str:
+    """Why a richer model is not taken; empty if it is."""
+    if (1 - rich.explained) > 0.5 * (1 - plain.explained):
+        return "explains less than half of what the plainer model leaves"
+    for name in ("K", *_ADDED[rich.fit.model.name]):
+        value, half = rich[name], rich.half_of(name)
+        known = half <= tolerance * abs(value) and (name != "n" or abs(value - 1) > half)
+        if value <= 0 or not known:
+            return f"the log does not tell its {name} ({value:.3g} +- {half:.2g})"
+    return ""
+
+
+def _sensor_rms(found: Answer) -> float:
+    return float(np.sqrt(max(found.sensor, 0.0)))
+
+
+def _compared(found: Answer, note: str) -> Comparison:
+    return Comparison(found.fit.model.name, found.fit.r2, found.fit.rmse, note)

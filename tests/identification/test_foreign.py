@@ -1,0 +1,136 @@
+"""The judge's own physics: what it calls true is true, and a seed makes one log."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "identification"))
+
+from foreign.logs import CELLS, Cell, make_log
+from foreign.motions import tracked
+from foreign.scoring import judged, score
+from foreign.surfaces import SURFACES, Surface, random_surface, touch
+from foreign.tables import row, tables
+from foreign.truth import dynamic_stiffness, octave_stiffness, press_stiffness
+
+SLICE = [cell for i, cell in enumerate(CELLS) if i % 23 == 5]
+
+
+def pressed(surface, depth, dt, seconds=2.0, below=0.6):
+    """Pressed with a sine that leaves the surface, from rest in the air."""
+    t = np.arange(int(seconds / dt)) * dt
+    command = depth * (0.5 * (1 - np.cos(2 * np.pi * 1.5 * t)) * (1 + below) - below)
+    x, v, a = tracked(command, 25.0, dt)
+    return x, v, a, touch(surface, x, v, a, dt)
+
+
+def drawn(name, seed=3):
+    surface = random_surface(name, np.random.default_rng(seed))
+    return surface, surface.depth_of(8.0)
+
+
+def test_the_generator_and_the_truth_know_nothing_of_the_package():
+    for name in ("surfaces", "motions", "recording", "logs", "truth", "bound"):
+        text = Path(sys.modules[f"foreign.{name}"].__file__).read_text(encoding="utf-8")
+        assert "palpate" not in text, name
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_out_of_contact_there_is_no_force_and_in_contact_none_pulls(name):
+    surface, depth = drawn(name)
+    x, _, _, touched = pressed(surface, depth, 1e-4)
+    assert touched.contact.any()
+    assert not touched.contact.all()
+    flying = ~touched.contact
+    if not surface["M"]:  # the blow of a mass lasts 2 ms, also where the probe bounces off sooner
+        assert np.all(touched.force[flying] == 0)
+    assert np.all(touched.force >= 0)
+    assert np.all(x <= touched.depth + 1e-12)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_a_surface_gives_back_no_more_than_it_took(name):
+    surface, depth = drawn(name)
+    _, v, _, touched = pressed(surface, depth, 5e-5)
+    work = np.cumsum(touched.force * v) * 5e-5
+    assert work[-1] >= 0
+    # A softening surface stores energy on the way; none of it is there before it was put in.
+    assert work.min() >= -1e-3 * work.max()
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_integrated_twice_as_fine_the_force_is_the_same(name):
+    surface, depth = drawn(name)
+    coarse = pressed(surface, depth, 1.25e-4)[3].force
+    fine = pressed(surface, depth, 6.25e-5)[3].force[::2][: len(coarse)]
+    apart = np.abs(coarse - fine)
+    # A jump at the touch may fall one step to the left or right; a bouncing mass does so more than once.
+    assert np.percentile(apart, 97) < (0.02 if surface["M"] else 2e-3) * fine.max()
+
+
+@pytest.mark.parametrize("name", ["kelvin-voigt", "mass"])
+def test_regression_on_the_force_without_noise_returns_the_parameters(name):
+    surface, depth = drawn(name)
+    x, v, a, touched = pressed(surface, depth, 1e-4)
+    inside = touched.contact & (touched.force > 0.1 * touched.force.max())
+    settled = inside & (np.convolve(inside, np.ones(61), "same") > 60)  # 3 ms from any blow
+    found = np.linalg.lstsq(np.column_stack([x, v, a])[settled], touched.force[settled], rcond=None)[0]
+    assert found[:2] == pytest.approx([surface["K"], surface["B"]], rel=1e-6)
+    assert found[2] == pytest.approx(surface["M"], rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["kelvin-voigt", "mass", "standard-linear", "arms"])
+def test_a_small_sine_has_the_dynamic_stiffness_of_the_formula(name):
+    surface, depth = drawn(name)
+    formula = dynamic_stiffness(surface, 3.0, depth, 0.1 * depth)
+    nearly = surface.scaled(K3=1e-9 * surface["K"] / depth**2)
+    assert not nearly.linear
+    measured = dynamic_stiffness(replace(nearly, arms=surface.arms), 3.0, depth, 0.1 * depth)
+    # Eight time constants leave 3e-4 of an arm, and the ramp to the depth as much in the first line of the period.
+    assert measured == pytest.approx(formula, rel=2e-3)
+
+
+def test_the_octave_and_the_press_of_a_spring_are_its_stiffness():
+    log = make_log(Cell("kelvin-voigt", "clean", "multisine"), 4)
+    stiffness = log.plan.surface["K"]
+    assert octave_stiffness(log.dense, 1.0).real == pytest.approx(stiffness, rel=0.01)
+    soft = replace(log.dense, force=np.where(log.dense.contact, stiffness * log.dense.depth, 0.0))
+    assert press_stiffness(soft) == pytest.approx(stiffness, rel=1e-9)
+
+
+def test_a_surface_that_recovers_slowly_is_met_deeper_again():
+    slow = Surface("slow", {"K": 1000.0, "B": 500.0})
+    x, _, _, touched = pressed(slow, 5e-3, 1e-4)
+    left = np.flatnonzero(touched.contact[:-1] & ~touched.contact[1:])[0]
+    assert touched.depth[left + 1000] > x[left + 1000] + 1e-4
+    decay = touched.depth[left + 1000] / touched.depth[left + 1]
+    assert decay == pytest.approx(np.exp(-1000 * 999 / 500 * 1e-4 / 1), rel=2e-2)
+
+
+@pytest.mark.parametrize("cell", SLICE, ids=str)
+def test_a_seed_makes_one_log_and_one_score(cell):
+    log, again = make_log(cell, 11), make_log(cell, 11)
+    for one, other in ((log.time, again.time), (log.position, again.position), (log.force, again.force)):
+        assert np.array_equal(one, other)
+        assert np.isfinite(one).all()
+    assert log.truth == again.truth
+    assert log.dense.contact.any()
+    result = score(cell, 11)
+    assert result.outcome in {"answered", "refused"}
+    figures = row("all", [result])
+    assert figures["logs"] == 1
+    assert figures["all"]["hold"] <= figures["all"]["answers"]
+    assert set(tables([result])) == {"surface x nuisance", "nuisance", "surface", "motion", "total"}
+
+
+def test_confidently_wrong_is_far_off_or_many_half_widths():
+    assert not judged("K", 100, (95, 105), (104, 104)).wrong
+    assert judged("K", 100, (60, 140), (130, 130)).holds
+    assert judged("K", 140, (100, 180), (100, 100)).wrong
+    assert judged("K", 104, (103, 105), (100, 100)).wrong
+    assert not judged("K", 101, (100.9, 101.1), (100, 100)).wrong
+    assert judged("M", 0.1, (0.09, 0.11), (0.0, 0.0)).wrong
+    assert judged("K", 100, (95, 105), (90, 200), defined=False).holds
