@@ -20,12 +20,12 @@ STYLE = "yellow"
 """Of what a reader must not miss."""
 
 
-def write(*lines: str) -> None:
+def print_lines(*lines: str) -> None:
     """Print lines as they are, however long, for a reader or for another program."""
     sys.stdout.write("".join(f"{shown(line)}\n" for line in lines))
 
 
-def write_json(value: Any) -> None:
+def print_json(value: Any) -> None:
     """Print one JSON value, in ASCII; numbers that are none are null."""
     import json
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from palpate.cli._terminal import console, place, write_json
+from palpate.cli._terminal import console, place, print_json
 from palpate.errors import InputError
 from palpate.files import check_place
 
@@ -265,7 +265,7 @@ def _print(
     if json:
         from palpate.report.excitation_files import summary
 
-        write_json(summary(found, helps))
+        print_json(summary(found, helps))
         return
     from palpate.report.excitation_table import show
 

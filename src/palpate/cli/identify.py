@@ -10,7 +10,7 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._arm_options import ArmOptions, FrameOptions
 from palpate.cli._log_options import LogOptions, read
-from palpate.cli._terminal import console, place, write_json
+from palpate.cli._terminal import console, place, print_json
 from palpate.cli._values import with_std
 from palpate.errors import InputError
 from palpate.files import check_place
@@ -190,7 +190,7 @@ def _write(found: Identification, record: Record, log: Path, figure: Path | None
 
 def _print(found: Identification, record: Record, log: Path, written: list[Path], json: bool) -> None:
     if json:
-        write_json(found.to_json())
+        print_json(found.to_json())
         return
     from palpate.contact_frame import told
     from palpate.report.identification_table import show

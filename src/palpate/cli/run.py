@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
+from palpate.cli._interrupts import noticed
 from palpate.cli._named import listed, source_of
-from palpate.cli._terminal import STYLE, console, head, place, show_table, write_json
+from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
 from palpate.errors import InputError
-from palpate.files import fresh_folder, signed
+from palpate.files import fresh_folder, signed, write_json, write_text
 from palpate.text import shown
 
 if TYPE_CHECKING:
@@ -61,44 +62,62 @@ def run(
     if name is None or source is None:
         return 0
     folder = out if out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    title, summary = _run(name, source, seed, folder, force, json)
-    _tell(
-        title, summary, folder, json
-    )  # when all is in its place, so that a reader who has gone loses nothing
-    return 130 if summary["end"] == "interrupted" else 0 if summary["end"] == "done" else 1
+    from palpate.bench.ending import DONE, INTERRUPTED
+
+    with noticed() as interrupted:
+        ran = _run(name, source, seed, folder, force, json, interrupted)
+    # All is in its place, so that a reader of the output who has gone loses nothing.
+    _tell(ran, folder, json)
+    if ran.undrawn:
+        raise InputError(f"{ran.undrawn}; the record is in {folder}")
+    if interrupted() or ran.summary["end"] == INTERRUPTED:
+        return 130
+    return 0 if ran.summary["end"] == DONE else 1
+
+
+@dataclass(frozen=True)
+class _Ran:
+    """What a run came to, and why it could not be drawn, if it could not."""
+
+    title: str
+    summary: dict[str, Any]
+    undrawn: str
 
 
 def _run(
-    name: str, source: str, seed: int, folder: Path, force: bool, as_json: bool
-) -> tuple[str, dict[str, Any]]:
-    """Runs and writes the folder of results; the experiment's title, and the summary."""
+    name: str,
+    source: str,
+    seed: int,
+    folder: Path,
+    force: bool,
+    as_json: bool,
+    interrupted: Callable[[], bool],
+) -> _Ran:
+    """Runs and writes the folder of results."""
     from palpate.bench import summarise
     from palpate.bench.experiment import parse
+    from palpate.logs import write_record
 
     with fresh_folder(folder, force=force) as fresh:
         experiment = parse(source, name)
         command = shown(f"palpate run {shlex.quote(name)} --seed {seed}")
-        record = _record(console(stderr=as_json), name, experiment, seed)
+        record = _record(console(stderr=as_json), name, experiment, seed, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         summary = signed({"experiment": shown(Path(name).stem), "command": command, **summarise(record)})
-        _write(record, summary, experiment.title, experiment.about, source, fresh)
-    return experiment.title, summary
+        write_record(record, fresh / "record.parquet")
+        write_json(fresh / "summary.json", summary)
+        undrawn = ""
+        try:
+            if len(record):
+                _report(record, experiment.title, experiment.about, source, summary, fresh)
+        except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
+            undrawn = f"there was not enough room to draw it ({shown(str(error)) or type(error).__name__})"
+    return _Ran(experiment.title, summary, undrawn)
 
 
-def _write(
-    record: Record, summary: dict[str, Any], title: str, about: str, source: str, folder: Path
-) -> None:
-    import msgspec
-
-    from palpate.logs import write_record
-
-    write_record(record, folder / "record.parquet")
-    (folder / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n")
-    if len(record):
-        _report(record, title, about, source, summary, folder)
-
-
-def _record(screen: Console, name: str, experiment: Any, seed: int) -> Record:
+def _record(
+    screen: Console, name: str, experiment: Any, seed: int, interrupted: Callable[[], bool]
+) -> Record:
     from rich.progress import BarColumn, Progress, TextColumn
 
     from palpate.bench import build
@@ -118,6 +137,8 @@ def _record(screen: Console, name: str, experiment: Any, seed: int) -> Record:
             progress.console.print(COMPILING)
 
         def show(time: float, phase: str) -> None:
+            if interrupted():
+                raise KeyboardInterrupt  # here the bench ends the run, and keeps what there is of it
             progress.update(bar, description=f"{phase:9}", time=f"{time:6.1f} s simulated")
 
         return bench.run(
@@ -142,17 +163,18 @@ def _report(
         source=source,
         notes=notes(summary),
     )
-    (folder / "report.html").write_text(text, encoding="utf-8")
+    write_text(folder / "report.html", text)
 
 
-def _tell(title: str, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
+def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
     from palpate.report.run_tables import notes, tables
 
+    summary = ran.summary
     if as_json:
-        write_json(summary)
+        print_json(summary)
         return
     screen = console()
-    head(screen, title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
+    head(screen, ran.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
     for content in tables(summary):
         show_table(screen, content)
     for note in notes(summary):

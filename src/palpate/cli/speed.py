@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from palpate.cli._terminal import say, write, write_json
+from palpate.cli._terminal import print_json, print_lines, say
 
 
 def speed(*, json: Annotated[bool, Parameter(negative="")] = False) -> int:
@@ -20,9 +20,9 @@ def speed(*, json: Annotated[bool, Parameter(negative="")] = False) -> int:
 
     figures = measure(waiting=lambda: say(COMPILING))
     if json:
-        write_json(figures)
+        print_json(figures)
         return 0
-    write(
+    print_lines(
         f"one tick of {EXPERIMENT}, pressing and learning, {STEPS} steps of the physics included: "
         f"{figures['ns_per_tick'] / 1e3:.2f} us on one core",
         f"{figures['times_real_time']:.0f} times real time; {figures['ticks_per_s']:.3g} ticks a second "

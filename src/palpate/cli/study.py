@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from palpate.cli._named import listed, source_of
-from palpate.cli._terminal import STYLE, console, head, place, say, show_table, write_json
+from palpate.cli._terminal import STYLE, console, head, place, print_json, say, show_table
 from palpate.errors import InputError
 from palpate.text import shown
 
@@ -169,7 +169,7 @@ class Lines:
 
 def _tell(found: Findings, folder: Path, as_json: bool) -> None:
     if as_json:
-        write_json(found.summary)
+        print_json(found.summary)
         return
     screen = console()
     head(screen, found.summary["study"], f", {found.summary['runs']} runs")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
-from palpate.cli._terminal import console, place, say, show_table, write
+from palpate.cli._terminal import console, place, print_lines, say, show_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,7 +45,7 @@ def thesis(
         everything = studies()
         width = 2 + max(len(known.NUMBER) for known in everything)
         for known in everything:
-            write(f"{known.NUMBER:<{width}}{known.TITLE}")
+            print_lines(f"{known.NUMBER:<{width}}{known.TITLE}")
         return 0
     chosen = studies() if figure is None else [study(figure)]
     folder = out if out is not None else Path("runs") / ("thesis" if figure is None else f"thesis-{figure}")

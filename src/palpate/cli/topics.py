@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from palpate.cli._terminal import write, write_json
+from palpate.cli._terminal import print_json, print_lines
 
 if TYPE_CHECKING:
     from palpate.logs.listing import Entry
@@ -31,7 +31,7 @@ def topics(
 
     entries, troubles = entries_of(log, delimiter)
     if json:
-        write_json({"entries": [entry.to_json() for entry in entries], "troubles": troubles})
+        print_json({"entries": [entry.to_json() for entry in entries], "troubles": troubles})
         return 0
     _show(log, entries, troubles)
     return 0
@@ -54,7 +54,7 @@ def _show(log: Path, entries: list[Entry], troubles: list[str]) -> None:
             for place, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
         lines.append("  ".join(cells).rstrip())
-    write(*lines, *troubles)
+    print_lines(*lines, *troubles)
 
 
 _NUMBERS = range(2, 6)
