@@ -218,6 +218,6 @@ def test_what_is_wrong_is_told_in_a_line(capsys, tmp_path):
     (tmp_path / "good.toml").write_text(SMALL)
     (tmp_path / "taken").write_text("")
     assert "is not a folder" in refused(capsys, "good.toml", "--out", "taken")
-    assert "no Dask scheduler answers at" in refused(
+    assert "is no address of a scheduler" in refused(
         capsys, "good.toml", "--scheduler", "tcp://127.0.0.1:nowhere"
     )

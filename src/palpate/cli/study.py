@@ -7,10 +7,11 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from palpate.cli._named import listed, source_of
 from palpate.cli._terminal import STYLE, console, head, place, print_json, say, show_table
@@ -20,9 +21,48 @@ from palpate.text import shown
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from palpate.studies.cluster import Cluster
     from palpate.studies.plan import Plan
     from palpate.studies.presenting import Findings
     from palpate.studies.running import Runner
+
+
+@Parameter(name="*", group=Group("A cluster", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class ClusterOptions:
+    """Where the runs go, if not to the cores of this machine.
+
+    Parameters
+    ----------
+    scheduler
+        Address of a Dask scheduler whose workers do the runs, tcp://HOST:PORT or tls://HOST:PORT. What they send
+        back may run anything here: name only a cluster that is trusted as this machine is.
+    tls_ca
+        Certificate of the authority that signed those of the cluster, a PEM file, for tls://.
+    tls_cert
+        Certificate of this machine, likewise.
+    tls_key
+        Its key, likewise.
+    """
+
+    scheduler: str | None = None
+    tls_ca: Path | None = None
+    tls_cert: Path | None = None
+    tls_key: Path | None = None
+
+    def cluster(self) -> Cluster | None:
+        """The cluster; None if none is named."""
+        from palpate.studies.cluster import Certificates, Cluster
+
+        files = (self.tls_ca, self.tls_cert, self.tls_key)
+        given = [path for path in files if path is not None]
+        if 0 < len(given) < len(files):
+            raise InputError("--tls-ca, --tls-cert and --tls-key go together")
+        if self.scheduler is None:
+            if given:
+                raise InputError("--tls-ca, --tls-cert and --tls-key are for --scheduler tls://HOST:PORT")
+            return None
+        return Cluster(self.scheduler, certificates=Certificates(*given) if given else None)
 
 
 def study(
@@ -30,7 +70,7 @@ def study(
     /,
     *,
     out: Path | None = None,
-    scheduler: str | None = None,
+    where: ClusterOptions | None = None,
     yes: Annotated[bool, Parameter(negative="")] = False,
     force: Annotated[bool, Parameter(negative="")] = False,
     list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
@@ -39,16 +79,23 @@ def study(
 ) -> int:
     """Run an experiment many times over a grid, a range or a random choice of parameters, or search for the best.
 
-    Args:
-        name: a study (see --list), or a TOML file of your own (see --print).
-        out: folder for results.parquet, report.html and the journal of runs; runs/study-NAME when left out. An
-            unfinished study there is gone on with.
-        scheduler: address of a Dask scheduler whose workers do the runs; all cores of this machine when left out.
-        yes: begin a study that takes very long without asking.
-        force: replace the results that stand there already.
-        list_: list the studies and stop.
-        print_: print the study's file, to copy and edit, and stop.
-        json: print the summary as JSON and nothing else.
+    Parameters
+    ----------
+    name
+        A study (see --list), or a TOML file of your own (see --print).
+    out
+        Folder for results.parquet, report.html and the journal of runs; runs/study-NAME when left out. An unfinished
+        study there is gone on with.
+    yes
+        Begin a study that takes very long without asking.
+    force
+        Replace the results that stand there already.
+    list_
+        List the studies and stop.
+    print_
+        Print the study's file, to copy and edit, and stop.
+    json
+        Print the summary as JSON and nothing else.
     """
     from palpate.studies import study as studies
 
@@ -60,7 +107,7 @@ def study(
         return 0
     folder = out if out is not None else Path("runs") / f"study-{Path(name).stem}"
     try:
-        found = _done(name, source, folder, scheduler, yes, force)
+        found = _done(name, source, folder, where or ClusterOptions(), yes, force)
     except KeyboardInterrupt:
         kept = f"what is done is saved in {folder}, and the same command goes on from there"
         say(f"interrupted; {kept}")
@@ -69,7 +116,7 @@ def study(
     return 0 if found.summary["results"].get("done") else 1
 
 
-def _done(name: str, source: str, folder: Path, scheduler: str | None, yes: bool, force: bool) -> Findings:
+def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
     from palpate.studies.plan import plan
     from palpate.studies.presenting import present
@@ -82,8 +129,8 @@ def _done(name: str, source: str, folder: Path, scheduler: str | None, yes: bool
     except InputError as error:
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
     if not yes and (force or not begun(folder)):
-        _ask(planned, screen, here=scheduler is None)
-    with _runner(scheduler, screen) as runner, _progress(screen, len(planned)) as show:
+        _ask(planned, screen, here=where.scheduler is None)
+    with _runner(where, screen) as runner, _progress(screen, len(planned)) as show:
         frame = Work(planned, source, folder, runner, show).done(force=force)
     return present(frame, planned, folder, source, shown(f"palpate study {shlex.quote(name)}"))
 
@@ -107,16 +154,14 @@ def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
 
 
 @contextmanager
-def _runner(scheduler: str | None, screen: Console) -> Iterator[Runner]:
-    if scheduler is None:
+def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
+    cluster = where.cluster()
+    if cluster is None:
         from palpate.cli._waiting import COMPILING
         from palpate.studies.local import Local
 
         yield Local(waiting=lambda: screen.print(COMPILING))
         return
-    from palpate.studies.cluster import Cluster
-
-    cluster = Cluster(scheduler)
     try:
         yield cluster
     finally:

@@ -66,6 +66,8 @@ class Scale:
             which.set_ticks(self.places, [style.literal(str(v)).replace(", ", "\n") for v in self.values])
         elif self.log:
             (axis.set_xscale if which is axis.xaxis else axis.set_yscale)("log")
+            if min(which.get_view_interval()) <= 0.0:  # there is nothing to be drawn over it
+                which.set_view_interval(*self.edges()[[0, -1]], ignore=True)
             self._ticks(which)
         elif 2 < len(self.values) <= 8:
             which.set_ticks(self.places, [f"{v:g}" for v in self.values])

@@ -13,6 +13,7 @@ from palpate.text import shown
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
 INK = "#222222"
 BLUE, ORANGE, GREEN, RED, VIOLET, GREY = "#1f6fb4", "#e07b16", "#2a9254", "#c4342d", "#7b53a6", "#8a8a8a"
@@ -86,11 +87,23 @@ def save(drawing: Figure, path: Path) -> Path:
 def _spell_out(drawing: Figure) -> None:
     """A label of the user's that is no formula is drawn as it is written."""
     from matplotlib.mathtext import MathTextParser
-    from matplotlib.text import Text
 
-    for text in drawing.findobj(Text):
-        if isinstance(text, Text) and text.get_text().count("$") > 1:
+    for text in _labels(drawing):
+        if text.get_text().count("$") > 1:
             try:
                 MathTextParser("path").parse(text.get_text())
             except ValueError:
                 text.set_parse_math(False)
+
+
+def _labels(drawing: Figure) -> Iterator[Text]:
+    """Titles, labels and legends; not the ticks, which are numbers."""
+    from matplotlib.text import Text
+
+    yield from drawing.texts
+    for axis in drawing.axes:
+        yield from (axis.xaxis.label, axis.yaxis.label)
+        yield from (one for one in axis.get_children() if isinstance(one, Text))
+        legend = axis.get_legend()
+        if legend is not None:
+            yield from legend.get_texts()
