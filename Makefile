@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench attack docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench attack trust docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -48,6 +48,9 @@ bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold s
 
 attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hour of each experiment; into docs/reliability.md
 	$(BIN)/python benchmarks/attack/run.py --write
+
+trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
+	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean

@@ -47,7 +47,6 @@ class Options:
         _check(options)
         return options
 
-
     def check_lag(self, duration: float) -> None:
         """Refuse a lag in other units than seconds."""
         if self.lag is not None and abs(self.lag) >= duration:

@@ -52,7 +52,11 @@ def outcome(
     spectrum, press, point = evidence
     mass = parameters.get("M")
     name = found.fit.model.name
-    if name == "kelvin-voigt-mass" and options.model is None and (mass is None or mass.verdict is not Verdict.IDENTIFIED):
+    if (
+        name == "kelvin-voigt-mass"
+        and options.model is None
+        and (mass is None or mass.verdict is not Verdict.IDENTIFIED)
+    ):
         name = "kelvin-voigt"
     return Identification(
         model=name,
@@ -74,7 +78,9 @@ def outcome(
     )
 
 
-def nothing(channels: Channels, chain: Chain, options: Options, terms: Terms, warnings: tuple[Warn, ...]) -> Identification:
+def nothing(
+    channels: Channels, chain: Chain, options: Options, terms: Terms, warnings: tuple[Warn, ...]
+) -> Identification:
     """There is no contact: every parameter without a number."""
     reason = "there is no contact in this log"
     units = impedance_units(terms.force_unit, terms.position_unit)
@@ -115,9 +121,7 @@ def _lag(choice: Choice) -> LagFound | None:
     return LagFound(prior.value, prior.std, 1.96 * prior.std, "prior")
 
 
-def _doubts(
-    parameters: dict[str, Parameter], problem: Problem, options: Options, terms: Terms
-) -> list[Warn]:
+def _doubts(parameters: dict[str, Parameter], problem: Problem, options: Options, terms: Terms) -> list[Warn]:
     warnings = []
     stiffness = parameters["K"].value if "K" in parameters else None
     if stiffness is not None and parameters["K"].unit == "N/m" and not _SOFTEST <= stiffness <= _STIFFEST:

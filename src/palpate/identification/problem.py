@@ -40,6 +40,10 @@ class FrontEnd(Protocol):
         """From row to row [s]."""
 
     @property
+    def dt(self) -> float:
+        """Sampling period of the position [s]."""
+
+    @property
     def cutoff(self) -> float:
         """Frequency up to which it passes [Hz]."""
 
@@ -53,8 +57,11 @@ class FrontEnd(Protocol):
     def times(self, rows: Rows) -> Array:
         """Of rows [s] from the first sample."""
 
-    def gain(self, frequency: Array) -> Array:
-        """Of its amplitude at frequencies [Hz], for noise of the force."""
+    def force_gain(self, frequency: Array) -> Array:
+        """Of the amplitude of the force's noise at frequencies [Hz]."""
+
+    def position_gain(self, frequency: Array) -> Array:
+        """Of the amplitude of the position at frequencies [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +113,9 @@ class Problem:
         if self.touch is None:
             return None
         motion = replace(self.motion, rows=self.touch.rows, _kept={})
-        return replace(self, motion=motion, force=self.touch.force, spans=self.touch.spans, touch=None, counted=True)
+        return replace(
+            self, motion=motion, force=self.touch.force, spans=self.touch.spans, touch=None, counted=True
+        )
 
 
 def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Options) -> Problem:

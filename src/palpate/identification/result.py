@@ -159,16 +159,16 @@ class WorkingPoint:
 
     Args:
         stiffness: storage of an octave, or slope of the way in.
-        force, depth: mean in contact [N], [m].
-        frequency: middle of the octave; of a press, one over four times its rise [Hz].
+        force_N, depth_m: mean in contact.
+        frequency_Hz: middle of the octave; of a press, one over four times its rise.
         source: octave or press.
         prediction95: interval for the same measured once more; None if it was measured once.
     """
 
     stiffness: Parameter
-    force: float
-    depth: float
-    frequency: float
+    force_N: float
+    depth_m: float
+    frequency_Hz: float
     source: str
     prediction95: tuple[float, float] | None = None
 
@@ -177,9 +177,9 @@ class WorkingPoint:
         again = list(self.prediction95) if self.prediction95 else None
         return {
             "stiffness": self.stiffness.to_json() | {"prediction95": again},
-            "force_N": self.force,
-            "depth_m": self.depth,
-            "frequency_Hz": self.frequency,
+            "force_N": self.force_N,
+            "depth_m": self.depth_m,
+            "frequency_Hz": self.frequency_Hz,
             "source": self.source,
         }
 

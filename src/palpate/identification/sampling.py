@@ -124,9 +124,7 @@ def thinned(channels: Channels, size: int) -> Channels:
     start = channels.start + (size - 1) / 2 * channels.dt
     dt = channels.dt * size
     rate = min(channels.rate, 1 / dt)
-    return replace(
-        channels, start=start, dt=dt, position=position, force=force, valid=valid, rate=rate
-    )
+    return replace(channels, start=start, dt=dt, position=position, force=force, valid=valid, rate=rate)
 
 
 def _common(

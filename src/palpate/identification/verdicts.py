@@ -61,6 +61,8 @@ def verdicts(
     if point is not None and {"K", "M"} <= set(found.names):
         parameters = _agreeing(parameters, found, point)
     parameters = _of_lag(parameters, found, lag, terms)
+    if not choice.problem.contacts.signed:
+        parameters = {name: _unsigned(p) for name, p in parameters.items()}
     return parameters, _warnings(parameters, found, lag, terms)
 
 
@@ -115,14 +117,12 @@ _REMEDY = {
 }
 
 
-def _agreeing(
-    parameters: dict[str, Parameter], found: Answer, point: WorkingPoint
-) -> dict[str, Parameter]:
+def _agreeing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoint) -> dict[str, Parameter]:
     """K and M that foretell another stiffness at the working point than the log shows are not identified."""
     own = point.stiffness
     if own.ci95 is None or own.value is None or point.source != "octave":
         return parameters
-    omega2 = (2 * np.pi * point.frequency) ** 2
+    omega2 = (2 * np.pi * point.frequency_Hz) ** 2
     i, j = found.names.index("K"), found.names.index("M")
     foretold = found.theta[i] - omega2 * found.theta[j]
     half = float(np.hypot(found.half[i], omega2 * found.half[j]))
@@ -130,7 +130,7 @@ def _agreeing(
     if abs(foretold - own.value) <= np.hypot(half, shown):
         return parameters
     reason = (
-        f"the model's stiffness at {point.frequency:.3g} Hz is {_digits(foretold)} {own.unit}, the log's dynamic"
+        f"the model's stiffness at {point.frequency_Hz:.3g} Hz is {_digits(foretold)} {own.unit}, the log's dynamic"
         f" stiffness there {_digits(own.value)}"
     )
     return {
@@ -141,9 +141,7 @@ def _agreeing(
     }
 
 
-def _of_lag(
-    parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms
-) -> dict[str, Parameter]:
+def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> dict[str, Parameter]:
     """No B or M rests on a lag that nobody calibrated and that is far from any sensor's."""
     if lag.known or LAG not in found.names or abs(found[LAG] - lag.value) <= _FAR * lag.std:
         return parameters
@@ -159,9 +157,17 @@ def _of_lag(
     return parameters | refused
 
 
-def _warnings(
-    parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms
-) -> tuple[Warn, ...]:
+def _unsigned(p: Parameter) -> Parameter:
+    """Nothing is identified where nobody knows which way force and position count."""
+    if p.verdict is not Verdict.IDENTIFIED:
+        return p
+    reason = (
+        "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
+    )
+    return replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
+
+
+def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> tuple[Warn, ...]:
     warnings = []
     if LAG in found.names and not lag.known:
         low = lag.value - _FAR * lag.std

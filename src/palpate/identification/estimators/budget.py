@@ -61,29 +61,28 @@ def of_octaves(system: System, levels: Levels, solution: Solution) -> Spread:
     """What the answer moves by when one octave is left out, beyond what its covariance grows by."""
     p = system.parameters
     theta, var = solution.theta[:p], np.diag(solution.cov)[:p]
-    excess, count = np.zeros(p), 0
+    excess = np.zeros(p)
     for octave in np.flatnonzero(system.lines > 0):
         use = np.ones(len(system.lines), bool)
         use[octave] = False
         other = solve(system, levels, use)
         grown = np.diag(other.cov)[:p] - var
         excess = np.maximum(excess, (other.theta[:p] - theta) ** 2 - np.maximum(grown, 0.0))
-        count += 1
-    return Spread(np.maximum(excess, 0.0), max(count - 1.0, 1.0))
+    return Spread(np.maximum(excess, 0.0))
 
 
-def of_halves(one: Solution, other: Solution, p: int) -> Spread:
-    """Variance of the mean of two parts that differ by more than their covariances."""
-    apart = (one.theta[:p] - other.theta[:p]) ** 2
-    own = np.diag(one.cov)[:p] + np.diag(other.cov)[:p]
-    return Spread(np.maximum(apart - own, 0.0) / 4, 1.0)
+def of_stretches(whole: Solution, parts: list[Solution], p: int) -> Spread:
+    """Variance by the jackknife over stretches of the log, beyond the mixed model's own (Efron and Stein, 1981).
 
-
-def of_strokes(whole: Solution, part: Solution, p: int) -> Spread:
-    """What strokes alone say against the whole, beyond what their covariance is larger by."""
-    apart = (whole.theta[:p] - part.theta[:p]) ** 2
-    grown = np.diag(part.cov)[:p] - np.diag(whole.cov)[:p]
-    return Spread(np.maximum(apart - np.maximum(grown, 0.0), 0.0), 2.0)
+    Args:
+        whole: of the whole log.
+        parts: with one stretch left out.
+        p: number of parameters.
+    """
+    count = len(parts)
+    apart = np.array([part.theta[:p] - whole.theta[:p] for part in parts])
+    variance = (count - 1) / count * (apart**2).sum(axis=0)
+    return Spread(np.maximum(variance - np.diag(whole.cov)[:p], 0.0), count - 1.0)
 
 
 def of_unexplained(system: System, levels: Levels, solution: Solution, sensor: Array) -> Spread:

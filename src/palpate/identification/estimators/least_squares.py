@@ -114,15 +114,23 @@ def covariance(
 
 
 def inverse(normal: Array) -> Array:
-    """Of a symmetric matrix; a direction that it says nothing of has a variance beyond all bounds."""
+    """Of a symmetric matrix; a direction that it says nothing of has a variance beyond all bounds, not none."""
     size = np.sqrt(np.abs(np.diag(normal)))
     size[size == 0] = 1.0
     scaled = normal / np.outer(size, size)
+    try:
+        root = np.linalg.cholesky(scaled)
+    except np.linalg.LinAlgError:
+        root = None
+    if root is not None and float(np.diag(root).min()) ** 2 > 10 * _SINGULAR:
+        half = np.linalg.inv(root)
+        found: Array = half.T @ half / np.outer(size, size)
+        return found
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
     floor = _SINGULAR * max(float(values[-1]), 1e-300)
     gain = np.where(values > floor, 1 / np.maximum(values, floor), 1 / (_SINGULAR * floor))
-    found: Array = (vectors * gain) @ vectors.T / np.outer(size, size)
-    return found
+    wide: Array = (vectors * gain) @ vectors.T / np.outer(size, size)
+    return wide
 
 
 def quantile(effective: float, parameters: int, level: float = 0.975) -> float:
