@@ -32,6 +32,8 @@ class Noise:
         return float(self.autocovariance[0] + 2 * self.autocovariance[1:].sum())
 
 
+_BEYOND = 1e6
+"""Variance of a direction without information, over that of the least that rounding lets one see."""
 _SINGULAR = 1e-13
 """Eigenvalue of a scaled normal matrix, over the largest, below which rounding alone makes it."""
 
@@ -127,8 +129,8 @@ def inverse(normal: Array) -> Array:
         found: Array = half.T @ half / np.outer(size, size)
         return found
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
-    floor = _SINGULAR * max(float(values[-1]), 1e-300)
-    gain = np.where(values > floor, 1 / np.maximum(values, floor), 1 / (_SINGULAR * floor))
+    floor = _SINGULAR * max(float(values[-1]), 1e-280)
+    gain = np.where(values > floor, 1 / np.maximum(values, floor), _BEYOND / floor)
     wide: Array = (vectors * gain) @ vectors.T / np.outer(size, size)
     return wide
 

@@ -151,7 +151,7 @@ def _fitted(blocks: _Blocks) -> _Line:
     between = np.array([float(moved.real @ moved.real), float(moved.imag @ moved.imag)]) * grown
     freedom = max(independent - 1, 2.0 * min(1.0, 2 / independent))
     change = complex(theta[1]) * np.sqrt(spread) if slope else 0j
-    return _Line(at, complex(theta[0]), change / 2, np.maximum(between, within), freedom)
+    return _Line(at, complex(theta[0]), change, np.maximum(between, within), freedom)
 
 
 def _student(freedom: float) -> float:
