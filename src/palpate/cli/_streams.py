@@ -20,7 +20,7 @@ def prepare() -> None:
     A stream that was closed before the program began is opened to nowhere: otherwise the next file that is opened
     would be taken for it. A letter that the encoding does not have is written in plain letters.
     """
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells at length of a home that cannot be written
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a home that cannot be written is no trouble
     codecs.register_error(_ERRORS, _plainly)
     for name, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
         if getattr(sys, name) is None:
