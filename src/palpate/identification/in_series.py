@@ -40,13 +40,12 @@ def without_series(found: Answer, series: float, series_std: float) -> Answer:
     r = k/(k - K_a). The covariance goes through the derivatives of these.
     """
     names = found.names
-    place = {name: names.index(name) for name in ("K", "B", "M") if name in names}
+    place: dict[str, int] = {name: names.index(name) for name in ("K", "B", "M") if name in names}
     theta = found.theta.copy()
     check(theta[place["K"]], series)
     new = _seen_through(theta, place, series)
     jacobian = np.eye(len(theta))
-    for name in place:
-        i = place[name]
+    for i in place.values():
         step = 1e-6 * max(abs(theta[i]), 1e-9)
         moved = theta.copy()
         moved[i] += step
