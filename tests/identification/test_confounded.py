@@ -72,6 +72,7 @@ def test_nothing_hides_behind_a_lag_that_is_calibrated():
     assert found.parameters["B"].std < 0.002 * TRUTH["B"]
 
 
+@pytest.mark.long
 def test_intervals_of_heavy_presses_cover_the_truth():
     told, wrong = 0, 0
     for seed in range(20):

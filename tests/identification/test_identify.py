@@ -44,6 +44,7 @@ def test_the_lags_own_uncertainty_is_in_the_interval():
     assert unsure.std == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pole", [0.0, 0.9, 0.99])
 def test_intervals_cover_the_truth_under_coloured_noise(pole):
     truth = {"K": 5000.0, "B": 40.0, "M": 0.5}
@@ -59,6 +60,7 @@ def test_intervals_cover_the_truth_under_coloured_noise(pole):
     assert min(inside.values()) >= 0.87 * runs, inside
 
 
+@pytest.mark.long
 def test_intervals_of_presses_cover_the_truth_without_a_known_lag():
     inside = 0
     for seed in range(40):
