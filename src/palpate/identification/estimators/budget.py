@@ -110,7 +110,7 @@ def half_widths(budget: Budget) -> Array:
     variance = np.array([part.variance for part in budget.values()])
     freedom = np.array([part.freedom for part in budget.values()])
     total = variance.sum(axis=0)
-    loss = (variance**2 / freedom[:, None]).sum(axis=0)
-    dof = np.where(loss > 0, total**2 / np.maximum(loss, 1e-300), 1e9)
-    found: Array = stdtrit(np.clip(dof, 1.0, 1e9), 0.975) * np.sqrt(total)
+    share = variance / np.where(total > 0, total, 1.0)
+    loss = (share**2 / freedom[:, None]).sum(axis=0)
+    found: Array = stdtrit(1 / np.clip(loss, 1e-9, 1.0), 0.975) * np.sqrt(total)
     return found
