@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.least_squares import inverse
+from palpate.identification.estimators.least_squares import solved
 from palpate.identification.estimators.octaves import Octaves
 
 Array = NDArray[np.float64]
@@ -166,8 +166,7 @@ def solve(system: System, levels: Levels, use: NDArray[np.bool_] | None = None) 
     for name, places in system.effects.items():
         variance = levels.effects[name]
         normal[places, places] += 1 / max(variance, 1e-280)
-    cov = inverse(normal)
-    return Solution(cov @ right, cov)
+    return Solution(*solved(normal, right))
 
 
 def estimate(system: System, begin: Levels | None = None) -> tuple[Solution, Levels]:
