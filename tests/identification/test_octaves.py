@@ -1,4 +1,4 @@
-"""Sums over lines of the cosine transform: they equal sums over rows, whatever the gaps."""
+"""Sums over the lines of windowed blocks: what holds among rows holds among them, octave by octave."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.identification.estimators.octaves import (
-    MOST_GROUPS,
+    GROUPS,
+    OVERLAP,
     SHORTEST,
     Segment,
-    line_frequencies,
-    lowest_line,
-    octave_of,
+    longest_of,
     octaves_of,
     segments_of,
 )
@@ -25,103 +24,114 @@ def columns(rows, seed=0, p=3):
     return np.random.default_rng(seed).normal(size=(rows, p))
 
 
+def sums(own, *lengths):
+    edges = np.cumsum([0, *(lengths or [len(own)])])
+    segments = [Segment(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
+    return octaves_of(own, segments, DT, longest_of(segments))
+
+
+def line(block, number):
+    """Of one block by hand: without its weighted mean and slope, behind Hann's window of unit noise power."""
+    n = len(block)
+    t = np.arange(n)
+    window = np.hanning(n + 2)[1:-1]
+    window /= np.sqrt((window**2).sum() / 2)
+    plain = np.column_stack([np.ones(n), t])
+    root = np.sqrt(window)[:, None]
+    level = plain @ np.linalg.lstsq(root * plain, root * block)[0]
+    return (window * np.exp(-2j * np.pi * number * t / n)) @ (block - level)
+
+
+def test_the_first_octave_is_the_whole_contact_and_the_next_its_blocks_by_hand():
+    own = columns(512)
+    found = sums(own)
+    whole = np.stack([line(own, k) for k in (1, 2, 3, 4, 5)])
+    np.testing.assert_allclose(found.total[0], np.real(whole.conj().T @ whole), rtol=1e-9, atol=1e-9)
+    assert found.all_lines[0] == 10  # real and imaginary parts
+    blocks = [own[a : a + 256] for a in (0, 128, 256)]
+    lines = np.concatenate([[line(block, k) for k in (3, 4, 5)] for block in blocks])
+    direct = OVERLAP * np.real(lines.conj().T @ lines)
+    np.testing.assert_allclose(found.total[2], direct, rtol=1e-9, atol=1e-9)
+    assert found.all_lines[2] == OVERLAP * 3 * 6
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.integers(SHORTEST, 300), min_size=1, max_size=5), st.integers(0, 2**31))
-def test_summed_over_octaves_they_are_the_products_without_each_segments_mean(lengths, seed):
-    """Parseval: the transform is orthonormal, and its first line is the mean."""
-    edges = np.r_[0, np.cumsum(lengths)]
-    segments = [Segment(int(a), int(b), i % 2) for i, (a, b) in enumerate(zip(edges, edges[1:], strict=False))]
-    own = columns(edges[-1], seed)
-    found = octaves_of(own, segments, DT, lowest_line(segments, DT))
-    direct = np.zeros((3, 3))
-    for s in segments:
-        part = own[s.first : s.last] - own[s.first : s.last].mean(axis=0)
-        direct += part.T @ part
-    np.testing.assert_allclose(found.total.sum(axis=0), direct, atol=1e-10 * edges[-1])
-    assert found.lines.sum() == edges[-1] - len(segments)
-
-
-def test_an_offset_in_each_segment_drops_out():
-    segments = [Segment(0, 100, 0), Segment(100, 250, 1)]
-    own = columns(250)
-    moved = own + np.where(np.arange(250) < 100, 7.0, -40.0)[:, None]
-    lowest = lowest_line(segments, DT)
-    for one, other in zip(
-        octaves_of(own, segments, DT, lowest).products, octaves_of(moved, segments, DT, lowest).products,
-        strict=True,
-    ):  # fmt: skip
-        np.testing.assert_allclose(other, one, atol=1e-9)
-
-
-def test_the_lowest_octave_has_three_lines_and_each_further_one_twice_as_many_as_before():
-    count = 2**10
-    frequency = line_frequencies(count, DT)
-    numbers, sizes = np.unique(octave_of(frequency, frequency[0]), return_counts=True)
-    np.testing.assert_array_equal(numbers, np.arange(len(sizes)))
-    np.testing.assert_array_equal(sizes, [3, *(4 * 2 ** np.arange(len(sizes) - 1))])
-
-
-def test_edges_of_octaves_are_frequencies_not_line_numbers():
-    """A segment of half the length has half the lines in each octave, of the same frequencies."""
-    long_one, short = Segment(0, 2048, 0), Segment(2048, 3072, 1)
-    own = columns(3072)
-    found = octaves_of(own, [long_one, short], DT, lowest_line([long_one, short], DT))
-    assert found.lines[0, 1:9].tolist() == [4.0 * 2**k for k in range(8)]
-    assert found.lines[1, 1:9].tolist() == [2.0 * 2**k for k in range(8)]
-    assert found.lines[:, 10:].sum() == 0  # of half the sampling rate and more, there is no line
-
-
-@pytest.mark.parametrize("frequency", [3.0, 11.0, 47.0, 210.0])
-def test_a_cosine_is_in_the_octave_of_its_frequency(frequency):
-    """Of a long segment; what leaks past its octave's neighbours is less than a hundredth of its power."""
-    t = np.arange(4000) * DT
-    segments = [Segment(0, 4000, 0)]
-    own = octaves_of(np.cos(2 * np.pi * frequency * t)[:, None], segments, DT, lowest_line(segments, DT))
-    power = own.total[:, 0, 0]
-    at = int(np.argmax(power))
-    assert own.frequency[at] / 2**0.5 * 0.999 <= frequency <= own.frequency[at] * 2**0.5 * 1.001
-    assert power[max(at - 1, 0) : at + 2].sum() > 0.99 * power.sum()
+def test_a_regression_that_holds_in_every_row_holds_in_every_octave(lengths, seed):
+    """A window multiplies both sides alike: f = 5 x - 2 y leaves nothing, whatever the gaps, offsets and slopes."""
+    rng = np.random.default_rng(seed)
+    own = rng.normal(size=(sum(lengths), 2)).cumsum(axis=0)
+    number = np.repeat(np.arange(len(lengths)), lengths)
+    drift = rng.normal(size=len(lengths))[number] + np.arange(len(own)) * rng.normal(size=len(lengths))[number]
+    found = sums(np.column_stack([own, own @ [5.0, -2.0] + drift]), *lengths)
+    left = np.array([5.0, -2.0, -1.0])
+    size = np.einsum("oii->o", found.total)
+    assert (np.abs(np.einsum("i,oij,j->o", left, found.total, left)) <= 1e-9 * size).all()
 
 
 def test_white_noise_has_its_variance_in_every_line():
-    segments = [Segment(0, 20_000, 0)]
-    own = octaves_of(columns(20_000, 3, 1), segments, DT, lowest_line(segments, DT))
-    level = own.total[:, 0, 0] / own.lines[0]
-    # A mean of n squares deviates by sqrt(2/n); four of them.
-    assert (np.abs(level - 1) < 4 * np.sqrt(2 / own.lines[0])).all()
+    found = sums(columns(40_000, 3, 1))
+    level = found.total[:, 0, 0] / found.all_lines
+    # A mean of n squares deviates by sqrt(2/n); Hann's window ties neighbours by 4/9 and 1/36. Four of them.
+    tied = 1 + 2 * (4 / 9) * 2 / 3 + 2 / 36 / 3
+    assert (np.abs(level - 1) < 4 * np.sqrt(2 * tied / found.all_lines)).all()
+
+
+@pytest.mark.parametrize("octave", [1, 3, 6])
+def test_a_sine_is_in_the_octave_of_its_frequency_and_leaks_into_no_other(octave):
+    """But for its neighbours, at whose edges it is."""
+    frequency = sums(columns(4000)).frequency[octave]
+    found = sums(np.sin(2 * np.pi * frequency * np.arange(4000) * DT)[:, None])
+    power = found.total[:, 0, 0] / found.all_lines
+    at = int(np.argmax(power))
+    assert at == octave
+    far = np.delete(power, [max(at - 1, 0), at, min(at + 1, len(power) - 1)])
+    assert far.max() < 1e-3 * power[at]
+
+
+def test_octaves_follow_each_other_by_two():
+    frequency = sums(columns(1000)).frequency
+    np.testing.assert_allclose(frequency[2:] / frequency[1:-1], 2.0, rtol=1e-3)
+    assert frequency[1] == pytest.approx(4 / (1000 * DT))
+
+
+def test_a_short_contact_has_its_say_from_the_octave_that_it_is_long_enough_for():
+    both, alone = sums(columns(1256), 1000, 256), sums(columns(1256)[:1000])
+    assert both.all_lines[1] == alone.all_lines[1]
+    assert both.all_lines[3] > alone.all_lines[3]
+
+
+def test_groups_are_stretches_of_the_log_that_sum_to_all_of_it():
+    own = columns(4000)
+    found = sums(own)
+    assert len(found.products) == GROUPS
+    np.testing.assert_allclose(found.products.sum(axis=0), found.total)
+    for group in range(GROUPS):
+        left = found.without(group)
+        np.testing.assert_allclose(left.total, found.total - found.products[group], atol=1e-9)
+        np.testing.assert_allclose(left.all_lines, found.all_lines - found.lines[group], atol=1e-9)
+
+
+def test_octaves_alone():
+    found = sums(columns(1000))
+    use = np.arange(len(found.frequency)) > 2
+    only = found.only(use)
+    np.testing.assert_array_equal(only.total[3:], found.total[3:])
+    assert not only.total[:3].any()
+    assert not only.all_lines[:3].any()
 
 
 def test_rows_are_cut_at_gaps_and_at_the_ends_of_contacts():
     rows = np.r_[np.arange(10, 60), np.arange(80, 120), np.arange(120, 150)]
     spans = np.r_[np.zeros(90, int), np.ones(30, int)]
-    found = segments_of(rows, spans)
-    assert [(s.first, s.last, s.group) for s in found] == [(0, 50, 0), (50, 90, 0), (90, 120, 1)]
+    assert [(s.first, s.last) for s in segments_of(rows, spans)] == [(0, 50), (50, 90), (90, 120)]
 
 
 def test_rows_that_are_two_samples_apart_have_no_gap():
-    assert segments_of(np.arange(0, 100, 2), np.zeros(50, int)) == [Segment(0, 50, 0)]
+    assert segments_of(np.arange(0, 100, 2), np.zeros(50, int)) == [Segment(0, 50)]
 
 
-def test_a_piece_too_short_for_two_octaves_is_left_out():
+def test_a_piece_too_short_for_a_block_is_left_out():
     rows = np.r_[np.arange(0, SHORTEST - 1), np.arange(100, 100 + SHORTEST)]
-    assert segments_of(rows, np.zeros(len(rows), int)) == [Segment(SHORTEST - 1, 2 * SHORTEST - 1, 0)]
+    assert segments_of(rows, np.zeros(len(rows), int)) == [Segment(SHORTEST - 1, 2 * SHORTEST - 1)]
     assert segments_of(np.empty(0, int), np.empty(0, int)) == []
-
-
-@given(st.integers(1, 200))
-@settings(max_examples=30, deadline=None)
-def test_contacts_are_grouped_in_order_and_never_into_more_than_a_few(count):
-    spans = np.repeat(np.arange(count) * 3, SHORTEST)
-    rows = np.arange(len(spans))
-    groups = [s.group for s in segments_of(rows, spans)]
-    assert groups == sorted(groups)
-    assert set(groups) == set(range(max(groups) + 1))
-    assert max(groups) + 1 <= MOST_GROUPS
-
-
-def test_some_groups_alone_are_the_sum_of_theirs():
-    segments = [Segment(0, 100, 0), Segment(100, 200, 1), Segment(200, 300, 2)]
-    found = octaves_of(columns(300), segments, DT, lowest_line(segments, DT))
-    part = found.of_groups([0, 2])
-    np.testing.assert_allclose(part.total, found.products[0] + found.products[2])
-    np.testing.assert_array_equal(part.lines, found.lines[[0]] + found.lines[[2]])
