@@ -12,7 +12,7 @@ import numpy as np
 
 from foreign.bound import half_widths
 from foreign.logs import Cell, Log, make_log
-from foreign.truth import Range, octave_stiffness, of_model, press_stiffness
+from foreign.truth import dynamic_stiffness, Range, octave_stiffness, of_model, press_stiffness
 from palpate.errors import InputError
 from palpate.identification import identify
 from palpate.records import Record
@@ -187,6 +187,9 @@ def _holds(interval: tuple[float, float], truth: Range) -> bool:
 def working_truth(log: Log, source: str, frequency: float | None) -> float | None:
     """The true stiffness at a working point [N/m], from the press without sensors; None where it has none."""
     if source == "octave" and frequency:
+        surface = log.plan.surface
+        if surface.linear:
+            return dynamic_stiffness(surface, frequency, 0.0, 0.0).real
         octave = octave_stiffness(log.dense, frequency)
         return octave.real if octave is not None else None
     return press_stiffness(log.dense)

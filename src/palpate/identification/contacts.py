@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters.state_variable import Chain, block_means
 from palpate.identification.options import NOTHING_SAID, Options
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.warning_codes import Code, Warn
@@ -20,16 +20,20 @@ ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""
 _REACHED = 0.2
 _BLOCKS = 100
-_WIDER = 4.0
-_OVERSAMPLED = 32.0
-"""Samples in a period of the cut-off that are kept: what lies between straight lines is then nothing."""
+_LONGEST_BLOCK = 0.25
+"""Of a median [s]: longer ones would hold whole presses of a long log."""
 _CLEAR = 3.0
 """Deviations of the free force below the threshold: noise cut at its own height stays below two, however coloured."""
 _FEWEST = 20
-_MOVED = 0.1
-"""Share of the position's range below which the place at one end of the force says nothing: few samples of noise."""
 _FREE = 0.25
-"""Share of the position's range that must be travelled without any force for contact to be sure to begin and end."""
+"""Share of the position's range that must be travelled at one end of the force for contact to be sure to begin there:
+the power law of the softest toe (n = 2) goes 0.22 of its depth below ONSET of its force."""
+_FLAT = 0.4
+"""Slope near the resting force over that in contact, below which it is no contact: a toe of n = 2 has 0.44 at ONSET."""
+_SIGNED = 0.6
+"""Correlation of block means of force and position below which nobody can tell which way they count."""
+_OVERSAMPLED = 32.0
+"""Samples in a period of the cut-off that are kept: what lies between straight lines is then nothing."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ class Contacts:
         warnings: what was found.
         clear: whether the force out of contact keeps well below that threshold. The contacts of mere noise are its
             peaks, and what is left out of contact reaches up to them. Not for a bonded one: it has no such force.
+        signed: whether it is known which way each channel counts: as told, as it is, or turned round by what a stretch
+            out of contact shows.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -55,6 +61,7 @@ class Contacts:
     threshold: float
     warnings: tuple[Warn, ...]
     clear: bool = True
+    signed: bool = True
 
 
 def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
@@ -63,14 +70,14 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
     Raises:
         InputError: a cut-off that the readings are too rare for.
     """
-    bonded, cutoff = options.bonded, options.cutoff
+    cutoff = options.cutoff
     highest = FASTEST * channels.rate
     if cutoff is not None and cutoff > 2 * highest:
         raise InputError(
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
         )
     chain = Chain(cutoff or highest, channels.dt)
-    contacts = find_contacts(channels, chain, bonded)
+    contacts = find_contacts(channels, chain, options)
     if not contacts.spans:
         return channels, chain, contacts
     chosen = cutoff or _chosen_cutoff(channels, contacts)
@@ -78,7 +85,7 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
         return channels, chain, contacts
     fewer = thinned(channels, int(1 / (_OVERSAMPLED * chosen * channels.dt)))
     narrow = Chain(chosen, fewer.dt)
-    again = find_contacts(fewer, narrow, bonded)
+    again = find_contacts(fewer, narrow, options)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
 
 
@@ -90,21 +97,25 @@ def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
     return choose_cutoff(channels.position[around], channels.force[around], channels.dt, channels.rate)
 
 
-def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) -> Contacts:
+def find_contacts(channels: Channels, chain: Chain, options: Options = NOTHING_SAID) -> Contacts:
     """Find the stretches in contact.
 
-    The force rests near zero out of contact and departs to one side in it; a force that goes to both sides by
-    comparable amounts is that of a probe fixed to the surface.
+    Free space is where the position travels and the force does not. A force that follows the position at both ends of
+    its range never leaves the surface: the whole log is one contact, and nothing tells what the force rests at.
 
     Args:
         channels: evenly sampled.
         chain: the filter that the fit will use, so that the spans count its delay.
-        bonded: True if the probe is fixed to the surface, False if not, None to find out.
+        options: whether the probe is fixed to the surface, and which way the force counts, if that is known.
     """
-    force = chain(channels.force)
-    rest, peak, sure = _extremes(force, channels.position)
-    if bonded or (bonded is None and not sure and _never_free(rest, peak)):
-        return Contacts(((0, len(force)),), True, 1.0, 1.0, 0.0, -np.inf, (), clear=False)
+    force, position = chain(channels.force), chain(channels.position)
+    end = None if options.bonded else _free_end(force, position, channels.dt)
+    if end is None and options.bonded is False:
+        low, high = _ends(force, channels.dt)
+        end = (low, high) if abs(low) <= abs(high) else (high, low)
+    if end is None:
+        return _never_left(channels, force, position, options)
+    rest, peak = end
     sign = 1.0 if peak > rest else -1.0
     level, top = sign * rest, sign * peak
     threshold = _threshold(sign * force, level, top)
@@ -113,79 +124,132 @@ def find_contacts(channels: Channels, chain: Chain, bonded: bool | None = None) 
         text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     clear = _clear(sign * force, spans, threshold, int(chain.settling / chain.dt))
-    return replace(_oriented(channels, chain, spans, sign, level, threshold), clear=clear)
+    return replace(_oriented(force, position, spans, (sign, level, threshold), options), clear=clear)
+
+
+def _never_left(channels: Channels, force: Array, position: Array, options: Options) -> Contacts:
+    """The whole log as one contact. Its channels count as they stand, or as told."""
+    sign = float(options.force_sign or 1)
+    spans = ((0, len(force)),)
+    if options.bonded:
+        return Contacts(spans, True, sign, 1.0, 0.0, -np.inf, (), clear=False)
+    along = _correlation(sign * force, position, channels.dt)
+    text = "the probe never leaves the surface: the force at rest is not known and is estimated as an offset"
+    warnings = [Warn(Code.CONTACT_AT_START, text)]
+    return Contacts(
+        spans, True, sign, 1.0, 0.0, -np.inf, tuple(warnings), clear=False, signed=along > _SIGNED
+    )
+
+
+def _correlation(force: Array, position: Array, dt: float) -> float:
+    """Of block means over a hundredth of the log, without their slow trend."""
+    from scipy.signal import detrend
+
+    width = max(len(force) // _BLOCKS, 1)
+    f, x = (detrend(block_means(values, width)) for values in (force, position))
+    size = float(np.sqrt((f @ f) * (x @ x)))
+    return float(f @ x) / size if size > 0 else 0.0
 
 
 def _clear(force: Array, spans: list[tuple[int, int]], threshold: float, settling: int) -> bool:
-    out = np.ones(len(force), bool)
-    out[:settling] = False
-    for begin, end in spans:
-        out[begin:end] = False
-    free = force[out]
+    free = force[_outside(len(force), spans, settling)]
     if len(free) < _FEWEST:
         return False
     middle = float(np.median(free))
     return threshold - middle > _CLEAR * 1.4826 * float(np.median(np.abs(free - middle)))
 
 
+def _outside(count: int, spans: list[tuple[int, int]], begin: int) -> NDArray[np.bool_]:
+    out = np.ones(count, bool)
+    out[:begin] = False
+    for first, last in spans:
+        out[first:last] = False
+    return out
+
+
 def _oriented(
-    channels: Channels,
-    chain: Chain,
+    force: Array,
+    position: Array,
     spans: list[tuple[int, int]],
-    sign: float,
-    level: float,
-    threshold: float,
+    levels: tuple[float, float, float],
+    options: Options,
 ) -> Contacts:
+    """Which way the channels count: into the surface is where the probe is in contact and not out of it."""
+    sign, level, threshold = levels
     warnings = []
     if sign < 0:
         text = "the force goes to negative values in contact; its sign was turned round"
         warnings.append(Warn(Code.FORCE_SIGN_REVERSED, text))
-    way = 1.0 if _together(channels, chain, spans, sign) >= 0 else -1.0
+    signed = options.force_sign in (None, int(sign))
+    if not signed:
+        text = "the force counts the other way than --force-sign says: in contact it goes to the other side of its rest"
+        warnings.append(Warn(Code.NEGATIVE_STIFFNESS, text))
+    inside = ~_outside(len(position), spans, 0)
+    out = _outside(len(position), spans, 0)
+    reach = float(np.ptp(position[inside])) or 1.0
+    deep = inside & (sign * force > np.median(sign * force[inside]))
+    apart = float(np.median(position[deep]) - np.median(position[out])) if out.sum() >= _FEWEST else 0.0
+    if abs(apart) < ONSET * reach:
+        apart = float(np.corrcoef(position[inside], sign * force[inside])[0, 1])
+    way = 1.0 if apart >= 0 else -1.0
     if way < 0:
         text = "the position falls as the probe goes in; its sign was turned round"
         warnings.append(Warn(Code.POSITION_SIGN_REVERSED, text))
     if spans[0][0] == 0:
-        text = "the log begins in contact: the force at rest is not known and is estimated as an offset"
+        text = "the log begins in contact: where that contact began is not known"
         warnings.append(Warn(Code.CONTACT_AT_START, text))
-    return Contacts(tuple(spans), False, sign, way, level, threshold, tuple(warnings))
+    return Contacts(tuple(spans), False, sign, way, level, threshold, tuple(warnings), signed=signed)
 
 
-def _extremes(force: Array, position: Array) -> tuple[float, float, bool]:
-    """The force at rest and at its peak, the two ends of its range; and whether the position leaves no doubt of it.
-
-    Out of contact the position may go anywhere without any force, in contact it may not: so rest is the end at which
-    the position spreads wider by far, and if it hardly does, the end nearer to zero. The ends are those of medians over
-    a hundredth of the log, which a chattering probe does not reach.
-    """
-    width = len(force) // _BLOCKS
+def _ends(force: Array, dt: float) -> tuple[float, float]:
+    """The two ends of the force's range: those of short medians, which a chattering probe does not reach."""
+    width = min(len(force) // _BLOCKS, int(_LONGEST_BLOCK / dt))
     low, high = np.percentile(force, [0.1, 99.9])
-    ratio, travelled = 1.0, 0.0
     if width >= 4:
-        step = max(width // 4, 1)
-        middle, place = (
-            np.median(np.lib.stride_tricks.sliding_window_view(values, width)[::step], axis=1)
-            for values in (force, position)
-        )
+        views = np.lib.stride_tricks.sliding_window_view(force, width)[:: max(width // 4, 1)]
+        middle = np.median(views, axis=1)
         if np.ptp(middle) > 0.2 * (high - low):
             low, high = middle.min(), middle.max()
-            near = ONSET * (high - low)
-            below, above = (_spread(place[end]) for end in (middle < low + near, middle > high - near))
-            ratio, travelled = below / max(above, 1e-300), max(below, above) / max(_spread(place), 1e-300)
-    told = travelled > _MOVED and not 1 / _WIDER < ratio < _WIDER
-    from_low = ratio > 1 if told else abs(low) <= abs(high)
-    rest, peak = (low, high) if from_low else (high, low)
-    return float(rest), float(peak), told and travelled > _FREE
+    return float(low), float(high)
+
+
+def _free_end(force: Array, position: Array, dt: float) -> tuple[float, float] | None:
+    """Resting and peak force, if at one end of its range the position travels without it; None if it never does."""
+    low, high = _ends(force, dt)
+    height = high - low
+    whole = _spread(position)
+    if height <= 0 or whole <= 0:
+        return (low, high) if abs(low) <= abs(high) else (high, low)
+    near = (force < low + ONSET * height, force > high - ONSET * height)
+    travel = [_spread(position[end]) / whole for end in near]
+    slope = height / max(_spread(position[~near[0] & ~near[1]]), 1e-300)
+    flat = [_flat(force[end], position[end], slope) for end in near]
+    free = [t > _FREE or f for t, f in zip(travel, flat, strict=True)]
+    if not any(free):
+        return None
+    if all(free):
+        ratio = travel[0] / max(travel[1], 1e-300)
+        from_low = ratio > 1 if max(ratio, 1 / max(ratio, 1e-300)) > 2 else abs(low) <= abs(high)
+    else:
+        from_low = free[0]
+    return (low, high) if from_low else (high, low)
+
+
+def _flat(force: Array, position: Array, slope: float) -> bool:
+    """Whether force near one end of its range follows the position by much less than in contact."""
+    if len(force) < _FEWEST or np.ptp(position) == 0:
+        return False
+    x = position - position.mean()
+    size = float(x @ x)
+    own = float(x @ force) / size
+    left = force - force.mean() - own * x
+    few = max(len(force) / 8, 3.0)  # neighbours behind a filter are not independent
+    std = float(np.sqrt((left @ left) / len(force) / (size / len(force)) / few))
+    return abs(own) + 2 * std < _FLAT * slope
 
 
 def _spread(values: Array) -> float:
     return float(np.ptp(values)) if len(values) else 0.0
-
-
-def _never_free(rest: float, peak: float) -> bool:
-    """Whether the force goes to both sides of zero by comparable amounts, or stays far from zero all the time."""
-    return (rest * peak < 0 and abs(rest) > abs(peak) / 2) or (
-        rest * peak > 0 and abs(rest) > 0.8 * abs(peak)
-    )
 
 
 def _threshold(force: Array, rest: float, peak: float) -> float:
@@ -197,21 +261,17 @@ def _threshold(force: Array, rest: float, peak: float) -> float:
 
 
 def _spans(force: Array, rest: float, peak: float, threshold: float, chain: Chain) -> list[tuple[int, int]]:
-    """Stretches above the onset that reach well above it and last longer than the filter needs to settle."""
+    """Stretches above the onset that reach well above it and last longer than the filter needs to settle.
+
+    Two are one if the force between them stays above half of the onset.
+    """
     above = force > threshold
     edges = np.diff(np.r_[0, above.astype(np.int8), 0])
     spans: list[tuple[int, int]] = []
     for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
-        if spans and (begin - spans[-1][1]) * chain.dt < chain.delay:
+        if spans and force[spans[-1][1] : begin].mean() > (rest + threshold) / 2:
             spans[-1] = (spans[-1][0], int(end))
         else:
             spans.append((int(begin), int(end)))
     least = max(20, int(2 * chain.settling / chain.dt))
     return [(b, e) for b, e in spans if e - b >= least and force[b:e].max() > rest + _REACHED * (peak - rest)]
-
-
-def _together(channels: Channels, chain: Chain, spans: list[tuple[int, int]], sign: float) -> float:
-    position, force = chain(channels.position), sign * chain(channels.force)
-    inside = np.concatenate([np.arange(b, e) for b, e in spans])
-    x, f = position[inside], force[inside]
-    return float((x - x.mean()) @ (f - f.mean()))

@@ -40,6 +40,10 @@ class FrontEnd(Protocol):
         """From row to row [s]."""
 
     @property
+    def dt(self) -> float:
+        """Sampling period of the position [s]."""
+
+    @property
     def cutoff(self) -> float:
         """Frequency up to which it passes [Hz]."""
 
@@ -53,8 +57,11 @@ class FrontEnd(Protocol):
     def times(self, rows: Rows) -> Array:
         """Of rows [s] from the first sample."""
 
-    def gain(self, frequency: Array) -> Array:
-        """Of its amplitude at frequencies [Hz], for noise of the force."""
+    def force_gain(self, frequency: Array) -> Array:
+        """Of the amplitude of the force's noise at frequencies [Hz]."""
+
+    def position_gain(self, frequency: Array) -> Array:
+        """Of the amplitude of the position at frequencies [Hz]."""
 
 
 @dataclass(frozen=True)

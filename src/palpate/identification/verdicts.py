@@ -61,6 +61,8 @@ def verdicts(
     if point is not None and {"K", "M"} <= set(found.names):
         parameters = _agreeing(parameters, found, point)
     parameters = _of_lag(parameters, found, lag, terms)
+    if not choice.problem.contacts.signed:
+        parameters = {name: _unsigned(p) for name, p in parameters.items()}
     return parameters, _warnings(parameters, found, lag, terms)
 
 
@@ -153,6 +155,16 @@ def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Te
         if name in ("B", "M")
     }
     return parameters | refused
+
+
+def _unsigned(p: Parameter) -> Parameter:
+    """Nothing is identified where nobody knows which way force and position count."""
+    if p.verdict is not Verdict.IDENTIFIED:
+        return p
+    reason = (
+        "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
+    )
+    return replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
 
 
 def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> tuple[Warn, ...]:

@@ -71,18 +71,18 @@ def of_octaves(system: System, levels: Levels, solution: Solution) -> Spread:
     return Spread(np.maximum(excess, 0.0))
 
 
-def of_halves(one: Solution, other: Solution, p: int) -> Spread:
-    """Variance of the mean of two parts that differ by more than their covariances."""
-    apart = (one.theta[:p] - other.theta[:p]) ** 2
-    own = np.diag(one.cov)[:p] + np.diag(other.cov)[:p]
-    return Spread(np.maximum(apart - own, 0.0) / 4)
+def of_stretches(whole: Solution, parts: list[Solution], p: int) -> Spread:
+    """Variance by the jackknife over stretches of the log, beyond the mixed model's own (Efron and Stein, 1981).
 
-
-def of_strokes(whole: Solution, part: Solution, p: int) -> Spread:
-    """What strokes alone say against the whole, beyond what their covariance is larger by."""
-    apart = (whole.theta[:p] - part.theta[:p]) ** 2
-    grown = np.diag(part.cov)[:p] - np.diag(whole.cov)[:p]
-    return Spread(np.maximum(apart - np.maximum(grown, 0.0), 0.0))
+    Args:
+        whole: of the whole log.
+        parts: with one stretch left out.
+        p: number of parameters.
+    """
+    count = len(parts)
+    apart = np.array([part.theta[:p] - whole.theta[:p] for part in parts])
+    variance = (count - 1) / count * (apart**2).sum(axis=0)
+    return Spread(np.maximum(variance - np.diag(whole.cov)[:p], 0.0), count - 1.0)
 
 
 def of_unexplained(system: System, levels: Levels, solution: Solution, sensor: Array) -> Spread:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -107,6 +107,25 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag) -> Fit:
     if known.known:
         best = _descend(model, motion, force, best, lag, asks, known)
     return _finish(model, motion, force, best, lag, known)
+
+
+def relinearised(fitted: Fit, motion: Motion, force: Array, theta: dict[str, float]) -> Fit:
+    """The same about other values of the parameters, for a model without nonlinear ones."""
+    values = np.array([theta.get(name, fitted[name]) for name in fitted.names])
+    lag = theta[LAG]
+    columns = np.column_stack(fitted.model.columns(motion, {}, lag))
+    count = columns.shape[1]
+    values[:count] += np.eye(count)[-1] * float(np.mean(force - columns @ values[:count]))  # of the offset
+    predicted = columns @ values[:count]
+    point = _Point({}, lag, columns, values[:count], force - predicted, 0.0, 0.0)
+    slope = _slopes(fitted.model, motion, point, [_lag_knob(motion, Lag(lag))])
+    jacobian = np.column_stack([columns, slope])
+    rmse = float(np.sqrt(np.mean((force - predicted) ** 2)))
+    spread = float(np.mean((force - force.mean()) ** 2))
+    return replace(
+        fitted, theta=values, jacobian=jacobian, residuals=force - predicted, predicted=predicted, lag=lag,
+        rmse=rmse, r2=1 - rmse**2 / spread if spread else 0.0,
+    )  # fmt: skip
 
 
 def _evaluate(

@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 60
 _SETTLED = 1e-4
+_LARGEST = 3.0
+"""Deviation of the weak prior of a term's force, over the force's: a term is known to be no larger than that by itself
+only where the log does not tell it, and there any number of this size does."""
 _NEIGHBOUR = 2.0
 """Lines that the level of an octave borrows from the next higher one: its own few may be fitted by chance."""
 
@@ -35,18 +38,16 @@ class Design:
         names: of the parameters, whose columns come first; the force is the last column.
         prior: mean and standard deviation of what is known of some parameters.
         effects: group of random effects -> its columns.
-        local: columns whose parameter may differ between octaves and between contacts.
     """
 
     names: tuple[str, ...]
     prior: dict[str, tuple[float, float]]
     effects: dict[str, tuple[int, ...]]
-    local: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class System:
-    """The expanded normal equations: parameters, effects, effects by octave, effects by group; last the force.
+    """The normal equations by octave: parameters, effects, last the force.
 
     Args:
         products: shape (octaves, d + 1, d + 1).
@@ -96,55 +97,24 @@ class Solution:
 
 
 def expanded(octaves: Octaves, design: Design) -> System:
-    """Add the columns that stand for one octave or one group of contacts only."""
-    groups, count, width, _ = octaves.products.shape
+    """The normal equations of a log, or of a part of it."""
     p = len(design.names)
-    own = [*range(p), *(c for cols in design.effects.values() for c in cols)]
-    base = [*own, width - 1]
-    by_group = groups if groups > 1 else 0
-    local = len(design.local)
-    d = len(own) + local * (count + by_group)
-    products = np.zeros((count, d + 1, d + 1))
-    place = np.r_[np.arange(len(own)), d]
-    total = octaves.total
-    for o in range(count):
-        products[o][np.ix_(place, place)] = total[o][np.ix_(base, base)]
-        for i, c in enumerate(design.local):
-            at = len(own) + i * count + o
-            products[o][at, place] = products[o][place, at] = total[o][c, base]
-            for j, other in enumerate(design.local):
-                products[o][at, len(own) + j * count + o] = total[o][c, other]
-            for g in range(by_group):
-                at_g = len(own) + local * count + i * by_group + g
-                part = octaves.products[g, o]
-                products[o][at_g, place] = products[o][place, at_g] = part[c, base]
-                for j, other in enumerate(design.local):
-                    at_o = len(own) + j * count + o
-                    products[o][at_g, at_o] = products[o][at_o, at_g] = part[c, other]
-                    products[o][at_g, len(own) + local * count + j * by_group + g] = part[c, other]
-    # An effect of an octave is a force of one size in each: what is unexplained there does not grow with the motion.
-    for i, c in enumerate(design.local):
-        for o in range(count):
-            at = len(own) + i * count + o
-            size = float(np.sqrt(total[o][c, c])) or 1.0
-            products[o][at, :] /= size
-            products[o][:, at] /= size
-    effects: dict[str, tuple[int, ...]] = {}
-    at = p
-    for name, columns in design.effects.items():
-        effects[name] = tuple(range(at, at + len(columns)))
-        at += len(columns)
-    for i in range(local):
-        effects[f"octave {design.names[design.local[i]]}"] = tuple(range(at, at + count))
-        at += count
-    for i in range(local if by_group else 0):
-        effects[f"contact {design.names[design.local[i]]}"] = tuple(range(at, at + by_group))
-        at += by_group
-    mean, weight = np.zeros(p), np.zeros(p)
+    mean = np.zeros(p)
+    weight = _weak(octaves.total.sum(axis=0), p)
     for name, (value, std) in design.prior.items():
         i = design.names.index(name)
         mean[i], weight[i] = value, 1 / std**2
-    return System(products, octaves.lines.sum(axis=0), effects, p, mean, weight)
+    return System(octaves.total, octaves.all_lines, design.effects, p, mean, weight)
+
+
+def _weak(products: Array, p: int) -> Array:
+    """Weights of a weak prior: no term of a model is many times the force itself, shape (p,).
+
+    It counts only for what the log says nothing of, as for a damping that friction may stand for.
+    """
+    power = np.diag(products)
+    found: Array = np.where(power[:p] > 0, power[:p] / (_LARGEST**2 * max(float(power[-1]), 1e-300)), 0.0)
+    return found
 
 
 def solve(system: System, levels: Levels, use: NDArray[np.bool_] | None = None) -> Solution:
@@ -165,18 +135,14 @@ def solve(system: System, levels: Levels, use: NDArray[np.bool_] | None = None) 
     right[:p] += system.prior_weight * system.prior_mean
     for name, places in system.effects.items():
         variance = levels.effects[name]
-        normal[places, places] += 1 / max(variance, 1e-280)
+        normal[places, places] += 1 / max(variance, 1e-200)
     return Solution(*solved(normal, right))
 
 
 def estimate(system: System, begin: Levels | None = None) -> tuple[Solution, Levels]:
     """Estimate variances and parameters together, from a guess of the variances if there is one."""
-    force = system.products[:, -1, -1]
-    mean = float(force.sum() / max(system.lines.sum(), 1))
-    start = 0.01 * mean
-    noise = np.maximum(0.1 * force / np.maximum(system.lines, 1), 1e-6 * mean) + 1e-280
-    effects = {name: start / max(_power(system, places), 1e-300) for name, places in system.effects.items()}
-    levels = begin or Levels(noise, effects)
+    begin = begin or _least_squares(system)
+    levels = begin
     solution = solve(system, levels)
     for _ in range(_ROUNDS):
         new = _updated(system, levels, solution)
@@ -185,6 +151,20 @@ def estimate(system: System, begin: Levels | None = None) -> tuple[Solution, Lev
         if change < _SETTLED:
             break
     return solution, levels
+
+
+def _least_squares(system: System) -> Levels:
+    """Where the search begins: what least squares leave is the noise, and each cause may be as large as a part of it."""
+    force = system.products[:, -1, -1]
+    mean = float(force.sum() / max(system.lines.sum(), 1))
+    noise = np.full(len(force), 1e-3 * mean) + 1e-280
+    none = dict.fromkeys(system.effects, 1e-200)
+    for _ in range(3):
+        plain = solve(system, Levels(noise, none))
+        noise = _updated(system, Levels(noise, none), plain).noise
+    left = float(noise @ system.lines) / max(float(system.lines.sum()), 1.0)
+    size = {name: max(_power(system, places), 1e-300) for name, places in system.effects.items()}
+    return Levels(noise, {name: max(left / own, 1e-200) for name, own in size.items()})
 
 
 def _power(system: System, places: tuple[int, ...]) -> float:
@@ -215,5 +195,5 @@ def _updated(system: System, levels: Levels, solution: Solution) -> Levels:
         square = float(theta[i] @ theta[i])
         was = levels.effects[name]
         known = max(len(i) - float(np.trace(cov[np.ix_(i, i)])) / was, 1e-6)
-        effects[name] = float(np.clip(square / known, 1e-10 * was, 1e4 * was)) + 1e-280
+        effects[name] = max(float(np.clip(square / known, 1e-10 * was, 1e4 * was)), 1e-200)
     return Levels(noise, effects)

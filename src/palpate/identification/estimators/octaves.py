@@ -1,37 +1,48 @@
 """Normal equations by octave of frequency: all that the mixed model needs of a log, whatever its length.
 
-Each contact goes through a discrete cosine transform without its mean, so that an offset of the force in each contact
-drops out. The products of all columns are then summed over the lines of each octave and over groups of contacts.
+In each octave every column goes through Hann blocks of four periods, half overlapping, of which the lines 3, 4, 5 are
+kept; the first octave has whole contacts, with lines 1 to 5. A window multiplies both sides of a regression alike, so
+the model holds among the lines as it does in time, while a disturbance stays in its own octave (a plain transform
+leaks from one into all). Each block is without its mean and mean slope, so an offset and a slow drift drop out. The
+products of all columns are summed over the lines of each octave and over stretches of the log.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SHORTEST = 8
-"""Rows of a segment, at least: fewer have no second octave."""
-MOST_GROUPS = 8
-"""Groups of contacts whose stiffness may differ: enough for a variance between them, few enough for a small system."""
+SHORTEST = 16
+"""Rows of a segment, at least: one block."""
+GROUPS = 8
+"""Stretches of the log whose stiffness may differ: enough for a variance between them, few enough for a small system."""
+PERIODS = 4
+"""Periods in a block."""
+_LINES = np.array([3.0, 4.0, 5.0])
+_WHOLE_LINES = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+OVERLAP = 0.75
+"""Independent blocks for each of half-overlapping Hann blocks of a coherent motion: 1/(1 + 2/6) (Welch 1967)."""
+_AT_ONCE = 1 << 22
+"""Numbers of one channel's blocks that are in memory at a time."""
 
 
 @dataclass(frozen=True)
 class Segment:
-    """Evenly spaced rows without a gap.
-
-    Args:
-        first, last: of the rows, past the last.
-        group: which group of contacts it belongs to.
-    """
+    """Evenly spaced rows without a gap: first, and past the last."""
 
     first: int
     last: int
-    group: int
+
+    @property
+    def length(self) -> int:
+        """Rows."""
+        return self.last - self.first
 
 
 @dataclass(frozen=True)
@@ -40,8 +51,8 @@ class Octaves:
 
     Args:
         products: of the columns with each other, shape (groups, octaves, p, p).
-        lines: how many lines each sum has, shape (groups, octaves).
-        frequency: geometric middle of each octave [Hz], shape (octaves,).
+        lines: how many independent lines each sum has, shape (groups, octaves).
+        frequency: middle of each octave [Hz], shape (octaves,).
     """
 
     products: Array
@@ -54,11 +65,20 @@ class Octaves:
         whole: Array = self.products.sum(axis=0)
         return whole
 
-    def of_groups(self, groups: Sequence[int]) -> Octaves:
-        """The same of some groups only, as one."""
-        own = list(groups)
-        products, lines = (sums[own].sum(axis=0, keepdims=True) for sums in (self.products, self.lines))
-        return Octaves(products, lines, self.frequency)
+    @property
+    def all_lines(self) -> Array:
+        """Lines of all groups, shape (octaves,)."""
+        whole: Array = self.lines.sum(axis=0)
+        return whole
+
+    def only(self, use: NDArray[np.bool_]) -> Octaves:
+        """The same with some octaves alone, shape (octaves,)."""
+        return Octaves(self.products * use[None, :, None, None], self.lines * use[None, :], self.frequency)
+
+    def without(self, group: int) -> Octaves:
+        """The same without one group."""
+        kept = np.arange(len(self.products)) != group
+        return Octaves(self.products[kept], self.lines[kept], self.frequency)
 
 
 def segments_of(rows: NDArray[np.intp], spans: NDArray[np.intp]) -> list[Segment]:
@@ -72,52 +92,83 @@ def segments_of(rows: NDArray[np.intp], spans: NDArray[np.intp]) -> list[Segment
         return []
     step = int(np.median(np.diff(rows))) if len(rows) > 1 else 1
     cuts = np.flatnonzero((np.diff(rows) != step) | (np.diff(spans) != 0)) + 1
-    edges = np.r_[0, cuts, len(rows)]
-    pieces = [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a >= SHORTEST]
-    numbers = np.unique([spans[a] for a, _ in pieces])
-    share = max(-(-len(numbers) // MOST_GROUPS), 1)
-    return [Segment(a, b, int(np.searchsorted(numbers, spans[a])) // share) for a, b in pieces]
+    edges = [0, *(int(cut) for cut in cuts), len(rows)]
+    return [Segment(a, b) for a, b in pairwise(edges) if b - a >= SHORTEST]
 
 
-def octave_of(frequency: Array, lowest: float) -> NDArray[np.intp]:
-    """Number of each line's octave; the lowest has the first three lines of the longest segment."""
-    return np.maximum(np.floor(np.log2(frequency / lowest * (1 + 1e-9))).astype(np.intp) - 1, 0)
+def longest_of(segments: Sequence[Segment]) -> int:
+    """Rows of the longest segment, from which octaves are counted."""
+    return max(s.length for s in segments)
 
 
-def line_frequencies(count: int, dt: float) -> Array:
-    """Of the cosines 1 to count - 1 of a segment [Hz]."""
-    found: Array = np.arange(1, count) / (2 * count * dt)
-    return found
+def octave_count(longest: int) -> int:
+    """Octaves until a block has its fewest rows."""
+    return int(np.log2(longest / SHORTEST)) + 2
 
 
-def lowest_line(segments: Sequence[Segment], dt: float) -> float:
-    """The lowest frequency of the longest segment [Hz], from which octaves are counted."""
-    return 1 / (2 * max(s.last - s.first for s in segments) * dt)
-
-
-def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, lowest: float) -> Octaves:
+def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: int) -> Octaves:
     """Sum the products of columns, shape (m, p), by octave.
 
     Args:
         columns: at the rows that the segments count.
         segments: one at least.
         dt: from row to row [s].
-        lowest: frequency from which octaves are counted [Hz].
+        longest: rows of the block of the first octave.
     """
-    from scipy.fft import dct
-
-    count = int(octave_of(np.array([0.5 / dt]), lowest)[0]) + 1
-    groups = max(s.group for s in segments) + 1
-    p = columns.shape[1]
-    products, lines = np.zeros((groups, count, p, p)), np.zeros((groups, count))
-    for segment in segments:
-        own = dct(columns[segment.first : segment.last], norm="ortho", axis=0)[1:]
-        number = octave_of(line_frequencies(segment.last - segment.first, dt), lowest)
-        edges = np.searchsorted(number, np.arange(count + 1))
+    count, p = octave_count(longest), columns.shape[1]
+    products, lines = np.zeros((GROUPS, count, p, p)), np.zeros((GROUPS, count))
+    begins = np.cumsum([0, *(s.length for s in segments)])
+    for number, segment in enumerate(segments):
+        own = columns[segment.first : segment.last]
         for octave in range(count):
-            part = own[edges[octave] : edges[octave + 1]]
-            products[segment.group, octave] += part.T @ part
-            lines[segment.group, octave] += len(part)
-    frequency = lowest * 2.0 ** (np.arange(count) + 1.5)
-    frequency[0] = lowest * 1.7  # geometric middle of lines 1 to 3
-    return Octaves(products, lines, frequency)
+            length = segment.length if octave == 0 else longest >> (octave - 1)
+            if length > segment.length or (octave == 0 and 2 * length < longest) or length < SHORTEST:
+                continue
+            starts = np.arange(0, segment.length - length + 1, max(length // 2, 1))
+            group = (begins[number] + starts + length // 2) * GROUPS // max(int(begins[-1]), 1)
+            for g, part in _sums(own, starts, group, length, _WHOLE_LINES if octave == 0 else _LINES):
+                share = OVERLAP if len(starts) > 1 else 1.0
+                products[g, octave] += share * part[0]
+                lines[g, octave] += share * part[1]
+    lengths = longest / 2.0 ** np.maximum(np.arange(count) - 1, 0)
+    frequency = PERIODS / (lengths * dt)
+    frequency[0] = 2 / (longest * dt)
+    seen = products.any(axis=(1, 2, 3))
+    return Octaves(products[seen], lines[seen], frequency) if seen.any() else Octaves(products, lines, frequency)
+
+
+def _sums(
+    own: Array, starts: NDArray[np.intp], group: NDArray[np.intp], length: int, numbers: Array
+) -> list[tuple[int, tuple[Array, int]]]:
+    """Products and lines of the blocks of each group."""
+    phase, level = _phase(length, numbers)
+    width = own.shape[1]
+    found: dict[int, list[object]] = {}
+    some = max(_AT_ONCE // (length * width), 1)
+    views = np.lib.stride_tricks.sliding_window_view(own, length, axis=0)
+    for first in range(0, len(starts), some):
+        at = starts[first : first + some]
+        block = views[at]  # (blocks, p, length)
+        lines = block @ phase - (block @ level[0]) @ level[1]
+        real = np.concatenate([lines.real, lines.imag], axis=2)  # (blocks, p, 2 lines)
+        for g in np.unique(group[first : first + some]):
+            mine = real[group[first : first + some] == g]
+            flat = mine.transpose(0, 2, 1).reshape(-1, width)
+            if int(g) in found:
+                found[int(g)][0] += flat.T @ flat  # type: ignore[operator]
+                found[int(g)][1] += len(flat)  # type: ignore[operator]
+            else:
+                found[int(g)] = [flat.T @ flat, len(flat)]
+    return [(g, (np.asarray(part[0]), int(part[1]))) for g, part in found.items()]  # type: ignore[call-overload]
+
+
+def _phase(length: int, numbers: Array) -> tuple[NDArray[np.complex128], tuple[Array, NDArray[np.complex128]]]:
+    """The transform of a block, and that of its mean and slope; the power of white noise stays what it is."""
+    time = np.arange(length)
+    window = np.hanning(length + 2)[1:-1]
+    window /= np.sqrt(window @ window / 2)
+    phase = np.exp(-2j * np.pi * np.outer(time, numbers) / length) * window[:, None]
+    plain = np.column_stack([np.ones(length), 2 * time / (length - 1) - 1])
+    weighted = window[:, None] * plain
+    fitted = np.linalg.solve(weighted.T @ plain, weighted.T)  # (2, length)
+    return phase, (np.ascontiguousarray(fitted.T), plain.T @ phase)

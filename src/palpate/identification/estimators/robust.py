@@ -8,6 +8,7 @@ free number; the columns are formed again at the lag found until it rests.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from palpate.errors import InputError
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.effects import effect_columns
-from palpate.identification.estimators.fit import Fit, fit
+from palpate.identification.estimators.fit import Fit, fit, relinearised
 from palpate.identification.estimators.mixed import (
     Design,
     Levels,
@@ -29,21 +30,21 @@ from palpate.identification.estimators.mixed import (
 from palpate.identification.estimators.octaves import (
     Octaves,
     Segment,
-    line_frequencies,
-    lowest_line,
-    octave_of,
+    longest_of,
     octaves_of,
     segments_of,
 )
-from palpate.identification.models import Model
+from palpate.identification.models import Model, Motion
 from palpate.identification.prior import LAG, mass_std
 from palpate.identification.problem import Problem
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 4
+_ROUNDS = 6
 _RESTS = 0.02
 """Share of its deviation by which a lag may still move."""
+_SEEN = 10.0
+"""Power of the position over that of its noise below which an octave is left out: it would be off by a tenth."""
 _QUIETEST = 16
 """Lines of an octave that may stand for the sensor's noise."""
 
@@ -104,13 +105,19 @@ def answer(problem: Problem, model: Model) -> Answer:
     if not segments:
         raise InputError("every stretch in contact is too short; log longer or faster")
     lag = problem.lag.value
-    levels = None
+    levels, theta = None, None
+    if problem.lag.std > 0 and not model.knobs:  # the lag's column needs parameters that are roughly right
+        exact = replace(problem, lag=replace(problem.lag, std=0.0))
+        first = _Question.of(exact, model, lag, segments, None)
+        solution, levels = estimate(first.system)
+        theta = dict(zip(first.names, solution.theta, strict=False))
     for _ in range(_ROUNDS):
-        question = _Question.of(problem, model, lag, segments)
+        question = _Question.of(problem, model, lag, segments, theta)
         solution, levels = estimate(question.system, levels)
         if problem.lag.std == 0:
             break
-        moved = float(solution.theta[question.names.index(LAG)])
+        theta = dict(zip(question.names, solution.theta, strict=False))
+        moved = theta[LAG]
         limit = 3 * problem.lag.std
         moved = float(np.clip(moved, problem.lag.value - limit, problem.lag.value + limit))
         if abs(moved - lag) < _RESTS * problem.lag.std:
@@ -129,19 +136,32 @@ class _Question:
     design: Design
     segments: list[Segment]
     octaves: Octaves
-    lowest: float
+    use: NDArray[np.bool_]
     system: System
 
     @classmethod
-    def of(cls, problem: Problem, model: Model, lag: float, segments: list[Segment]) -> _Question:
-        """Linearise the model at a lag, and sum its columns by octave."""
+    def of(
+        cls,
+        problem: Problem,
+        model: Model,
+        lag: float,
+        segments: list[Segment],
+        theta: dict[str, float] | None,
+    ) -> _Question:
+        """Linearise the model at a lag, and sum its columns by octave.
+
+        A model without nonlinear parameters is linearised about what the mixed model had for it before, if it has been
+        asked: least squares may be far off in a log with other forces, and with them the column of the lag.
+        """
         motion = problem.motion
         fitted = fit(model, motion, problem.force, replace(problem.lag, value=lag, std=0.0))
+        if theta is not None and not model.knobs:
+            fitted = relinearised(fitted, motion, problem.force, {**theta, LAG: lag})
         free = [n for n in fitted.names if n != "offset" and (n != LAG or problem.lag.std > 0)]
         at = [fitted.names.index(n) for n in free]
         jacobian, theta = fitted.jacobian[:, at], fitted.theta[at]
         target = fitted.residuals + jacobian @ theta
-        effects = effect_columns(motion, lag, segments, problem.time)
+        effects = effect_columns(motion, lag, segments)
         columns = np.column_stack([jacobian, *(c for own in effects.values() for c in own), target])
         places, begin = {}, len(free)
         for name, own in effects.items():
@@ -150,13 +170,13 @@ class _Question:
         prior = {LAG: (problem.lag.value, problem.lag.std)} if LAG in free else {}
         if problem.lag.mass is not None and "M" in free:
             prior["M"] = (problem.lag.mass[0], mass_std(problem.lag.mass))
-        local = tuple(free.index(n) for n in ("K", "B") if n in free)
-        design = Design(tuple(free), prior, places, local)
+        design = Design(tuple(free), prior, places)
         dt = float(np.median(np.diff(problem.time)))
-        lowest = lowest_line(segments, dt)
-        octaves = octaves_of(columns, segments, dt, lowest)
-        system = expanded(octaves, design)
-        return cls(problem, fitted, tuple(free), columns, design, segments, octaves, lowest, system)
+        longest = longest_of(segments)
+        octaves = octaves_of(columns, segments, dt, longest)
+        use = _seen(motion, lag, segments, octaves)
+        system = expanded(octaves.only(use), design)
+        return cls(problem, fitted, tuple(free), columns, design, segments, octaves, use, system)
 
     @property
     def dt(self) -> float:
@@ -170,66 +190,43 @@ class _Question:
         sensor = self._sensor(levels)
         budget = causes.of_system(self.system, levels, solution, lag)
         budget["octaves"] = causes.of_octaves(self.system, levels, solution)
-        budget["repetition"] = self._repetition(levels)
-        budget["strokes"] = self._strokes(solution, levels)
+        budget["repetition"] = self._repetition(solution, levels)
         budget["unexplained"] = causes.of_unexplained(self.system, levels, solution, sensor)
         explained, left = self._explained(solution, levels, sensor)
         theta, cov = solution.theta[:p], solution.cov[:p, :p]
+        fitted = self.fit
+        if not fitted.model.knobs:
+            values = dict(zip(self.names, theta, strict=True))
+            fitted = relinearised(fitted, self.problem.motion, self.problem.force, {LAG: fitted.lag, **values})
         noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
-        return Answer(self.names, theta, cov, budget, self.fit, explained, left, noise)
+        return Answer(self.names, theta, cov, budget, fitted, explained, left, noise)
 
-    def _repetition(self, levels: Levels) -> Spread:
-        """Two disjoint parts of the log: every other contact, or the two halves of a single one."""
-        groups = sorted({s.group for s in self.segments})
-        if len(groups) > 1:
-            one, other = groups[::2], groups[1::2]
-            octaves = self.octaves
-        else:
-            halves = [h for s in self.segments for h in _halves(s)]
-            if len({h.group for h in halves}) < 2:
-                return Spread(np.zeros(self.system.parameters))
-            octaves = octaves_of(self.columns, halves, self.dt, self.lowest)
-            one, other = [0], [1]
-        p = self.system.parameters
-        first, second = (solve(expanded(octaves.of_groups(g), self.design), levels) for g in (one, other))
-        return causes.of_halves(first, second, p)
-
-    def _strokes(self, solution: Solution, levels: Levels) -> Spread:
-        """Motion into the surface and out of it, each by itself."""
-        p = self.system.parameters
-        speed = self.problem.motion.moved(1, self.fit.lag)
-        pieces = _strokes(speed, self.segments)
-        if not pieces:
-            return Spread(np.zeros(p))
-        octaves = octaves_of(self.columns, pieces, self.dt, self.lowest)
-        ways = sorted({piece.group for piece in pieces})
-        part = solve(expanded(octaves.of_groups(ways), self.design), levels)
-        spread = causes.of_strokes(solution, part, p)
-        if len(ways) == 2:
-            both = [solve(expanded(octaves.of_groups([w]), self.design), levels) for w in ways]
-            apart = causes.of_halves(both[0], both[1], p)
-            spread = Spread(np.maximum(spread.variance, apart.variance))
-        return spread
+    def _repetition(self, solution: Solution, levels: Levels) -> Spread:
+        """Stretches of the log left out one after the other."""
+        octaves = self.octaves.only(self.use)
+        count = len(octaves.products)
+        if count < 2:
+            return Spread(np.zeros(self.system.parameters))
+        parts = [solve(expanded(octaves.without(g), self.design), levels) for g in range(count)]
+        return causes.of_stretches(solution, parts, self.system.parameters)
 
     def _sensor(self, levels: Levels) -> Array:
         """Variance of a line by the sensor's own noise in each octave: out of contact, else the quietest octave's."""
-        from scipy.fft import dct
-
-        count = len(levels.noise)
-        gain = self.problem.motion.chain.gain(self.octaves.frequency) ** 2
-        enough = self.system.lines >= _QUIETEST
-        ratio = levels.noise / np.maximum(gain, 1e-12)
+        gain = self.problem.motion.chain.force_gain(self.octaves.frequency) ** 2
+        lines = self.octaves.all_lines
+        enough = lines >= _QUIETEST
+        unseen = self.octaves.total[:, -1, -1] / np.maximum(lines, 1.0)
+        ratio = np.where(self.use, levels.noise, unseen) / np.maximum(gain, 1e-12)
         floor = float(ratio[enough].min()) if enough.any() else float(ratio.min())
         sensor = floor * gain
-        power, lines = np.zeros(count), np.zeros(count)
-        for stretch in self.problem.free:
-            own = dct(stretch - stretch.mean(), norm="ortho")[1:] ** 2
-            number = octave_of(line_frequencies(len(stretch), self.dt), self.lowest)
-            keep = number < count
-            power += np.bincount(number[keep], own[keep], count)
-            lines += np.bincount(number[keep], minlength=count)
-        seen = lines >= 2
-        sensor[seen] = np.maximum(power[seen] / lines[seen], sensor[seen])
+        free, longest = self.problem.free, longest_of(self.segments)
+        if free:
+            edges = np.cumsum([0, *(len(f) for f in free)])
+            rest = octaves_of(
+                np.concatenate(free)[:, None], [Segment(int(a), int(b)) for a, b in pairwise(edges)], self.dt, longest
+            )
+            seen = rest.all_lines >= 2
+            sensor[seen] = np.maximum(rest.total[seen, 0, 0] / rest.all_lines[seen], sensor[seen])
         return np.minimum(sensor, levels.noise)
 
     def _explained(self, solution: Solution, levels: Levels, sensor: Array) -> tuple[float, float]:
@@ -249,22 +246,13 @@ class _Question:
         return 1 - left / whole, float(np.sqrt(left / count))
 
 
-def _halves(segment: Segment) -> list[Segment]:
-    middle = (segment.first + segment.last) // 2
-    parts = [Segment(segment.first, middle, 0), Segment(middle, segment.last, 1)]
-    return [s for s in parts if s.last - s.first >= 8]
-
-
-def _strokes(speed: Array, segments: list[Segment]) -> list[Segment]:
-    """Stretches that move one way, of 8 rows or more; group 0 into the surface, 1 out of it, if both are there."""
-    still = 0.05 * float(np.percentile(np.abs(speed), 95))
-    way = np.where(speed > still, 1, np.where(speed < -still, -1, 0)).astype(np.int8)
-    found = []
-    for s in segments:
-        own = way[s.first : s.last]
-        edges = np.flatnonzero(np.diff(own)) + 1
-        for a, b in zip(np.r_[0, edges], np.r_[edges, len(own)], strict=True):
-            if b - a >= 8 and own[a] != 0:
-                found.append(Segment(s.first + int(a), s.first + int(b), 0 if own[a] > 0 else 1))
-    groups = {s.group for s in found}
-    return [replace(s, group=0) for s in found] if groups == {1} else found
+def _seen(
+    motion: Motion, lag: float, segments: list[Segment], octaves: Octaves
+) -> NDArray[np.bool_]:
+    """Octaves up to the first in which the position is mostly its own noise, which pulls every parameter to zero."""
+    chain = motion.chain
+    dt = float(np.median(np.diff(chain.times(motion.rows))))
+    moved = octaves_of(motion.moved(0, lag)[:, None], segments, dt, longest_of(segments))
+    line = motion.noise.power(octaves.frequency, chain.dt) * chain.position_gain(octaves.frequency) ** 2
+    noise = moved.all_lines * line * chain.dt / dt
+    return np.logical_and.accumulate(moved.total[:, 0, 0] >= _SEEN * noise)

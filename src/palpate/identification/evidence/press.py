@@ -26,9 +26,11 @@ _SHOWN = 400
 
 @dataclass(frozen=True)
 class Stroke:
-    """One way in: depth [m], force [N] and time [s], shape (n,)."""
+    """One way in: depth [m], its first two rates, force [N] and time [s], shape (n,)."""
 
     depth: Array
+    speed: Array
+    acceleration: Array
     force: Array
     time: Array
 
@@ -51,7 +53,9 @@ class Slope:
 
 def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[Stroke]:
     """The way in of each contact: up to its deepest row, at least half of the range of all."""
-    depth, force, time = problem.motion.moved(0, lag), problem.force, problem.time
+    motion = problem.motion
+    channels = (*(motion.moved(k, lag) for k in range(3)), problem.force, problem.time)
+    depth = channels[0]
     found = []
     reach = max((float(np.ptp(depth[s.first : s.last])) for s in segments), default=0.0)
     for s in segments:
@@ -61,15 +65,16 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
             continue
         begin = s.first + int(np.argmin(depth[s.first : top]))
         if top - begin >= _FEWEST:
-            found.append(Stroke(depth[begin:top], force[begin:top], time[begin:top]))
+            found.append(Stroke(*(own[begin:top] for own in channels)))
     return found
 
 
 def slope_of(strokes: list[Stroke]) -> Slope | None:
     """Slope in the upper part of the force; None without a way in that rises.
 
-    Its interval has the scatter of each way in, the change of the slope over the range, and the variance between ways
-    in (a random effect, Student's t).
+    Half way between the slope as it is and the slope at rest, less what the force has of speed and acceleration. Its
+    interval has both, the scatter of each way in, the change of the slope over the range, and the variance between
+    ways in (a random effect, Student's t).
     """
     slopes, variances, rises, changes = [], [], [], []
     for stroke in strokes:
@@ -80,9 +85,10 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
         if len(rows) < _FEWEST or np.ptp(stroke.depth[rows]) <= 0:
             continue
         slope, variance, change = _line(stroke.depth[rows], stroke.force[rows])
-        slopes.append(slope)
+        at_rest = _at_rest(stroke, rows)
+        slopes.append((slope + at_rest) / 2)
         variances.append(variance)
-        changes.append(change)
+        changes.append(float(np.hypot(change, (slope - at_rest) / 2)))
         rises.append(float(stroke.time[-1] - stroke.time[0]))
     if not slopes:
         return None
@@ -103,6 +109,17 @@ def _line(x: Array, f: Array) -> tuple[float, float, float]:
     variance = noise.variance * len(f) / max(noise.effective, 4.0) * np.diag(gram)
     curve = abs(float(theta[2]))
     return float(theta[1] / reach), float(variance[1] / reach**2), curve / reach
+
+
+def _at_rest(stroke: Stroke, rows: NDArray[np.intp]) -> float:
+    """Slope less what the force has of the speed and the acceleration on the way."""
+    columns = np.column_stack(
+        [np.ones(len(rows)), stroke.depth[rows], stroke.speed[rows], stroke.acceleration[rows]]
+    )
+    size = np.sqrt((columns**2).sum(axis=0))
+    size[size == 0] = 1.0
+    theta, *_ = np.linalg.lstsq(columns / size, stroke.force[rows], rcond=1e-3)
+    return float(theta[1] / size[1])
 
 
 def pooled(values: Array, variances: Array) -> tuple[float, float, float]:

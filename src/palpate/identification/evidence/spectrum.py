@@ -1,9 +1,9 @@
 """Dynamic stiffness by octaves: force over position in blocks of four periods, and how much the blocks differ.
 
-In each block the transform of the force is regressed on that of the position over the three lines about the octave's
-middle (the best linear approximation of Pintelon and Schoukens, 2012). Blocks are pooled by the power of their
-motion; the variance between them, with Student's t for their effective number, makes the interval, so that whatever
-differs from block to block, known or not, widens it.
+Over the three lines of an octave the stiffness is a straight line of the frequency (the local polynomial method of
+Pintelon and Schoukens, 2012, ch. 7), fitted to all blocks and read where the motion is. The variance between blocks,
+with Student's t for their effective number, makes the interval, so that whatever differs from block to block, known or
+not, widens it.
 """
 
 from __future__ import annotations
@@ -18,21 +18,45 @@ from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 PERIODS = 4
 """Periods in a block: the lines 3, 4, 5 of its transform are then the octave."""
-_LINES = np.array([3, 4, 5])
+_LINES = np.array([3.0, 4.0, 5.0])
 _FEWEST = 16
 """Rows in a block."""
 _MOST = 24
+_OVERLAP = 0.75
+"""Independent blocks for each of half-overlapping Hann blocks (Welch 1967)."""
+_FLAT = 1e-3
+"""Share of the motion's power off the middle line below which a slope over the frequency is not asked for."""
 
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Transforms at the three lines, shape (blocks, 3)."""
+    """Transforms at the three lines, shape (blocks, 3), and the power of noise of the position in one line."""
 
-    position: NDArray[np.complex128]
-    force: NDArray[np.complex128]
+    position: Complex
+    force: Complex
+    noise: float
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Stiffness where the motion is, what it changes by over the octave, and variances of its two parts.
+
+    Args:
+        at: power-weighted mean of the line numbers.
+        value, change: complex stiffness at it, and rms change over the lines.
+        variance: of real and imaginary part, shape (2,).
+        freedom: of the variance.
+    """
+
+    at: float
+    value: complex
+    change: complex
+    variance: Array
+    freedom: float
 
 
 def dynamic_stiffness(
@@ -47,78 +71,87 @@ def dynamic_stiffness(
         lag_std: what is not known of it [s].
     """
     dt = float(np.median(np.diff(problem.time)))
-    position, force = problem.motion.moved(0, lag), problem.force
+    position = problem.motion.moved(0, lag)
     variance = float(np.concatenate([position[s.first : s.last] for s in segments]).var()) or 1e-300
-    longest = max(s.last - s.first for s in segments)
     found = []
-    length = longest
+    length = max(s.last - s.first for s in segments)
     for _ in range(_MOST):
         if length < _FEWEST:
             break
-        blocks = _blocks(position, force, segments, length)
-        frequency = PERIODS / (length * dt)
-        found.append(_octave(problem, blocks, frequency, length, variance, lag_std))
+        blocks = _blocks(problem, position, segments, length)
+        found.append(_octave(blocks, length, dt, variance, lag_std))
         length //= 2
     return tuple(found)
 
 
-def _blocks(position: Array, force: Array, segments: list[Segment], length: int) -> _Blocks:
-    """Of all segments that hold one; half overlapping."""
+def _blocks(problem: Problem, position: Array, segments: list[Segment], length: int) -> _Blocks:
+    """Of all segments that hold one; half overlapping, without their mean and their mean slope."""
     window = np.hanning(length + 2)[1:-1]
+    ramp = np.arange(length) - (length - 1) / 2
     phase = np.exp(-2j * np.pi * np.outer(np.arange(length), _LINES) / length) * window[:, None]
-    lines: list[list[NDArray[np.complex128]]] = [[], []]
+    level = window[:, None] * np.column_stack([np.ones(length), ramp])
+    level_out = np.linalg.solve(level.T @ np.column_stack([np.ones(length), ramp]), level.T)
+    lines: list[list[Complex]] = [[], []]
     for s in segments:
         if s.last - s.first < length:
             continue
-        for channel, values in enumerate((position, force)):
-            own = np.lib.stride_tricks.sliding_window_view(values[s.first : s.last], length)[
-                :: max(length // 2, 1)
-            ]
-            own = own - (own @ window / window.sum())[:, None]
-            lines[channel].append(own @ phase)
-    return _Blocks(np.concatenate(lines[0]), np.concatenate(lines[1]))
+        for channel, values in enumerate((position, problem.force)):
+            views = np.lib.stride_tricks.sliding_window_view(values[s.first : s.last], length)
+            own = views[:: max(length // 2, 1)]
+            fitted = own @ level_out.T
+            lines[channel].append(
+                own @ phase - fitted[:, :1] * phase.sum(axis=0) - fitted[:, 1:] * (ramp @ phase)
+            )
+    chain, dt = problem.motion.chain, float(np.median(np.diff(problem.time)))
+    frequency = np.array([PERIODS / (length * dt)])
+    line = problem.motion.noise.power(frequency, chain.dt) * chain.position_gain(frequency) ** 2
+    power = float(line[0]) * chain.dt / dt * float(window @ window)
+    return _Blocks(np.concatenate(lines[0]), np.concatenate(lines[1]), power)
 
 
-def _octave(
-    problem: Problem, blocks: _Blocks, frequency: float, length: int, variance: float, lag_std: float
-) -> DynamicStiffness:
-    power = (np.abs(blocks.position) ** 2).sum(axis=1)
-    total = float(power.sum()) or 1e-300
-    cross = (np.conj(blocks.position) * blocks.force).sum(axis=1)
-    stiffness = complex(cross.sum() / total)
-    count = total**2 / float((power**2).sum() or 1e-300)
-    independent = max(
-        count * (1.0 if len(power) < 2 else 0.75), 1.0
-    )  # half-overlapping Hann blocks: Welch 1967
-    spread = cross - stiffness * power
-    left = blocks.force - stiffness * blocks.position
-    within = float((np.abs(left) ** 2).sum()) / max(6 * len(power) - 2, 1) / total / 0.75
-    parts = []
-    for part in (spread.real, spread.imag):
-        between = float(part @ part) / total**2 * independent / max(independent - 1, 0.5)
-        parts.append(max(between, within))
-    dof = max(independent - 1, 0.0) + 4.0 * min(1.0, 1 / max(independent, 1.0))
-    halves = _student(dof) * np.sqrt(parts)
+def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: float) -> DynamicStiffness:
+    power = float((np.abs(blocks.position) ** 2).sum())
+    line = _fitted(blocks)
+    frequency = line.at / (length * dt)
     omega = 2 * np.pi * frequency
-    storage, loss = stiffness.real, stiffness.imag
+    parts = np.array([line.value.real, line.value.imag])
+    halves = _student(line.freedom) * np.sqrt(line.variance)
     by_lag = 1.96 * omega * lag_std
-    noise = _noise_share(problem, frequency, length, total / len(power))
-    halves = np.hypot(halves, [abs(loss) * by_lag + abs(storage) * by_lag**2 / 2, abs(storage) * by_lag])
-    halves = np.hypot(halves, noise * np.abs([storage, loss]))
-    share = total / len(power) * 2 / (length * float((np.hanning(length + 2) ** 2).sum())) / variance
-    return DynamicStiffness(
-        frequency, storage, float(halves[0]), loss, float(halves[1]), len(power), float(min(share, 1.0))
-    )
-
-
-def _noise_share(problem: Problem, frequency: float, length: int, power: float) -> float:
-    """Power of the position's noise in the three lines, over that of the position there."""
-    noise = problem.motion.noise
-    spacing = problem.motion.chain.period
-    step = 4 * np.sin(np.pi * min(frequency * spacing, 0.5)) ** 2
-    variance = noise.white**2 + 0.5 * noise.jump**2 / max(step, 1e-12)
+    halves = np.hypot(halves, [abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag])
+    noise = min(3 * blocks.noise * len(blocks.position) / max(power, 1e-300), 1.0)
+    halves = np.hypot(halves, noise * np.abs(parts))
+    halves = np.hypot(halves, np.abs([line.change.real, line.change.imag]))
     window = float((np.hanning(length + 2) ** 2).sum())
-    return min(3 * variance * window / max(power, 1e-300), 1.0)
+    share = power / len(blocks.position) * 2 / (length * window) / variance
+    return DynamicStiffness(
+        frequency, float(parts[0]), float(halves[0]), float(parts[1]), float(halves[1]),
+        len(blocks.position), float(min(share, 1.0)),
+    )  # fmt: skip
+
+
+def _fitted(blocks: _Blocks) -> _Line:
+    """Least squares of the force's lines on the position's, a straight line over the frequency."""
+    x, f = blocks.position, blocks.force
+    power = np.abs(x) ** 2
+    total = float(power.sum()) or 1e-300
+    at = float((power @ _LINES).sum()) / total
+    u = _LINES - at
+    spread = float((power @ u**2).sum()) / total
+    slope = spread > _FLAT
+    columns = np.stack([x, u * x], axis=-1) if slope else x[..., None]
+    gram = np.einsum("blp,blq->pq", columns.conj(), columns)
+    bread = np.linalg.pinv(gram)
+    theta = bread @ np.einsum("blp,bl->p", columns.conj(), f)
+    left = f - columns @ theta
+    own = power.sum(axis=1)
+    independent = max(_OVERLAP * total**2 / float((own**2).sum() or 1e-300), 1.0)
+    within = float((np.abs(left) ** 2).sum()) / max(6 * len(x) - 4, 1) * float(bread[0, 0].real) / _OVERLAP
+    moved = (np.einsum("blp,bl->bp", columns.conj(), left) @ bread.T)[:, 0]
+    grown = independent / max(independent - 1, 0.5) / _OVERLAP
+    between = np.array([float(moved.real @ moved.real), float(moved.imag @ moved.imag)]) * grown
+    freedom = max(independent - 1, 2.0 * min(1.0, 2 / independent))
+    change = complex(theta[1]) * np.sqrt(spread) if slope else 0j
+    return _Line(at, complex(theta[0]), change / 2, np.maximum(between, within), freedom)
 
 
 def _student(freedom: float) -> float:

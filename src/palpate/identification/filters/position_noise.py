@@ -36,6 +36,19 @@ class PositionNoise:
     jump: float
     count: float = 0.0
 
+    def power(self, frequency: Array, dt: float) -> Array:
+        """Of a line of an orthonormal transform of the position, at frequencies [Hz].
+
+        An encoder's error never leaves its count: below the rate jump^2/count^2 of its steps it is flat, with a whole
+        variance of count^2/12.
+        """
+        step = 4 * np.sin(np.pi * np.minimum(frequency * dt, 0.5)) ** 2
+        jumps = _IN_BAND * self.jump**2 / np.maximum(step, 1e-12)
+        if self.count and self.jump:
+            jumps = np.minimum(jumps, self.count**4 / (24 * self.jump**2))
+        found: Array = self.white**2 + jumps
+        return found
+
     def spread(self, weights: Array) -> Array:
         """Covariance of filtered derivatives 0 to k - 1 of this noise, shape (k, k).
 

@@ -74,9 +74,13 @@ class SensorPath:
         found: Array = self.instants[rows] * self.dt
         return found
 
-    def gain(self, frequency: Array) -> Array:
+    def force_gain(self, frequency: Array) -> Array:
         """Of the amplitude of the readings' own noise: they are taken as they are."""
         return np.ones_like(frequency)
+
+    def position_gain(self, frequency: Array) -> Array:
+        """Of the amplitude of the position at frequencies [Hz]."""
+        return np.abs(self.low_pass.at(2 * pi * frequency))
 
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
         """The filtered signal or a derivative of it at the samples `rows` of the force, shape (len(rows),).

@@ -51,10 +51,14 @@ class Chain:
         found: Array = rows * self.dt - self.delay
         return found
 
-    def gain(self, frequency: Array) -> Array:
+    def force_gain(self, frequency: Array) -> Array:
         """Of its amplitude at frequencies [Hz]."""
         found: Array = (1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2)
         return found
+
+    def position_gain(self, frequency: Array) -> Array:
+        """The same: both channels go the same way."""
+        return self.force_gain(frequency)
 
     @property
     def delay(self) -> float:
