@@ -43,15 +43,15 @@ def levels_of(system, noise=1.0, effect=0.0):
 
 @pytest.mark.parametrize("last", [1.0, 0.1])
 def test_without_effects_it_is_weighted_least_squares(last):
-    """Over lines, summed by hand."""
+    """Over lines, summed by hand; but for the weak prior that no term is many times the force."""
     own, force = two_columns()
     system = system_of(own, force)
     noise = np.geomspace(1.0, last, len(system.lines))
     gram = sum(part[:2, :2] / s for part, s in zip(system.products, noise, strict=True))
     right = sum(part[:2, 2] / s for part, s in zip(system.products, noise, strict=True))
     found = solve(system, Levels(noise, {}))
-    np.testing.assert_allclose(found.theta, np.linalg.solve(gram, right), rtol=1e-9)
-    np.testing.assert_allclose(found.cov, np.linalg.inv(gram), rtol=1e-9)
+    np.testing.assert_allclose(found.theta, np.linalg.solve(gram, right), rtol=1e-5)
+    np.testing.assert_allclose(found.cov, np.linalg.inv(gram), rtol=1e-5)
 
 
 def test_effects_of_no_variance_change_nothing():
@@ -143,8 +143,8 @@ def test_a_prior_is_an_observation_as_good_as_its_deviation():
     own_std = np.sqrt(alone.cov[0, 0])
     told = system_of(own, force, prior={"K": (4.0, own_std)})
     found = solve(told, levels_of(told, 0.25))
-    assert found.theta[0] == pytest.approx((alone.theta[0] + 4.0) / 2, rel=1e-9)
-    assert found.cov[0, 0] == pytest.approx(own_std**2 / 2, rel=1e-9)
+    assert found.theta[0] == pytest.approx((alone.theta[0] + 4.0) / 2, rel=1e-5)
+    assert found.cov[0, 0] == pytest.approx(own_std**2 / 2, rel=1e-4)
 
 
 def found_of(force, own, drift):
