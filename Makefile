@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format check bench docs pictures lock clean
+.PHONY: help demo test lint format check bench trust docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -41,6 +41,9 @@ bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold s
 	$(BIN)/python benchmarks/many_runs.py
 	$(BIN)/python benchmarks/least_squares.py
 	$(BIN)/python benchmarks/cold_start.py
+
+trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
+	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean

@@ -8,17 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import t as student
 
-from identification.test_mixed import DT, ROWS, coloured_columns, levels_of, system_of
+from identification.test_by_octave import DT, ROWS, level, system
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import HIDDEN_SHARE, Spread
-from palpate.identification.estimators.mixed import Levels, Solution, solve
-from palpate.identification.estimators.octaves import PERIODS, Segment
+from palpate.identification.estimators.by_octave import Solution, solve
+from palpate.identification.estimators.octaves import PERIODS
 
 NOISE = 0.1
 
 
 def solution(theta, std):
-    return Solution(np.array(theta, float), np.diag(np.square(np.array(std, float))))
+    return Solution(np.array(theta, float), np.diag(np.square(np.array(std, float))), np.ones(1))
 
 
 def flat_columns(seed=0, count=1):
@@ -44,7 +44,7 @@ def stretches(values, std):
 def test_stretches_that_differ_have_the_variance_of_their_mean():
     """The jackknife of a mean is its variance, less what their own deviations account for."""
     values = np.array([3.0, 9.0, 5.0, 7.0, 6.0])
-    found = causes.of_stretches(*stretches(values, 0.1), 1)
+    found = causes.of_stretches(*stretches(values, 0.1))
     assert found.variance[0] == pytest.approx(values.var(ddof=1) / 5 - 0.1**2 / 5)
     assert found.freedom == 4
 
@@ -54,7 +54,7 @@ def test_stretches_that_agree_within_their_deviations_add_next_to_nothing():
     added = []
     for seed in range(100):
         values = np.random.default_rng(seed).normal(5.0, 1.0, 8)
-        added.append(causes.of_stretches(*stretches(values, 1.0), 1).variance[0])
+        added.append(causes.of_stretches(*stretches(values, 1.0)).variance[0])
     assert np.mean(added) < 0.25 / 8 * 1.0 + 1e-9
 
 
@@ -64,10 +64,9 @@ def test_an_octave_that_differs_is_seen_by_leaving_it_out(off):
     column = flat_columns()
     at = PERIODS / (ROWS // 16 * DT)
     noise = np.random.default_rng(1).normal(0, NOISE, ROWS)
-    system = system_of(column, stiffer_about(column[:, 0], at, off) + noise)
-    levels = levels_of(system, NOISE**2)
-    whole = solve(system, levels)
-    found = np.sqrt(causes.of_octaves(system, levels, whole).variance[0])
+    asked = system(column, stiffer_about(column[:, 0], at, off) + noise)
+    whole = solve(asked, level(asked, NOISE**2))
+    found = np.sqrt(causes.of_octaves(asked, whole).variance[0])
     pull = abs(whole.theta[0] - 5.0)
     std = np.sqrt(whole.cov[0, 0])
     if off:
@@ -81,19 +80,17 @@ def test_an_octave_that_differs_is_seen_by_leaving_it_out(off):
 def test_a_force_that_nothing_explains_is_bounded_by_what_is_seen_of_it():
     """A spring whose force is off by a known amount in one octave: half of that may lie along its column."""
     column = flat_columns()
-    system = system_of(column, 5.0 * column[:, 0])
-    count = len(system.lines)
-    noise = np.full(count, NOISE**2)
+    asked = system(column, 5.0 * column[:, 0])
+    noise = level(asked, NOISE**2)
     seen = noise.copy()
     seen[4] += 2.0**2
-    levels = Levels(seen, {})
-    found = causes.of_unexplained(system, levels, solve(system, levels), noise)
+    found = causes.of_unexplained(asked, solve(asked, seen), noise)
     weight = 1 / seen
-    gram = system.products[:, 0, 0]
+    gram = asked.products[:, 0, 0]
     # All lines of the octave may conspire: a force of amplitude 2 in each, along the column.
-    pull = np.sqrt(system.lines[4] * 2.0**2 * gram[4]) * weight[4] / (weight @ gram)
+    pull = np.sqrt(asked.lines[4] * 2.0**2 * gram[4]) * weight[4] / (weight @ gram)
     assert np.sqrt(found.variance[0]) == pytest.approx(HIDDEN_SHARE * pull, rel=1e-6)
-    none = causes.of_unexplained(system, levels, solve(system, levels), seen)
+    none = causes.of_unexplained(asked, solve(asked, seen), seen)
     assert none.variance[0] == 0.0
 
 
@@ -102,43 +99,34 @@ def test_more_of_the_same_log_does_not_hide_what_is_unexplained():
     shares = []
     for rows in (500, 2000):
         column = np.random.default_rng(3).normal(size=(rows, 1))
-        system = system_of(column, 5.0 * column[:, 0], [Segment(0, rows)])
-        levels = Levels(np.full(len(system.lines), 1.0), {})
-        whole = solve(system, levels)
-        hidden = causes.of_unexplained(system, levels, whole, np.full(len(system.lines), 0.01))
+        asked = system(column, 5.0 * column[:, 0])
+        whole = solve(asked, level(asked))
+        hidden = causes.of_unexplained(asked, whole, level(asked, 0.01))
         shares.append(np.sqrt([hidden.variance[0], whole.cov[0, 0]]))
     (hidden, noise), (hidden_long, noise_long) = shares
     assert noise_long == pytest.approx(noise / 2, rel=0.1)
     assert hidden_long > 0.6 * hidden
 
 
-def test_parts_of_the_covariance_add_up_to_it():
-    """Noise, lag and other forces: whatever the share of each, together the mixed model's own."""
-    own = np.column_stack([coloured_columns(0), flat_columns(1), flat_columns(2)])
-    force = own[:, :2] @ [5.0, 2.0] + np.random.default_rng(5).normal(0, NOISE, ROWS)
-    system = system_of(own, force, effects={"other": (3,)}, prior={"M": (0.0, 0.01)})
-    levels = Levels(np.full(len(system.lines), NOISE**2), dict.fromkeys(system.effects, 0.04))
-    whole = solve(system, levels)
-    parts = causes.of_system(system, levels, whole, lag=2)
+def test_parts_of_the_covariance_are_what_each_cause_adds():
+    """Noise with lag and other forces known; what the lag, and what the other forces, add to it."""
+    base = flat_columns(0)
+    own = np.column_stack([base, base + 0.5 * flat_columns(1), base + 2.0 * flat_columns(2)])
+    force = own[:, :1] @ [5.0] + np.random.default_rng(5).normal(0, NOISE, ROWS)
+    asked = system(own, force, names=("K", "lag", "Fc"))
+    noise = level(asked, NOISE**2)
+    whole = solve(asked, noise)
+    parts = causes.of_noise(asked, whole, ("K", "lag", "Fc"), 2, "lag")
     assert set(parts) == {"noise", "lag", "other forces"}
     total = sum(part.variance for part in parts.values())
-    np.testing.assert_allclose(total, np.diag(whole.cov)[:3], rtol=1e-9)
-    assert parts["other forces"].variance[0] > 0
-    assert parts["lag"].variance[2] == 0.0
-
-
-def test_what_a_lag_does_is_the_difference_between_known_and_unknown():
-    own = np.column_stack([flat_columns(0), flat_columns(0) + 0.5 * flat_columns(1)])
-    force = own @ [5.0, 0.0] + np.random.default_rng(5).normal(0, NOISE, ROWS)
-    free = system_of(own, force)
-    levels = levels_of(free, NOISE**2)
-    parts = causes.of_system(free, levels, solve(free, levels), lag=1)
-    known = system_of(own[:, :1], force)
-    assert parts["noise"].variance[0] == pytest.approx(
-        solve(known, levels_of(known, NOISE**2)).cov[0, 0], rel=1e-9
-    )
-    whole = solve(free, levels).cov[0, 0]
-    assert parts["lag"].variance[0] == pytest.approx(whole - parts["noise"].variance[0], rel=1e-9)
+    assert total[0] == pytest.approx(whole.cov[0, 0], rel=1e-6)
+    without_others = system(own[:, :2], force, names=("K", "lag"))
+    alone = solve(without_others, noise).cov[0, 0]
+    assert parts["other forces"].variance[0] == pytest.approx(whole.cov[0, 0] - alone, rel=1e-3)
+    without_lag = system(own[:, [0, 2]], force, names=("K", "Fc"))
+    known = solve(without_lag, noise).cov[0, 0]
+    assert parts["lag"].variance[0] == pytest.approx(whole.cov[0, 0] - known, rel=1e-3)
+    assert parts["lag"].variance[1] == 0.0
 
 
 def test_half_widths_are_students_for_one_cause():

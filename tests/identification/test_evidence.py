@@ -37,9 +37,7 @@ def answering(impedance, frequency, size=1e-3, noise=0.0, seed=0):
     phase = np.random.default_rng(1).uniform(0, 2 * np.pi, len(omega))
     turning = size / np.sqrt(len(omega)) * np.exp(1j * (np.outer(TIME, omega) + phase))
     force = 10 + (turning * impedance(1j * omega)).imag.sum(axis=1)
-    return record(
-        TIME, turning.imag.sum(axis=1), force + np.random.default_rng(seed).normal(0, noise, COUNT)
-    )
+    return record(TIME, turning.imag.sum(axis=1), force + np.random.default_rng(seed).normal(0, noise, COUNT))
 
 
 def seen(log, lag=0.0, lag_std=0.0, **said):
@@ -127,7 +125,9 @@ def test_what_differs_between_blocks_widens_the_interval():
     uneven = record(TIME, even["position"], 10 + grows * (even["force"] - 10))
     _, steady = seen(even)
     _, changing = seen(uneven)
-    for one, other in zip(steady[2 : 2 * len(frequency) : 2], changing[2 : 2 * len(frequency) : 2], strict=True):
+    for one, other in zip(
+        steady[2 : 2 * len(frequency) : 2], changing[2 : 2 * len(frequency) : 2], strict=True
+    ):
         assert other.storage_half > 2 * one.storage_half
         assert abs(other.storage - 1.125 * one.storage) < other.storage_half
 

@@ -9,11 +9,12 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "identification"))
 
+from foreign.bound import columns_of, half_widths
 from foreign.logs import CELLS, Cell, make_log
 from foreign.motions import tracked
 from foreign.scoring import judged, score
 from foreign.surfaces import SURFACES, Surface, random_surface, touch
-from foreign.tables import row, tables
+from foreign.tables import BEGIN, END, in_page, tables
 from foreign.truth import dynamic_stiffness, octave_stiffness, press_stiffness
 
 SLICE = [cell for i, cell in enumerate(CELLS) if i % 23 == 5]
@@ -111,19 +112,52 @@ def test_a_surface_that_recovers_slowly_is_met_deeper_again():
 
 
 @pytest.mark.parametrize("cell", SLICE, ids=str)
-def test_a_seed_makes_one_log_and_one_score(cell):
+def test_a_seed_makes_one_log(cell):
     log, again = make_log(cell, 11), make_log(cell, 11)
     for one, other in ((log.time, again.time), (log.position, again.position), (log.force, again.force)):
         assert np.array_equal(one, other)
         assert np.isfinite(one).all()
     assert log.truth == again.truth
     assert log.dense.contact.any()
-    result = score(cell, 11)
-    assert result.outcome in {"answered", "refused"}
-    figures = row("all", [result])
-    assert figures["logs"] == 1
-    assert figures["all"]["hold"] <= figures["all"]["answers"]
-    assert set(tables([result])) == {"surface x nuisance", "nuisance", "surface", "motion", "total"}
+
+
+@pytest.fixture(scope="module")
+def scores():
+    """Of logs at 65 to 125 rows a second, which are soon identified."""
+    return [score(Cell(name, "low-rate", "sine"), 11) for name in ("kelvin-voigt", "friction", "arms")]
+
+
+def test_every_log_has_one_outcome_and_counts_once(scores):
+    assert {s.outcome for s in scores} <= {"answered", "refused"}
+    for rows in tables(scores).values():
+        assert sum(figures["logs"] for figures in rows) == len(scores)
+        for figures in rows:
+            assert figures["all"]["hold"] <= figures["all"]["answers"]
+            assert figures["K known and given"] <= figures["K known"] <= figures["logs"]
+
+
+def test_the_tables_stand_between_the_marks_of_the_page(scores):
+    page = f"before {BEGIN} stale {END} after"
+    written = in_page(page, scores, "judge.py")
+    assert written.startswith("before ")
+    assert written.endswith(" after")
+    assert "stale" not in written
+    assert in_page(written, scores, "judge.py") == written
+    with pytest.raises(ValueError, match="marks"):
+        in_page("no marks", scores, "judge.py")
+
+
+def test_a_knowing_estimator_scatters_as_the_bound_says():
+    log = make_log(Cell("kelvin-voigt", "lag-told", "multisine"), 2)
+    columns, _ = columns_of(log, ["K", "B"])
+    recording, rng = log.plan.recording, np.random.default_rng(1)
+    truth = np.array([log.truth["K"][0], log.truth["B"][0], 0.0])
+    noise = np.hypot(recording.force_noise, truth[0] * recording.position_noise)
+    solve = np.linalg.pinv(columns)
+    found = np.array([solve @ (columns @ truth + noise * rng.normal(size=len(columns))) for _ in range(200)])
+    bound = half_widths(log)
+    # The deviation of 200 draws is known to 5 %.
+    assert 1.96 * found[:, :2].std(0) == pytest.approx([bound["K"], bound["B"]], rel=0.2)
 
 
 def test_confidently_wrong_is_far_off_or_many_half_widths():

@@ -62,7 +62,9 @@ def test_a_regression_that_holds_in_every_row_holds_in_every_octave(lengths, see
     rng = np.random.default_rng(seed)
     own = rng.normal(size=(sum(lengths), 2)).cumsum(axis=0)
     number = np.repeat(np.arange(len(lengths)), lengths)
-    drift = rng.normal(size=len(lengths))[number] + np.arange(len(own)) * rng.normal(size=len(lengths))[number]
+    drift = (
+        rng.normal(size=len(lengths))[number] + np.arange(len(own)) * rng.normal(size=len(lengths))[number]
+    )
     found = sums(np.column_stack([own, own @ [5.0, -2.0] + drift]), *lengths)
     left = np.array([5.0, -2.0, -1.0])
     size = np.einsum("oii->o", found.total)

@@ -17,13 +17,14 @@ def half_widths(log: Log) -> dict[str, float]:
     """Least half-width of a 95 % interval of K, B and M that the log carries; none for surfaces that are not linear.
 
     Noise of the position counts as noise of the force, times K. A mass is only asked for where there is one, or where a
-    payload looks like one. A stiffness that differs between repeats costs its spread over their number.
+    payload looks like one. A stiffness that differs between repeats costs its spread over their number, an arm
+    that is told with a deviation what that deviation does.
     """
     plan, r = log.plan, log.plan.recording
     if plan.surface.name not in _KNOWN:
         return {}
     names = ["K", "B"] + (["M"] if plan.surface["M"] or r.payload else [])
-    columns, rows = _columns(log, names)
+    columns, rows = columns_of(log, names)
     if len(rows) < 2 * columns.shape[1]:
         return {}
     stiff = plan.surface["K"]
@@ -40,13 +41,16 @@ def half_widths(log: Log) -> dict[str, float]:
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     covariance = scale[:, None] * np.linalg.pinv(scale[:, None] * information * scale, 1e-12) * scale
     again = plan.repeats**2 / max(log.dense.contact.sum() * log.dense.dt, 1.0)
+    arm = plan.told.get("series_std", 0.0) * (stiff / r.series) ** 2 / stiff
+    # K k/(k - K) of the apparent K: dK/dk = -(K/k)^2; B and M with twice the relative error.
+    spread = {"K": again + arm**2, "B": again + 4 * arm**2, "M": again + 4 * arm**2}
     return {
-        name: 1.96 * float(np.sqrt(covariance[i, i] + again * (plan.surface[name] ** 2)))
+        name: 1.96 * float(np.sqrt(covariance[i, i] + spread[name] * plan.surface[name] ** 2))
         for i, name in enumerate(names)
     }
 
 
-def _columns(log: Log, names: list[str]) -> tuple[Array, NDArray[np.intp]]:
+def columns_of(log: Log, names: list[str]) -> tuple[Array, NDArray[np.intp]]:
     """What a unit of each parameter adds to the fresh readings in contact, an offset and the rest that is not known."""
     plan, r, dense = log.plan, log.plan.recording, log.dense
     v = np.gradient(dense.depth, dense.dt)

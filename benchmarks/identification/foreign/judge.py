@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from foreign.logs import CELLS, Cell, make_log
 from foreign.scoring import Score, record_of, score
-from foreign.tables import HEAD, line, summary, tables
+from foreign.tables import HEAD, in_page, line, summary, tables
 from palpate.identification import identify
 
 
@@ -45,7 +45,9 @@ def main() -> None:
     parser.add_argument("--cells", default="", help="regular expression: SURFACE/NUISANCE/any")
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1))
     parser.add_argument("--json", type=Path, help="write every score and every table there")
-    parser.add_argument("--markdown", type=Path, help="write the last table there, between its two marks")
+    parser.add_argument(
+        "--markdown", type=Path, help="write the tables into that page, between its two marks"
+    )
     parser.add_argument(
         "--show", help="SEED/SURFACE/NUISANCE[/MOTION]: one log, its truth, options and answer"
     )
@@ -60,9 +62,8 @@ def main() -> None:
     if asked.trials < 1:
         parser.error(f"--trials must be 1 or more, got {asked.trials}")
     scores = judged(cells, range(asked.seed, asked.seed + asked.trials), asked.workers)
-    command = f"judge.py --trials {asked.trials} --seed {asked.seed}" + (
-        f" --cells '{asked.cells}'" if asked.cells else ""
-    )
+    command = f"benchmarks/identification/foreign/judge.py --trials {asked.trials} --seed {asked.seed}"
+    command += f" --cells '{asked.cells}'" if asked.cells else ""
     every = tables(scores)
     for name, rows in every.items():
         print(f"\n{name}\n{HEAD}", *(line(figures) for figures in rows), sep="\n")
@@ -70,10 +71,16 @@ def main() -> None:
     if asked.json:
         found = {"command": command, "scores": [s.to_json() for s in scores], "tables": every}
         asked.json.write_text(json.dumps(found, indent=1))
+    if len(scores) < len(cells) * asked.trials:
+        sys.exit(130)
+    if asked.markdown:
+        asked.markdown.write_text(in_page(asked.markdown.read_text("utf-8"), scores, command), "utf-8")
 
 
 def judged(cells: list[Cell], seeds: range, workers: int) -> list[Score]:
-    """The scores of all logs, in their order; of those done, if the user interrupts."""
+    """The scores of all logs, in their order; of those done, if the user interrupts or ends the program."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     order = {(str(c), s): i for i, (c, s) in enumerate((c, s) for s in seeds for c in cells)}
     done: list[Score] = []
@@ -92,6 +99,7 @@ def judged(cells: list[Cell], seeds: range, workers: int) -> list[Score]:
 def _deaf() -> None:
     """Workers leave an interrupt to the process that started them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def show(what: str, save: Path | None) -> None:

@@ -12,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foreign.motions import BY_FORCE, MOTIONS, course, drifting, tracked
-from foreign.recording import Recording, recorded
-from foreign.surfaces import SURFACES, Surface, press, random_surface, touch
+from foreign.recording import BEGIN, Recording, recorded
+from foreign.surfaces import SURFACES, Surface, Touched, press, random_surface, touch
 from foreign.truth import Dense, Range, parameters
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
 
 _DENSE = 8000.0
+_LATER = 0.15
+"""By how much more a Butterworth delays below half of its cut-off than it delays what is slow, relative."""
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,8 @@ def planned(cell: Cell, rng: Rng) -> Plan:
     if surface.name == "falling":
         largest = float(surface.static(np.array([-2.0 * surface["K2"] / (2.35 * surface["K3"]) * 0.98]))[0])
     rate = float(rng.choice([250, 500, 1000, 1000, 2000]))
-    noise = largest * float(np.exp(rng.uniform(np.log(3e-4), np.log(5e-3))))
-    fine = surface.depth_of(largest) * float(np.exp(rng.uniform(np.log(2e-5), np.log(3e-4))))
+    noise = largest * float(np.exp(rng.uniform(np.log(5e-4), np.log(1e-2))))
+    fine = surface.depth_of(largest) * float(np.exp(rng.uniform(np.log(5e-5), np.log(1e-3))))
     recording = Recording(rate, noise, position_noise=fine, bias=float(rng.normal()) * 0.05 * largest)
     motion = cell.motion if cell.motion != "any" else str(rng.choice(MOTIONS))
     told = {"lag": 0.0} if rng.uniform() < 0.5 else {}
@@ -127,37 +129,79 @@ def surface_stiffness(surface: Surface) -> float:
     return float(surface.static(np.array([depth]))[0] / depth)
 
 
+@dataclass(frozen=True)
+class Pressed:
+    """A press before it is written down.
+
+    Args:
+        dt: step [s].
+        x, acceleration: of the probe against the surface at rest [m], [m/s^2], shape (n,).
+        height: of the surface [m], (n,); the position that is written is x + height.
+        touched: what happened at the surface.
+        span: what of it the log shows [s].
+    """
+
+    dt: float
+    x: Array
+    acceleration: Array
+    height: Array
+    touched: Touched
+    span: Range
+
+
 def log_of_plan(plan: Plan, rng: Rng, cell: Cell, seed: int) -> Log:
     """Simulate the press, write it down, cut it, and say what is true of it."""
-    r = plan.recording
-    dt = 1 / (r.rate * np.ceil(_DENSE / r.rate))
+    rate = plan.recording.rate
+    dt = 1 / (rate * np.ceil(_DENSE / rate))
     deep = plan.surface.depth_of(plan.largest)
     gap = float(rng.uniform(0.1, 0.5)) + 0.3e-3 / deep * float(rng.uniform(0, 1))
-    way = course(plan.motion, rng, dt, r.rate, gap)
+    way = course(plan.motion, rng, dt, rate, gap)
     t = np.arange(len(way.command)) * dt
     if way.by_force:
         gain = float(rng.uniform(6, 15)) * deep / plan.largest
         x, _, a, touched = press(plan.surface, plan.largest * way.command, -0.1 * deep, gain, dt)
-        height = np.zeros_like(x)
     else:
         x, v, a = tracked(deep * way.command, float(rng.uniform(15, 40)), dt)
-        height = drifting(t, plan.moving * deep, rng) if plan.moving else np.zeros_like(x)
         touched = touch(plan.surface, x, v, a, dt)
-    force = touched.force * _repeats(t, plan.repeats, rng)
-    times, position, newton = recorded(r, x + height + float(rng.uniform(-0.05, 0.3)), a, force, dt, rng)
-    begin, end = _cut(plan, way.base, way.begin, way.end, t[-1], rng)
-    rows = (times + 0.025 >= begin) & (times + 0.025 <= end)
+    still = way.by_force or not plan.moving
+    height = np.zeros_like(x) if still else drifting(t, plan.moving * deep, rng)
+    touched = replace(touched, force=touched.force * _repeats(t, plan.repeats, rng))
+    height = height + float(rng.uniform(-0.05, 0.3))
+    span = _cut(plan, way.base, way.begin, way.end, t[-1], rng)
+    return written(plan, Pressed(dt, x, a, height, touched, span), rng, cell, seed)
+
+
+def written(plan: Plan, pressed: Pressed, rng: Rng, cell: Cell, seed: int) -> Log:
+    """A press as its recording leaves it, with what is true of it."""
+    r, dt, (begin, end) = plan.recording, pressed.dt, pressed.span
+    seen = pressed.x + pressed.height
+    times, position, newton = recorded(r, seen, pressed.acceleration, pressed.touched.force, dt, rng)
+    rows = (times + BEGIN >= begin) & (times + BEGIN <= end)
+    t = np.arange(len(pressed.x)) * dt
     inside = (t >= begin) & (t <= end)
-    dense = Dense(dt, touched.depth[inside], force[inside], touched.contact[inside])
+    dense = Dense(
+        dt, *(s[inside] for s in (pressed.touched.depth, pressed.touched.force, pressed.touched.contact))
+    )
     truth, defined = parameters(plan.surface, dense, r.payload)
     if isfinite(r.series) and "series_stiffness" not in plan.told:
-        truth = {**truth, "K": (1 / (1 / truth["K"][0] + 1 / r.series), truth["K"][1])}
-    held = (r.hold_force - 1) / r.rate, (r.hold_position - 1) / r.rate
-    lag = r.whole_lag - held[1], r.whole_lag + held[0]
+        truth = _through(r.series, truth)
+    late = _LATER * (r.whole_lag - r.lag) if "force_filter" not in plan.told else 0.0
+    lag = r.whole_lag - (r.hold_position - 1) / r.rate, r.whole_lag + late + (r.hold_force - 1) / r.rate
     return Log(
         cell, seed, plan, times[rows] - times[rows][0], position[rows], newton[rows], dict(plan.told), truth,
         defined, lag, dense,
     )  # fmt: skip
+
+
+def _through(arm: float, truth: Mapping[str, Range]) -> dict[str, Range]:
+    """What K, B and M may be called through an arm that nobody told of: the surface's, or those of both in series.
+
+    K s -> K k/(K + k), and the next terms of the series in s: B r^2 and M r^2 - B^2 r^2/(K + k) with r = k/(K + k).
+    """
+    k, b, m = (truth[name] for name in ("K", "B", "M"))
+    share = arm / (max(k[1], 0.0) + arm)
+    least = share**2 * (m[0] - b[1] ** 2 / (max(k[0], 0.0) + arm))
+    return {"K": (k[0] * arm / (k[0] + arm), k[1]), "B": (b[0] * share**2, b[1]), "M": (least, m[1])}
 
 
 def _repeats(t: Array, spread: float, rng: Rng) -> Array:
@@ -222,7 +266,7 @@ def _held_steady(plan: Plan, rng: Rng) -> Plan:
 
 def _lag_told(plan: Plan, rng: Rng) -> Plan:
     lag = float(rng.uniform(0.001, 0.02))
-    return _tell(_record(plan, lag=lag), lag=lag)
+    return _tell(_record(plan, lag=lag), lag=lag, lag_std=None)
 
 
 def _lag_std(plan: Plan, rng: Rng) -> Plan:
@@ -232,7 +276,7 @@ def _lag_std(plan: Plan, rng: Rng) -> Plan:
 
 
 def _lag_unknown(plan: Plan, rng: Rng) -> Plan:
-    return _tell(_record(plan, lag=float(rng.uniform(0.001, 0.02))), lag=None)
+    return _tell(_record(plan, lag=float(rng.uniform(0.001, 0.02))), lag=None, lag_std=None)
 
 
 def _filter(plan: Plan, rng: Rng) -> Plan:
@@ -246,12 +290,15 @@ def _filter(plan: Plan, rng: Rng) -> Plan:
 def _filter_told(plan: Plan, rng: Rng) -> Plan:
     plan = _filter(plan, rng)
     order, cutoff = plan.recording.low_pass
-    return _tell(plan, force_filter=f"butterworth{order}:{cutoff:g}", lag=plan.recording.whole_lag)
+    return _tell(
+        plan, force_filter=f"butterworth{order}:{cutoff:g}", lag=plan.recording.whole_lag, lag_std=None
+    )
 
 
 def _filter_unknown(plan: Plan, rng: Rng) -> Plan:
     plan = _filter(plan, rng)
-    return _tell(plan, lag=plan.recording.whole_lag if rng.uniform() < 0.5 else None)
+    told = plan.recording.whole_lag if rng.uniform() < 0.5 else None
+    return _tell(plan, lag=told, lag_std=None, force_filter=None)
 
 
 def _coloured(plan: Plan, rng: Rng) -> Plan:

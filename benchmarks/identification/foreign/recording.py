@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+BEGIN = 0.025
+"""Instant of the first row [s]: what the force is late by lies before it."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -103,7 +106,7 @@ def recorded(
     r = recording
     span = (len(x) - 4) * dt
     rows = int((span - 0.03) * r.rate)
-    times = 0.025 + (np.arange(rows) + r.jitter * rng.uniform(-0.5, 0.5, rows)) / r.rate
+    times = BEGIN + (np.arange(rows) + r.jitter * rng.uniform(-0.5, 0.5, rows)) / r.rate
     felt = r.low_passed(force + r.payload * acceleration, dt)
     read_at = _held(times, r.hold_force, rng)
     newton = at_times(felt, read_at - r.lag, dt)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import resource
 import time
 import traceback
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from foreign.bound import half_widths
 from foreign.logs import Cell, Log, make_log
-from foreign.truth import dynamic_stiffness, Range, octave_stiffness, of_model, press_stiffness
+from foreign.truth import Range, dynamic_stiffness, octave_stiffness, of_model, press_stiffness
 from palpate.errors import InputError
 from palpate.identification import identify
 from palpate.records import Record
@@ -21,6 +21,7 @@ FAR = 0.25
 """An identified value further off than this share is confidently wrong."""
 HALVES, SMALL = 3.0, 0.02
 """So is one that is off by more half-widths than this and by more than this share."""
+WORKING_POINT = "working point"
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Answer:
     """One identified parameter against its truth.
 
     Args:
-        name: K, B, M, or another of the model's own; "working point".
+        name: K, B, M, or another of the model's own; WORKING_POINT.
         value, low, high: of the answer, its 95 % interval.
         truth: lowest and highest true value.
         defined: whether the surface has it as one number; else the range of what a linear model may call so.
@@ -51,7 +52,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Score:
-    """What was made of one log.
+    """What was made of one log. The working point is an answer also where it is not called identified.
 
     Args:
         cell, motion, seed: what makes the log again.
@@ -131,6 +132,22 @@ def score_log(log: Log) -> Score:
     )
 
 
+def judge_found(log: Log, found: Any) -> list[str]:
+    """What is wrong with an answer to a log: intervals that miss the truth, a false lag; one sentence each."""
+    answers = (*_parameters(log, found, {}), *_working_point(log, found))
+    missed = [
+        f"{a.name} {a.low:.4g} .. {a.high:.4g} misses {_named(a.truth)}" for a in answers if not a.holds
+    ]
+    _, false, _ = _lag(log, found)
+    low, high = log.lag
+    return missed + ([f"lag is {_named((1e3 * low, 1e3 * high))} ms"] if false else [])
+
+
+def _named(truth: Range) -> str:
+    low, high = truth
+    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+
+
 def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, ...]:
     own = of_model(log.plan.surface, found.model)
     answers = []
@@ -184,15 +201,23 @@ def _holds(interval: tuple[float, float], truth: Range) -> bool:
     return bool(interval[0] <= truth[1] and interval[1] >= truth[0])
 
 
-def working_truth(log: Log, source: str, frequency: float | None) -> float | None:
-    """The true stiffness at a working point [N/m], from the press without sensors; None where it has none."""
+def working_truth(log: Log, source: str, frequency: float | None) -> Range | None:
+    """The true stiffness at a working point [N/m], from the press without sensors; None where it has none.
+
+    An arm in series that is not told may be in it or not, and so may the inertia of a payload.
+    """
+    dense, r = log.dense, log.plan.recording
+    arm = r.series if "series_stiffness" not in log.options else np.inf
     if source == "octave" and frequency:
         surface = log.plan.surface
-        if surface.linear:
-            return dynamic_stiffness(surface, frequency, 0.0, 0.0).real
-        octave = octave_stiffness(log.dense, frequency)
-        return octave.real if octave is not None else None
-    return press_stiffness(log.dense)
+        own = dynamic_stiffness(surface, frequency, 0.0, 0.0) if surface.linear else None
+        own = octave_stiffness(dense, frequency) if own is None else own
+        if own is not None:
+            inertia = (2 * np.pi * frequency) ** 2 * r.payload
+            ends = [z.real - more for z in (own, own / (1 + own / arm)) for more in (0.0, inertia)]
+            return min(ends), max(ends)
+    slope = press_stiffness(dense)
+    return None if slope is None else tuple(sorted((slope, slope / (1 + slope / arm))))
 
 
 def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:
@@ -202,21 +227,20 @@ def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:
         return ()
     truth = working_truth(log, str(point.source), point.frequency_Hz)
     if truth is None:
-        truth = press_stiffness(log.dense)
-    if truth is None:
         return ()
-    return (judged("working point", p.value, p.ci95, (truth, truth), True),)
+    answer = judged(WORKING_POINT, p.value, p.ci95, truth)
+    return (replace(answer, wrong=answer.wrong and str(p.verdict) == "identified"),)
 
 
 def _lag(log: Log, found: Any) -> tuple[bool, bool, bool]:
-    """Whether a lag was reported that nobody told, whether it is false by its own bound, whether there is none."""
+    """Whether a lag is reported that nobody told, whether it is false by its own bound, whether there is none."""
     lag = found.lag
     if lag is None or "lag" in log.options:
         return False, False, False
-    value, std = lag if isinstance(lag, tuple) else (lag.value, lag.std)
-    kind = str(getattr(lag, "kind", "measured"))
-    reach = getattr(lag, "bound", None)
-    reach = 1.96 * std if reach is None else reach
+    if isinstance(lag, tuple):
+        value, reach, kind = lag[0], 1.96 * lag[1], "measured"
+    else:
+        value, reach, kind = lag.value, lag.bound, str(lag.kind)
     low, high = log.lag
     false = max(low - value, value - high, 0.0) > reach
-    return kind != "prior", bool(false), bool(false and high <= 0.0 and value > 0)
+    return kind != "prior", bool(false), bool(false and low >= 0.0 >= high)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from foreign.scoring import Answer, Score
+from foreign.scoring import FAR, WORKING_POINT, Answer, Score
 
 NAMES = ("K", "B", "M")
 ENOUGH, LEAST = 40, 0.88
@@ -19,10 +19,10 @@ def row(name: str, scores: list[Score]) -> dict[str, Any]:
 
     Args:
         name: of the row.
-        scores: of its logs, at least one.
+        scores: of its logs.
     """
     answers = [a for s in scores for a in s.answers]
-    sure = [a for a in answers if a.defined and a.name != "working point"]
+    sure = [a for a in answers if a.defined and a.name != WORKING_POINT]
     known = [s for s in scores if "K" in s.known]
     seconds = [s.seconds for s in scores if s.outcome == "answered"]
     figures: dict[str, Any] = {"name": name, "logs": len(scores), "all": counts(sure)}
@@ -30,7 +30,7 @@ def row(name: str, scores: list[Score]) -> dict[str, Any]:
         figures[parameter] = counts([a for a in sure if a.name == parameter])
     figures["other"] = counts([a for a in sure if a.name not in NAMES])
     figures["apparent"] = counts([a for a in answers if not a.defined])
-    figures["working point"] = counts([a for a in answers if a.name == "working point"])
+    figures[WORKING_POINT] = counts([a for a in answers if a.name == WORKING_POINT])
     figures["K known"] = len(known)
     figures["K known and given"] = sum(any(a.name == "K" for a in s.answers) for s in known)
     figures["lag given"] = sum(s.lag_given for s in scores)
@@ -113,10 +113,11 @@ def summary(scores: list[Score]) -> list[str]:
     if not scores:
         return []
     total = row("all", scores)
-    every, point = total["all"], total["working point"]
-    alone = row("", [s for s in scores if "/mixture/" not in s.cell] or scores)["all"]
-    mixed = row("", [s for s in scores if "/mixture/" in s.cell] or scores)["all"]
-    touched = len(scores)
+    every, point = total["all"], total[WORKING_POINT]
+    alone = row("", [s for s in scores if "/mixture/" not in s.cell])["all"]
+    mixed = row("", [s for s in scores if "/mixture/" in s.cell])["all"]
+    narrow = [a for s in scores for a in s.answers if a.name == WORKING_POINT]
+    narrow = [a for a in narrow if a.high - a.low <= 2 * FAR * abs(a.value)]
     lines = [
         _share("ci95 of everything identified holds the truth", every["hold"], every["answers"]),
         _share("  one nuisance at a time", alone["hold"], alone["answers"]),
@@ -130,8 +131,10 @@ def summary(scores: list[Score]) -> list[str]:
             _share(f"{n}: confidently wrong", total[n]["wrong"], total[n]["answers"])
             for n in (*NAMES, "apparent")
         ),
-        _share("stiffness at the working point given", point["answers"], touched),
+        _share("stiffness at the working point given", point["answers"], len(scores)),
+        _share("stiffness at the working point given to 25 %", len(narrow), len(scores)),
         _share("stiffness at the working point holds", point["hold"], point["answers"]),
+        _share("stiffness at the working point confidently wrong", point["wrong"], point["answers"]),
         _share(
             "K given where a knowing estimator has it to 5 %", total["K known and given"], total["K known"]
         ),
@@ -151,3 +154,51 @@ def _share(name: str, part: int, whole: int) -> str:
 def flagged(figures: Iterable[dict[str, Any]]) -> list[str]:
     """Names of the rows that are flagged."""
     return [f["name"] for f in figures if f["flag"]]
+
+
+BEGIN, END = "<!-- trust: begin -->", "<!-- trust: end -->"
+
+
+def in_page(page: str, scores: list[Score], command: str) -> str:
+    """A page with the tables of the scores between its two marks.
+
+    Args:
+        page: text with BEGIN and END in it.
+        scores: of at least one log.
+        command: that made them.
+
+    Raises:
+        ValueError: a mark is missing.
+    """
+    head, _, rest = page.partition(BEGIN)
+    _, mark, tail = rest.partition(END)
+    if not mark:
+        raise ValueError(f"the page needs the marks {BEGIN} and {END}, in this order")
+    every = tables(scores)
+    parts = [f"    python {command}", "```\n" + "\n".join(summary(scores)) + "\n```"]
+    parts += [_markdown(name, every[name]) for name in ("nuisance", "surface", "motion")]
+    low = flagged(every["surface x nuisance"])
+    parts.append(
+        f"Cells of surface and nuisance with {ENOUGH} answers or more of which fewer than {LEAST:.0%} hold: "
+        f"{', '.join(low) or 'none'}."
+    )
+    return head + BEGIN + "\n\n" + "\n\n".join(parts) + "\n\n" + END + tail
+
+
+def _markdown(name: str, rows: list[dict[str, Any]]) -> str:
+    columns = ("K", "B", "M", "all", "apparent", WORKING_POINT)
+    lines = [
+        f"| {name} | logs | {' | '.join(columns)} | K known and given | lags invented |",
+        "|---" * 10 + "|",
+    ]
+    for figures in rows:
+        known = figures["K known"]
+        given = f"{figures['K known and given']} of {known}" if known else "-"
+        cells = [
+            str(figures["logs"]),
+            *(_three(figures[c]) for c in columns),
+            given,
+            str(figures["lag invented"]),
+        ]
+        lines.append(f"| {figures['name']} | {' | '.join(cells)} |")
+    return "\n".join(lines)

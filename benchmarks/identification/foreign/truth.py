@@ -70,22 +70,28 @@ def dynamic_stiffness(surface: Surface, frequency: float, depth: float, amplitud
 def octave_stiffness(dense: Dense, frequency: float) -> complex | None:
     """Best linear approximation of force by depth in the octave about a frequency, over blocks in contact [N/m].
 
-    Hann blocks of four periods, half overlapping; one regression over all of them (Pintelon and Schoukens 2012, 3.4).
-    None where no block lies in contact.
+    Hann blocks of four periods, half overlapping, shorter ones if none of them lies in contact; one regression over all
+    of them (Pintelon and Schoukens 2012, 3.4). None where no block does.
     """
-    low, high = frequency / np.sqrt(2), frequency * np.sqrt(2)
     short = dense.thinned(max(60 * frequency, 50.0))
-    size = int(4 / (frequency * short.dt))
+    for periods in (4, 2):
+        size = int(periods / (frequency * short.dt))
+        blocks = [slice(i, i + size) for i in range(0, len(short.depth) - size + 1, max(size // 2, 1))]
+        blocks = [block for block in blocks if short.contact[block].all()]
+        if blocks:
+            return _regressed(short, blocks, size, frequency)
+    return None
+
+
+def _regressed(dense: Dense, blocks: list[slice], size: int, frequency: float) -> complex | None:
+    bins = np.fft.rfftfreq(size, dense.dt)
+    inside = (bins >= frequency / np.sqrt(2)) & (bins <= frequency * np.sqrt(2))
+    line, window = np.arange(size), np.hanning(size)
     top = bottom = 0.0 + 0j
-    line = np.arange(size)
-    bins = np.fft.rfftfreq(size, short.dt)
-    inside = (bins >= low) & (bins <= high)
-    window = np.hanning(size)
-    for begin in range(0, len(short.depth) - size + 1, max(size // 2, 1)):
-        block = slice(begin, begin + size)
-        if not short.contact[block].all():
-            continue
-        x, f = (np.fft.rfft(window * _level(line, s[block]))[inside] for s in (short.depth, short.force))
+    for block in blocks:
+        x, f = (
+            np.fft.rfft(window * _level(line, signal[block]))[inside] for signal in (dense.depth, dense.force)
+        )
         top += (f * x.conj()).sum()
         bottom += (np.abs(x) ** 2).sum()
     return complex(top / bottom) if abs(bottom) > 0 else None
@@ -96,14 +102,14 @@ def _level(line: Array, values: Array) -> Array:
 
 
 def press_stiffness(dense: Dense, low: float = 0.4) -> float | None:
-    """Slope of force over depth of the loading above `low` of the largest force, a level for each stretch [N/m]."""
+    """Slope of force over depth of the loading above `low` of the forces' range, a level for each stretch [N/m]."""
     short = dense.thinned(1000.0)
     if not short.contact.any():
         return None
-    top = np.percentile(short.force[short.contact], 99.5)
+    bottom, top = np.percentile(short.force[short.contact], [0.5, 99.5])
     speed = np.gradient(short.depth, short.dt)
     moving = speed > 0.05 * np.percentile(np.abs(speed[short.contact]), 95)
-    inside = short.contact & moving & (short.force > low * top)
+    inside = short.contact & moving & (short.force > bottom + low * (top - bottom))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.view(np.int8), [0]])))
     xx = xf = 0.0
     for begin, end in pairwise(edges):

@@ -1,9 +1,9 @@
 """How far each parameter may be off, cause by cause: the interval that holds whatever the model.
 
-Beside the mixed model's own covariance, an answer is held against itself: with each octave left out, on two disjoint
-parts of the log, and on strokes in and out alone. What these differ by beyond their covariances is added (a jackknife
-over blocks that are alike only if the model holds). What no part can tell is bounded by what the model leaves: a force
-beyond the sensor's noise that is there in an octave may as well be hidden along the parameters' own columns.
+Beside its own covariance, an answer is held against itself: with each octave left out, and with each stretch of the
+log left out. What these differ by beyond their covariances is added. What no part can tell is bounded by what the
+model leaves: a force beyond the sensor's noise that is there in an octave may as well be hidden along the parameters'
+own columns.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.identification.estimators.by_octave import Solution, System, solve
 from palpate.identification.estimators.least_squares import inverse
-from palpate.identification.estimators.mixed import Levels, Solution, System, solve
 
 Array = NDArray[np.float64]
 
 HIDDEN_SHARE = 0.5
-"""Share of the unexplained amplitude of an octave that may lie along a parameter's own column. One half is the mean
-share of a force whose direction among (in phase, in quadrature) nobody knows, of which only the rest is seen as
-unexplained; `benchmarks/identification/foreign` measures the coverage that follows."""
+"""Share of the unexplained amplitude of an octave that may lie along a parameter's own column: of a force in an
+unknown phase, in phase and in quadrature, half of the power is along either. `make trust` measures the coverage that
+follows."""
 
 
 @dataclass(frozen=True)
@@ -35,68 +35,67 @@ class Spread:
 Budget = dict[str, Spread]
 
 
-def of_system(system: System, levels: Levels, solution: Solution, lag: int | None) -> Budget:
-    """Noise, lag and random effects: the parts of the mixed model's own covariance."""
-    p = system.parameters
-    weight = np.where(system.lines > 0, 1 / levels.noise, 0.0)
-    normal = np.tensordot(weight, system.products, axes=1)[:p, :p] + np.diag(system.prior_weight)
-    plain = inverse(normal)
-    by_lag = plain[:, lag] ** 2 / plain[lag, lag] if lag is not None else np.zeros(p)
-    noise = np.diag(plain) - by_lag
-    if lag is not None:
-        noise[lag], by_lag[lag] = plain[lag, lag], 0.0
-    whole = np.diag(solution.cov)[:p]
-    known = 0.0
-    for name, places in system.effects.items():
-        i = list(places)
-        known += max(len(i) - float(np.trace(solution.cov[np.ix_(i, i)])) / levels.effects[name], 0.0)
-    return {
-        "noise": Spread(np.maximum(noise, 0.0)),
-        "lag": Spread(np.maximum(by_lag, 0.0)),
-        "other forces": Spread(np.maximum(whole - np.diag(plain), 0.0), max(known, 1.0)),
-    }
+def of_noise(system: System, solution: Solution, names: tuple[str, ...], own: int, lag: str) -> Budget:
+    """Noise, lag, and other forces beside the model: the parts of the answer's own covariance.
+
+    Args:
+        system: of the log.
+        solution: of it.
+        names: of the parameters, those of the model first.
+        own: how many are the model's.
+        lag: name of the lag among them.
+    """
+    whole = np.diag(solution.cov)
+    normal = inverse(solution.cov)
+    alone = np.zeros(len(names))
+    alone[:own] = np.diag(inverse(normal[:own, :own]))
+    by_lag = np.zeros(len(names))
+    if lag in names:
+        i = names.index(lag)
+        by_lag = solution.cov[:, i] ** 2 / solution.cov[i, i]
+        by_lag[i] = 0.0
+    others = np.maximum(whole - alone, 0.0)
+    noise = np.maximum(whole - by_lag - others, 0.0)
+    return {"noise": Spread(noise), "lag": Spread(np.minimum(by_lag, whole)), "other forces": Spread(others)}
 
 
-def of_octaves(system: System, levels: Levels, solution: Solution) -> Spread:
+def of_octaves(system: System, solution: Solution) -> Spread:
     """What the answer moves by when one octave is left out, beyond what its covariance grows by."""
-    p = system.parameters
-    theta, var = solution.theta[:p], np.diag(solution.cov)[:p]
-    excess = np.zeros(p)
+    var = np.diag(solution.cov)
+    excess = np.zeros(system.size)
     for octave in np.flatnonzero(system.lines > 0):
         use = np.ones(len(system.lines), bool)
         use[octave] = False
-        other = solve(system, levels, use)
-        grown = np.diag(other.cov)[:p] - var
-        excess = np.maximum(excess, (other.theta[:p] - theta) ** 2 - np.maximum(grown, 0.0))
-    return Spread(np.maximum(excess, 0.0))
+        other = solve(system, solution.noise, use)
+        grown = np.maximum(np.diag(other.cov) - var, 0.0)
+        excess = np.maximum(excess, (other.theta - solution.theta) ** 2 - grown)
+    return Spread(excess)
 
 
-def of_stretches(whole: Solution, parts: list[Solution], p: int) -> Spread:
-    """Variance by the jackknife over stretches of the log, beyond the mixed model's own (Efron and Stein, 1981).
+def of_stretches(whole: Solution, parts: list[Solution]) -> Spread:
+    """Variance by the jackknife over stretches of the log, beyond the answer's own (Efron and Stein, 1981).
 
     Args:
         whole: of the whole log.
         parts: with one stretch left out.
-        p: number of parameters.
     """
     count = len(parts)
-    apart = np.array([part.theta[:p] - whole.theta[:p] for part in parts])
+    apart = np.array([part.theta - whole.theta for part in parts])
     variance = (count - 1) / count * (apart**2).sum(axis=0)
-    return Spread(np.maximum(variance - np.diag(whole.cov)[:p], 0.0), count - 1.0)
+    return Spread(np.maximum(variance - np.diag(whole.cov), 0.0), count - 1.0)
 
 
-def of_unexplained(system: System, levels: Levels, solution: Solution, sensor: Array) -> Spread:
+def of_unexplained(system: System, solution: Solution, sensor: Array) -> Spread:
     """What a force hidden along the parameters' columns may do, as large as what is seen beyond the sensor's noise.
 
     Args:
-        system, levels, solution: of the mixed model.
+        system: of the log.
+        solution: of it.
         sensor: variance of a line by the sensor's own noise in each octave, shape (octaves,).
     """
-    p = system.parameters
-    beyond = np.maximum(levels.noise - sensor, 0.0)
-    rows = solution.cov[:p]
-    gain = np.einsum("ki,oij,kj->ok", rows, system.products[:, :-1, :-1], rows)
-    weight = np.where(system.lines > 0, system.lines * beyond / levels.noise**2, 0.0)
+    beyond = np.maximum(solution.noise - sensor, 0.0)
+    gain = np.einsum("ki,oij,kj->ok", solution.cov, system.products[:, :-1, :-1], solution.cov)
+    weight = np.where(system.lines > 0, system.lines * beyond / solution.noise**2, 0.0)
     return Spread(HIDDEN_SHARE**2 * np.maximum(weight @ gain, 0.0))
 
 
@@ -104,6 +103,9 @@ def half_widths(budget: Budget) -> Array:
     """95 % half-widths of all causes together, shape (p,).
 
     Student's t with the degrees of freedom that Welch and Satterthwaite give a sum of variances.
+
+    Args:
+        budget: variances by cause.
     """
     from scipy.special import stdtrit
 

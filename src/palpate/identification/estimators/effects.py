@@ -1,4 +1,4 @@
-"""Columns of force that no contact model has, but many a log: drift, friction, relaxation, change with time and depth."""
+"""Columns of force that no contact model has, but many a log: friction, and a stiffness that changes with depth."""
 
 from __future__ import annotations
 
@@ -6,30 +6,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.octaves import Segment
-from palpate.identification.models import Motion, direction
+from palpate.identification.models import Model, Motion, direction
 
 Array = NDArray[np.float64]
 
-_ARMS = 9
-_FASTEST, _SLOWEST = 0.02, 5.0
-"""Relaxation times of the arms [s]. Between two of nine, spaced evenly in the logarithm, any relaxation is matched to a
-few per cent; faster ones are damping, slower ones drift."""
+FRICTION = "Fc"
 
 
-def effect_columns(
-    motion: Motion, lag: float, segments: list[Segment]
-) -> dict[str, list[Array]]:
-    """Columns by cause, each of shape (m,), scaled to the size of the position's.
+def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segment]) -> dict[str, Array]:
+    """Columns by name, each of shape (m,), of what the model has not got itself.
 
     Args:
         motion: of the log.
+        model: that they stand beside.
         lag: of the force behind the position [s].
-        segments: of its rows.
-        time: of its rows [s], shape (m,).
+        segments: of the rows.
     """
+    found = {FRICTION: motion.filtered(direction(motion), 0, lag)}
+    if model.knobs:
+        return found
     x = motion.moved(0, lag)
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
-    middle, reach = float(x[inside].mean()), float(np.ptp(x[inside])) or 1.0
-    depth = (x - middle) / reach
-    friction = motion.filtered(direction(motion), 0, lag)
-    return {"friction": [reach * friction], "depth": [reach * depth**2, reach * depth**3]}
+    depth = (x - float(x[inside].mean())) / (float(np.ptp(x[inside])) or 1.0)
+    return found | {"depth^2": depth**2, "depth^3": depth**3}

@@ -32,6 +32,8 @@ class Noise:
         return float(self.autocovariance[0] + 2 * self.autocovariance[1:].sum())
 
 
+_BEYOND = 1e6
+"""Variance of a direction without information, over that of the least that rounding lets one see."""
 _SINGULAR = 1e-13
 """Eigenvalue of a scaled normal matrix, over the largest, below which rounding alone makes it."""
 
@@ -136,9 +138,9 @@ def solved(normal: Array, right: Array) -> tuple[Array, Array]:
         found: Array = half.T @ half / np.outer(size, size)
         return found @ right, found
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
-    floor = _SINGULAR * max(float(values[-1]), 1e-300)
+    floor = _SINGULAR * max(float(values[-1]), 1e-280)
     known = values > floor
-    gain = np.where(known, 1 / np.maximum(values, floor), 1 / (_SINGULAR * floor))
+    gain = np.where(known, 1 / np.maximum(values, floor), _BEYOND / floor)
     wide: Array = (vectors * gain) @ vectors.T / np.outer(size, size)
     theta: Array = vectors @ (np.where(known, gain, 0.0) * (vectors.T @ (right / size))) / size
     return theta, wide

@@ -1,8 +1,8 @@
 """A model's parameters and how far each may be off, whatever else is in the log.
 
-The model is linearised where least squares have it; the mixed model then weighs its columns by octave beside other
-causes of force, and the budget says what each cause may do. The lag of the force is a column with a prior, never a
-free number; the columns are formed again at the lag found until it rests.
+The model is linearised; its columns are weighted by octave beside columns of other forces, and the budget says what
+each cause may do. The lag of the force is a column with a prior, never a free number; the columns are formed again at
+the lag found until it rests.
 """
 
 from __future__ import annotations
@@ -16,24 +16,10 @@ from numpy.typing import NDArray
 from palpate.errors import InputError
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget, Spread
-from palpate.identification.estimators.effects import effect_columns
+from palpate.identification.estimators.by_octave import Solution, System, estimate, solve, system_of
+from palpate.identification.estimators.effects import FRICTION, effect_columns
 from palpate.identification.estimators.fit import Fit, fit, relinearised
-from palpate.identification.estimators.mixed import (
-    Design,
-    Levels,
-    Solution,
-    System,
-    estimate,
-    expanded,
-    solve,
-)
-from palpate.identification.estimators.octaves import (
-    Octaves,
-    Segment,
-    longest_of,
-    octaves_of,
-    segments_of,
-)
+from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of, segments_of
 from palpate.identification.models import Model, Motion
 from palpate.identification.prior import LAG, mass_std
 from palpate.identification.problem import Problem
@@ -105,15 +91,15 @@ def answer(problem: Problem, model: Model) -> Answer:
     if not segments:
         raise InputError("every stretch in contact is too short; log longer or faster")
     lag = problem.lag.value
-    levels, theta = None, None
+    theta = None
     if problem.lag.std > 0 and not model.knobs:  # the lag's column needs parameters that are roughly right
         exact = replace(problem, lag=replace(problem.lag, std=0.0))
         first = _Question.of(exact, model, lag, segments, None)
-        solution, levels = estimate(first.system)
+        solution = estimate(first.system)
         theta = dict(zip(first.names, solution.theta, strict=False))
     for _ in range(_ROUNDS):
         question = _Question.of(problem, model, lag, segments, theta)
-        solution, levels = estimate(question.system, levels)
+        solution = estimate(question.system)
         if problem.lag.std == 0:
             break
         theta = dict(zip(question.names, solution.theta, strict=False))
@@ -123,8 +109,7 @@ def answer(problem: Problem, model: Model) -> Answer:
         if abs(moved - lag) < _RESTS * problem.lag.std:
             break
         lag = moved
-    assert levels is not None
-    return question.answered(solution, levels)
+    return question.answered(solution)
 
 
 @dataclass(frozen=True)
@@ -132,8 +117,8 @@ class _Question:
     problem: Problem
     fit: Fit
     names: tuple[str, ...]
-    columns: Array
-    design: Design
+    own: int
+    prior: dict[str, tuple[float, float]]
     segments: list[Segment]
     octaves: Octaves
     use: NDArray[np.bool_]
@@ -150,8 +135,8 @@ class _Question:
     ) -> _Question:
         """Linearise the model at a lag, and sum its columns by octave.
 
-        A model without nonlinear parameters is linearised about what the mixed model had for it before, if it has been
-        asked: least squares may be far off in a log with other forces, and with them the column of the lag.
+        A model without nonlinear parameters is linearised about what was found for it before, if anything was: least
+        squares may be far off in a log with other forces, and with them the column of the lag.
         """
         motion = problem.motion
         fitted = fit(model, motion, problem.force, replace(problem.lag, value=lag, std=0.0))
@@ -159,64 +144,60 @@ class _Question:
             fitted = relinearised(fitted, motion, problem.force, {**theta, LAG: lag})
         free = [n for n in fitted.names if n != "offset" and (n != LAG or problem.lag.std > 0)]
         at = [fitted.names.index(n) for n in free]
-        jacobian, theta = fitted.jacobian[:, at], fitted.theta[at]
-        target = fitted.residuals + jacobian @ theta
-        effects = effect_columns(motion, lag, segments)
-        columns = np.column_stack([jacobian, *(c for own in effects.values() for c in own), target])
-        places, begin = {}, len(free)
-        for name, own in effects.items():
-            places[name] = tuple(range(begin, begin + len(own)))
-            begin += len(own)
+        jacobian, values = fitted.jacobian[:, at], fitted.theta[at]
+        effects = effect_columns(motion, model, lag, segments)
+        target = fitted.residuals + jacobian @ values
+        columns = np.column_stack([jacobian, *effects.values(), target])
         prior = {LAG: (problem.lag.value, problem.lag.std)} if LAG in free else {}
         if problem.lag.mass is not None and "M" in free:
             prior["M"] = (problem.lag.mass[0], mass_std(problem.lag.mass))
-        design = Design(tuple(free), prior, places)
         dt = float(np.median(np.diff(problem.time)))
-        longest = longest_of(segments)
-        octaves = octaves_of(columns, segments, dt, longest)
+        octaves = octaves_of(columns, segments, dt, longest_of(segments))
         use = _seen(motion, lag, segments, octaves)
-        system = expanded(octaves.only(use), design)
-        return cls(problem, fitted, tuple(free), columns, design, segments, octaves, use, system)
+        names = (*free, *effects)
+        system = system_of(octaves.only(use), names, prior)
+        return cls(problem, fitted, names, len(free), prior, segments, octaves, use, system)
 
     @property
     def dt(self) -> float:
         """From row to row [s]."""
         return float(np.median(np.diff(self.problem.time)))
 
-    def answered(self, solution: Solution, levels: Levels) -> Answer:
+    def answered(self, solution: Solution) -> Answer:
         """The answer with its budget."""
-        p = self.system.parameters
-        lag = self.names.index(LAG) if LAG in self.names else None
-        sensor = self._sensor(levels)
-        budget = causes.of_system(self.system, levels, solution, lag)
-        budget["octaves"] = causes.of_octaves(self.system, levels, solution)
-        budget["repetition"] = self._repetition(solution, levels)
-        budget["unexplained"] = causes.of_unexplained(self.system, levels, solution, sensor)
-        explained, left = self._explained(solution, levels, sensor)
-        theta, cov = solution.theta[:p], solution.cov[:p, :p]
+        sensor = self._sensor(solution)
+        budget = causes.of_noise(self.system, solution, self.names, self.own, LAG)
+        budget["octaves"] = causes.of_octaves(self.system, solution)
+        budget["repetition"] = self._repetition(solution)
+        budget["unexplained"] = causes.of_unexplained(self.system, solution, sensor)
+        explained, left = self._explained(solution, sensor)
+        kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
+        names = tuple(self.names[i] for i in kept)
+        budget = {cause: Spread(part.variance[kept], part.freedom) for cause, part in budget.items()}
         fitted = self.fit
         if not fitted.model.knobs:
-            values = dict(zip(self.names, theta, strict=True))
+            values = {n: v for n, v in zip(self.names, solution.theta, strict=True) if n in fitted.names}
             fitted = relinearised(fitted, self.problem.motion, self.problem.force, {LAG: fitted.lag, **values})
         noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
-        return Answer(self.names, theta, cov, budget, fitted, explained, left, noise)
+        cov = solution.cov[np.ix_(kept, kept)]
+        return Answer(names, solution.theta[kept], cov, budget, fitted, explained, left, noise)
 
-    def _repetition(self, solution: Solution, levels: Levels) -> Spread:
+    def _repetition(self, solution: Solution) -> Spread:
         """Stretches of the log left out one after the other."""
         octaves = self.octaves.only(self.use)
         count = len(octaves.products)
         if count < 2:
-            return Spread(np.zeros(self.system.parameters))
-        parts = [solve(expanded(octaves.without(g), self.design), levels) for g in range(count)]
-        return causes.of_stretches(solution, parts, self.system.parameters)
+            return Spread(np.zeros(self.system.size))
+        others = (system_of(octaves.without(g), self.names, self.prior) for g in range(count))
+        return causes.of_stretches(solution, [solve(other, solution.noise) for other in others])
 
-    def _sensor(self, levels: Levels) -> Array:
+    def _sensor(self, solution: Solution) -> Array:
         """Variance of a line by the sensor's own noise in each octave: out of contact, else the quietest octave's."""
         gain = self.problem.motion.chain.force_gain(self.octaves.frequency) ** 2
         lines = self.octaves.all_lines
         enough = lines >= _QUIETEST
         unseen = self.octaves.total[:, -1, -1] / np.maximum(lines, 1.0)
-        ratio = np.where(self.use, levels.noise, unseen) / np.maximum(gain, 1e-12)
+        ratio = np.where(self.use, solution.noise, unseen) / np.maximum(gain, 1e-12)
         floor = float(ratio[enough].min()) if enough.any() else float(ratio.min())
         sensor = floor * gain
         free, longest = self.problem.free, longest_of(self.segments)
@@ -227,13 +208,13 @@ class _Question:
             )
             seen = rest.all_lines >= 2
             sensor[seen] = np.maximum(rest.total[seen, 0, 0] / rest.all_lines[seen], sensor[seen])
-        return np.minimum(sensor, levels.noise)
+        return np.minimum(sensor, solution.noise)
 
-    def _explained(self, solution: Solution, levels: Levels, sensor: Array) -> tuple[float, float]:
+    def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float]:
         """Share of the force's variance in contact that the model's own columns account for, noise left aside."""
-        p, total = self.system.parameters, self.octaves.total.sum(axis=0)
+        total = self.system.products.sum(axis=0)
         full = np.zeros(total.shape[0])
-        full[:p], full[-1] = -solution.theta[:p], 1.0
+        full[: self.own], full[-1] = -solution.theta[: self.own], 1.0
         offset = np.zeros_like(full)
         offset[-1] = 1.0
         if LAG in self.names:  # the target counts the lag from zero

@@ -51,7 +51,7 @@ class _Line:
 
     Args:
         omega: rms frequency of the motion [rad/s].
-        parts, change: storage and loss at it, and half of their rms change over the lines, shape (2,).
+        parts, change: storage and loss at it, and their rms change over the lines, shape (2,).
         variance: of storage and loss, shape (2,).
         freedom: of the variance.
     """
@@ -111,7 +111,8 @@ def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segmen
     frequency = np.array([PERIODS / (length * dt)])
     line = problem.motion.noise.power(frequency, chain.dt) * chain.position_gain(frequency) ** 2
     power = float(line[0]) * chain.dt / dt * float(window @ window)
-    return _Blocks(*(np.concatenate(channel) for channel in lines), power)
+    x, v, f = (np.concatenate(channel) for channel in lines)
+    return _Blocks(x, v, f, power)
 
 
 def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: float) -> DynamicStiffness:
@@ -153,7 +154,7 @@ def _fitted(blocks: _Blocks) -> _Line:
     moved = np.einsum("blp,bl->bp", columns.conj(), left).real @ bread[:, :2]
     grown = independent / max(independent - 1, 0.5) / _OVERLAP
     freedom = max(independent - 1, 2.0 * min(1.0, 2 / independent))
-    change = theta[2:] * np.sqrt(spread) / 2 if slope else np.zeros(2)
+    change = theta[2:] * np.sqrt(spread) if slope else np.zeros(2)
     variance = np.maximum((moved**2).sum(axis=0) * grown, within)
     return _Line(omega, theta[:2], change, variance, freedom)
 
