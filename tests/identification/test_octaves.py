@@ -11,6 +11,7 @@ from palpate.identification.estimators.octaves import (
     GROUPS,
     OVERLAP,
     SHORTEST,
+    TIED,
     Segment,
     longest_of,
     octaves_of,
@@ -46,13 +47,13 @@ def test_the_first_octave_is_the_whole_contact_and_the_next_its_blocks_by_hand()
     own = columns(512)
     found = sums(own)
     whole = np.stack([line(own, k) for k in (1, 2, 3, 4, 5)])
-    np.testing.assert_allclose(found.total[0], np.real(whole.conj().T @ whole), rtol=1e-9, atol=1e-9)
-    assert found.all_lines[0] == 10  # real and imaginary parts
+    np.testing.assert_allclose(found.total[0], np.real(whole.conj().T @ whole) / TIED, rtol=1e-9, atol=1e-9)
+    assert found.all_lines[0] == pytest.approx(10 / TIED)  # real and imaginary parts
     blocks = [own[a : a + 256] for a in (0, 128, 256)]
     lines = np.concatenate([[line(block, k) for k in (3, 4, 5)] for block in blocks])
-    direct = OVERLAP * np.real(lines.conj().T @ lines)
+    direct = OVERLAP / TIED * np.real(lines.conj().T @ lines)
     np.testing.assert_allclose(found.total[2], direct, rtol=1e-9, atol=1e-9)
-    assert found.all_lines[2] == OVERLAP * 3 * 6
+    assert found.all_lines[2] == pytest.approx(OVERLAP / TIED * 3 * 6)
 
 
 @settings(max_examples=30, deadline=None)
