@@ -121,7 +121,7 @@ def test_what_differs_between_blocks_widens_the_interval():
     """A surface that is a quarter stiffer in the second half: the interval holds the mean of both."""
     frequency = octave_frequencies(15.0)
     even = answering(kelvin_voigt, frequency, noise=0.02)
-    grows = np.where(TIME < TIME[-1] / 2, 1.0, 1.25)
+    grows = np.where(TIME[-1] / 2 > TIME, 1.0, 1.25)
     uneven = record(TIME, even["position"], 10 + grows * (even["force"] - 10))
     _, steady = seen(even)
     _, changing = seen(uneven)
