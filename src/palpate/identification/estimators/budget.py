@@ -95,7 +95,7 @@ def of_unexplained(system: System, solution: Solution, sensor: Array) -> Spread:
     """
     beyond = np.maximum(solution.noise - sensor, 0.0)
     gain = np.einsum("ki,oij,kj->ok", solution.cov, system.products[:, :-1, :-1], solution.cov)
-    weight = np.where(system.lines > 0, system.lines * beyond / solution.noise**2, 0.0)
+    weight = np.where(system.lines > 0, system.lines * (beyond / solution.noise) / solution.noise, 0.0)
     return Spread(HIDDEN_SHARE**2 * np.maximum(weight @ gain, 0.0))
 
 
