@@ -9,8 +9,8 @@ import numpy as np
 
 from palpate.bench import build, load
 from palpate.bench.experiment import changed
+from palpate.excitation.fisher_information import ForceChain, bound, phase_std
 from palpate.identification import identify
-from palpate.identification.information import ForceChain, bound, phase_std
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from palpate.identifiers import NeuralProbe
-from palpate.identifiers.least_squares import rls
+from palpate.identifiers.kernels.least_squares import rls
 
 Array = NDArray[np.float64]
 

@@ -22,9 +22,14 @@ class PartError(PalpateError, TypeError):
     """A part of the user's cannot run in a loop; the text says where it fails, or what it may not do."""
 
 
+_LISTED = 60
+"""Names that an error lists at most."""
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     """The error for a name that is not in a list: it names the nearest, or else all there are."""
     names = sorted(known)
     near = get_close_matches(name, names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    return InputError(f"unknown {kind} {name!r}; {hint}there are: {', '.join(names)}")
+    listed = ", ".join(names[:_LISTED]) + (f", ... ({len(names)} in all)" if len(names) > _LISTED else "")
+    return InputError(f"unknown {kind} {name!r}; {hint}there are: {listed}")

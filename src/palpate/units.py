@@ -67,7 +67,14 @@ _ALIASES = {
     "gram": "g",
     "grams": "g",
     "sec": "s",
+    "seconds": "s",
+    "Seconds": "s",
+    "millimeters": "mm",
+    "meters": "m",
     "newton": "N",
+    "newtons": "N",
+    "Newton": "N",
+    "Newtons": "N",
     "inch": "in",
     "lb": "lbf",
     "oz": "ozf",
@@ -86,6 +93,12 @@ def unit(symbol: str) -> Unit:
     if symbol not in UNITS:
         raise unknown("unit", symbol, UNITS)
     return UNITS[symbol]
+
+
+def known_unit(symbol: str) -> bool:
+    """Whether a symbol is that of a unit; none at all is not."""
+    symbol = symbol.strip()
+    return bool(symbol) and _ALIASES.get(symbol, symbol) in UNITS
 
 
 def split_spec(spec: str) -> tuple[str, str | None]:

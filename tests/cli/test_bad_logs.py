@@ -72,7 +72,7 @@ FILES = {
     "a stub of SQLite": (lambda path: half(path, "sqlite", 1000), "cannot be read as a ROS 2 bag"),
     "an old ROS bag": (
         lambda path: path.write_bytes(b"#ROSBAG V1.2\n" + bytes(50)),
-        "version 102 is not supported",
+        "version 1.2 is not supported",
     ),
     "another database": (
         lambda path: path.write_bytes(b"SQLite format 3\x00" + bytes(4080)),

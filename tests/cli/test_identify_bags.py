@@ -243,10 +243,10 @@ def test_topics_of_a_bag(tmp_path, capsys):
     assert entries["/ft"]["count"] == 4000
     assert entries["/ft"]["rate"] == pytest.approx(1000)
     assert entries["/ft"]["last"] - entries["/ft"]["first"] == pytest.approx(3.999)
-    assert (
-        entries["/joint_states"]["about"] == "/joint_states.FIELD: position.lift, velocity.lift, effort.lift"
-    )
-    assert entries["/grip"]["about"] == "/grip.FIELD: grip, load.left, load.right"
+    assert entries["/joint_states"]["about"] == "/joint_states.FIELD"
+    assert entries["/joint_states"]["fields"] == ["position.lift", "velocity.lift", "effort.lift"]
+    assert entries["/grip"]["fields"] == ["grip", "load.left", "load.right"]
+    assert found["identify"]["command"] == "palpate identify press --wrench /ft --pose /pose"
 
 
 def test_topics_of_a_bag_that_was_cut(tmp_path, capsys):

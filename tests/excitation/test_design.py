@@ -18,8 +18,8 @@ from palpate.excitation import (
     design,
     remedies,
 )
+from palpate.excitation.fisher_information import ForceChain
 from palpate.excitation.multisine import PERIOD
-from palpate.identification.information import ForceChain
 from palpate.references.waves import Chirp, Multisine
 
 RANGE = SurfaceRange((3000.0, 8000.0), (50.0, 300.0), (0.1, 0.3))

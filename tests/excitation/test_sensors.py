@@ -7,9 +7,9 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.excitation import Sensors, Surface
+from palpate.excitation.fisher_information import ForceChain, bound
 from palpate.excitation.sensors import LAG_UNIT
 from palpate.excitation.spectra import covariance
-from palpate.identification.information import ForceChain, bound
 
 FOAM = Surface(5200.0, 200.0, 0.1)
 

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from palpate._vector import Mat3, Vec3
 from palpate.errors import InputError
 from palpate.identifiers import RecursiveLeastSquares
-from palpate.identifiers.doubt import Doubt, long_run_variance, unsure
 from palpate.identifiers.forgetting import Directional, Exponential, SIFt
-from palpate.identifiers.least_squares import LeastSquares, learned, rls
-from palpate.identifiers.sizes import Three
+from palpate.identifiers.kernels.dimension import Three
+from palpate.identifiers.kernels.error_covariance import Doubt, long_run_variance, unsure
+from palpate.identifiers.kernels.least_squares import LeastSquares, learned, rls
 
 SIZES = [3, 4, 5]  # three and four parameters go by value, other numbers by array
 

@@ -188,3 +188,53 @@ def test_four_parameters_go_the_same_way():
 def test_numbers_out_of_range_are_refused(arguments, told):
     with pytest.raises(InputError, match=told):
         RestartingLeastSquares(np.zeros(3), VAGUE, **arguments)
+
+
+def pressed(make):
+    phi, force = changed(11, CHANGE)
+    estimator = make(np.zeros(3), VAGUE)
+    estimator.update_many(phi, force)
+    return estimator
+
+
+@pytest.mark.parametrize("make", [RecursiveLeastSquares, RestartingLeastSquares])
+def test_zeros_teach_nothing(make):
+    """Ten thousand samples of exact zeros tell neither of the surface nor of the noise."""
+    estimator = pressed(make)
+    before = estimator.estimate()
+    estimator.update_many(np.zeros((10_000, 3)), np.zeros(10_000))
+    after = estimator.estimate()
+    np.testing.assert_array_equal(after.theta, before.theta)
+    np.testing.assert_array_equal(after.covariance, before.covariance)
+
+
+def test_no_variance_is_below_zero_however_long_nothing_moves():
+    """Rest at one place is where differences of covariances lose their sign; a root has none to lose."""
+    estimator = pressed(RestartingLeastSquares)
+    phi = np.tile([0.0, 1e-2, 1.0], (200_000, 1))
+    random = np.random.default_rng(12)
+    for _ in range(5):
+        estimator.update_many(phi, 70.0 + random.normal(0.0, NOISE, len(phi)))
+        C = estimator.estimate().covariance
+        std = np.sqrt(np.diag(C))
+        assert np.linalg.eigvalsh(C / np.outer(std, std))[0] > -1e-12
+
+
+def test_two_threads_share_an_estimator_with_a_lock():
+    """An estimator belongs to one thread at a time: behind a lock no sample is lost."""
+    from threading import Lock, Thread
+
+    phi, force = changed(13, CHANGE)
+    estimator, lock = RecursiveLeastSquares(np.zeros(3), VAGUE), Lock()
+
+    def work(first):
+        for row, f in zip(phi[first::2], force[first::2], strict=True):
+            with lock:
+                estimator.update(row, f)
+
+    threads = [Thread(target=work, args=(first,)) for first in (0, 1)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert estimator.estimate().samples == CHANGE

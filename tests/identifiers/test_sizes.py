@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate._vector import outer, solve
-from palpate.identifiers.sized import eliminated
-from palpate.identifiers.sizes import AnyNumber, Four, Three, size_of
+from palpate.identifiers.kernels.any_size import eliminated
+from palpate.identifiers.kernels.dimension import AnyNumber, Four, Three, size_of
 
 KINDS = [Three(), Four(), AnyNumber(3), AnyNumber(4), AnyNumber(6)]
 kinds = pytest.mark.parametrize("size", KINDS, ids=str)

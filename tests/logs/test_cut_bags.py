@@ -139,7 +139,7 @@ def test_damage_anywhere_is_read_around_or_refused_in_a_line(tmp_path, kind, pac
         try:
             with Bag(path, kind_of(path)) as bag:
                 bag.streams({"/ft": ["wrench.force.z"]})
-                bag.times()
+                assert all(topic.times for topic in bag.topics.values() if topic.count)
         except InputError as error:
             said.append(str(error))
     assert 0 < len(said) < 30

@@ -29,7 +29,7 @@ from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid,
 from palpate.errors import InputError
 from palpate.friction import Coulomb, LuGre
 from palpate.identifiers.front_ends import Centring, Matched
-from palpate.identifiers.least_squares import LeastSquares
+from palpate.identifiers.kernels.least_squares import LeastSquares
 from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
 from palpate.references import Approach, Chirp, ForceSchedule, Multisine
 from palpate.references.force_schedule import NO_WAVE

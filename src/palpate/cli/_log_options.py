@@ -12,7 +12,12 @@ from cyclopts import Group, Parameter
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
+    from palpate.logs.limits import Limits
     from palpate.records import Record
+
+_SHOWN = 40
+GB = 2.0
+"""What a log may unpack to [GB]; the default of `palpate.logs.limits`."""
 
 
 @Parameter(name="*", group=Group("What is in the log", sort_key=1))
@@ -41,7 +46,11 @@ class LogOptions:
     missing
         A value that means "no reading", as -1; may be given again. A plain one is found by itself.
     delimiter
-        Between two cells of a CSV file; found if not given.
+        Between two cells of a text log; found if not given.
+    max_size
+        Of what the log unpacks to, in GB; a larger one is refused.
+    max_seconds
+        To read the log; one that takes longer is refused.
     """
 
     time: str | None = None
@@ -54,6 +63,8 @@ class LogOptions:
     end: float | None = None
     missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = ()
     delimiter: str | None = None
+    max_size: float = GB
+    max_seconds: float = 600.0
 
     @property
     def plain(self) -> bool:
@@ -76,12 +87,25 @@ def read(log: Path, options: LogOptions, *, samples: bool) -> Record:
     from palpate.logs.kinds import kind_of
     from palpate.logs.own_runs import is_run, read_run
 
-    cut: dict[str, Any] = {"start": options.start, "end": options.end, "missing": options.missing}
+    limits = limits_of(options.max_size, options.max_seconds)
+    cut: dict[str, Any] = {
+        "start": options.start,
+        "end": options.end,
+        "missing": options.missing,
+        "limits": limits,
+    }
     if options.plain and is_run(log):
         return read_run(log, **cut)
     if kind_of(log).is_bag:
         return _of_bag(log, options, cut, samples)
     return _of_table(log, options, cut | {"delimiter": options.delimiter, "rate": options.rate})
+
+
+def limits_of(max_size: float, max_seconds: float) -> Limits:
+    """Limits of size [GB] and time [s]."""
+    from palpate.logs.limits import Limits
+
+    return Limits(max_size * 1e9, max_seconds)
 
 
 def _of_bag(log: Path, options: LogOptions, cut: dict[str, Any], samples: bool) -> Record:
@@ -98,10 +122,13 @@ def _of_bag(log: Path, options: LogOptions, cut: dict[str, Any], samples: bool) 
 
 
 def _of_table(log: Path, options: LogOptions, cut: dict[str, Any]) -> Record:
-    from palpate.logs import columns_of, read_log, read_wrench_and_pose
+    from palpate.logs import read_log, read_wrench_and_pose
+    from palpate.logs.kinds import kind_of
     from palpate.logs.roles import POSE, WRENCH
+    from palpate.logs.tables import open_table
 
-    there = columns_of(log, options.delimiter)
+    table = open_table(log, kind_of(log), options.delimiter, cut["limits"])
+    there = list(table.names)
     time = options.time or ("time" if "time" in there and options.rate is None else None)
     columns: dict[str, Any] = {} if time is None else {"time": time}
     saved = options.position is None and options.force is None and {*WRENCH[:3], *POSE[:3]} <= set(there)
@@ -112,11 +139,15 @@ def _of_table(log: Path, options: LogOptions, cut: dict[str, Any]) -> Record:
     names: dict[str, Any] = {
         role: getattr(options, role) or (role if role in there else None) for role in ("position", "force")
     }
-    lacking = [] if columns or options.rate is not None else ["time"]
+    timed = bool(columns) or options.rate is not None or table.rate is not None
+    lacking = [] if timed else ["time"]
     lacking += [role for role, name in names.items() if name is None]
     if lacking:
         flags = ", ".join(f"--{role}" for role in lacking) + (" (or --rate)" if "time" in lacking else "")
-        raise InputError(f"name the columns of {log} with {flags}; there are: {', '.join(there)}")
+        listed = f"{', '.join(there[:_SHOWN])}{', ...' if len(there) > _SHOWN else ''}"
+        raise InputError(
+            f"name the columns of {log} with {flags}; there are: {listed} (palpate topics {log} proposes a command)"
+        )
     return read_log(log, **cut, **columns, **names)
 
 

@@ -2,64 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from palpate.cli._places import check_folder, own_place
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
-    from palpate.excitation import Design, ForceLoop, Question, Remedy, Sensors
+    from palpate.excitation import Budget, Design, ForceLoop, Question, Remedy, Sensors, SurfaceRange
 
 _FLAG = Parameter(negative=())
 _NUMBER = Parameter(allow_leading_hyphen=True)
 
 
-def excite(
-    *,
-    stiffness: Annotated[str, _NUMBER],
-    damping: Annotated[str, _NUMBER],
-    mass: Annotated[str | None, _NUMBER] = None,
-    force: Annotated[str, _NUMBER],
-    peak: Annotated[str, _NUMBER],
-    precision: Annotated[str, _NUMBER] = "10%",
-    least: Annotated[str, _NUMBER] = "2",
-    bandwidth: Annotated[str, _NUMBER] = "40",
-    lowest: Annotated[str, _NUMBER] = "0.5",
-    force_rate: Annotated[str | None, _NUMBER] = None,
-    drive: Annotated[str | None, _NUMBER] = None,
-    duration: Annotated[str | None, _NUMBER] = None,
-    longest: Annotated[str, _NUMBER] = "60",
-    settle: Annotated[str, _NUMBER] = "1",
-    kind: str = "multisine",
-    criterion: str = "worst",
-    noise: Annotated[str, _NUMBER] = "0.6",
-    sampling: Annotated[int, _NUMBER] = 480,
-    force_filter: str = "butterworth3:120",
-    rate: Annotated[int, _NUMBER] = 1000,
-    position_step: Annotated[str, _NUMBER] = "1.6:um",
-    lag_std: Annotated[str, _NUMBER] = "0",
-    loop_bandwidth: Annotated[str | None, _NUMBER] = None,
-    tip_mass: Annotated[str | None, _NUMBER] = None,
-    tip_friction: Annotated[str | None, _NUMBER] = None,
-    gain: Annotated[float | None, _NUMBER] = None,
-    integral: Annotated[float | None, _NUMBER] = None,
-    out: Path | None = None,
-    experiment: Path | None = None,
-    replace: Annotated[bool, _FLAG] = False,
-    figure: Path | None = None,
-    no_figure: Annotated[bool, _FLAG] = False,
-    json: Annotated[bool, _FLAG] = False,
-) -> int:
-    """Design a force that shows what a surface is, and say how well, before the robot moves.
-
-    Numbers are SI, or carry their unit after a colon; a range is LOW:HIGH or LOW:HIGH:UNIT:
-
-    palpate excite --stiffness 3:8:N/mm --damping 50:300 --mass 0.1:0.3 --force 15 --peak 20 --precision K=5%,B=5%,M=25%
-
-    Exit code 1 says that the precision cannot be had within the limits; what would help is printed.
+@Parameter(name="*", group=Group("The surfaces", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class SurfaceOptions:
+    """What may be touched.
 
     Parameters
     ----------
@@ -69,12 +31,35 @@ def excite(
         Of the surfaces, N s/m.
     mass
         Of the surfaces, kg; left out, they have none that matters.
+    """
+
+    stiffness: Annotated[str, _NUMBER]
+    damping: Annotated[str, _NUMBER]
+    mass: Annotated[str | None, _NUMBER] = None
+
+    def range(self) -> SurfaceRange:
+        """All of them."""
+        from palpate.excitation import SurfaceRange
+        from palpate.excitation.quantities import spread
+
+        return SurfaceRange(
+            spread("--stiffness", self.stiffness, "stiffness"),
+            spread("--damping", self.damping, "damping"),
+            None if self.mass is None else spread("--mass", self.mass, "mass"),
+        )
+
+
+@Parameter(name="*", group=Group("What is allowed", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class BudgetOptions:
+    """Limits of force and frequency.
+
+    Parameters
+    ----------
     force
         Mean force, N.
     peak
         Highest force, N.
-    precision
-        Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%.
     least
         Lowest force, N, so that contact is kept.
     bandwidth
@@ -85,6 +70,42 @@ def excite(
         Fastest change of the desired force, N/s.
     drive
         How far the desired force may depart from its mean, N, if more than the force on the surface may.
+    """
+
+    force: Annotated[str, _NUMBER]
+    peak: Annotated[str, _NUMBER]
+    least: Annotated[str, _NUMBER] = "2"
+    bandwidth: Annotated[str, _NUMBER] = "40"
+    lowest: Annotated[str, _NUMBER] = "0.5"
+    force_rate: Annotated[str | None, _NUMBER] = None
+    drive: Annotated[str | None, _NUMBER] = None
+
+    def budget(self) -> Budget:
+        """The limits."""
+        from palpate.excitation import Budget
+
+        return Budget(
+            _quantity("--force", self.force, "force"),
+            _quantity("--peak", self.peak, "force"),
+            _quantity("--least", self.least, "force"),
+            _quantity("--lowest", self.lowest, "frequency"),
+            _quantity("--bandwidth", self.bandwidth, "frequency"),
+            float("inf")
+            if self.force_rate is None
+            else _quantity("--force-rate", self.force_rate, "force rate"),
+            None if self.drive is None else _quantity("--drive", self.drive, "force"),
+        )
+
+
+@Parameter(name="*", group=Group("What is asked", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class GoalOptions:
+    """Precision and time.
+
+    Parameters
+    ----------
+    precision
+        Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%.
     duration
         Of the excitation, s; the shortest that suffices if not given.
     longest
@@ -95,6 +116,23 @@ def excite(
         multisine or chirp.
     criterion
         What a multisine makes small: the worst parameter, or D, A or E as the theory of experiments has them.
+    """
+
+    precision: Annotated[str, _NUMBER] = "10%"
+    duration: Annotated[str | None, _NUMBER] = None
+    longest: Annotated[str, _NUMBER] = "60"
+    settle: Annotated[str, _NUMBER] = "1"
+    kind: str = "multisine"
+    criterion: str = "worst"
+
+
+@Parameter(name="*", group=Group("The sensors", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class SensorOptions:
+    """What measures force and position.
+
+    Parameters
+    ----------
     noise
         Standard deviation of one reading of the force sensor, N.
     sampling
@@ -107,6 +145,43 @@ def excite(
         Quantisation of the position, m.
     lag_std
         Standard deviation of the calibrated lag between force and position, s.
+    """
+
+    noise: Annotated[str, _NUMBER] = "0.6"
+    sampling: Annotated[int, _NUMBER] = 480
+    force_filter: str = "butterworth3:120"
+    rate: Annotated[int, _NUMBER] = 1000
+    position_step: Annotated[str, _NUMBER] = "1.6:um"
+    lag_std: Annotated[str, _NUMBER] = "0"
+
+    def sensors(self) -> Sensors:
+        """The sensors."""
+        from palpate.excitation import Sensors
+        from palpate.excitation.fisher_information import ForceChain, phase_std
+        from palpate.signals.low_pass import LowPass
+
+        for option, value in (("--sampling", self.sampling), ("--rate", self.rate)):
+            if value < 1:
+                raise InputError(f"{option} must be at least 1 Hz, got {value}")
+        # A sensor as fast as its log, or faster, gives one reading a row; its phase is then a part of the lag.
+        open_phase = phase_std(self.sampling, self.rate) if self.sampling < self.rate else 0.0
+        chain = ForceChain(
+            LowPass.parse(self.force_filter),
+            float(min(self.sampling, self.rate)),
+            _quantity("--noise", self.noise, "force"),
+            open_phase,
+        )
+        step = _quantity("--position-step", self.position_step, "length")
+        return Sensors(chain, step, float(self.rate), _quantity("--lag-std", self.lag_std, "time"))
+
+
+@Parameter(name="*", group=Group("The robot", sort_key=5))
+@dataclass(frozen=True, kw_only=True)
+class LoopOptions:
+    """Its force control.
+
+    Parameters
+    ----------
     loop_bandwidth
         Of the robot's force control, Hz, if that is all that is known of it.
     tip_mass
@@ -117,6 +192,44 @@ def excite(
         Of the force error.
     integral
         Of the force error, 1/s.
+    """
+
+    loop_bandwidth: Annotated[str | None, _NUMBER] = None
+    tip_mass: Annotated[str | None, _NUMBER] = None
+    tip_friction: Annotated[str | None, _NUMBER] = None
+    gain: Annotated[float | None, _NUMBER] = None
+    integral: Annotated[float | None, _NUMBER] = None
+
+    def loop(self) -> ForceLoop:
+        """The loop."""
+        from palpate.excitation import HybridLoop, KnownBandwidth
+
+        given = {
+            "tip_mass": None if self.tip_mass is None else _quantity("--tip-mass", self.tip_mass, "mass"),
+            "friction": None
+            if self.tip_friction is None
+            else _quantity("--tip-friction", self.tip_friction, "force"),
+            "gain": self.gain,
+            "integral": self.integral,
+        }
+        told: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        if self.loop_bandwidth is None:
+            return HybridLoop(**told)
+        if told:
+            raise InputError(
+                "--loop-bandwidth stands for the whole robot; leave out --tip-mass, --tip-friction, --gain, "
+                "--integral"
+            )
+        return KnownBandwidth(_quantity("--loop-bandwidth", self.loop_bandwidth, "frequency"))
+
+
+@Parameter(name="*", group=Group("What is written", sort_key=6))
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions:
+    """Where results go.
+
+    Parameters
+    ----------
     out
         Where to write the desired force over time: .csv or .parquet.
     experiment
@@ -130,119 +243,93 @@ def excite(
     json
         Print one JSON object and nothing else; a figure is written only if --figure is given.
     """
-    from palpate.excitation import Budget, Question, SurfaceRange
-    from palpate.excitation.quantities import quantity, shares, spread
 
-    picture = _picture(figure, wanted=not no_figure and (figure is not None or not json))
-    _check_places(out, experiment, replace)
-    surfaces = SurfaceRange(
-        spread("--stiffness", stiffness, "stiffness"),
-        spread("--damping", damping, "damping"),
-        None if mass is None else spread("--mass", mass, "mass"),
-    )
-    budget = Budget(
-        quantity("--force", force, "force"),
-        quantity("--peak", peak, "force"),
-        quantity("--least", least, "force"),
-        quantity("--lowest", lowest, "frequency"),
-        quantity("--bandwidth", bandwidth, "frequency"),
-        float("inf") if force_rate is None else quantity("--force-rate", force_rate, "force rate"),
-        None if drive is None else quantity("--drive", drive, "force"),
-    )
+    out: Path | None = None
+    experiment: Path | None = None
+    replace: Annotated[bool, _FLAG] = False
+    figure: Path | None = None
+    no_figure: Annotated[bool, _FLAG] = False
+    json: Annotated[bool, _FLAG] = False
+
+
+def excite(
+    *,
+    surface: SurfaceOptions,
+    limits: BudgetOptions,
+    goal: GoalOptions | None = None,
+    sensor: SensorOptions | None = None,
+    robot: LoopOptions | None = None,
+    output: OutputOptions | None = None,
+) -> int:
+    """Design a force that shows what a surface is, and say how well, before the robot moves.
+
+    Numbers are SI, or carry their unit after a colon; a range is LOW:HIGH or LOW:HIGH:UNIT:
+
+    palpate excite --stiffness 3:8:N/mm --damping 50:300 --mass 0.1:0.3 --force 15 --peak 20 --precision K=5%,B=5%,M=25%
+
+    Exit code 1 says that the precision cannot be had within the limits; what would help is printed.
+    """
+    from palpate.excitation import Question
+    from palpate.excitation.quantities import shares
+
+    goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
+    robot, output = robot or LoopOptions(), output or OutputOptions()
+    picture = _picture(output)
+    _check_places(output)
+    surfaces = surface.range()
     question = Question(
         surfaces,
-        budget,
-        shares("--precision", precision, surfaces.names),
-        _sensors(noise, sampling, force_filter, rate, position_step, lag_std),
-        _loop(loop_bandwidth, tip_mass, tip_friction, gain, integral),
-        kind,
-        criterion,
-        None if duration is None else quantity("--duration", duration, "time"),
-        quantity("--longest", longest, "time"),
-        quantity("--settle", settle, "time"),
+        limits.budget(),
+        shares("--precision", goal.precision, surfaces.names),
+        sensor.sensors(),
+        robot.loop(),
+        goal.kind,
+        goal.criterion,
+        None if goal.duration is None else _quantity("--duration", goal.duration, "time"),
+        _quantity("--longest", goal.longest, "time"),
+        _quantity("--settle", goal.settle, "time"),
     )
-    return _answer(question, rate, out, experiment, picture, json)
+    return _answer(question, sensor.rate, output, picture)
 
 
-def _sensors(
-    noise: str, sampling: int, force_filter: str, rate: int, position_step: str, lag_std: str
-) -> Sensors:
-    from palpate.excitation import Sensors
-    from palpate.excitation.quantities import quantity
-    from palpate.identification.information import ForceChain, phase_std
-    from palpate.signals.low_pass import LowPass
-
-    for option, value in (("--sampling", sampling), ("--rate", rate)):
-        if value < 1:
-            raise InputError(f"{option} must be at least 1 Hz, got {value}")
-    # A sensor as fast as its log, or faster, gives one reading a row; its phase is then a part of the lag.
-    open_phase = phase_std(sampling, rate) if sampling < rate else 0.0
-    chain = ForceChain(
-        LowPass.parse(force_filter),
-        float(min(sampling, rate)),
-        quantity("--noise", noise, "force"),
-        open_phase,
-    )
-    step = quantity("--position-step", position_step, "length")
-    return Sensors(chain, step, float(rate), quantity("--lag-std", lag_std, "time"))
-
-
-def _loop(
-    bandwidth: str | None, mass: str | None, friction: str | None, gain: float | None, integral: float | None
-) -> ForceLoop:
-    from palpate.excitation import HybridLoop, KnownBandwidth
+def _quantity(option: str, text: str, kind: str) -> float:
     from palpate.excitation.quantities import quantity
 
-    given = {
-        "tip_mass": None if mass is None else quantity("--tip-mass", mass, "mass"),
-        "friction": None if friction is None else quantity("--tip-friction", friction, "force"),
-        "gain": gain,
-        "integral": integral,
-    }
-    told: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    if bandwidth is None:
-        return HybridLoop(**told)
-    if told:
-        raise InputError(
-            "--loop-bandwidth stands for the whole robot; leave out --tip-mass, --tip-friction, --gain, --integral"
-        )
-    return KnownBandwidth(quantity("--loop-bandwidth", bandwidth, "frequency"))
+    return quantity(option, text, kind)
 
 
-def _picture(figure: Path | None, wanted: bool) -> Path | None:
+def _picture(output: OutputOptions) -> Path | None:
     """Where the figure goes; found wrong before any work is done."""
-    if not wanted:
+    if output.no_figure or (output.figure is None and output.json):
         return None
-    return own_place(figure if figure is not None else Path("excite.png"), ".png", "--figure")
+    return own_place(output.figure or Path("excite.png"), ".png", "--figure")
 
 
-def _check_places(out: Path | None, experiment: Path | None, replace: bool) -> None:
+def _check_places(output: OutputOptions) -> None:
     from palpate.report.excitation_files import check_ending
 
-    if out is not None:
-        check_ending(out)
-    if experiment is not None and experiment.suffix.lower() != ".toml":
-        raise InputError(f"{experiment}: an experiment is a .toml file; name it so")
-    for path in filter(None, (out, experiment)):
+    if output.out is not None:
+        check_ending(output.out)
+    if output.experiment is not None and output.experiment.suffix.lower() != ".toml":
+        raise InputError(f"{output.experiment}: an experiment is a .toml file; name it so")
+    for path in filter(None, (output.out, output.experiment)):
         check_folder(path)
-        if path.exists() and not replace:
+        if path.exists() and not output.replace:
             raise InputError(f"{path} exists; choose another place, or add --replace")
 
 
-def _answer(
-    question: Question, rate: int, out: Path | None, experiment: Path | None, picture: Path | None, json: bool
-) -> int:
+def _answer(question: Question, rate: int, output: OutputOptions, picture: Path | None) -> int:
     from palpate.excitation import design, remedies
 
     found = design(question)
     helps = [] if found.feasible else remedies(found)
     if found.feasible:
-        _write(found, rate, out, experiment)
+        _write(found, rate, output.out, output.experiment)
     if picture is not None:
         from palpate.report.excitation import write_figure
 
         write_figure(found, picture)
-    _print(found, helps, [out, experiment] if found.feasible else [], picture, json)
+    _print(found, helps, [output.out, output.experiment] if found.feasible else [], picture, output.json)
     return 0 if found.feasible else 1
 
 

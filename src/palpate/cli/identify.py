@@ -122,7 +122,8 @@ def identify(
     Parameters
     ----------
     log
-        CSV, Parquet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; or the record.parquet of a run.
+        Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; or the
+        record.parquet of a run.
     """
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
     fitted, output = fitted or ModelOptions(), output or OutputOptions()

@@ -3,58 +3,89 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from palpate.cli._log_options import GB, limits_of
+from palpate.cli._text import plain
+
 if TYPE_CHECKING:
-    from palpate.logs.listing import Entry
+    from palpate.logs.listing import Entry, Listing
 
 
 def topics(
-    log: Path, /, *, delimiter: str | None = None, json: Annotated[bool, Parameter(negative=())] = False
+    log: Path,
+    /,
+    *,
+    delimiter: str | None = None,
+    max_size: float = GB,
+    max_seconds: float = 600.0,
+    json: Annotated[bool, Parameter(negative=())] = False,
 ) -> int:
-    """List what a log holds: topics of a bag, variables of a MATLAB file, columns of a table.
+    """List what a log holds, and propose how to identify it.
 
     Parameters
     ----------
     log
-        CSV, Parquet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP.
+        Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP.
     delimiter
-        Between two cells of a CSV file; found if not given.
+        Between two cells of a text log; found if not given.
+    max_size
+        Of what the log unpacks to, in GB; a larger one is refused.
+    max_seconds
+        To read it.
     json
         Print one JSON object and nothing else.
     """
-    from palpate.logs.listing import entries_of
+    from palpate.logs.listing import list_log
 
-    entries, troubles = entries_of(log, delimiter)
+    found = list_log(log, delimiter, limits_of(max_size, max_seconds))
+    command = found.proposal.command(log)
     if json:
         from json import dumps
 
-        print(dumps({"entries": [entry.to_json() for entry in entries], "troubles": troubles}))  # noqa: T201
+        proposal = {"command": command, "guesses": list(found.proposal.guesses)}
+        entries = [entry.to_json() for entry in found.entries]
+        print(dumps({"entries": entries, "troubles": found.troubles, "identify": proposal}))  # noqa: T201
         return 0
-    _show(log, entries, troubles)
+    print("\n".join(map(plain, [*_table(log, found), *_told(found, command)])))  # noqa: T201
     return 0
 
 
-def _show(log: Path, entries: list[Entry], troubles: list[str]) -> None:
+def _table(log: Path, found: Listing) -> list[str]:
     """A line an entry, as wide as it is, so that it may be searched by other programs."""
-    begin = _begin(entries)
+    begin = _begin(found.entries)
     rows = [("name", "type", "count", "rate", "first", "last", "what")]
-    for entry in entries:
+    for entry in found.entries:
         times = (_number(None if time is None else time - begin, " s") for time in (entry.first, entry.last))
         words = (entry.name, entry.kind.replace("/msg/", "/"), str(entry.count), _number(entry.rate, " Hz"))
         rows.append((*words, *times, entry.about))  # type: ignore[arg-type]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     since = f", times from {_date(begin)} on" if begin else ""
-    lines = [f"{log.name}: {len(entries)} {_kind(entries)}{since}"]
-    for row in rows:
+    lines = [f"{log.name}: {len(found.entries)} {_kind(found.entries)}{since}"]
+    for row, fields in zip(rows, [(), *(entry.fields for entry in found.entries)], strict=True):
         cells = [
             cell.rjust(width) if place in _NUMBERS else cell.ljust(width)
             for place, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
         lines.append("  ".join(cells).rstrip())
-    print("\n".join([*lines, *troubles]))  # noqa: T201
+        lines += wrap(", ".join(fields), 110, initial_indent="    ", subsequent_indent="    ")
+    return [*lines, *found.facts, *found.troubles]
+
+
+def _told(found: Listing, command: str | None) -> list[str]:
+    """The command that the log asks for, and what of it is guessed."""
+    guesses = [f"  {guess}" for guess in found.proposal.guesses]
+    if command is None:
+        return ["", "no command is proposed:", *guesses]
+    return [
+        "",
+        "to identify it:" if not guesses else "to identify it (a guess, see below):",
+        f"  {command}",
+        *guesses,
+    ]
 
 
 _NUMBERS = range(2, 6)
@@ -70,7 +101,10 @@ def _begin(entries: list[Entry]) -> float:
 def _date(seconds: float) -> str:
     from datetime import UTC, datetime
 
-    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    try:
+        return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    except (ValueError, OverflowError, OSError):
+        return f"{seconds:g} s"
 
 
 def _kind(entries: list[Entry]) -> str:

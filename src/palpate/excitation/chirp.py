@@ -57,12 +57,14 @@ def _predicted(question: Question, sweep: Chirp) -> Made:
     omega = _frequencies(sweep)
     forces = question.forces(omega, np.full(_FINE, sweep.amplitude))
     information = question.information(omega, forces).mean(axis=1)
+    pulls = question.pull(omega, forces, together=False)
     predictions = []
-    for surface, force, told in zip(question.surfaces.surfaces(), forces, information, strict=True):
+    each = zip(question.surfaces.surfaces(), forces, information, pulls, strict=True)
+    for surface, force, told, pull in each:
         felt = float(np.abs(force).max())
         travel = 2 * float(np.abs(force / surface.impedance(omega)).max())
         between = (question.budget.mean - felt, question.budget.mean + felt)
         predictions.append(
-            Prediction(surface, question.surfaces.names, told, question.prior, between, travel)
+            Prediction(surface, question.surfaces.names, told, question.prior, pull, between, travel)
         )
     return Made(sweep, tuple(predictions), gap=0.0)

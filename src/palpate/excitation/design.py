@@ -22,7 +22,7 @@ _FIRST = 10.0  # s; where the search for the shortest duration starts
 _ROUNDS = 4
 _LONGER = 1.05  # where the duration that was aimed at misses by a hair
 _STEP = 0.5  # s; a chirp is as long as a whole number of these
-_FOREVER = 1e7  # s
+FOREVER = 1e7  # s
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def design(question: Question) -> Design:
 
 def needed(made: Made, question: Question) -> float:
     """Seconds of a wave that reach the precision: more of them never tell less."""
-    low, high = 1e-3, _FOREVER
+    low, high = 1e-3, FOREVER
     if made.excess(high, question.precision) > 1:
         return np.inf
     while high / low > 1 + 1e-6:
@@ -112,4 +112,4 @@ def needed(made: Made, question: Question) -> float:
 def _whole(question: Question, seconds: float) -> float:
     """At least so many seconds, as a whole number of periods or steps, and no more than the longest."""
     step = max(multisine.PERIOD, 1 / question.budget.lowest) if question.kind == "multisine" else _STEP
-    return min(ceil(seconds / step - 1e-6) * step if seconds < _FOREVER else np.inf, question.longest)
+    return min(ceil(seconds / step - 1e-6) * step if seconds < FOREVER else np.inf, question.longest)

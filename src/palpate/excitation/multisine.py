@@ -99,12 +99,16 @@ def _within_budget(
     forces = question.forces(omega, amplitudes)
     told = question.information(omega, forces).sum(axis=1)
     predictions = []
-    for surface, force, information in zip(question.surfaces.surfaces(), forces, told, strict=True):
+    pulls = question.pull(omega, forces, together=True)
+    each = zip(question.surfaces.surfaces(), forces, told, pulls, strict=True)
+    for surface, force, information, pull in each:
         felt_there = question.budget.mean + summed(force * start, harmonics, _POINTS)
         moved = summed(force / surface.impedance(omega) * start, harmonics, _POINTS)
         between = float(felt_there.min()), float(felt_there.max())
         names, prior = question.surfaces.names, question.prior
-        predictions.append(Prediction(surface, names, information, prior, between, float(np.ptp(moved))))
+        predictions.append(
+            Prediction(surface, names, information, prior, pull, between, float(np.ptp(moved)))
+        )
     frequencies = omega / (2 * np.pi)
     wave = Multisine(tuple(frequencies.tolist()), tuple(amplitudes.tolist()), tuple(phases.tolist()))
     return Made(wave, tuple(predictions), gap)

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 Wave = Multisine | Chirp
 
 ALL = ("K", "B", "M")
+POWER_KNOWN = 0.3
+"""Relative error of the position noise's power within the band of a fit, which is told from above that band."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,7 @@ class Prediction:
         names: of the parameters that are identified.
         information: about them (of their logarithms) and the lag, of a second, shape (n, n).
         prior: known beforehand about the same, shape (n, n).
+        pull: share by which noise of the position pulls each, shape (n,).
         force: lowest and highest force on the surface [N].
         travel: of the tip, from end to end [m].
     """
@@ -35,12 +38,16 @@ class Prediction:
     names: tuple[str, ...]
     information: Array
     prior: Array
+    pull: Array
     force: tuple[float, float]
     travel: float
 
     def half_widths(self, seconds: float) -> dict[str, float]:
-        """95 % half-width of each parameter, as a share of its value, after so many seconds."""
-        C = covariance(seconds * self.information, self.prior)
+        """95 % half-width of each parameter, as a share of its value, after so many seconds.
+
+        What noise of the position pulls is undone as well as its power is known, which no time makes better.
+        """
+        C = covariance(seconds * self.information, self.prior) + np.diag((POWER_KNOWN * self.pull) ** 2)
         return {name: 1.96 * float(np.sqrt(C[i, i])) for i, name in enumerate(self.names)}
 
 

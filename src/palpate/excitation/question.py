@@ -14,7 +14,7 @@ from palpate.excitation.budget import Budget
 from palpate.excitation.force_loops import ForceLoop, HybridLoop, contact_force
 from palpate.excitation.prediction import ALL
 from palpate.excitation.sensors import Sensors
-from palpate.excitation.spectra import CRITERIA
+from palpate.excitation.spectra import CRITERIA, covariance
 from palpate.excitation.surfaces import SurfaceRange
 
 Array = NDArray[np.float64]
@@ -119,3 +119,22 @@ class Question:
         pairs = zip(self.surfaces.surfaces(), forces, strict=True)
         found = np.stack([self.sensors.information(surface, omega, force) for surface, force in pairs])
         return found[:, :, self.free[:, None], self.free]
+
+    def pull(self, omega: Array, forces: Complex, together: bool) -> Array:
+        """By what share noise of the position pulls each of `free` from its value on each surface, shape (C, n).
+
+        Least squares take the noise for motion; its part of the information is taken out again, as well as it is known.
+
+        Args:
+            omega: angular frequencies [rad/s], shape (F,).
+            forces: phasors on the surfaces [N], shape (C, F).
+            together: all frequencies at once; otherwise one after the other, each for an equal time.
+        """
+        found = np.zeros((len(forces), len(self.free)))
+        own = self.free[:-1]  # the lag is calibrated: noise does not move it
+        for i, (surface, force) in enumerate(zip(self.surfaces.surfaces(), forces, strict=True)):
+            moments = self.sensors.moments(surface, omega, force / surface.impedance(omega))
+            motion = (moments.sum(axis=0) if together else moments.mean(axis=0))[np.ix_(own, own)]
+            noise = self.sensors.noise_moments(surface)[np.ix_(own, own)]
+            found[i, :-1] = covariance(motion, np.zeros_like(motion)) @ noise.sum(axis=1)
+        return found

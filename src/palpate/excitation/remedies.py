@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import ceil
 
-from palpate.excitation.design import MAKERS, Design, needed
+from palpate.excitation.design import FOREVER, MAKERS, Design, needed
 from palpate.excitation.question import LONGEST, Question
 
 _MUCH = 10.0  # times the force
@@ -21,30 +21,33 @@ class Remedy:
         reached: largest half-width of each parameter on any surface with it.
         enough: whether that is what was asked.
         needed: how long it must last with it [s], the change of the duration aside; may be infinite.
+        limit: largest half-width per that asked for, however long it lasts.
     """
 
     change: str
     reached: dict[str, float]
     enough: bool
     needed: float
+    limit: float
 
 
 def remedies(found: Design) -> list[Remedy]:
-    """Of more time, more force, faster changes, a wider band and a better known lag those that help.
+    """Of more time, more force, faster changes, a wider band, a better known lag and a finer position those that help.
 
     If none is enough by itself, all of them at once.
     """
     helpful = []
     if found.needed <= LONGEST:
         told = f"{ceil(found.needed)} s instead of {found.seconds:g} s"
-        helpful.append(Remedy(told, found.made.worst(found.needed), True, found.needed))
-    together = found.question
-    for change in (_stronger, _steeper, _wider, _synchronous):
+        helpful.append(Remedy(told, found.made.worst(found.needed), True, found.needed, 1.0))
+    together, limit = found.question, found.made.excess(FOREVER, found.question.precision)
+    for change in (_stronger, _steeper, _wider, _synchronous, _finer):
         words, other = change(found.question, found.excess)
         if other == found.question:
             continue
         tried = _tried(words, other, found.seconds)
-        if _excess(tried, found) < _HELPS * found.excess or tried.needed < _SOONER * found.needed:
+        sooner = tried.needed < _SOONER * found.needed
+        if sooner or _excess(tried, found) < _HELPS * found.excess or tried.limit < _HELPS * limit:
             helpful.append(tried)
             together = change(together, found.excess)[1]
     if len(helpful) > 1 and not any(remedy.enough for remedy in helpful):
@@ -55,7 +58,8 @@ def remedies(found: Design) -> list[Remedy]:
 def _tried(words: str, question: Question, seconds: float) -> Remedy:
     made = MAKERS[question.kind](question, seconds)
     enough = made.excess(seconds, question.precision) <= 1
-    return Remedy(words, made.worst(seconds), enough, needed(made, question))
+    limit = made.excess(FOREVER, question.precision)
+    return Remedy(words, made.worst(seconds), enough, needed(made, question), limit)
 
 
 def _excess(tried: Remedy, found: Design) -> float:
@@ -93,3 +97,10 @@ def _synchronous(question: Question, _excess: float) -> tuple[str, Question]:
     exact = replace(sensors, lag_std=0.0, force=replace(sensors.force, phase_std=0.0))
     words = f"a lag between force and position known exactly, not to {1e6 * sensors.lag_error:.0f} us"
     return words, replace(question, sensors=exact)
+
+
+def _finer(question: Question, _excess: float) -> tuple[str, Question]:
+    sensors = question.sensors
+    step = sensors.position_step / _MUCH
+    words = f"a position in steps of {1e6 * step:.3g} um instead of {1e6 * sensors.position_step:.3g} um"
+    return words, replace(question, sensors=replace(sensors, position_step=step))

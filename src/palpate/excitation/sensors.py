@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
+from palpate.excitation.fisher_information import ForceChain, phase_std
 from palpate.excitation.surfaces import Surface
-from palpate.identification.information import ForceChain, phase_std
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 LAG_UNIT = 1e-4
 """The lag is counted in tenths of a millisecond, so that it is of the size of the relative parameters."""
+_BANDS = 2000
+"""Into which the spectrum of the position's noise is cut."""
 _SURE = 1e-8  # s; a lag known better is known as well as exactly
 
 
@@ -58,15 +60,36 @@ class Sensors:
             omega: angular frequencies [rad/s], shape (F,).
             force: phasors of the force on the surface [N], shape (F,).
         """
-        low_pass, Z = self.force.low_pass.at(omega), surface.impedance(omega)
-        s = 1j * omega
-        K, B, M = surface.values
-        motion = low_pass * force / Z
-        columns = np.stack([K + 0 * s, B * s, M * s**2, -s * Z * LAG_UNIT], axis=-1) * motion[:, None]
-        quantised = (np.abs(Z * low_pass) * self.position_step) ** 2 / 12
+        Z = surface.impedance(omega)
+        quantised = (np.abs(Z * self.force.low_pass.at(omega)) * self.position_step) ** 2 / 12
         density = self.force.noise**2 / self.force.sampling + quantised / self.rate  # N^2/Hz, of both signs
-        outer = np.real(columns[:, :, None] * np.conj(columns[:, None, :]))
-        return outer / (2 * density[:, None, None])
+        return self.moments(surface, omega, force / Z) / density[:, None, None]
+
+    def moments(self, surface: Surface, omega: Array, motion: Complex) -> Array:
+        """Mean products of the regressors of (ln K, ln B, ln M, lag) under a motion, shape (F, 4, 4) [N^2].
+
+        Args:
+            surface: what is touched.
+            omega: angular frequencies [rad/s], shape (F,).
+            motion: phasors of the position [m], shape (F,).
+        """
+        s, Z = 1j * omega, surface.impedance(omega)
+        K, B, M = surface.values
+        columns = np.stack([K + 0 * s, B * s, M * s**2, -s * Z * LAG_UNIT], axis=-1)
+        columns *= (self.force.low_pass.at(omega) * motion)[:, None]
+        found: Array = np.real(columns[:, :, None] * np.conj(columns[:, None, :])) / 2
+        return found
+
+    def noise_moments(self, surface: Surface) -> Array:
+        """The same products of what the quantisation of the position makes of the regressors, shape (4, 4) [N^2].
+
+        Its error is even in a step and white (Widrow, 1956), so its power lies evenly below half the rate; the force
+        sensor's low-pass lets through what is slower than its cut-off, be there a motion or not.
+        """
+        edges = np.linspace(0, np.pi * self.rate, _BANDS + 1)
+        middles = (edges[1:] + edges[:-1]) / 2
+        amplitude = self.position_step * np.sqrt(2 / (12 * _BANDS))
+        return self.moments(surface, middles, np.full(_BANDS, amplitude, complex)).sum(axis=0)
 
     def prior(self) -> Array:
         """Information about the same four before anything has moved: that of the lag, shape (4, 4)."""

@@ -60,25 +60,30 @@ def _check(o: Options) -> None:
         raise unknown("model", o.model, NAMES)
     if o.method not in METHODS:
         raise unknown("method", o.method, METHODS)
+    if o.force_sign not in (None, 1, -1):
+        raise InputError(f"the force sign must be +1 or -1, got {o.force_sign}")
     if o.method != LEAST_SQUARES and o.force_filter is not None:
         raise InputError(
             f"a known force filter is for {LEAST_SQUARES}: leave --force-filter out for {o.method}"
         )
+    _check_numbers(o)
+
+
+def _check_numbers(o: Options) -> None:
     if not 0 < o.tolerance <= 1:
         raise InputError(f"the tolerance must be in (0, 1], got {o.tolerance:g}; 0.25 means 25 %")
     if o.calibration >= 1:
         raise InputError(f"the calibration must be below 1, got {o.calibration:g}; 0.01 means 1 %")
     if o.lag is not None and not isfinite(o.lag):
         raise InputError(f"the lag must be a number of seconds, got {o.lag:g}")
-    if o.force_sign not in (None, 1, -1):
-        raise InputError(f"the force sign must be +1 or -1, got {o.force_sign}")
     if o.mass is not None and not all(isfinite(number) and number >= 0 for number in o.mass):
         raise InputError(f"the mass and its std must be 0 or more, got {o.mass[0]:g} and {o.mass[1]:g}")
-    for name, value in (
-        ("calibration", o.calibration),
-        ("lag's std", o.lag_std),
-        ("series stiffness' std", o.series_std),
-    ):
+    deviations = {
+        "calibration": o.calibration,
+        "lag's std": o.lag_std,
+        "series stiffness' std": o.series_std,
+    }
+    for name, value in deviations.items():
         if not (isfinite(value) and value >= 0):
             raise InputError(f"the {name} must be 0 or more, got {value:g}")
     for name, positive in (("series stiffness", o.series_stiffness), ("cut-off", o.cutoff)):

@@ -39,7 +39,8 @@ def lag_prior(
     """The prior of the lag.
 
     Args:
-        lag, lag_std: as calibrated [s]; None if it is not.
+        lag: as calibrated [s]; None if it is not.
+        lag_std: standard deviation of that [s].
         period: between two readings of the slower channel [s].
         filtered: delay of the force sensor's own low-pass [s], 0 if it is not known.
         mass: as in `Lag`.

@@ -223,10 +223,10 @@ def _leave_saturated(
 
 
 def _far_end(force: Array) -> list[float]:
-    """The end of the range that is further from the usual force; none if that is zero: so rests a force in the air."""
-    middle = float(np.median(force))
-    level = max((float(force.max()), float(force.min())), key=lambda extreme: abs(extreme - middle))
-    return [level] if level else []
+    """The ends of the range that are far from zero: near it rests a force in the air."""
+    ends = [float(force.max()), float(force.min())]
+    far = max(abs(end) for end in ends)
+    return [end for end in ends if abs(end) > far / 2]
 
 
 def _rate(time: Array) -> float:

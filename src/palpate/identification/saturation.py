@@ -11,12 +11,16 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 _FEWEST = 8
-_SHARE = 1000
-_MOVED = 0.02
+_RUN = 3
+"""Equal readings in a row that count as standing still."""
+_STEPS = 4.0
+"""Steps of the reading's own resolution that the force should have changed by meanwhile, were it not at its limit."""
 
 
 def at_limit(force: Array, place: Array, levels: Iterable[float], among: Rows | None = None) -> Rows:
-    """Rows in unbroken stretches of exactly one force while the probe moves by 2 % of its travel, shape (n,).
+    """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,).
+
+    The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution.
 
     Args:
         force: of one axis [N], shape (n,).
@@ -26,14 +30,18 @@ def at_limit(force: Array, place: Array, levels: Iterable[float], among: Rows | 
     """
     stuck = np.zeros(len(force), bool)
     rows = np.arange(len(force)) if among is None else np.flatnonzero(among)
-    least, far = max(_FEWEST, len(force) // _SHARE), _MOVED * _travel(place)
+    step = np.abs(np.diff(force[rows]))
+    if not step.any():
+        return stuck
+    resolution = float(np.percentile(step[step > 0], 5))
+    far = _STEPS * resolution * _travel(place) / max(float(np.ptp(force[rows])), 1e-300)
     for level in levels:
         edges = np.diff(np.r_[0, (force[rows] == level).astype(np.int8), 0])
         for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
             own = rows[begin:end]
-            if len(own) >= least and _travel(place[own[0] : own[-1] + 1]) > far:
+            if len(own) >= _RUN and _travel(place[own[0] : own[-1] + 1]) > far:
                 stuck[own] = True
-    return stuck
+    return stuck if stuck.sum() >= _FEWEST else np.zeros(len(force), bool)
 
 
 def _travel(place: Array) -> float:

@@ -58,7 +58,10 @@ def choose(problem: Problem, options: Options) -> Choice:
         best, at = plain, problem
         tried = [_compared(plain, "")]
         if name is None and options.series_stiffness is None and plain.unexplained > _sensor_rms(plain):
-            for make in (standard_linear_solid, hunt_crossley):
+            one_sided = (
+                problem.with_touches is not None
+            )  # a power of the depth needs the place of the surface
+            for make in (standard_linear_solid, *([hunt_crossley] if one_sided else [])):
                 rich, own = _one_sided(make, problem)
                 why = _against(rich, best, tolerance)
                 tried.append(_compared(rich, why))

@@ -16,6 +16,8 @@ from palpate.units import impedance_units
 
 _FAR = 2.0
 """Prior deviations from its prior beyond which a lag nobody calibrated is a sign of another cause (5 % by chance)."""
+_NOTHING = 1e4
+"""Half-widths over the value beyond which no bounds are worth printing."""
 _SHAPE = ("n", "tau", "x0")
 """Parameters without force in their unit: no calibration of force or position scales them."""
 
@@ -89,6 +91,8 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
     if positive and interval[1] < 0:
         reason = f"the fit gives {_digits(value)} {_shown(unit)}, below zero: no passive surface does that"
         return said(Verdict.REJECTED, " ".join(reason.split()), number=False)
+    if half > _NOTHING * max(abs(value), 1e-300):
+        return said(Verdict.NOT_IDENTIFIABLE, f"the log says nothing of it: {_REMEDY['noise']}", number=False)
     bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_shown(unit)}".rstrip()
     clear = interval[0] > 0 or interval[1] < 0
     if not choice.explains:
@@ -161,9 +165,7 @@ def _unsigned(p: Parameter) -> Parameter:
     """Nothing is identified where nobody knows which way force and position count."""
     if p.verdict is not Verdict.IDENTIFIED:
         return p
-    reason = (
-        "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
-    )
+    reason = "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
     return replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
 
 

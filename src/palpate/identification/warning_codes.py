@@ -37,6 +37,12 @@ class Code(Enum):
     UNIT_GUESS = (
         "A unit was taken from a column's name, or the stiffness is so unusual that a unit is probably wrong."
     )
+    UNIT_STATED = "A unit was taken from what the file itself states, or differs from it."
+    TIME_DOUBTFUL = (
+        "The time is hardly one in this unit: it counts rows, or its rows come at a rate that no log has."
+    )
+    COLUMNS_SWAPPED = "A column was named for a role that its own name speaks against."
+    LINES_SKIPPED = "Lines of the file that are no rows of its table were left out."
     FORCE_SIGN_REVERSED = "The force falls as the probe goes in; it was turned round."
     POSITION_SIGN_REVERSED = "The position falls as the probe goes in; it was turned round."
     LOW_RATE = "Rows are so rare that fast behaviour, damping and mass above all, may be missed."

@@ -19,8 +19,8 @@ from palpate.identifiers.forgetting import Directional, Exponential, SIFt
 from palpate.identifiers.kalman_filter import KalmanFilter
 from palpate.identifiers.neural_probe import NeuralProbe, Probed
 from palpate.identifiers.recursive_least_squares import RecursiveLeastSquares
+from palpate.identifiers.replay import watch
 from palpate.identifiers.restarting import RestartingLeastSquares
-from palpate.identifiers.watching import watch
 
 __all__ = [
     "ContactIdentifier",

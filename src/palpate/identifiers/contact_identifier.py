@@ -6,15 +6,18 @@ that `palpate.identification` uses for a log, so that a stream and a log of it g
 
 from __future__ import annotations
 
-from collections import deque
-from math import ceil, floor
-from typing import Protocol
+from math import ceil
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from palpate._jit import kernel
 from palpate.errors import InputError
-from palpate.identifiers.recursive_least_squares import RecursiveLeastSquares
+from palpate.identifiers.block_fit import block_fit
+from palpate.identifiers.estimator import entry
+from palpate.identifiers.kernels import block_sums, contact_state, contact_stream, positions, sample_clock
+from palpate.identifiers.kernels.contact_stream import ticked
 from palpate.signals.low_pass import LowPass
 from palpate.signals.taps import FRACTIONS, taps
 from palpate.signals.types import Estimate
@@ -23,10 +26,9 @@ Array = NDArray[np.float64]
 
 NAMES = ("M", "B", "K", "offset")
 _FORGOTTEN = 10.0
-_ROOM = 1e-9
-"""Of a period, for the rounding of an instant that falls on a row."""
-_VAGUE = (10.0, 1e4, 1e6, 1e3)
-"""Deviation of each parameter before anything is known [kg], [N s/m], [N/m], [N], in the force's noise."""
+"""Times the low-pass' slowest mode falls by e until what was before is forgotten."""
+_VAGUE = np.array([10.0, 1e4, 1e6, 1e3])
+"""Deviation of each parameter before anything is known [kg], [N s/m], [N/m], [N]."""
 
 
 class Estimator(Protocol):
@@ -37,47 +39,6 @@ class Estimator(Protocol):
 
     def estimate(self) -> Estimate:
         """What is known so far."""
-
-
-class Refresh:
-    """Follows the instants at which a sensor slower than the loop puts out its samples.
-
-    A change seen in a row says that a sample came out within the row before it; the rows seen so far leave the phase
-    of an even grid in a small interval, whose middle is taken.
-
-    Args:
-        period: rows between two samples, at least 1.
-    """
-
-    def __init__(self, period: float):
-        self.period = period
-        self._low, self._high = -np.inf, np.inf
-        self._last = -1
-
-    def seen(self, row: int, changed: bool) -> float | None:
-        """The instant of the sample that this row shows for the first time, in rows; None if it shows none."""
-        if changed:
-            self._narrow(row)
-        elif not np.isfinite(self._high) or self._high + (self._last + 1) * self.period > row:
-            return None
-        else:  # it has come out, and equals the one before
-            self._last += 1
-        return (self._low + self._high) / 2 + self._last * self.period
-
-    def _narrow(self, row: int) -> None:
-        if not np.isfinite(self._high):
-            self._low, self._high, self._last = row - 1.0, float(row), 0
-            return
-        number = (
-            floor((row - 1 - self._high) / self.period + _ROOM) + 1
-        )  # the first that may have come out since
-        if self._low + number * self.period > row:  # the clock drifts: the nearest
-            number = round((row - 0.5 - (self._low + self._high) / 2) / self.period)
-        self._last = max(number, self._last)
-        start = self._last * self.period
-        low, high = max(self._low, row - 1 - start), min(self._high, row - start)
-        drifted = low >= high - _ROOM  # it comes after `low`, and no later than `high`
-        self._low, self._high = (row - 1 - start, row - start) if drifted else (low, high)
 
 
 class ContactIdentifier:
@@ -91,11 +52,12 @@ class ContactIdentifier:
         rate: ticks a second [Hz].
         lag: how much later a fresh force reading stands in the loop than the force it measured, the low-pass
             included [s].
+        lag_std: standard deviation of that calibration [s].
         sampling: samples of the force sensor a second [Hz]; None if each tick has a fresh one.
-        touch: force above which the tip is in contact, and half of which it is again free below [N]; None while it
-            never leaves the surface. It is the mean over some samples that counts, for noise must not choose which
-            samples of a light contact are taken; so that none taken is too late to be in contact, all wait for it.
-        estimator: of `NAMES`, four regressors; recursive least squares that forget nothing if None.
+        touch: force above which the tip is in contact, and half of which it is again free below [N]; 0 if it never
+            leaves the surface; None has contact found, and its loss, from position and force (`contact_state`).
+        estimator: of `NAMES`, four regressors, for a surface that changes; None for least squares that forget nothing,
+            noise of the position taken out.
 
     Raises:
         InputError: a low-pass of less than second order, a rate that is too low for it, a number out of range.
@@ -107,57 +69,75 @@ class ContactIdentifier:
         rate: float,
         lag: float,
         *,
+        lag_std: float = 0.0,
         sampling: float | None = None,
         touch: float | None = None,
         estimator: Estimator | None = None,
     ):
         self.low_pass = LowPass.parse(low_pass) if isinstance(low_pass, str) else low_pass
-        _check(self.low_pass, rate, lag, sampling, touch)
-        vague = np.diag(np.square(_VAGUE))
-        self.estimator = estimator or RecursiveLeastSquares(np.zeros(4), vague, names=NAMES)
-        self.touch = touch
+        _check(self.low_pass, rate, lag, lag_std, sampling, touch)
+        self.rate, self.lag_std, self.touch, self.estimator = rate, lag_std, touch, estimator
         dt = 1 / rate
-        weights = taps(self.low_pass, dt, 3)
-        self._weights = weights.weights[:, ::-1] / np.array([dt**2, dt, 1.0])[:, None]
-        self._before, self._after = weights.before, weights.after
-        self._late = (lag - self.low_pass.lag) * rate
-        self._count = self._weights.shape[2]
-        self._settling = _FORGOTTEN / self.low_pass.decay * rate
-        self._held = 2 * self._settling if touch is not None else 0.0
-        self._samples = ceil(self._settling * (sampling or rate) / rate)
-        self._recent: deque[float] = deque(maxlen=self._samples)
-        self._room = self._count + ceil(abs(self._late)) + ceil(self._held) + 2
-        self._ring = np.zeros(2 * self._room)
-        self._phi = np.ones(4)
-        self._refresh = Refresh(rate / sampling) if sampling is not None else None
-        self._waiting: deque[tuple[float, float]] = deque()
-        self._row, self._since, self._origin, self._force = -1, 0.0, 0.0, np.nan
-        self._touching = touch is None
+        window = taps(self.low_pass, dt, 3)
+        self._weights = np.ascontiguousarray(window.weights[:, ::-1] / np.array([dt**2, dt, 1.0])[:, None])
+        settings = _settings(self.low_pass, rate, lag, sampling, touch)
+        settings[[contact_stream.BEFORE, contact_stream.AFTER]] = window.before, window.after
+        if settings[contact_stream.HOLD] > 0:  # contact is decided when the regressor is there
+            settings[contact_stream.HOLD] += max(window.after - settings[contact_stream.LATE], 0.0)
+        room = (
+            self._weights.shape[2]
+            + ceil(abs(settings[contact_stream.LATE]))
+            + ceil(settings[contact_stream.HOLD])
+        )
+        settings[contact_stream.ROOM] = room = 2 * room + int(settings[contact_stream.GAP]) + 8
+        settings[contact_stream.QUEUE] = 2 * room
+        self._state = _state(settings)
+        self._out = np.empty((2 * room, 5))
+        self._bind()
 
     @property
     def delay(self) -> int:
-        """Ticks between a reading and its part in the estimate."""
-        return max(ceil(self._after - self._late), ceil(self._held), 0) + 1
+        """Ticks between a reading and its part in the estimate, where none is missing."""
+        s = self._state
+        waits = s[contact_stream.AFTER] - s[contact_stream.LATE]
+        return max(ceil(waits), ceil(s[contact_stream.HOLD]), 0)
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether the tip is in contact, `delay` ticks ago at the latest."""
+        return bool(self._contact[contact_state.TOUCHING])
+
+    @property
+    def contacts(self) -> int:
+        """How many contacts there were."""
+        return int(self._contact[contact_state.CONTACTS])
+
+    @property
+    def samples(self) -> int:
+        """How many samples came through."""
+        return int(self._sums[block_sums.SEEN])
 
     def update(self, position: float, force: float) -> None:
         """Takes in a tick's position [m], growing into the surface, and force on the surface [N].
 
+        A reading that is missing is NaN, and keeps its place: short gaps of the position are filled, longer ones cost
+        the samples about them.
+
         Raises:
-            InputError: a number that is not finite; the estimate is unchanged.
+            InputError: an infinite number; the estimate is unchanged.
         """
-        if not (abs(position) < np.inf and abs(force) < np.inf):
-            raise InputError(f"a tick must be finite, got position {position}, force {force}; leave it out")
-        row = self._row = self._row + 1
-        if row == 0:
-            self._origin = position
-        slot = row % self._room
-        self._ring[slot] = self._ring[slot + self._room] = position - self._origin
-        instant = float(row) if self._refresh is None else self._refresh.seen(row, force != self._force)
-        self._force = force
-        if instant is not None and self._in_contact(instant, force):
-            self._waiting.append((instant, force))
-        while self._waiting and self._ripe(self._waiting[0][0]):
-            self._take(*self._waiting.popleft())
+        if abs(position) == np.inf or abs(force) == np.inf:
+            raise InputError(
+                f"a tick must be finite, got position {position}, force {force}; in its place call skip()"
+            )
+        taken = self._one(self._state, self._weights, position, force, self._out)
+        if taken and self.estimator is not None:
+            for row in self._out[:taken]:
+                self.estimator.update(row[:4], float(row[4]))
+
+    def skip(self) -> None:
+        """Takes in a tick that has no readings: it keeps its place in time."""
+        self.update(np.nan, np.nan)
 
     def update_many(self, positions: ArrayLike, forces: ArrayLike) -> None:
         """Takes k ticks in, as k calls of `update` would: positions and forces of shape (k,)."""
@@ -168,46 +148,126 @@ class ContactIdentifier:
             self.update(position, force)
 
     def estimate(self) -> Estimate:
-        """The estimator's own."""
-        return self.estimator.estimate()
+        """M, B, K and the offset, with all that is known to make them uncertain, and whether the model holds.
 
-    def _in_contact(self, instant: float, force: float) -> bool:
-        """Whether a sample belongs to a contact that its low-pass has seen nothing else than."""
-        if self.touch is not None:
-            self._recent.append(force)
-            mean = sum(self._recent) / self._samples
-            if not self._touching and mean > self.touch:
-                self._touching, self._since = True, instant
-            elif self._touching and mean < self.touch / 2:
-                self._touching = False
-                self._waiting.clear()
-        return self._touching and instant >= self._since + self._settling
+        Where the force stands at the end of its range, contact is never kept for long enough, or a test of
+        `block_fit` fails, the estimate is `rejected`, with the reason.
+        """
+        own = self.estimator.estimate() if self.estimator is not None else None
+        fit = block_fit(self._blocks(own), self._weights[FRACTIONS // 2], _VAGUE, self._lag_error)
+        refused = self._refusal() or (fit.rejected if fit is not None else "")
+        if own is None:
+            theta = fit.theta if fit is not None else np.zeros(4)
+            covariance = fit.covariance if fit is not None else np.diag(_VAGUE**2)
+            worth = float(self.samples)
+        else:
+            theta = own.theta + (fit.step if fit is not None else 0.0)
+            covariance = own.covariance + (fit.open if fit is not None else 0.0)
+            worth = own.samples
+        return Estimate(NAMES, theta, covariance, worth, refused)
 
-    def _ripe(self, instant: float) -> bool:
-        """Whether the position around a sample is there, and the tip has been in contact for long enough after it."""
-        return floor(instant - self._late) + self._after < self._row and instant + self._held <= self._row
+    def _blocks(self, own: Estimate | None) -> Array:
+        """The blocks that an estimate rests on, the newest last, shape (b, WIDTH)."""
+        blocks = self._sums[block_sums.HEADER : -block_sums.COLUMNS].reshape(-1, block_sums.WIDTH)
+        blocks = blocks[: int(self._sums[block_sums.FILLED]) + 1]
+        if own is None:
+            return blocks
+        newer = np.cumsum(blocks[::-1, block_sums.WEIGHT])[::-1]
+        return blocks[newer <= own.samples + 0.5]
 
-    def _take(self, instant: float, force: float) -> None:
-        place = round((instant - self._late) * FRACTIONS)
-        whole, part = divmod(place, FRACTIONS)
-        first = whole - self._before
-        if first < 0:
-            return
-        start = first % self._room
-        np.dot(self._weights[part], self._ring[start : start + self._count], out=self._phi[:3])
-        self.estimator.update(self._phi, force)
+    @property
+    def _lag_error(self) -> float:
+        """What is not known of the lag, the phase of the sensor's clock included: a standard deviation [s]."""
+        s, clock = self._state, self._state[contact_stream.AT_CLOCK : contact_stream.AT_POSITIONS]
+        if not s[contact_stream.PERIOD]:
+            return self.lag_std
+        between = min(clock[sample_clock.HIGH] - clock[sample_clock.LOW], 1.0)
+        return float(np.hypot(self.lag_std, between / self.rate / np.sqrt(12)))
+
+    def _refusal(self) -> str:
+        """Why none of the numbers can be trusted, as far as the samples tell before a fit."""
+        c = self._contact
+        if c[contact_state.LIMITED]:
+            return f"the force stands at {c[contact_state.HIGHEST]:.4g} N while the tip moves on: it is saturated"
+        if self.samples < block_sums.FIRST and c[contact_state.LOST] > 0:
+            return "contact is lost again before the low-pass has settled"
+        return ""
+
+    @property
+    def _contact(self) -> Array:
+        return self._state[contact_stream.AT_CONTACT : contact_stream.AT_SUMS]
+
+    @property
+    def _sums(self) -> Array:
+        return self._state[contact_stream.AT_SUMS : contact_stream.AT_RING]
+
+    def _bind(self) -> None:
+        self._one = entry(_one, self._state.copy(), self._weights, 0.0, 0.0, self._out)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            name: value.copy() if name == "_state" else value
+            for name, value in self.__dict__.items()
+            if name not in ("_one", "_out")
+        }
+
+    def __setstate__(self, known: dict[str, Any]) -> None:
+        self.__dict__.update(known)
+        self._out = np.empty((int(self._state[contact_stream.QUEUE]), 5))
+        self._bind()
 
 
-def _check(low_pass: LowPass, rate: float, lag: float, sampling: float | None, touch: float | None) -> None:
+def _settings(
+    low_pass: LowPass, rate: float, lag: float, sampling: float | None, touch: float | None
+) -> Array:
+    """The settings of `contact_stream`, but for those of the taps and the room."""
+    settings = np.zeros(contact_stream.SETTINGS)
+    settling = _FORGOTTEN / low_pass.decay * rate
+    settings[contact_stream.GAP] = max(ceil(rate / (2 * low_pass.cutoff)) - 1, 0)
+    settings[contact_stream.PERIOD] = 0.0 if sampling is None else rate / sampling
+    settings[contact_stream.LATE] = (lag - low_pass.lag) * rate
+    settings[contact_stream.SETTLING] = settling
+    settings[contact_stream.HOLD] = 0.0 if touch == 0 else 2 * settling if touch else settling
+    settings[contact_stream.TOUCH] = -1.0 if touch is None else touch
+    settings[contact_stream.AVERAGED] = ceil(settling * (sampling or rate) / rate)
+    settings[contact_stream.DT] = 1 / rate
+    return settings
+
+
+def _state(settings: Array) -> Array:
+    """The state before the first tick."""
+    s = contact_stream
+    room, queue = int(settings[s.ROOM]), int(settings[s.QUEUE])
+    own, clock, track = np.zeros(s.OWN), np.array(sample_clock.UNSET), np.zeros(positions.NUMBERS)
+    own[[s.ORIGIN, s.FORCE]], own[s.FRESH] = np.nan, -2.0
+    track[[positions.ROW, positions.RESOLVED, positions.GOOD, positions.OPEN]] = -1.0
+    track[positions.LAST_SIXTH] = np.nan
+    contact = np.zeros(contact_state.FIELDS)
+    for at in (contact_state.KNOWN, contact_state.CERTAIN):
+        contact[at + 4 : at + 20] = np.diag(_VAGUE).ravel()
+    ring = np.full(2 * room, np.nan)
+    parts = [settings, own, clock, track, contact, block_sums.no_sums(), ring]
+    return np.concatenate([*parts, np.zeros(queue * contact_state.SAMPLE)])
+
+
+@kernel
+def _one(state, weights, x, force, out):
+    return ticked(state, weights, x, force, out)
+
+
+def _check(
+    low_pass: LowPass, rate: float, lag: float, lag_std: float, sampling: float | None, touch: float | None
+) -> None:
     if low_pass.roll_off < 2:
         raise InputError(f"the low-pass must be of second order at least, got {low_pass}")
     if not 4 * low_pass.cutoff <= rate < np.inf:
         raise InputError(
             f"the rate must be at least four times the cut-off of {low_pass.cutoff:g} Hz, got {rate:g} Hz"
         )
-    if not 0 <= lag < np.inf:
-        raise InputError(f"the lag must be a number of seconds from 0, got {lag:g}")
+    for name, value in (("lag", lag), ("lag_std", lag_std)):
+        if not 0 <= value < np.inf:
+            raise InputError(f"the {name} must be a number of seconds from 0, got {value:g}")
     if sampling is not None and not 0 < sampling <= rate:
         raise InputError(f"sampling must be above 0 and at most the rate of {rate:g} Hz, got {sampling:g}")
-    if touch is not None and not 0 < touch < np.inf:
-        raise InputError(f"touch must be a force above 0 N, got {touch:g}")
+    if touch is not None and not 0 <= touch < np.inf:
+        raise InputError(f"touch must be a force of 0 N or more, got {touch:g}")

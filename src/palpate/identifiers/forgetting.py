@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from palpate._jit import law, part
 from palpate._vector import solve, sqrt
-from palpate.identifiers.square_root import stretched
+from palpate.identifiers.kernels.square_root import stretched
 from palpate.signals.parameters import coerced, require
 
 

@@ -10,8 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from palpate._jit import Kernel, kernel, law, part
 from palpate._vector import sqrt
 from palpate.errors import InputError
-from palpate.identifiers.doubt import carried
-from palpate.identifiers.flat import (
+from palpate.identifiers.estimator import HUGE, Streaming, checked
+from palpate.identifiers.kernels.dimension import AnyNumber
+from palpate.identifiers.kernels.error_covariance import carried
+from palpate.identifiers.kernels.square_root import drifted, measured
+from palpate.identifiers.kernels.state_layout import (
     bounded,
     covariance_in,
     doubt_in,
@@ -20,9 +23,6 @@ from palpate.identifiers.flat import (
     put,
     statistics_at,
 )
-from palpate.identifiers.sizes import AnyNumber
-from palpate.identifiers.square_root import drifted, measured
-from palpate.identifiers.streaming import HUGE, Streaming, checked
 from palpate.signals.types import Estimate
 
 MEMORY = 10_000.0

@@ -8,11 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from palpate._jit import Kernel, kernel, law
-from palpate.identifiers.flat import bounded, covariance_in, doubt_in, known_first, length, put
+from palpate.identifiers.estimator import HUGE, Streaming, checked
 from palpate.identifiers.forgetting import Forgetting, policy_of
-from palpate.identifiers.least_squares import learned
-from palpate.identifiers.sizes import AnyNumber
-from palpate.identifiers.streaming import HUGE, Streaming, checked
+from palpate.identifiers.kernels.dimension import AnyNumber
+from palpate.identifiers.kernels.least_squares import learned
+from palpate.identifiers.kernels.state_layout import (
+    bounded,
+    covariance_in,
+    doubt_in,
+    known_first,
+    length,
+    put,
+)
 from palpate.signals.types import Estimate
 
 

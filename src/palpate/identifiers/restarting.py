@@ -7,7 +7,9 @@ from numpy.typing import ArrayLike
 
 from palpate._jit import Kernel, kernel, law
 from palpate.errors import InputError
-from palpate.identifiers.changes import (
+from palpate.identifiers.estimator import checked
+from palpate.identifiers.forgetting import Forgetting, policy_of
+from palpate.identifiers.kernels.change_detection import (
     COUNTERS,
     EXTRA,
     Watch,
@@ -15,10 +17,8 @@ from palpate.identifiers.changes import (
     looked_back,
     noticed,
 )
-from palpate.identifiers.flat import known_first, length, statistics_at
-from palpate.identifiers.forgetting import Forgetting, policy_of
+from palpate.identifiers.kernels.state_layout import known_first, length, statistics_at
 from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorb
-from palpate.identifiers.streaming import checked
 
 
 class RestartingLeastSquares(LeastSquaresEstimator):
@@ -27,7 +27,8 @@ class RestartingLeastSquares(LeastSquaresEstimator):
     When to use it: a probe that slides from foam onto metal, a grasp that closes on something else. Where the force
     stops being what the estimate foretells, the last samples are fitted anew, and if that is far likelier the
     estimate starts again, from the first sample of the new surface that can be told from the old. Between changes it
-    is `RecursiveLeastSquares`. Its covariance is the new estimate's own: wide after a change, as it should be.
+    is `RecursiveLeastSquares`. Its covariance is the new estimate's own: wide after a change, as it should be. A
+    sample whose regressor is exactly zero teaches nothing, neither of theta nor of the noise.
 
     Args:
         theta: initial estimate, shape (n,); also the one that it starts again from.

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.held import fresh_rows
 from palpate.logs.stamps import Timed
 
 Array = NDArray[np.float64]
@@ -95,6 +94,8 @@ def _sorted(stream: Timed, missing: Sequence[float], notes: list[dict[str, Any]]
 
 def _fresh(stream: Timed, notes: list[dict[str, Any]]) -> Timed:
     """Without the messages that only repeat a held reading."""
+    from palpate.identification.held import fresh_rows
+
     liveliest = int(np.argmax(np.ptp(stream.values, axis=0)))
     fresh = fresh_rows(stream.values[:, liveliest])
     if fresh is None or fresh.sum() < _FEWEST:

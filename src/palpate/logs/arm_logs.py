@@ -8,26 +8,44 @@ from typing import Any
 
 from palpate.errors import InputError
 from palpate.logs.bags import Bag
-from palpate.logs.from_table import open_table
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.read import read_log
 from palpate.logs.roles import POSE, WRENCH
+from palpate.logs.tables import open_table
 from palpate.records import Record
 
+_XYZ = ("x", "y", "z")
+
+
+def _axes(*prefixes: str, axes: tuple[str, ...] = _XYZ) -> tuple[str, ...]:
+    return tuple(f"{prefix}.{axis}".lstrip(".") for prefix in prefixes for axis in axes)
+
+
+def _pose(place: str, turn: str) -> tuple[str, ...]:
+    return (*_axes(place), *_axes(turn, axes=(*_XYZ, "w")))
+
+
 _WRENCHES = {
-    "geometry_msgs/msg/WrenchStamped": "wrench.",
-    "geometry_msgs/msg/Wrench": "",
+    "geometry_msgs/msg/WrenchStamped": _axes("wrench.force", "wrench.torque"),
+    "geometry_msgs/msg/Wrench": _axes("force", "torque"),
+    "franka_msgs/msg/FrankaState": _axes("O_F_ext_hat_K", axes=("0", "1", "2", "3", "4", "5")),
+    "franka_msgs/msg/FrankaRobotState": _axes("o_f_ext_hat_k.wrench.force", "o_f_ext_hat_k.wrench.torque"),
 }
 _POSES = {
-    "geometry_msgs/msg/PoseStamped": ("pose.position.", "pose.orientation."),
-    "geometry_msgs/msg/Pose": ("position.", "orientation."),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": ("pose.pose.position.", "pose.pose.orientation."),
-    "nav_msgs/msg/Odometry": ("pose.pose.position.", "pose.pose.orientation."),
-    "geometry_msgs/msg/TransformStamped": ("transform.translation.", "transform.rotation."),
-    "geometry_msgs/msg/PointStamped": ("point.", ""),
-    "geometry_msgs/msg/Point": ("", ""),
+    "geometry_msgs/msg/PoseStamped": _pose("pose.position", "pose.orientation"),
+    "geometry_msgs/msg/Pose": _pose("position", "orientation"),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _pose("pose.pose.position", "pose.pose.orientation"),
+    "nav_msgs/msg/Odometry": _pose("pose.pose.position", "pose.pose.orientation"),
+    "geometry_msgs/msg/TransformStamped": _pose("transform.translation", "transform.rotation"),
+    "geometry_msgs/msg/PointStamped": _axes("point"),
+    "geometry_msgs/msg/Point": _axes(""),
+    "franka_msgs/msg/FrankaState": _axes("O_T_EE", axes=("12", "13", "14", "qx", "qy", "qz", "qw")),
+    "franka_msgs/msg/FrankaRobotState": _pose("o_t_ee.pose.position", "o_t_ee.pose.orientation"),
 }
-"""Where the components are, by the types that palpate knows as a wrench or as a pose."""
+"""Where the components are, by the types that palpate knows as a wrench or as a pose.
+
+Franka's states hold both, the wrench as estimated from the joints, in the base's axes.
+"""
 _COUNTS = {"wrench": (WRENCH, (3, 6)), "pose": (POSE, (3, 7))}
 _ORDERS = {"wrench": "fx,fy,fz or fx,fy,fz,tx,ty,tz", "pose": "x,y,z or x,y,z,qx,qy,qz,qw"}
 
@@ -62,7 +80,7 @@ def read_wrench_and_pose(
     """
     path = Path(path)
     kind = kind_of(path)
-    with Bag(path, kind) if kind.is_bag else nullcontext() as bag:
+    with Bag(path, kind, options.get("limits")) if kind.is_bag else nullcontext() as bag:
         wrench = wrench or _only("wrench", bag, path)
         pose = pose or _only("pose", bag, path)
         columns = _columns("wrench", wrench, path, kind, bag) | _columns("pose", pose, path, kind, bag)
@@ -101,13 +119,9 @@ def _columns(what: str, spec: str, path: Path, kind: Kind, bag: Bag | None) -> d
 
 def _of_topic(what: str, name: str, bag: Bag) -> list[str]:
     topic = bag.topic(name)
-    if what == "wrench" and topic.kind in _WRENCHES:
-        at = f"{name}.{_WRENCHES[topic.kind]}"
-        return [f"{at}{part}.{axis}" for part in ("force", "torque") for axis in "xyz"]
-    if what == "pose" and topic.kind in _POSES:
-        place, turn = _POSES[topic.kind]
-        names = [f"{name}.{place}{axis}" for axis in "xyz"]
-        return names + [f"{name}.{turn}{axis}" for axis in "xyzw" if turn]
+    known = _WRENCHES if what == "wrench" else _POSES
+    if topic.kind in known:
+        return [f"{name}.{path}" for path in known[topic.kind]]
     raise InputError(
         f"{name} is a {topic.kind}, which palpate does not know as a {what}; name its fields:"
         f" --{what} {','.join(f'{name}.FIELD' for _ in range(3))}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from palpate.contact_frame.vectors import continuous
 from palpate.errors import InputError
 from palpate.logs.aligning import align
 from palpate.logs.bags import Bag, Stream
@@ -67,11 +66,11 @@ def _of_joints(bag: Bag, topic: str) -> bool:
 def _field(role: str, spec: str, bag: Bag) -> tuple[str, str]:
     """Topic and path of a field."""
     name, symbol = split_spec(spec)
-    topic, dot, path = name.partition(".")
+    topic, path = bag.split(name)
     if symbol is not None:
         check_quantity(role, name, symbol)
     bag.topic(topic)
-    if not (dot and path):
+    if not path:
         raise InputError(
             f"{role} needs a field of {topic}, as {topic}.wrench.force.z; palpate topics {bag.path} lists them"
         )
@@ -80,6 +79,8 @@ def _field(role: str, spec: str, bag: Bag) -> tuple[str, str]:
 
 def _steady(stream: Stream, roles: Sequence[str]) -> None:
     """A quaternion and its negative are one rotation; between messages they must not change places."""
+    from palpate.contact_frame.vectors import continuous
+
     places = [roles.index(role) for role in _TURN if role in roles]
     if len(places) == len(_TURN):
         stream.values[:, places] = continuous(stream.values[:, places])

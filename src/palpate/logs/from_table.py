@@ -1,4 +1,4 @@
-"""Columns of CSV, Parquet and MATLAB files in SI units."""
+"""Columns of text, Parquet, MATLAB and spreadsheet files in SI units."""
 
 from __future__ import annotations
 
@@ -10,20 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.logs.columns import Columns
-from palpate.logs.kinds import Kind
-from palpate.logs.mat import MatFile
+from palpate.logs.doubts import epoch_unit
 from palpate.logs.missing import find_sentinel
-from palpate.logs.roles import Loaded, check_apart, check_quantity, quantity, si_unit
-from palpate.logs.table import Table
+from palpate.logs.roles import Loaded, check_apart, check_quantity, family, quantity, si_unit
+from palpate.logs.tables import Columns, Stated
 from palpate.units import split_spec, unit, unit_in_name
 
-
-def open_table(path: Path, kind: Kind, delimiter: str | None = None) -> Columns:
-    """A file of columns, read where they are asked for."""
-    if kind is Kind.MAT:
-        return MatFile(path)
-    return Table(path, delimiter, parquet=kind is Kind.PARQUET)
+_LOSSLESS = 2.0**53
+"""Whole numbers above it are not exact as floats."""
 
 
 def from_table(
@@ -40,38 +34,102 @@ def from_table(
     arrays = dict(zip(places, table.numbers(list(places.values()), words), strict=True))
     if not len(next(iter(arrays.values()))):
         raise InputError(f"{table.path} holds a header and no rows; give a log with a row for each sample")
-    notes: list[dict[str, Any]] = []
-    units = {"time": "s"}
+    loaded = Loaded(arrays, {"time": "s"}, 0.0, list(table.notes))
+    origin = _from_first(table, places, arrays)
     for role, spec in columns.items():
-        symbol, note = _symbol(role, spec, table, places[role])
-        notes += note
+        name, stated = table.names[places[role]], table.stated.get(table.names[places[role]], Stated(None))
+        epoch = _epoch(arrays["time"], origin) if role == "time" else None
+        symbol = _symbol(role, spec, table, places[role], epoch, loaded.notes)
         if role != "time":
-            notes += _missing(role, arrays[role], table.names[places[role]], given=bool(words))
-        units[role] = unit(symbol).si
-        arrays[role] *= unit(symbol).factor
-    start = _from_zero(arrays, rate, table.path)
-    return Loaded(arrays, units, start, notes)
+            loaded.notes += _missing(role, arrays[role], name, given=bool(words))
+        loaded.units[role] = unit(symbol).si
+        arrays[role] += stated.offset
+        arrays[role] *= stated.scale * unit(symbol).factor
+        if stated.scale != 1.0:
+            loaded.facts.append(
+                f"{name!r} is scaled by {stated.scale:g} {stated.unit} a volt, as {stated.where} says"
+            )
+        origin *= unit(symbol).factor if role == "time" else 1.0
+    loaded.start = _time(table, arrays, rate, loaded) + origin
+    return loaded
 
 
-def _symbol(role: str, spec: str, table: Columns, place: int) -> tuple[str, list[dict[str, Any]]]:
-    """The unit's symbol of one column: said, else stored in the file, else carried by the name, else SI."""
+def _from_first(
+    table: Columns, places: Mapping[str, int], arrays: Mapping[str, NDArray[np.float64]]
+) -> float:
+    """Take the first row's time off before it is scaled, in whole numbers where floats would lose some.
+
+    Returns:
+        What was taken off, in the file's own unit; 0 where there is no time.
+    """
+    if "time" not in places or not np.isfinite(arrays["time"][0]):
+        return 0.0
+    time = arrays["time"]
+    origin = float(time[0])
+    counts = table.counts(places["time"]) if abs(origin) >= _LOSSLESS else None
+    time[:] = time - origin if counts is None else counts - counts[0]
+    return origin
+
+
+def _epoch(time: NDArray[np.float64], origin: float) -> str | None:
+    """The unit in which a time counts from 1970; None if it does not."""
+    steps = np.diff(time[:1000])
+    return epoch_unit(origin + float(time[0]), float(np.median(steps)) if len(steps) else 0.0)
+
+
+def _symbol(
+    role: str, spec: str, table: Columns, place: int, epoch: str | None, notes: list[dict[str, Any]]
+) -> str:
+    """The unit's symbol of one column: said, else stated in the file, else carried by the name, else SI."""
     name, symbol = split_spec(spec)
     own = table.names[place]
-    if own in table.clocks and (symbol or "s") != "s":
-        raise InputError(f"{name!r} holds dates and times, which are read as seconds; leave :{symbol} out")
+    stated = table.stated.get(own, Stated(None))
+    if own in table.clocks:
+        if (symbol or "s") != "s":
+            raise InputError(
+                f"{name!r} holds dates and times, which are read as seconds; leave :{symbol} out"
+            )
+        check_quantity(role, name, "s")
+        return "s"
     if symbol is not None:
         check_quantity(role, name, symbol)
-        return symbol, []
-    if own in table.clocks:
-        check_quantity(role, name, "s")
-        return "s", []
-    if own in table.units:
-        return table.units[own], []
-    guess = unit_in_name(own, quantity(role))
+        _contradicted(name, symbol, stated, notes)
+        return symbol
+    if stated.unit is not None:
+        check_quantity(role, name, stated.unit)
+        if stated.where:
+            text = f"{name!r} is taken in {stated.unit}, by {stated.where}; say {name}:UNIT if that is wrong"
+            notes.append({"code": "unit-stated", "text": text})
+        return stated.unit
+    guess, why = unit_in_name(own, quantity(role)), "its name"
+    if guess is None and epoch:
+        guess, why = epoch, "its values, which then are dates"
     if guess and unit(guess).factor != 1.0:
-        text = f"no unit was given for {own!r}: {guess} is taken from its name; say {name}:{guess} or what is right"
-        return guess, [{"code": "unit-guess", "text": text}]
-    return si_unit(role), []
+        text = (
+            f"no unit was given for {own!r}: {guess} is taken from {why}; say {name}:{guess} or what is right"
+        )
+        notes.append({"code": "unit-guess", "text": text})
+        return guess
+    other = _other_unit(role, own)
+    if other:
+        text = f"{role} is read from {own!r}, whose name says {other}, a unit of {unit(other).quantity}"
+        notes.append({"code": "columns-swapped", "text": f"{text}: is it the right column?"})
+    return si_unit(role)
+
+
+def _contradicted(name: str, symbol: str, stated: Stated, notes: list[dict[str, Any]]) -> None:
+    """Say that a unit is another than the file states."""
+    if stated.unit and stated.where and unit(symbol) != unit(stated.unit):
+        text = f"{name!r} is taken in {symbol} as you say, but {stated.where} says {stated.unit}"
+        notes.append({"code": "unit-stated", "text": text})
+
+
+def _other_unit(role: str, name: str) -> str | None:
+    """A unit that a column's name carries, of a quantity that the role is not."""
+    others = {"time", "length", "force"} - {quantity(role)}
+    if family(role) not in {"time", "position", "force"}:
+        return None
+    return next((symbol for other in sorted(others) if (symbol := unit_in_name(name, other))), None)
 
 
 def _missing(role: str, values: NDArray[np.float64], name: str, given: bool) -> list[dict[str, Any]]:
@@ -93,24 +151,40 @@ def _missing(role: str, values: NDArray[np.float64], name: str, given: bool) -> 
     return notes
 
 
-def _from_zero(arrays: dict[str, NDArray[np.float64]], rate: float | None, path: Path) -> float:
+def _time(
+    table: Columns, arrays: dict[str, NDArray[np.float64]], rate: float | None, loaded: Loaded
+) -> float:
     """Make time start at 0, so that unix time keeps its digits; make it from the rate where there is no column."""
-    n = len(next(iter(arrays.values())))
     if "time" not in arrays:
-        if rate is None:
-            raise InputError(
-                "a log needs its time: name its column with --time, or give rows per second with --rate"
-            )
-        if not (np.isfinite(rate) and rate > 0):
-            raise InputError(f"the rate must be above 0 rows a second, got {rate:g}")
-        arrays["time"] = np.arange(n) / rate
+        arrays["time"] = np.arange(len(next(iter(arrays.values())))) / _rate(table, rate, loaded)
         return 0.0
     if rate is not None:
         raise InputError("give the time's column or the rate, not both")
     time = arrays["time"]
     if np.isnan(time).any():
         row = int(np.flatnonzero(np.isnan(time))[0]) + 1
-        raise InputError(f"{path}: row {row} has no time; remove the row, or give --rate instead of --time")
+        raise InputError(
+            f"{table.path}: row {row} has no time; remove the row, or give --rate instead of --time"
+        )
     origin = float(time[0])
     time -= origin
     return origin
+
+
+def _rate(table: Columns, rate: float | None, loaded: Loaded) -> float:
+    """Rows per second: said, or stated in the file."""
+    if rate is None and table.rate is not None:
+        loaded.facts.append(
+            f"timed by {table.rate:g} rows a second, as {Path(table.path).name} itself states"
+        )
+        return table.rate
+    if rate is None:
+        raise InputError(
+            "a log needs its time: name its column with --time, or give rows per second with --rate"
+        )
+    if not (np.isfinite(rate) and rate > 0):
+        raise InputError(f"the rate must be above 0 rows a second, got {rate:g}")
+    if table.rate is not None and not np.isclose(rate, table.rate, rtol=1e-3):
+        text = f"rows are taken at {rate:g} a second as you say, but the file states {table.rate:g}"
+        loaded.notes.append({"code": "time-doubtful", "text": text})
+    return rate

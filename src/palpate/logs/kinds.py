@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
+from zipfile import BadZipFile, ZipFile
 
 from palpate.errors import InputError
 
@@ -14,6 +15,7 @@ class Kind(Enum):
     TEXT = "text"
     PARQUET = "Parquet"
     MAT = "a MATLAB file"
+    SHEETS = "a spreadsheet"
     BAG1 = "a ROS 1 bag"
     MCAP = "MCAP"
     SQLITE = "a ROS 2 bag (sqlite3)"
@@ -27,6 +29,8 @@ class Kind(Enum):
 
 STORAGES = (".mcap", ".db3")
 """Suffixes of the files that a ROS 2 bag's folder holds its messages in."""
+PACKED = ".zstd"
+"""Suffix that follows it where the file was packed as a whole."""
 
 _BEGINNINGS = {
     b"PAR1": Kind.PARQUET,
@@ -47,7 +51,10 @@ def kind_of(path: Path) -> Kind:
     if not path.exists():
         raise InputError(f"there is no file {path}; check the path")
     if path.is_dir():
-        if any((path / "metadata.yaml").is_file() or file.suffix in STORAGES for file in path.iterdir()):
+        if any(
+            (path / "metadata.yaml").is_file() or {file.suffix, file.with_suffix("").suffix} & {*STORAGES}
+            for file in path.iterdir()
+        ):
             return Kind.FOLDER
         raise InputError(f"{path} is a folder and no ROS 2 bag; give a log file, or a bag's own folder")
     if not path.is_file():
@@ -58,5 +65,16 @@ def kind_of(path: Path) -> Kind:
         raise InputError(f"{path} is empty; give a log with a row of numbers for each sample")
     if begin.startswith(_HDF5) and (begin.startswith(b"MATLAB") or path.suffix.lower() == ".mat"):
         raise InputError(f"{path} is a MATLAB file of version 7.3 (HDF5); save it in MATLAB with: save -v7")
+    if begin.startswith(b"PK\x03\x04") and _is_spreadsheet(path):
+        return Kind.SHEETS
     found = next((kind for magic, kind in _BEGINNINGS.items() if begin.startswith(magic)), Kind.TEXT)
     return Kind.MAT if found is Kind.TEXT and path.suffix.lower() == ".mat" else found
+
+
+def _is_spreadsheet(path: Path) -> bool:
+    """Whether a zip archive holds the parts of a spreadsheet."""
+    try:
+        with ZipFile(path) as packed:
+            return bool({"xl/workbook.xml", "xl/workbook.bin", "content.xml"} & set(packed.namelist()))
+    except (BadZipFile, OSError, ValueError, NotImplementedError):
+        return path.suffix.lower() in {".xlsx", ".xlsm", ".xlsb", ".ods"}

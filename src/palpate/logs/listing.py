@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag
 from palpate.logs.bags.fields import leaves
-from palpate.logs.columns import Columns
-from palpate.logs.from_table import open_table
+from palpate.logs.doubts import epoch_unit
 from palpate.logs.kinds import kind_of
+from palpate.logs.limits import Limits
+from palpate.logs.own_runs import is_run
+from palpate.logs.proposal import Proposal, Seen, clock_of, for_a_run, from_columns, from_topics
+from palpate.logs.tables import Columns, Stated, open_table
 from palpate.units import unit, unit_in_name
-
-_SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Entry:
         rate: a second [1/s]; None where it is not known.
         first, last: time of the first and the last [s], on the log's own clock; None likewise.
         about: how to name it in `palpate identify`, or what its values are.
+        fields: the numbers in a topic's messages.
     """
 
     name: str
@@ -41,102 +42,122 @@ class Entry:
     first: float | None
     last: float | None
     about: str
+    fields: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """As plain values."""
         return asdict(self)
 
 
-def entries_of(path: str | Path, delimiter: str | None = None) -> tuple[list[Entry], list[str]]:
-    """What a log holds, and what is wrong with it.
+@dataclass(frozen=True)
+class Listing:
+    """What a log holds.
+
+    Args:
+        entries: of the log, in its order.
+        troubles: what is wrong with it, a sentence each.
+        proposal: how to identify it.
+        facts: what it states about itself.
+    """
+
+    entries: list[Entry]
+    troubles: list[str]
+    proposal: Proposal
+    facts: list[str] = field(default_factory=list)
+
+
+def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | None = None) -> Listing:
+    """What a log holds, what is wrong with it, and how to identify it.
 
     Args:
         path: of the log.
-        delimiter: of a CSV file; found when None.
+        delimiter: of a text log; found when None.
+        limits: of unpacked size and time; those of `read_log` when None.
 
     Raises:
         InputError: the file is missing, or is none that can be read.
     """
     path = Path(path)
     kind = kind_of(path)
-    if not kind.is_bag:
-        return _of_table(open_table(path, kind, delimiter)), []
-    with Bag(path, kind) as bag:
-        times = bag.times()
-        return [_of_topic(bag, name, times.get(name)) for name in bag.topics], bag.troubles
+    if kind.is_bag:
+        with Bag(path, kind, limits) as bag:
+            fields = {name: _fields(bag, name) for name in bag.topics}
+            entries = [_of_topic(bag, name, fields[name]) for name in bag.topics]
+            return Listing(entries, bag.troubles, from_topics(bag, fields))
+    table = open_table(path, kind, delimiter, limits)
+    seen = _seen(table)
+    clock = clock_of(table, seen)
+    entries = [_of_column(own, clock) for own in seen]
+    entries += [Entry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
+    proposal = for_a_run() if is_run(path) else from_columns(table, seen, delimiter)
+    facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
+    return Listing(entries, [note["text"] for note in table.notes], proposal, facts)
 
 
-def _of_topic(bag: Bag, name: str, times: tuple[float, float] | None) -> Entry:
+def _fields(bag: Bag, name: str) -> tuple[str, ...]:
     topic = bag.topics[name]
-    first, last = times if times else (None, None)
-    rate = (
-        (topic.count - 1) / (last - first)
-        if first is not None and last is not None and last > first
-        else None
-    )
-    return Entry(name, topic.kind, topic.count, rate, first, last, _use(bag, name))
+    if not (topic.known and topic.count):
+        return ()
+    return tuple(path for path, _ in leaves(bag.first(name)))
 
 
-def _use(bag: Bag, name: str) -> str:
+def _of_topic(bag: Bag, name: str, fields: tuple[str, ...]) -> Entry:
+    topic = bag.topics[name]
+    first, last = topic.times or (None, None)
+    long = first is not None and last is not None and last > first
+    rate = (topic.count - 1) / (last - first) if long and first is not None and last is not None else None
+    return Entry(name, topic.kind, topic.count, rate, first, last, _use(bag, name, fields), fields)
+
+
+def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
     """How a topic is named on the command line, by its type."""
     topic = bag.topics[name]
     if not topic.known:
         return "unknown type: the bag does not define it"
-    if is_wrench(topic.kind):
-        return f"--wrench {name}"
-    if is_pose(topic.kind):
-        return f"--pose {name}"
     if not topic.count:
         return ""
-    fields = [path for path, _ in leaves(bag.first(name))]
-    more = ", ..." if len(fields) > _SHOWN else ""
-    return f"{name}.FIELD: {', '.join(fields[:_SHOWN])}{more}" if fields else "no numbers"
+    uses = [f"--wrench {name}"] if is_wrench(topic.kind) else []
+    uses += [f"--pose {name}"] if is_pose(topic.kind) else []
+    if not uses:
+        return f"{name}.FIELD" if fields else "no numbers"
+    return " ".join(uses) + (f" (in {topic.parent})" if topic.parent else "")
 
 
-def _of_table(table: Columns) -> list[Entry]:
-    columns = [_column(table, place) for place in range(len(table.names))]
-    clock = next((i for i, own in enumerate(columns) if own is not None and _counts_time(own)), None)
-    time = None if clock is None else columns[clock]
-    symbol = None if clock is None else unit_in_name(table.names[clock], "time")
-    if time is not None and symbol:
-        time *= unit(symbol).factor
-    return [_of_column(table, i, own, time, is_time=i == clock) for i, own in enumerate(columns)]
-
-
-def _column(table: Columns, place: int) -> NDArray[np.float64] | None:
-    """The numbers of a column; None if it holds something else."""
+def _seen(table: Columns) -> list[Seen]:
+    """Every column's values and unit."""
+    places = list(range(len(table.names)))
     try:
-        return table.numbers([place], ["nan"])[0]
+        columns = table.glance(places)
     except InputError:
-        return None
+        columns = [np.empty(0) for _ in places]
+    found = []
+    for place, values in zip(places, columns, strict=True):
+        name = table.names[place]
+        stated = table.stated.get(name, Stated(None))
+        scaled = (values + stated.offset) * stated.scale
+        found.append(Seen(place, name, scaled, stated.unit, name in table.clocks))
+    return found
 
 
-def _counts_time(column: NDArray[np.float64]) -> bool:
-    """Whether a column goes on and on in even steps, as a time does."""
-    step = np.diff(column)
-    return len(step) > 2 and bool((step > 0).all() and np.median(step) > 0.5 * np.mean(step))
-
-
-def _of_column(
-    table: Columns,
-    place: int,
-    column: NDArray[np.float64] | None,
-    time: NDArray[np.float64] | None,
-    *,
-    is_time: bool,
-) -> Entry:
-    name = table.names[place]
-    if column is None:
-        return Entry(name, "text", 0, None, None, None, "not numbers")
-    there = np.isfinite(column)
+def _of_column(own: Seen, clock: Seen | None) -> Entry:
+    there = np.isfinite(own.values)
     count = int(there.sum())
-    kind = "date" if name in table.clocks else "number"
-    about = f"{column[there].min():.6g} to {column[there].max():.6g}" if count else "no reading"
-    about += f" {table.units[name]}" if table.units.get(name, "1") != "1" else ""
-    if time is None or count < 2 or len(time) != len(column):
-        return Entry(name, kind, count, None, None, None, about)
-    own = time[there]
-    rate = (count - 1) / float(own[-1] - own[0])
-    return Entry(
-        name, kind, count, rate, float(own[0]), float(own[-1]), f"{about}{' (time?)' if is_time else ''}"
-    )
+    if not count:
+        return Entry(own.name, "text", 0, None, None, None, "not numbers")
+    kind = "date" if own.clock else "number"
+    about = f"{own.values[there].min():.6g} to {own.values[there].max():.6g}"
+    about += f" {own.unit}" if own.unit not in {None, "1"} else ""
+    if clock is None or count < 2 or len(clock.values) != len(own.values):
+        return Entry(own.name, kind, count, None, None, None, about)
+    time = clock.values[there] * _factor(clock)
+    rate = (count - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else None
+    about += " (time?)" if own is clock else ""
+    return Entry(own.name, kind, count, rate, float(time[0]), float(time[-1]), about)
+
+
+def _factor(clock: Seen) -> float:
+    """From a time's own unit to seconds."""
+    if clock.clock:
+        return 1.0
+    symbol = clock.unit or unit_in_name(clock.name, "time") or epoch_unit(float(clock.values[0]), clock.step)
+    return unit(symbol).factor if symbol and unit(symbol).quantity == "time" else 1.0

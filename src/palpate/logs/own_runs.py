@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
+from palpate.errors import InputError
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.read import read_log
 from palpate.logs.store import stored_about
@@ -21,7 +23,7 @@ def is_run(path: Path) -> bool:
     if kind_of(path) is not Kind.PARQUET:
         return False
     about = stored_about(path)
-    return about is not None and set(RUN.values()) <= set(about["units"])
+    return about is not None and set(RUN.values()) <= set(about.units)
 
 
 def read_run(path: Path, **options: Any) -> Record:
@@ -38,10 +40,31 @@ def measured_by(path: Path) -> dict[str, Any]:
     The lag is that of a fresh reading: the sensor's low-pass at rest, its wait, less what the position is late.
     """
     about = stored_about(path)
-    instruments: Mapping[str, Any] = about["meta"].get("instruments", {}) if about else {}
-    force, position = instruments.get("force"), instruments.get("position", {})
-    if not force or force["filter"] == "unknown":
+    instruments = about.meta.get("instruments") if about else None
+    if instruments is None:
         return {}
-    low_pass = LowPass.parse(force["filter"])
-    lag = low_pass.lag + force["delay_s"] - position.get("lag_s", 0.0)
-    return {"lag": lag, "force_filter": force["filter"] if low_pass.roll_off else None}
+    try:
+        found = msgspec.convert(instruments, _Instruments)
+    except msgspec.ValidationError as error:
+        raise InputError(
+            f"{path}: what it says of its instruments is spoiled ({error}); run it again"
+        ) from None
+    if found.force is None or found.force.filter == "unknown":
+        return {}
+    low_pass = LowPass.parse(found.force.filter)
+    lag = low_pass.lag + found.force.delay_s - found.position.lag_s
+    return {"lag": lag, "force_filter": found.force.filter if low_pass.roll_off else None}
+
+
+class _Force(msgspec.Struct, frozen=True):
+    filter: str
+    delay_s: float
+
+
+class _Position(msgspec.Struct, frozen=True):
+    lag_s: float = 0.0
+
+
+class _Instruments(msgspec.Struct, frozen=True):
+    force: _Force | None = None
+    position: _Position = _Position()

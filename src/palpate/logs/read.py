@@ -11,12 +11,16 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.logs.bags import Bag
+from palpate.logs.doubts import check_range, doubts_about_time
 from palpate.logs.from_bag import from_bag
-from palpate.logs.from_table import from_table, open_table
+from palpate.logs.from_table import from_table
 from palpate.logs.kinds import kind_of
+from palpate.logs.limits import Limits
 from palpate.logs.roles import Loaded
 from palpate.logs.store import read_record
+from palpate.logs.tables import open_table
 from palpate.records import Record
+from palpate.units import split_spec
 
 
 def read_log(
@@ -28,6 +32,7 @@ def read_log(
     missing: Sequence[str | float] = (),
     delimiter: str | None = None,
     held: str | None = None,
+    limits: Limits | None = None,
     **columns: str,
 ) -> Record:
     """Read columns of a log into a record.
@@ -38,15 +43,17 @@ def read_log(
     force="/wrench.wrench.force.z")`, aligned on the rows of the topic that has most messages.
 
     Args:
-        path: CSV with or without a header, in any usual dialect, Parquet, a MATLAB file (v4 to v7), a ROS 1 bag, or a
-            ROS 2 bag (its folder, or an MCAP or SQLite file of it); time may be dates and times (ISO 8601).
-        rate: rows per second [1/s], for a log without a column of time.
+        path: text in columns (CSV, LabVIEW's .lvm, Aurora's .ddf, ...), Parquet, a spreadsheet, a MATLAB file (v4 to
+            v7), a ROS 1 bag, or a ROS 2 bag (its folder, or an MCAP or SQLite file of it); time may be dates and times
+            (ISO 8601).
+        rate: rows per second [1/s], for a log without a column of time that does not state its rate either.
         start: leave out the rows before it, in seconds from the first row [s].
         end: leave out the rows from it on, likewise [s].
         missing: values that mean "no reading"; they become NaN, as empty cells do. A plain one is found by itself.
         delimiter: between two cells of a CSV file; found when None.
         held: the column whose readings are not moved in time where a bag's other topic has more of them, as
             `identify(force_filter=...)` wants its force; each stands in the first row after it.
+        limits: of unpacked size and time; 2 GB and 600 s when None.
         columns: by the name that the record gives it, a column's name or number with its unit: `NAME:UNIT`; of a bag
             `TOPIC.FIELD:UNIT`.
 
@@ -59,29 +66,34 @@ def read_log(
     """
     path = Path(path)
     if not columns:
-        return read_record(path)
+        return read_record(path, limits)
     kind = kind_of(path)
     if kind.is_bag:
         if rate is not None:
             raise InputError(f"the messages of {path} carry their own time; leave --rate out")
-        with Bag(path, kind) as bag:
+        with Bag(path, kind, limits) as bag:
             loaded = from_bag(bag, columns, missing, held)
     else:
-        loaded = from_table(open_table(path, kind, delimiter), columns, rate, missing)
+        loaded = from_table(open_table(path, kind, delimiter, limits), columns, rate, missing)
+    check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)
+    if "time" in columns:
+        loaded.notes += doubts_about_time(loaded.columns, loaded.start, columns["time"])
     return _record(loaded, path, start, end)
 
 
 def _record(loaded: Loaded, path: Path, start: float | None, end: float | None) -> Record:
     meta: dict[str, Any] = {"source": str(path), "start_s": loaded.start, "notes": loaded.notes}
     if loaded.facts:
-        meta |= {"facts": loaded.facts, "frames": loaded.frames}
+        meta["facts"] = loaded.facts
+    if loaded.frames:
+        meta["frames"] = loaded.frames
     if loaded.joints:
         meta["position_from"] = "joints"
     kept = _cut(loaded.columns, start, end, path)
     return Record(kept, {name: loaded.units[name] for name in kept}, meta)
 
 
-def columns_of(path: str | Path, delimiter: str | None = None) -> list[str]:
+def columns_of(path: str | Path, delimiter: str | None = None, limits: Limits | None = None) -> list[str]:
     """Names of a log's columns; numbers from 0 if it has no header.
 
     Raises:
@@ -90,7 +102,7 @@ def columns_of(path: str | Path, delimiter: str | None = None) -> list[str]:
     kind = kind_of(Path(path))
     if kind.is_bag:
         raise InputError(f"{path} is a bag and has topics, not columns; palpate topics {path} lists them")
-    return list(open_table(Path(path), kind, delimiter).names)
+    return list(open_table(Path(path), kind, delimiter, limits).names)
 
 
 def _cut(

@@ -44,12 +44,14 @@ class Estimate:
         theta: the values, shape (n,), SI.
         covariance: of theta, shape (n, n): the noise found in the data included.
         samples: how many samples the data are worth (fewer than were seen when old ones are forgotten).
+        rejected: why no number of it may be trusted; empty if nothing speaks against the model.
     """
 
     names: tuple[str, ...]
     theta: NDArray[np.float64]
     covariance: NDArray[np.float64]
     samples: float
+    rejected: str = ""
 
     @property
     def std(self) -> NDArray[np.float64]:
@@ -57,7 +59,9 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     def verdicts(self, tolerance: float = 0.25) -> dict[str, str]:
-        """By parameter, "identified" or "not identifiable": see `verdict`."""
+        """By parameter, "identified" or "not identifiable", see `verdict`; "rejected" where the estimate is."""
+        if self.rejected:
+            return dict.fromkeys(self.names, "rejected")
         pairs = zip(self.names, self.theta, self.std, strict=True)
         return {name: verdict(float(value), float(std), tolerance) for name, value, std in pairs}
 

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 SHORTEST = 16
 """Rows of a segment, at least: one block."""
 GROUPS = 8
-"""Stretches of the log whose stiffness may differ: enough for a variance between them, few enough for a small system."""
+"""Stretches of the log that are held against each other: enough for a variance, few enough to be quick."""
 PERIODS = 4
 """Periods in a block."""
 _LINES = np.array([3.0, 4.0, 5.0])
@@ -137,7 +137,9 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
     frequency = PERIODS / (lengths * dt)
     frequency[0] = 2 / (longest * dt)
     seen = products.any(axis=(1, 2, 3))
-    return Octaves(products[seen], lines[seen], frequency) if seen.any() else Octaves(products, lines, frequency)
+    return (
+        Octaves(products[seen], lines[seen], frequency) if seen.any() else Octaves(products, lines, frequency)
+    )
 
 
 def _sums(
@@ -162,10 +164,12 @@ def _sums(
                 found[int(g)][1] += len(flat)  # type: ignore[operator]
             else:
                 found[int(g)] = [flat.T @ flat, len(flat)]
-    return [(g, (np.asarray(part[0]), int(part[1]))) for g, part in found.items()]  # type: ignore[call-overload]
+    return [(g, (np.asarray(part[0]), int(part[1]))) for g, part in found.items()]
 
 
-def _phase(length: int, numbers: Array) -> tuple[NDArray[np.complex128], tuple[Array, NDArray[np.complex128]]]:
+def _phase(
+    length: int, numbers: Array
+) -> tuple[NDArray[np.complex128], tuple[Array, NDArray[np.complex128]]]:
     """The transform of a block, and that of its mean and slope; the power of white noise stays what it is."""
     time = np.arange(length)
     window = np.hanning(length + 2)[1:-1]

@@ -179,7 +179,9 @@ class _Question:
         fitted = self.fit
         if not fitted.model.knobs:
             values = {n: v for n, v in zip(self.names, solution.theta, strict=True) if n in fitted.names}
-            fitted = relinearised(fitted, self.problem.motion, self.problem.force, {LAG: fitted.lag, **values})
+            fitted = relinearised(
+                fitted, self.problem.motion, self.problem.force, {LAG: fitted.lag, **values}
+            )
         noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
         return Answer(names, solution.theta[kept], cov, budget, fitted, explained, left, noise)
@@ -206,7 +208,10 @@ class _Question:
         if free:
             edges = np.cumsum([0, *(len(f) for f in free)])
             rest = octaves_of(
-                np.concatenate(free)[:, None], [Segment(int(a), int(b)) for a, b in pairwise(edges)], self.dt, longest
+                np.concatenate(free)[:, None],
+                [Segment(int(a), int(b)) for a, b in pairwise(edges)],
+                self.dt,
+                longest,
             )
             seen = rest.all_lines >= 2
             sensor[seen] = np.maximum(rest.total[seen, 0, 0] / rest.all_lines[seen], sensor[seen])
@@ -229,9 +234,7 @@ class _Question:
         return 1 - left / whole, float(np.sqrt(left / count))
 
 
-def _seen(
-    motion: Motion, lag: float, segments: list[Segment], octaves: Octaves
-) -> NDArray[np.bool_]:
+def _seen(motion: Motion, lag: float, segments: list[Segment], octaves: Octaves) -> NDArray[np.bool_]:
     """Octaves up to the first in which the position is mostly its own noise, which pulls every parameter to zero."""
     chain = motion.chain
     dt = float(np.median(np.diff(chain.times(motion.rows))))

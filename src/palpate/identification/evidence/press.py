@@ -26,11 +26,10 @@ _SHOWN = 400
 
 @dataclass(frozen=True)
 class Stroke:
-    """One way in: depth [m], its first two rates, force [N] and time [s], shape (n,)."""
+    """One way in: depth [m], speed [m/s], force [N] and time [s], shape (n,)."""
 
     depth: Array
     speed: Array
-    acceleration: Array
     force: Array
     time: Array
 
@@ -54,7 +53,7 @@ class Slope:
 def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[Stroke]:
     """The way in of each contact: up to its deepest row, at least half of the range of all."""
     motion = problem.motion
-    channels = (*(motion.moved(k, lag) for k in range(3)), problem.force, problem.time)
+    channels = (motion.moved(0, lag), motion.moved(1, lag), problem.force, problem.time)
     depth = channels[0]
     found = []
     reach = max((float(np.ptp(depth[s.first : s.last])) for s in segments), default=0.0)
@@ -72,7 +71,7 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
 def slope_of(strokes: list[Stroke]) -> Slope | None:
     """Slope in the upper part of the force; None without a way in that rises.
 
-    Half way between the slope as it is and the slope at rest, less what the force has of speed and acceleration. Its
+    Half way between the slope as it is and the slope at rest, less what the force has of the speed. Its
     interval has both, the scatter of each way in, the change of the slope over the range, and the variance between
     ways in (a random effect, Student's t).
     """
@@ -112,10 +111,8 @@ def _line(x: Array, f: Array) -> tuple[float, float, float]:
 
 
 def _at_rest(stroke: Stroke, rows: NDArray[np.intp]) -> float:
-    """Slope less what the force has of the speed and the acceleration on the way."""
-    columns = np.column_stack(
-        [np.ones(len(rows)), stroke.depth[rows], stroke.speed[rows], stroke.acceleration[rows]]
-    )
+    """Slope less what the force has of the speed on the way."""
+    columns = np.column_stack([np.ones(len(rows)), stroke.depth[rows], stroke.speed[rows]])
     size = np.sqrt((columns**2).sum(axis=0))
     size[size == 0] = 1.0
     theta, *_ = np.linalg.lstsq(columns / size, stroke.force[rows], rcond=1e-3)
@@ -126,7 +123,8 @@ def pooled(values: Array, variances: Array) -> tuple[float, float, float]:
     """Mean of effects that differ, its deviation and degrees of freedom (Paule-Mandel, Hartung-Knapp).
 
     Args:
-        values, variances: of each, shape (n,).
+        values: of each, shape (n,).
+        variances: of each about its own truth, shape (n,).
     """
     n = len(values)
     if n == 1:

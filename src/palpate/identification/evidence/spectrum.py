@@ -121,7 +121,9 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
     omega, parts = line.omega, line.parts
     halves = _student(line.freedom) * np.sqrt(line.variance)
     by_lag = 1.96 * omega * lag_std
-    halves = np.hypot(halves, [abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag])
+    halves = np.hypot(
+        halves, [abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag]
+    )
     noise = min(3 * blocks.noise * len(blocks.position) / max(power, 1e-300), 1.0)
     halves = np.hypot(halves, noise * np.abs(parts))
     halves = np.hypot(halves, np.abs(line.change))

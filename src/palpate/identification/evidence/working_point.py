@@ -71,7 +71,7 @@ def _octave(spectrum: Sequence[DynamicStiffness]) -> DynamicStiffness | None:
     for i, own in enumerate(spectrum):
         lower = [o for o in spectrum[:i] if o.share >= _EXCITED]
         falls = any(own.storage + own.storage_half < o.storage - o.storage_half for o in lower)
-        if own.share >= _EXCITED and own.storage > 0 and not falls:
+        if own.share >= _EXCITED and not falls:
             kept.append(own)
     return max(kept, key=lambda own: own.share, default=None)
 

@@ -48,7 +48,7 @@ class Chain:
 
     def times(self, rows: NDArray[np.intp]) -> Array:
         """Of rows [s] from the first sample, less the chain's own delay."""
-        found: Array = rows * self.dt - self.delay
+        found: Array = rows.astype(np.float64) * self.dt - self.delay
         return found
 
     def force_gain(self, frequency: Array) -> Array:

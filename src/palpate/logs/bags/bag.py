@@ -7,20 +7,23 @@ from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.errors import InputError, unknown
 from palpate.logs.bags.fields import Stream, finder, leaves, no_field
-from palpate.logs.bags.reading import Reader, first_line, open_bag, open_damaged
+from palpate.logs.bags.reading import first_line, open_files
+from palpate.logs.bags.scanning import Channel
 from palpate.logs.kinds import Kind
+from palpate.logs.limits import Budget, Limits
 
 if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
     from rosbags.typesys.store import Typestore
 
-T = TypeVar("T")
+_TRANSFORMS = {"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"}
+"""Messages that are lists of transforms, each of a frame of its own."""
 
 
 @dataclass(frozen=True)
@@ -32,28 +35,50 @@ class Topic:
         kind: the type of its messages, as `geometry_msgs/msg/WrenchStamped`.
         count: of its messages.
         known: whether the messages can be read: their type is defined in the bag, or is one of ROS 2's own.
+        times: when the recorder got the first and the last [s since 1970]; None if there is none.
+        parent: the frame that a frame's transforms are given in; empty for other topics.
     """
 
     name: str
     kind: str
     count: int
     known: bool
+    times: tuple[float, float] | None = None
+    parent: str = ""
 
 
 class Bag:
     """A bag of ROS 1 or ROS 2, whole or cut; open within `with`.
 
+    A topic of transforms, such as `/tf`, gives one topic more for each frame, `/tf.tool0`.
+
     Args:
         path: a file or a folder.
         kind: what it is.
+        limits: of size and time.
 
     Raises:
         InputError: nothing of it can be read, or the library that reads bags is not installed.
     """
 
-    def __init__(self, path: Path, kind: Kind) -> None:
+    def __init__(self, path: Path, kind: Kind, limits: Limits | None = None) -> None:
         self.path, self.kind = path, kind
-        self._take(*open_bag(path, kind))
+        self._unpacked = TemporaryDirectory()
+        try:
+            self._files, self.troubles = open_files(
+                path, kind, Budget(path, limits or Limits()), self._unpacked
+            )
+            self._types = _types([channel for file in self._files for channel in file.channels.values()])
+            self.topics = {topic.name: topic for topic in self._found()}
+            self._add_frames()
+        except ImportError:
+            self.close()
+            raise InputError(
+                "bags need the library rosbags; install it with: pip install 'palpate[bags]'"
+            ) from None
+        except BaseException:
+            self.close()
+            raise
         if not any(topic.count for topic in self.topics.values()):
             self.close()
             raise InputError(f"{path} holds no messages; record it again")
@@ -66,21 +91,35 @@ class Bag:
 
     def close(self) -> None:
         """Let the file go."""
-        self._reader.close()
+        self._unpacked.cleanup()
 
-    def _take(self, reader: Reader, troubles: list[str]) -> None:
-        self._reader, self.troubles = reader, troubles
-        self._types = _types(self._connections())
-        self.topics = {name: self._topic(name) for name in sorted({c.topic for c in self._connections()})}
+    def _found(self) -> Iterator[Topic]:
+        own = [(file, channel) for file in self._files for channel in file.channels.values()]
+        for name in sorted({channel.topic for _, channel in own}):
+            channels = [(file, channel) for file, channel in own if channel.topic == name]
+            kinds = sorted({channel.kind for _, channel in channels})
+            known = len(kinds) == 1 and kinds[0] in self._types.fielddefs
+            spans = [file.spans[c.number] for file, c in channels if c.number in file.spans]
+            times = (min(a for a, _ in spans) / 1e9, max(b for _, b in spans) / 1e9) if spans else None
+            count = sum(file.counts[channel.number] for file, channel in channels)
+            yield Topic(name, " and ".join(kinds), count, known, times)
 
-    def _connections(self) -> list[Connection]:
-        return list(self._reader.connections)
-
-    def _topic(self, name: str) -> Topic:
-        own = [c for c in self._connections() if c.topic == name]
-        kinds = sorted({c.msgtype for c in own})
-        known = all(kind in self._types.fielddefs for kind in kinds)
-        return Topic(name, " and ".join(kinds), sum(c.msgcount for c in own), known and len(kinds) == 1)
+    def _add_frames(self) -> None:
+        """A topic for each frame that a topic of transforms tells of."""
+        lists = [
+            topic
+            for topic in self.topics.values()
+            if topic.kind in _TRANSFORMS and topic.known and topic.count
+        ]
+        found: dict[str, tuple[int, int, int, str]] = {}
+        for name, received, transform in self._messages([f"{topic.name}." for topic in lists]):
+            count, first, last, _ = found.get(name, (0, received, received, ""))
+            parent = str(transform.header.frame_id)
+            found[name] = (count + 1, min(first, received), max(last, received), parent)
+        for name, (count, first, last, parent) in found.items():
+            self.topics[name] = Topic(
+                name, "geometry_msgs/msg/TransformStamped", count, True, (first / 1e9, last / 1e9), parent
+            )
 
     def topic(self, name: str) -> Topic:
         """A topic that can be read.
@@ -103,19 +142,7 @@ class Bag:
     def first(self, name: str) -> Any:
         """The first message of a topic."""
         self.topic(name)
-        return self._unhurt(lambda: next(self._messages([name]))[2])
-
-    def times(self) -> dict[str, tuple[float, float]]:
-        """When the recorder got the first and the last message of each topic [s since 1970]."""
-
-        def look() -> dict[str, tuple[int, int]]:
-            found: dict[str, tuple[int, int]] = {}
-            for name, received, _ in self._raw(list(self.topics)):
-                first, last = found.get(name, (received, received))
-                found[name] = (min(first, received), max(last, received))
-            return found
-
-        return {name: (first / 1e9, last / 1e9) for name, (first, last) in self._unhurt(look).items()}
+        return next(self._messages([name]))[2]
 
     def streams(self, wanted: Mapping[str, Sequence[str]]) -> tuple[dict[str, Stream], float]:
         """Numbers of some topics, by topic the paths of its fields; and the time that they are counted from.
@@ -128,7 +155,7 @@ class Bag:
         """
         for name in wanted:
             self.topic(name)
-        rows = self._unhurt(lambda: self._rows(wanted))
+        rows = self._rows(wanted)
         for name, own in rows.items():
             if not own.received:
                 raise InputError(f"{self.path}: no message on {name} is whole; record or copy it again")
@@ -150,38 +177,32 @@ class Bag:
             rows[name].add(received, getattr(message, "header", None))
         return rows
 
-    def _unhurt(self, look: Callable[[], T]) -> T:
-        """What a look into the bag finds; where it meets damage, the bag is opened as a damaged one."""
-        try:
-            return look()
-        except _DamageError as error:
-            reader, troubles = open_damaged(self.path, self.kind, str(error))
-            self.close()
-            self._take(reader, troubles)
-            return look()
+    def split(self, spec: str) -> tuple[str, str]:
+        """The longest topic that a name begins with, and what follows it: a field; empty if nothing does."""
+        at = [i for i, letter in enumerate(spec) if letter == "."] + [len(spec)]
+        end = next((end for end in reversed(at) if spec[:end] in self.topics), at[0])
+        return spec[:end], spec[end + 1 :]
 
     def _messages(self, names: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+        """Messages of some topics, of the frames of transforms, or, by `/tf.`, of all frames of one topic."""
         read = self._types.deserialize_ros1 if self.kind is Kind.BAG1 else self._types.deserialize_cdr
-        for name, received, data in self._raw(names):
-            kind = self.topics[name].kind
+        wanted = set(names)
+        lists = {name for name, topic in self.topics.items() if topic.kind in _TRANSFORMS}
+        plain = wanted | {name for name in lists if any(other.startswith(f"{name}.") for other in wanted)}
+        for channel, received, data in (item for file in self._files for item in file.messages(plain)):
+            name, kind = channel.topic, channel.kind
             try:
-                message = read(data, kind)
+                message: Any = read(data, kind)
             except Exception as error:  # noqa: BLE001 - whatever its bytes make of the library's own code
                 text = f"{self.path}: a message on {name} is no {kind} ({first_line(error)}); record it again"
                 raise InputError(text) from None
-            yield name, received, message
-
-    def _raw(self, names: Sequence[str]) -> Iterator[tuple[str, int, bytes]]:
-        wanted = [c for c in self._connections() if c.topic in names]
-        try:
-            for connection, received, data in self._reader.messages(wanted):
-                yield connection.topic, received, data
-        except Exception as error:  # noqa: BLE001 - a damaged file fails in as many ways as there are bytes
-            raise _DamageError(first_line(error)) from None
-
-
-class _DamageError(Exception):
-    """The library met something in the file that it cannot read."""
+            if name in wanted:
+                yield name, received, message
+            if name in lists:
+                for transform in message.transforms:
+                    frame = f"{name}.{str(transform.child_frame_id).lstrip('/')}"
+                    if frame in wanted or f"{name}." in wanted:
+                        yield frame, received, transform
 
 
 @dataclass
@@ -212,20 +233,18 @@ class _Rows:
         return Stream(topic, (received - origin) / 1e9, stamps, values, self.frame or "")
 
 
-def _types(connections: Sequence[Connection]) -> Typestore:
+def _types(channels: Sequence[Channel]) -> Typestore:
     """The types that the bag defines; those of ROS 2 itself where it defines none, as bags before 2023 did."""
-    from rosbags.interfaces import MessageDefinitionFormat
     from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
     found: dict[str, Any] = {}
-    for connection in connections:
-        form, text = connection.msgdef
+    for channel in channels:
         try:
-            if form is MessageDefinitionFormat.MSG:
-                found.update(get_types_from_msg(text, connection.msgtype))
-            elif form is MessageDefinitionFormat.IDL:
-                found.update(get_types_from_idl(text))
-        except TypesysError:
+            if channel.encoding in {"ros1msg", "ros2msg"}:
+                found.update(get_types_from_msg(channel.definition, channel.kind))
+            elif channel.encoding in {"ros2idl", "omgidl"}:
+                found.update(get_types_from_idl(channel.definition))
+        except (TypesysError, RecursionError):
             continue
     store = get_typestore(Stores.EMPTY if found else Stores.LATEST)
     if found:

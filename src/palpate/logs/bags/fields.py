@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
 
-_SHOWN = 12
+_SHOWN = 64
+_TRANSFORM = 16
+"""Numbers of a homogeneous transform; its quaternion is `O_T_EE.qx` to `O_T_EE.qw`."""
 _NUMBER = (int, float, np.number)
 
 
@@ -112,8 +114,38 @@ def _is_list(value: Any) -> bool:
     return isinstance(value, np.ndarray | list | tuple)
 
 
+_TURNS = ("qx", "qy", "qz", "qw")
+
+
+def _turn(columns: Sequence[float], step: str) -> float:
+    """A component of the quaternion of a homogeneous transform, 16 numbers column by column."""
+    r = [[float(columns[4 * j + i]) for j in range(3)] for i in range(3)]
+    squares = (
+        1 + r[0][0] - r[1][1] - r[2][2],
+        1 - r[0][0] + r[1][1] - r[2][2],
+        1 - r[0][0] - r[1][1] + r[2][2],
+        1 + r[0][0] + r[1][1] + r[2][2],
+    )  # four times the square of each component
+    largest = max(range(4), key=squares.__getitem__)
+    products = {
+        frozenset((0, 1)): r[0][1] + r[1][0],
+        frozenset((0, 2)): r[0][2] + r[2][0],
+        frozenset((1, 2)): r[1][2] + r[2][1],
+        frozenset((0, 3)): r[2][1] - r[1][2],
+        frozenset((1, 3)): r[0][2] - r[2][0],
+        frozenset((2, 3)): r[1][0] - r[0][1],
+    }  # four times the product of two
+    own = _TURNS.index(step)
+    most = math.sqrt(max(squares[largest], 0.0))
+    return (
+        most / 2 if own == largest else products[frozenset((own, largest))] / (2 * most) if most else math.nan
+    )
+
+
 def _in_list(values: Sequence[Any], names: Sequence[str], step: str) -> float:
-    if step.isdigit():
+    if step in _TURNS and len(values) == _TRANSFORM:
+        return _turn(values, step)
+    if step.isascii() and step.isdigit():
         place = int(step)
     elif step in names:
         place = list(names).index(step)

@@ -1,85 +1,106 @@
-"""Bags opened by the library that knows them, or, where they are cut, read as far as they are whole."""
+"""The files of a bag read from their beginnings, as far as they are whole."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import msgspec
 
 from palpate.errors import InputError
 from palpate.logs.bags.scan_bag1 import scan_bag1
 from palpate.logs.bags.scan_mcap import scan_mcap
 from palpate.logs.bags.scan_sqlite import scan_sqlite
-from palpate.logs.bags.scanning import End, Raw
-from palpate.logs.kinds import STORAGES, Kind, kind_of
-
-if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
+from palpate.logs.bags.scanning import Channel, End, Raw
+from palpate.logs.bags.unpacking import unpack_file, unpack_message
+from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
+from palpate.logs.limits import Budget
 
 _SCANS = {Kind.BAG1: scan_bag1, Kind.MCAP: scan_mcap, Kind.SQLITE: scan_sqlite}
+_LATEST = 2**63
+_METADATA = 10_000_000
+"""No metadata is longer [bytes]."""
 
 
-class Reader(Protocol):
-    """What rosbags' readers and those of damaged bags have in common."""
-
-    @property
-    def connections(self) -> Collection[Connection]:
-        """Topics with their types."""
-        ...
-
-    def messages(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
-        """Connection, time of recording [ns] and serialised message, of some connections."""
-        ...
-
-    def close(self) -> None:
-        """Let the file go."""
-        ...
-
-
-class CutReader:
-    """A bag read from its beginning to its end, or to where it is cut.
+class Storage:
+    """One file of a bag, read to its end, or to where it is cut.
 
     Args:
         path: the file.
         kind: what it is.
+        budget: of the log.
+        packed: whether each message is packed by itself.
+
+    Raises:
+        InputError: nothing of it can be read.
+        ImportError: the library that reads bags is not installed.
     """
 
-    def __init__(self, path: Path, kind: Kind) -> None:
-        self.path = path
+    def __init__(self, path: Path, kind: Kind, budget: Budget, *, packed: bool = False) -> None:
+        self.path, self._budget, self._packed = path, budget, packed
         self._scan = _SCANS[kind]
         self.end = End(finished=False)
-        connections: dict[int, Connection] = {}
-        counts: Counter[int] = Counter()
-        for item in self._items():
-            if isinstance(item, Raw):
-                counts[item.channel] += 1
-            elif isinstance(item, End):
-                self.end = item
-            else:
-                connections[item.id] = item
-        self.connections = [c._replace(msgcount=counts[c.id]) for c in connections.values()]
-        self.count = sum(c.msgcount for c in self.connections)
+        self.channels: dict[int, Channel] = {}
+        self.counts: Counter[int] = Counter()
+        self.spans: dict[int, tuple[int, int]] = {}
+        trouble = self._look()
+        if not self.counts and not (self.end.finished and self.channels):
+            trouble = trouble or "nothing in it is whole"
+            raise InputError(f"{path} cannot be read as {kind.value} ({trouble}); record or copy it again")
 
-    def messages(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
-        """The whole messages of some connections."""
-        wanted = {c.id: c for c in connections}
-        for item in self._items():
-            if isinstance(item, Raw) and item.channel in wanted:
-                yield wanted[item.channel], item.received, item.data
-
-    def _items(self) -> Iterator[Connection | Raw | End]:
-        """What the file holds up to its end, or to whatever in it cannot be read."""
+    def _look(self) -> str:
+        """Find channels, counts and times; what ended it early."""
         try:
-            yield from self._scan(self.path)
-        except (ImportError, PermissionError):
-            raise
-        except Exception:  # noqa: BLE001 - a damaged file fails in as many ways as there are bytes
+            for item in self._items():
+                if isinstance(item, Raw):
+                    self.counts[item.channel] += 1
+                    first, last = self.spans.get(item.channel, (item.received, item.received))
+                    self.spans[item.channel] = min(first, item.received), max(last, item.received)
+                elif isinstance(item, End):
+                    self.end = item
+                else:
+                    self.channels[item.number] = item
+        except _DamageError as error:
+            return str(error)
+        return ""
+
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[Channel, int, bytes]]:
+        """Channel, time of recording [ns] and serialised message, of some topics."""
+        try:
+            for item in self._items():
+                if isinstance(item, Raw) and self.channels[item.channel].topic in topics:
+                    data = unpack_message(item.data, self._budget) if self._packed else item.data
+                    yield self.channels[item.channel], item.received, data
+        except _DamageError:
             return
 
+    def _items(self) -> Iterator[Channel | Raw | End]:
+        """What the file holds up to its end, or to whatever in it cannot be read."""
+        try:
+            for item in self._scan(self.path, self._budget):
+                if isinstance(item, Raw) and not (
+                    item.channel in self.channels and 0 <= item.received < _LATEST
+                ):
+                    return
+                yield item
+        except (ImportError, PermissionError, InputError):
+            raise
+        except Exception as error:  # noqa: BLE001 - a damaged file fails in as many ways as there are bytes
+            raise _DamageError(first_line(error)) from None
+
     @property
-    def said(self) -> str:
-        """That it is cut, and how much is lost."""
+    def count(self) -> int:
+        """Of its whole messages."""
+        return self.counts.total()
+
+    @property
+    def said(self) -> str | None:
+        """That it is cut, and how much is lost; None if it is whole."""
+        if self.end.finished:
+            return None
         if self.end.share == 0:
             return (
                 f"{self.path} has lost the end of its index; all {self.count} messages are there and are read"
@@ -88,100 +109,88 @@ class CutReader:
         whole = f"{self.count} messages are whole and are read"
         return f"{self.path} is cut short or was never closed: {whole}, {lost} is lost"
 
-    def close(self) -> None:
-        """Nothing is held open."""
+
+class _DamageError(Exception):
+    """Something in the file cannot be read."""
 
 
-class Parts:
-    """The files of one ROS 2 bag, one after the other, where they cannot be read together."""
+def open_files(
+    path: Path, kind: Kind, budget: Budget, unpacked: TemporaryDirectory[str]
+) -> tuple[list[Storage], list[str]]:
+    """The files of a bag in the order of time, and what is wrong with them.
 
-    def __init__(self, readers: Collection[Reader]) -> None:
-        self._readers = list(readers)
-
-    @property
-    def connections(self) -> list[Connection]:
-        """Of all files; each knows its own."""
-        return [c for reader in self._readers for c in reader.connections]
-
-    def messages(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
-        """File by file."""
-        for reader in self._readers:
-            own = [c for c in reader.connections if any(c is wanted for wanted in connections)]
-            if own:
-                yield from reader.messages(own)
-
-    def close(self) -> None:
-        """Close all files."""
-        for reader in self._readers:
-            reader.close()
-
-
-def open_bag(path: Path, kind: Kind) -> tuple[Reader, list[str]]:
-    """A reader of a bag, and what is wrong with the bag.
+    Args:
+        path: of the file or the folder.
+        kind: what it is.
+        budget: of the log.
+        unpacked: where files that are packed as a whole are unpacked to.
 
     Raises:
-        InputError: nothing of it can be read, or the library that reads bags is not installed.
+        InputError: nothing of it can be read.
+        ImportError: the library that reads bags is not installed.
     """
+    if kind is not Kind.FOLDER:
+        files = [Storage(path, kind, budget)]
+        return files, [file.said for file in files if file.said]
+    about, troubles = _metadata(path)
+    places = sorted(place for place in path.iterdir() if _is_storage(place))
+    if not places:
+        raise InputError(f"{path} cannot be read as a ROS 2 bag; it holds no .mcap or .db3 file")
+    missing = {PurePath(name).name for name in about.relative_file_paths} - {place.name for place in places}
+    troubles += [f"{path}: {name} is missing, which its metadata.yaml names" for name in sorted(missing)]
+    files = []
+    for place in places:
+        file = _unpacked(place, budget, unpacked) if place.suffix == PACKED else place
+        found = kind_of(file)
+        if found not in _SCANS:
+            raise InputError(f"{place} is no storage of a bag; record or copy it again")
+        files.append(Storage(file, found, budget, packed=about.compression_mode.lower() == "message"))
+    files.sort(key=lambda file: min((first for first, _ in file.spans.values()), default=0))
+    return files, [*troubles, *(file.said for file in files if file.said)]
+
+
+class _About(msgspec.Struct, frozen=True):
+    """What matters of a bag's metadata."""
+
+    relative_file_paths: list[str] = []
+    compression_mode: str = ""
+
+
+def _metadata(folder: Path) -> tuple[_About, list[str]]:
+    """The bag's metadata.yaml, and what is wrong with it."""
+    path = folder / "metadata.yaml"
+    if not path.is_file() or path.stat().st_size > _METADATA:
+        return _About(), [f"{folder} has no metadata.yaml; its files are read one by one"]
     try:
-        return _whole(path, kind), []
-    except ImportError:
-        raise InputError(
-            "bags need the library rosbags; install it with: pip install 'palpate[bags]'"
-        ) from None
-    except PermissionError:
+        from ruamel.yaml import YAML
+
+        content: Any = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+        return msgspec.convert(content["rosbag2_bagfile_information"], _About), []
+    except (ImportError, PermissionError):
         raise
     except Exception as error:  # noqa: BLE001 - a damaged file fails in as many ways as there are bytes
-        return open_damaged(path, kind, first_line(error))
+        return _About(), [f"{path} is spoiled ({first_line(error)}); the bag's files are read one by one"]
 
 
-def open_damaged(path: Path, kind: Kind, trouble: str) -> tuple[Reader, list[str]]:
-    """A reader of what is whole in a bag that the library does not read, and how much is lost.
-
-    Raises:
-        InputError: nothing is whole.
-    """
-    if kind is Kind.FOLDER:
-        return _parts(path, trouble)
-    reader = CutReader(path, kind)
-    if not reader.count:
-        raise InputError(f"{path} cannot be read as {kind.value} ({trouble}); record or copy it again")
-    return reader, [] if reader.end.finished else [reader.said]
+def _is_storage(path: Path) -> bool:
+    return path.suffix in STORAGES or (path.suffix == PACKED and path.with_suffix("").suffix in STORAGES)
 
 
-def _whole(path: Path, kind: Kind) -> Reader:
-    from rosbags.rosbag1 import Reader as Bag1
-    from rosbags.rosbag2 import Reader as Bag2
-    from rosbags.rosbag2.storage_mcap import McapReader
-    from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
-
-    readers: dict[Kind, Any] = {
-        Kind.BAG1: Bag1,
-        Kind.FOLDER: Bag2,
-        Kind.MCAP: McapReader,
-        Kind.SQLITE: Sqlite3Reader,
-    }
-    reader = readers[kind](path)
-    reader.open()
-    return reader
-
-
-def _parts(folder: Path, trouble: str) -> tuple[Reader, list[str]]:
-    """The files of a bag by themselves, where its metadata is missing or one of them is damaged."""
-    files = sorted(file for file in folder.iterdir() if file.suffix in STORAGES)
-    if not files:
-        raise InputError(
-            f"{folder} cannot be read as a ROS 2 bag ({trouble}); it holds no .mcap or .db3 file"
-        )
-    readers: list[Reader] = []
-    said = []
-    for file in files:
-        kind = kind_of(file)
-        if not kind.is_bag:
-            raise InputError(f"{file} is no storage of a bag; record or copy it again")
-        cut = CutReader(file, kind)
-        readers.append(cut)
-        said += [] if cut.end.finished else [cut.said]
-    return Parts(readers), said or [f"{folder}: {trouble}; its files are read one by one"]
+def _unpacked(path: Path, budget: Budget, to: TemporaryDirectory[str]) -> Path:
+    """A file that was packed as a whole, unpacked."""
+    kind_of(path)
+    place = Path(to.name) / path.stem
+    try:
+        with path.open("rb") as source, place.open("wb") as file:
+            unpack_file(source, file, budget)
+    except (ImportError, InputError, PermissionError):
+        raise
+    except Exception as error:  # noqa: BLE001 - likewise
+        if not place.stat().st_size:
+            raise InputError(
+                f"{path} cannot be unpacked ({first_line(error)}); record or copy it again"
+            ) from None
+    return place
 
 
 def first_line(error: Exception) -> str:

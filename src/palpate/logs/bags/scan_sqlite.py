@@ -1,4 +1,4 @@
-"""A ROS 2 bag in SQLite read row by row, for one that is cut."""
+"""A ROS 2 bag in SQLite read row by row, so that one that is cut is read as well."""
 
 from __future__ import annotations
 
@@ -6,37 +6,62 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
-from palpate.logs.bags.scanning import End, Raw, connection
+from palpate.errors import InputError
+from palpate.logs.bags.scanning import Channel, End, Raw
+from palpate.logs.limits import Budget
 
-if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
-
+_TABLES = "SELECT name FROM sqlite_master WHERE type = 'table' AND sql LIKE 'CREATE TABLE%'"
+_OTHERS = "SELECT name, type FROM sqlite_master WHERE name IN ('topics', 'messages', 'message_definitions')"
 _TOPICS = "SELECT id, name, type FROM topics"
 _TYPES = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id"
+_STEPS = 100_000
+"""Instructions of SQLite between two looks at the clock."""
 
 
-def scan_sqlite(path: Path) -> Iterator[Connection | Raw | End]:
+def scan_sqlite(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
     """Topics and messages of a ROS 2 bag in SQLite as far as its pages are there."""
-    with closing(sqlite3.connect(f"file:{quote(str(path))}?immutable=1", uri=True)) as database:
-        # SQLite refuses a file that is shorter than its first page says, unless a repair seems to be under way.
-        database.execute("PRAGMA writable_schema = ON")
+    with closing(_opened(path, budget)) as database:
         types = {kind: (encoding, text) for kind, encoding, text in _rows(database, _TYPES)}
         for number, topic, kind in _rows(database, _TOPICS):
-            yield connection(number, topic, kind, *types.get(kind, ("", "")))
+            yield Channel(number, topic, kind, *types.get(kind, ("", "")))
         hurt = False
+        left = path.stat().st_size
         try:
             for row in database.execute(_MESSAGES):
-                if hurt := None in row:  # a page that is there in part is read as if zeros followed
+                left -= 0 if None in row else len(row[2])
+                if (
+                    hurt := None in row or left < 0
+                ):  # a page that is there in part is read as if zeros followed
                     break
                 yield Raw(*row)
         except sqlite3.DatabaseError:
+            if budget.seconds_left <= 0:
+                raise budget.too_long() from None
             hurt = True
     share = _lost(path)
     yield End(finished=not (hurt or share), share=share)
+
+
+def _opened(path: Path, budget: Budget) -> sqlite3.Connection:
+    """The database, to be read only, and no longer than the log may take."""
+    database = sqlite3.connect(f"file:{quote(str(path))}?mode=ro&immutable=1", uri=True)
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(path.stat().st_size + 1_000_000, 2**31 - 1))
+    database.set_progress_handler(lambda: budget.seconds_left <= 0, _STEPS)
+    # SQLite refuses a file that is shorter than its first page says, unless a repair seems to be under way.
+    database.execute("PRAGMA writable_schema = ON")
+    database.execute("PRAGMA trusted_schema = OFF")
+    tables = {name for (name,) in _rows(database, _TABLES)}
+    for name, kind in _rows(database, _OTHERS):
+        if name not in tables:
+            database.close()
+            raise InputError(
+                f"{path} is no ROS 2 bag: its {name} is not a plain table but a {kind}; record it again"
+            )
+    return database
 
 
 def _rows(database: sqlite3.Connection, question: str) -> list[tuple[Any, ...]]:

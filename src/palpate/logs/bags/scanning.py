@@ -1,20 +1,37 @@
-"""What the scanners of damaged bags yield, and how much of a file they found whole."""
+"""What the scanners of bags yield, and how much of a file they found whole."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
+from palpate.logs.limits import Budget
+
+
+class Channel(NamedTuple):
+    """A topic as one file holds it.
+
+    Args:
+        number: its own in this file.
+        topic: its name.
+        kind: the type of its messages, as `geometry_msgs/msg/Pose`.
+        encoding: of the definition: ros1msg, ros2msg, ros2idl; or something that cannot be read.
+        definition: of the type.
+    """
+
+    number: int
+    topic: str
+    kind: str
+    encoding: str
+    definition: str
 
 
 class Raw(NamedTuple):
     """A message as it lies in the file.
 
     Args:
-        channel: the number of its connection.
+        channel: the number of its topic in this file.
         received: when the recorder got it [ns].
         data: serialised.
     """
@@ -36,32 +53,5 @@ class End(NamedTuple):
     share: float | None = None
 
 
-Scan = Callable[[Path], Iterator["Connection | Raw | End"]]
-"""Reads a file from its beginning as far as it is whole; yields connections before their messages, and the end last."""
-
-
-def connection(number: int, topic: str, kind: str, encoding: str, definition: str) -> Connection:
-    """A connection such as rosbags' own readers have.
-
-    Args:
-        number: its own in this file.
-        topic: its name.
-        kind: the type of its messages, as `geometry_msgs/msg/Pose`.
-        encoding: of the definition: ros1msg, ros2msg, ros2idl; or something that cannot be read.
-        definition: of the type.
-    """
-    from rosbags.interfaces import (
-        Connection,
-        ConnectionExtRosbag2,
-        MessageDefinition,
-        MessageDefinitionFormat,
-    )
-
-    formats = {
-        "ros1msg": MessageDefinitionFormat.MSG,
-        "ros2msg": MessageDefinitionFormat.MSG,
-        "ros2idl": MessageDefinitionFormat.IDL,
-        "omgidl": MessageDefinitionFormat.IDL,
-    }
-    about = MessageDefinition(formats.get(encoding, MessageDefinitionFormat.NONE), definition)
-    return Connection(number, topic, kind, about, "", 0, ConnectionExtRosbag2("cdr", []), None)
+Scan = Callable[[Path, Budget], Iterator["Channel | Raw | End"]]
+"""Reads a file from its beginning as far as it is whole; yields channels before their messages, and the end last."""

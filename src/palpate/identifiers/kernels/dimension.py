@@ -12,8 +12,8 @@ import numpy as np
 
 from palpate._jit import part
 from palpate._vector import Mat3, Vec3
-from palpate.identifiers.bordered import Mat4, Vec4
-from palpate.identifiers.sized import Matrix, Vector
+from palpate.identifiers.kernels.any_size import Matrix, Vector
+from palpate.identifiers.kernels.four import Mat4, Vec4
 
 _AXES = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 _NONE = Vec3(0.0, 0.0, 0.0)

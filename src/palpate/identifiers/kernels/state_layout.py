@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate._jit import law
-from palpate.identifiers.doubt import Doubt
-from palpate.identifiers.square_root import held
+from palpate.identifiers.kernels.error_covariance import NOTHING, Doubt
+from palpate.identifiers.kernels.square_root import held
 
 _STATISTICS = 6
 
@@ -18,8 +18,10 @@ def known_first(theta: NDArray[np.float64], P: NDArray[np.float64]) -> NDArray[n
     """The state before the first sample: the initial estimate and its covariance, shapes (n,) and (n, n)."""
     n = len(theta)
     root, identity = np.linalg.cholesky(P).ravel(), np.eye(n).ravel()
-    nothing, even = np.zeros(2 * n * n + n + _STATISTICS), np.full(n, 1.0 / np.trace(P))
-    return np.concatenate([theta, root, root, identity, nothing, 1.0 / np.diag(P), even])
+    heard, nothing, even = np.zeros(n * n), np.zeros(n + _STATISTICS), np.full(n, 1.0 / np.trace(P))
+    return np.concatenate(
+        [theta, root, root, identity, heard, NOTHING * root, nothing, 1.0 / np.diag(P), even]
+    )
 
 
 @law

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.identification.information import (
+from palpate.excitation.fisher_information import (
     NAMES,
     ForceChain,
     bound,

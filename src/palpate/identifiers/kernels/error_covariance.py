@@ -10,13 +10,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from palpate._jit import law, part
-from palpate._vector import Mat3, Vec3, outer
+from palpate._vector import Mat3, Vec3, outer, solve, sqrt
 
 BLOCK = 100
 """Samples whose noise is summed before it is squared: it may be correlated over less than this."""
 _CAUTION = 4.0
 """Blocks that the cautious first-order correction counts for, beside those that were seen."""
 
+NOTHING = 1e-10
+"""Of the initial root: what noise has left before there was any, so that its root can be inverted."""
 _STUDENT = 2.4
 """(1.96^2 + 1) / 2: over the degrees of freedom, what Student's interval of 95 % adds to the square of Gauss'."""
 
@@ -31,7 +33,7 @@ class Doubt(NamedTuple):
     left: Mat3  # root of the initial covariance, as far as it was left when the block began
     passed: Mat3  # what the samples since have made of an error
     heard: Mat3  # covariance that the noise of the blocks before has left
-    white: Mat3  # covariance that all noise has left, were it white and of variance 1
+    white: Mat3  # root of the covariance that all noise has left, were it white and of variance 1
     added: Vec3  # error that the noise of this block has added
     weight: float  # samples seen, the old ones discounted
     squares: float  # of the scaled innovations, discounted alike
@@ -43,11 +45,15 @@ class Doubt(NamedTuple):
     def after(self, phi, gain, e, keep, memory, size):
         """The doubt after a sample with this gain and scaled innovation e.
 
-        It leaves `keep` of what the older ones weigh in theta, and `memory` of what they say of the noise.
+        It leaves `keep` of what the older ones weigh in theta, and `memory` of what they say of the noise. A regressor
+        of exact zeros says nothing: theta does not depend on such a sample, and neither does its uncertainty. Were
+        their innovations, zeros too, heard as noise, nothing touched would make what was touched more certain.
         """
+        if not phi @ phi > 0.0:
+            return self
         left, heard, blocks, filled = self.left, self.heard, keep * keep * self.blocks, self.filled + 1.0
         passed = self.passed - outer(gain, self.passed.T @ phi)
-        white = carried(self.white, phi, gain, 1.0)
+        white = fed(self.white, phi, gain)
         added = self.added + (e - phi @ self.added) * gain
         if filled >= BLOCK:
             left, heard = passed @ left, passed @ heard @ passed.T + outer(added, added)
@@ -79,9 +85,22 @@ class Doubt(NamedTuple):
         """
         left = self.passed @ self.left
         heard = self.passed @ self.heard @ self.passed.T + outer(self.added, self.added)
-        spread = (_CAUTION * self.noise(parameters)) * self.white + self.blocks * heard
+        spread = (_CAUTION * self.noise(parameters)) * (self.white @ self.white.T) + self.blocks * heard
         known = _CAUTION + self.blocks
         return left @ left.T + ((1.0 + _STUDENT * self.blocks / known**2) / known) * spread
+
+
+@law
+def fed(W, phi, gain):
+    """Root of the covariance of an error after a sample with noise of variance 1; W is that before it.
+
+    (I - gain phi^T) W W^T (I - gain phi^T)^T + gain gain^T, whose difference would lose its sign to rounding in the
+    end; of a root each sample makes a root.
+    """
+    z = (1.0 / max(1.0 - phi @ gain, 1e-16)) * solve(W, gain)
+    q = z @ z
+    left = W - outer(gain, W.T @ phi)
+    return left + outer(((sqrt(1.0 + q) - 1.0) / q) * gain, z) if q > 0.0 else left
 
 
 @law
@@ -98,7 +117,7 @@ def carried(C, phi, gain, variance):
 @law
 def unsure(theta, root, identity):
     """The doubt before the first sample, from a root of the initial covariance."""
-    return Doubt(root, identity, 0.0 * root, 0.0 * root, 0.0 * theta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Doubt(root, identity, 0.0 * root, NOTHING * root, 0.0 * theta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @law

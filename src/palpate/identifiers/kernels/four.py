@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate._jit import part
 from palpate._vector import Mat3, Vec3, outer
-from palpate.identifiers.sized import eliminated
+from palpate.identifiers.kernels.any_size import eliminated
 
 
 @part

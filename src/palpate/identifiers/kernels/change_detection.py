@@ -11,9 +11,9 @@ from math import inf, log
 from typing import Any, NamedTuple
 
 from palpate._jit import law, part
-from palpate.identifiers.doubt import long_run_variance, unsure
-from palpate.identifiers.flat import length, put, statistics_at
-from palpate.identifiers.least_squares import learned
+from palpate.identifiers.kernels.error_covariance import long_run_variance, unsure
+from palpate.identifiers.kernels.least_squares import learned
+from palpate.identifiers.kernels.state_layout import length, put, statistics_at
 
 COUNTERS = 5
 """Behind the initial estimate and its root: the alarm, the next row, rows written, changes, samples since the last."""

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, outer, sqrt, trace
-from palpate.identifiers.doubt import Doubt, unsure
-from palpate.identifiers.flat import bounded
 from palpate.identifiers.forgetting import stretch_of
-from palpate.identifiers.sizes import Three
-from palpate.identifiers.square_root import measured
+from palpate.identifiers.kernels.dimension import Three
+from palpate.identifiers.kernels.error_covariance import Doubt, unsure
+from palpate.identifiers.kernels.square_root import measured
+from palpate.identifiers.kernels.state_layout import bounded
 
 _SIZE = Three()
 _ONES = Vec3(1.0, 1.0, 1.0)

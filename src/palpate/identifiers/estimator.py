@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from palpate._jit import Kernel
 from palpate.errors import InputError
-from palpate.identifiers.sizes import size_of
+from palpate.identifiers.kernels.dimension import size_of
 from palpate.signals.types import Estimate
 
 HUGE = 1e300
@@ -19,6 +19,9 @@ HUGE = 1e300
 
 class Streaming(ABC):
     """Estimates theta in ``force = regressor . theta``; the update is compiled in the constructor.
+
+    An estimator belongs to one thread at a time: updates change its state in place without a lock of their own, which
+    would cost as much as they do. Threads that share one hold a lock around each call, or samples are lost.
 
     Args:
         state: all that is known, flat; the first n values are theta.
@@ -100,7 +103,7 @@ class Streaming(ABC):
     def _bind(self) -> None:
         one, many = self._kernels()
         # An impossible sample compiles the update and leaves the state alone.
-        self._one = _entry(one, self._state, np.full(self._n, np.nan), 0.0, self._policy, self._size)
+        self._one = entry(one, self._state, np.full(self._n, np.nan), 0.0, self._policy, self._size)
         self._many = many.compiled
 
     def __getstate__(self) -> dict[str, Any]:
@@ -115,7 +118,7 @@ class Streaming(ABC):
         self._bind()
 
 
-def _entry(kernel: Kernel, *example: Any) -> Any:
+def entry(kernel: Kernel, *example: Any) -> Any:
     """The compiled code for such arguments, without the look-up by type that half of a short call's time goes into.
 
     It still checks that they are arrays of as many dimensions and numbers; not what an array holds.

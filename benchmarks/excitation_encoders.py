@@ -1,0 +1,80 @@
+"""What `palpate excite` foretells for position sensors fine and coarse, beside what presses then give.
+
+    python benchmarks/excitation_encoders.py [RUNS]         # 30 runs: two minutes
+
+10 s of a multisine of 15 N with 5 N to each side on three surfaces. The motion and the force come from the design's own
+phasors, the force through the sensor's low-pass and with its noise, the position rounded to the encoder's steps from a
+place of the run's own; `ContactIdentifier` reads them. Deviations are rms about the truth.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.excitation import Budget, Design, KnownBandwidth, Question, Sensors, SurfaceRange, design
+from palpate.excitation.fisher_information import ForceChain
+from palpate.identifiers import ContactIdentifier
+from palpate.references.waves import Multisine
+
+Array = NDArray[np.float64]
+
+SURFACES = {"soft, damped": (5.2e3, 200.0, 0.1), "soft": (5.2e3, 60.0, 0.3), "rubber": (60e3, 150.0, 0.3)}
+STEPS = (1.6e-6, 1e-5, 4e-5)  # m
+NAMES = ("K", "B", "M")
+CHAIN = ForceChain()
+RATE, SECONDS = 1000.0, 10.0
+
+
+def designed(surface: tuple[float, float, float], step: float) -> Design:
+    """The excitation for a surface, exactly known, and an encoder."""
+    ranges = SurfaceRange(*((value, value) for value in surface))
+    sensors = Sensors(CHAIN, position_step=step)
+    asked, loop = dict.fromkeys(NAMES, 0.1), KnownBandwidth(60.0)
+    return design(Question(ranges, Budget(15.0, 20.0), asked, sensors, loop, duration=SECONDS))
+
+
+def signals(made: Design, begin: float) -> tuple[Array, Array]:
+    """Position [m] and force through the sensor's low-pass [N], from an instant of the wave on."""
+    wave, question = made.wave, made.question
+    if not isinstance(wave, Multisine):
+        raise TypeError("the wave must be a multisine")
+    omega = 2 * np.pi * np.array(wave.frequencies)
+    force = question.forces(omega, np.array(wave.amplitudes))[0] * np.exp(1j * np.array(wave.phases))
+    surface, t = made.predictions[0].surface, begin + np.arange(round(SECONDS * RATE)) / RATE
+    turned = np.exp(1j * np.outer(t, omega))
+    position = np.imag(turned @ (force / surface.impedance(omega)))
+    felt = np.imag(turned @ (force * CHAIN.low_pass.at(omega)))
+    return position + question.budget.mean / surface.stiffness, felt + question.budget.mean
+
+
+def errors(made: Design, step: float, seed: int) -> Array:
+    """Relative errors of K, B and M in one press."""
+    random = np.random.default_rng(seed)
+    position, force = signals(made, random.uniform(0, SECONDS))
+    place = random.uniform(0, 1)
+    position = (np.round(position / step + place) - place) * step
+    # A fresh reading each tick, of the noise density of the sensor's own sampling.
+    force += random.normal(0, CHAIN.noise * np.sqrt(RATE / CHAIN.sampling), len(force))
+    contact = ContactIdentifier(CHAIN.low_pass, RATE, CHAIN.low_pass.lag, touch=0.0)
+    contact.update_many(position, force)
+    return contact.estimate().theta[[2, 1, 0]] / made.predictions[0].surface.values - 1
+
+
+def main(runs: int) -> None:
+    """Print a row for each surface and encoder: the foretold deviation, the one found, their ratio."""
+    print(f"{'':28}" + "".join(f"{name:^32}" for name in NAMES))
+    for name, surface in SURFACES.items():
+        for step in STEPS:
+            made = designed(surface, step)
+            foretold = np.array([made.made.worst(made.seconds)[n] for n in NAMES]) / 1.96
+            rms = np.sqrt(np.mean([np.square(errors(made, step, seed)) for seed in range(runs)], axis=0))
+            cells = (f"{a:7.2%} {b:7.2%} ratio {b / a:4.2f}" for a, b in zip(foretold, rms, strict=True))
+            label = f"{name}, {1e6 * step:g} um"
+            print(f"{label:28}" + "".join(f"{cell:^32}" for cell in cells), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 30)

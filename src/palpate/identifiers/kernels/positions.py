@@ -1,0 +1,106 @@
+"""The last positions of a loop, tick by tick: missing readings keep their place, and short gaps are filled."""
+
+from math import isnan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._jit import law, part
+
+NAN = float("nan")
+ROW, RESOLVED, GOOD, RUN, LAST_SIXTH, POWER, PRODUCT, COUNT, OPEN = range(9)
+"""Last row; last row that is final; last row with a reading; readings in a row; of the sixth differences the last one,
+the sum of squares, of products of neighbours, and how many; and the row before a gap to be filled, -1 for none."""
+NUMBERS = 9
+_SIXTH = (1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0)
+
+
+@part
+class Positions(NamedTuple):
+    """A ring of positions, each written twice, so that any stretch of it lies in one piece.
+
+    Args:
+        ring: relative to the first reading [m], shape (2 room,).
+        numbers: see `ROW` and its like.
+        room: rows kept.
+        gap: ticks that may be missing in a row: more leave motion within the low-pass untold (Nyquist).
+    """
+
+    ring: NDArray[np.float64]
+    numbers: NDArray[np.float64]
+    room: int
+    gap: int
+
+    def put(self, row, x):
+        """Writes a row."""
+        slot = int(row) % self.room
+        self.ring[slot] = self.ring[slot + self.room] = x
+
+    def at(self, row):
+        """The position of a row."""
+        return self.ring[int(row) % self.room]
+
+
+@law
+def placed(positions, x):
+    """Takes a tick's position in, NaN where it is missing; a gap is filled a tick after its end."""
+    s = positions.numbers
+    s[ROW] += 1.0
+    row = s[ROW]
+    positions.put(row, x)
+    if s[OPEN] >= 0.0:
+        _fill(positions, s[OPEN], row - 1.0, x)
+        s[OPEN], s[RESOLVED] = -1.0, row - 1.0
+    if isnan(x):
+        s[RUN] = 0.0
+        if row - s[GOOD] > positions.gap or s[GOOD] < 0.0:
+            s[RESOLVED] = row
+        return
+    s[RUN] += 1.0
+    missing = row - s[GOOD] - 1.0
+    if 0.0 < missing <= positions.gap and s[GOOD] > 0.0:
+        s[OPEN] = s[GOOD]
+    else:
+        s[RESOLVED] = row
+    s[GOOD] = row
+    _heard(positions)
+
+
+@law
+def _fill(positions, before, after, following):
+    """Fills a gap by the cubic through two readings on each side; through as many of them as there are."""
+    gap = after - before
+    x0, x1, x2 = positions.at(before - 1.0), positions.at(before), positions.at(after)
+    slope = (x2 - x1) / gap
+    bend = (slope - (x1 - x0)) / (gap + 1.0) if not isnan(x0) else 0.0
+    twist = 0.0
+    if not isnan(x0 + following):
+        twist = ((following - x2 - slope) / (gap + 1.0) - bend) / (gap + 2.0)
+    row = before + 1.0
+    while row < after:
+        u = row - before
+        positions.put(row, x1 + u * (slope + (u - gap) * (bend + (u + 1.0) * twist)))
+        row += 1.0
+
+
+@law
+def _heard(positions):
+    """Adds to what the noise of the position is told from: its sixth differences, which hardly see a motion.
+
+    A motion of frequency f counts as (2 pi f dt)^6 of itself: at 40 Hz in 1 kHz, 1/4000.
+    """
+    s = positions.numbers
+    if s[RUN] < 7.0:
+        s[LAST_SIXTH] = NAN
+        return
+    sixth = 0.0
+    for k in range(7):
+        sixth += _SIXTH[k] * positions.at(s[ROW] - k)
+    s[POWER] += sixth * sixth
+    if not isnan(s[LAST_SIXTH]):
+        s[PRODUCT] += sixth * s[LAST_SIXTH]
+        s[COUNT] += 1.0
+    else:
+        s[POWER] -= sixth * sixth
+    s[LAST_SIXTH] = sixth

@@ -1,0 +1,207 @@
+"""What a text log looks like: what parts its cells, where its rows begin, the names and units above them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+from palpate.errors import InputError
+from palpate.logs.tables.lines import Line, Parting
+from palpate.units import known_unit
+
+_PARTINGS = (
+    Parting(","),
+    Parting(";"),
+    Parting(";", decimal_comma=True),
+    Parting("\t"),
+    Parting("\t", decimal_comma=True),
+    Parting("|"),
+    Parting("|", decimal_comma=True),
+    Parting(" "),
+    Parting(" ", decimal_comma=True),
+    Parting(",", decimal_comma=True),  # between quotes
+)
+"""In the order of preference among those that part a log equally well."""
+_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "space"}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How to read a text log.
+
+    Args:
+        parting: of its cells.
+        names: of the columns; numbers from 0 where the file has no header.
+        units: the row of units below the header, by name; empty without one.
+        first_row: the line of the file, from 1, that holds the first row of numbers.
+        header: the text of the header's line; empty without one.
+        above: the lines before the header.
+        surplus: names in the header for which there is no column.
+        quoted: cells may stand in quotes.
+    """
+
+    parting: Parting
+    names: tuple[str, ...]
+    units: dict[str, str]
+    first_row: int
+    header: str
+    above: tuple[str, ...]
+    surplus: tuple[str, ...]
+    quoted: bool
+
+    @property
+    def delimiter_name(self) -> str:
+        """What to call the delimiter in a sentence."""
+        return _NAMES.get(self.parting.delimiter, repr(self.parting.delimiter))
+
+
+def find_layout(path: Path, lines: Sequence[Line], delimiter: str | None = None) -> Layout:
+    """Look at the first lines of a text log.
+
+    Raises:
+        InputError: they hold no rows of numbers, or a header that does not fit the rows.
+    """
+    if delimiter is not None and len(delimiter) != 1:
+        raise InputError(f"the delimiter must be one character, got {delimiter!r}")
+    plain = [line for line in lines if not line.comment]
+    if not plain:
+        raise InputError(f"{path} is empty; give a log with a row of numbers for each sample")
+    block = _best(plain, delimiter)
+    if block is None:
+        if delimiter is not None:
+            told = _NAMES.get(delimiter, repr(delimiter))
+            raise InputError(f"{path} holds no rows of numbers parted by {told}; is the delimiter right?")
+        if len(plain) == 1 and len(_PARTINGS[0].split(plain[0].text)) > 1:
+            raise InputError(f"{path} holds a header and no rows; give a log with a row for each sample")
+        raise InputError(f"{path} holds no rows of numbers in columns; give a log with a row for each sample")
+    if block.parting.delimiter != ";":
+        lines = [replace(line, comment=True) if line.text[0] == ";" else line for line in lines]
+    return _layout(path, lines, block)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """The rows of numbers, as far as they are looked at.
+
+    Args:
+        parting: of their cells.
+        first: line of the first.
+        width: cells in each.
+        filled: columns up to the last that holds something.
+        score: how well this parting suits: no other text, a delimiter that is seen, most numbers.
+        quoted: some cells stand in quotes.
+    """
+
+    parting: Parting
+    first: int
+    width: int
+    filled: int
+    score: tuple[bool, bool, float]
+    quoted: bool
+
+
+def _best(lines: Sequence[Line], delimiter: str | None) -> _Block | None:
+    tried = [p for p in _PARTINGS if delimiter in {None, p.delimiter}]
+    if not tried and delimiter is not None:
+        tried = [Parting(delimiter), Parting(delimiter, decimal_comma=delimiter != ",")]
+    blocks = [block for block in (_block(lines, parting) for parting in tried) if block is not None]
+    return max(blocks, key=lambda block: block.score, default=None)
+
+
+def _block(lines: Sequence[Line], parting: Parting) -> _Block | None:
+    """The rows of numbers under one parting: the longest run of lines of one width that hold some."""
+    cells = [parting.split(line.text) for line in lines]
+    kinds = [[parting.kind(cell) for cell in row] for row in cells]
+    runs = [
+        (width, list(group))
+        for width, group in groupby(range(len(lines)), lambda i: len(kinds[i]) if 1 in kinds[i] else 0)
+        if width
+    ]
+    if not runs:
+        return None
+    width, run = max(runs, key=lambda run: (len(run[1]), run[1][-1]))
+    usual = [Counter(kinds[i][place] for i in run).most_common(1)[0][0] for place in range(width)]
+    numeric = [place for place, kind in enumerate(usual) if kind == 1]
+    if not numeric:
+        return None
+    first = next(i for i in range(run[0] + 1) if _is_row(kinds[i], width, numeric))
+    filled = max(place for place in range(width) if any(cells[i][place] for i in run)) + 1
+    text = usual.count(-1)
+    seen = parting.delimiter != " " and width > 1
+    quoted = any('"' in lines[i].text for i in run)
+    return _Block(parting, lines[first].number, width, filled, (not text, seen, len(numeric) - text), quoted)
+
+
+def _is_row(kinds: Sequence[int], width: int, numeric: Sequence[int]) -> bool:
+    """Whether a line is a row as the others are: as wide, with numbers in half of the places where they have some.
+
+    A line that begins with a word where they begin with a number is a label and what it labels.
+    """
+    labelled = numeric[0] == 0 and bool(kinds) and kinds[0] < 0
+    there = len(kinds) == width and not labelled
+    return there and 2 * sum(kinds[place] == 1 for place in numeric) >= len(numeric)
+
+
+def _layout(path: Path, lines: Sequence[Line], block: _Block) -> Layout:
+    above = [line for line in lines if line.number < block.first]
+    symbols: list[str] = []
+    if len(above) > 1 and _is_units(found := block.parting.header(above[-1].text), block):
+        symbols, above = found, above[:-1]
+    found = _header(above[-1], block) if above else []
+    header = above.pop().text if found else ""
+    if found and len(found) < block.filled:
+        raise InputError(
+            f"{path}: its rows hold more cells than its header's {len(found)}; name every column,"
+            " or part the cells by something that no number holds"
+        )
+    names = found[: max(block.filled, min(len(found), block.width))]
+    surplus = [name for name in found[len(names) :] if name]
+    names = [name or str(i) for i, name in enumerate(names)] or [str(i) for i in range(block.filled)]
+    units = {name: symbol.strip("[]() ") for name, symbol in zip(names, symbols, strict=False)}
+    return Layout(
+        block.parting,
+        tuple(names),
+        {name: symbol for name, symbol in units.items() if symbol},
+        block.first,
+        header,
+        tuple(line.text for line in above),
+        tuple(surplus),
+        block.quoted,
+    )
+
+
+def _is_units(cells: Sequence[str], block: _Block) -> bool:
+    """Whether a line is a row of units: nothing else, and at least half of the columns have one."""
+    symbols = [cell.strip("[]() ") for cell in cells]
+    known = [symbol for symbol in symbols if symbol and known_unit(symbol)]
+    others = [symbol for symbol in symbols if symbol and not known_unit(symbol)]
+    return len(cells) >= block.filled and len(known) >= max(1, block.filled / 2) and len(others) < len(known)
+
+
+def _header(line: Line, block: _Block) -> list[str]:
+    """The names in the line above the rows; none if it is something else.
+
+    A header may be parted otherwise than its rows are; it then has a name for each column.
+    """
+    text = line.text.lstrip("; ") if line.comment else line.text
+    own = _bare(block.parting.header(text))
+    if len(own) == block.filled:
+        return own
+    for parting in _PARTINGS:
+        other = _bare(parting.header(text))
+        if len(other) == block.filled > 1:
+            return other
+    words = all(block.parting.kind(cell) < 1 for cell in own)
+    if line.comment or block.parting.delimiter == " " or not words or 2 * len(own) < block.filled:
+        return []
+    return own if len(own) > 1 or block.filled == 1 else []
+
+
+def _bare(cells: list[str]) -> list[str]:
+    """Without the empty cells at the end, and without quotes."""
+    while cells and not cells[-1]:
+        cells = cells[:-1]
+    return [cell.strip('"') for cell in cells]

@@ -1,0 +1,137 @@
+"""The lines of a text log: its first ones, what parts their cells, and what a cell is."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from palpate.errors import InputError
+from palpate.logs.tables.clock import seconds_of_text
+
+LOOK = 4_000_000
+"""Bytes at the beginning of a file that are looked at."""
+_LINES, _LETTERS, _FEWEST = 1000, 500_000, 20
+"""Of these, no more lines are parted, or no more letters, but always some lines."""
+COMMENTS = ("#", "%", "//", ";")
+"""What a line of comment begins with; a semicolon only where it does not part the cells."""
+NO_READING = {"", "nan", "na", "n/a", "null", "none", "-", "--"}
+"""Words that stand for no reading, in lower case."""
+
+_NO_TEXT = {
+    b"\x1f\x8b": "is compressed by gzip; unpack it first",
+    b"BZh": "is compressed by bzip2; unpack it first",
+    b"\x28\xb5\x2f\xfd": "is compressed by zstd; unpack it first",
+    b"PK\x03\x04": "is a zip archive; unpack it first",
+    b"\xd0\xcf\x11\xe0": "is a spreadsheet of the old kind (.xls); save it as .xlsx or CSV",
+    b"\x89HDF": "is HDF5; write its columns out as CSV or Parquet",
+    b"\xff\xfe": "is UTF-16 text; save it as UTF-8",
+    b"\xfe\xff": "is UTF-16 text; save it as UTF-8",
+    b"TDSm": "is a TDMS file of LabVIEW; write its channels out as CSV or .lvm",
+}
+"""What other files begin with."""
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_COMMA_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
+_SPACED = re.compile(r"\[[^\]]*\]|\([^)]*\)|[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?")
+"""A name in a header parted by spaces, with its unit in brackets: `Force [N]`."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line that holds something.
+
+    Args:
+        number: in the file, from 1.
+        text: without the mark of a comment.
+        comment: whether it had one.
+    """
+
+    number: int
+    text: str
+    comment: bool
+
+
+@dataclass(frozen=True)
+class Parting:
+    """What parts the cells of a line, and how numbers are written.
+
+    Args:
+        delimiter: one character; a space stands for any run of white space.
+        decimal_comma: numbers are written 1,5.
+    """
+
+    delimiter: str
+    decimal_comma: bool = False
+
+    def split(self, text: str) -> list[str]:
+        """The cells of a line, without white space around them."""
+        if self.delimiter == " ":
+            return text.split()
+        if '"' not in text:
+            return [cell.strip() for cell in text.split(self.delimiter)]
+        try:
+            return [cell.strip() for cell in next(csv.reader([text], delimiter=self.delimiter), [])]
+        except csv.Error:  # a cell longer than the library takes, or a quote that never ends
+            return [cell.strip() for cell in text.split(self.delimiter)]
+
+    def header(self, text: str) -> list[str]:
+        """The cells of a line of names; a unit in brackets belongs to the name before it."""
+        return _SPACED.findall(text) if self.delimiter == " " else self.split(text)
+
+    def kind(self, cell: str) -> int:
+        """1 for a number, a date or a time; 0 for no reading; -1 for other text."""
+        if (_COMMA_NUMBER if self.decimal_comma else _NUMBER).fullmatch(cell):
+            return 1
+        if cell.lower() in NO_READING:
+            return 0
+        return 1 if seconds_of_text(cell) is not None else -1
+
+
+def first_lines(path: Path) -> tuple[list[Line], bool]:
+    """The lines at a file's beginning that hold something, and whether they end with CR alone.
+
+    Raises:
+        InputError: the file is not text, or has a line so long that it is no table.
+    """
+    with path.open("rb") as file:
+        begin = file.read(LOOK)
+        more = bool(file.read(1))
+    for magic, what in _NO_TEXT.items():
+        if begin.startswith(magic):
+            raise InputError(f"{path} {what}")
+    begin = begin if more else begin.rstrip(b"\x00")  # a disk that lost power leaves zeros at the end
+    if b"\x00" in begin:
+        raise InputError(f"{path} is not text (it holds zero bytes); give a CSV or a Parquet file")
+    if more:
+        begin, newline, _ = begin.rpartition(b"\n")
+        if not newline:
+            raise InputError(f"the first line of {path} has over {LOOK:,} bytes; a table has a line a row")
+    return lines_of(_decoded(begin)), b"\r" in begin and b"\n" not in begin
+
+
+def lines_of(text: str) -> list[Line]:
+    """The first lines of a text that hold something."""
+    lines: list[Line] = []
+    seen = 0
+    for number, raw in enumerate(re.split(r"\r\n|\n|\r", text)[:_LINES], 1):
+        seen += len(raw)
+        if seen > _LETTERS and len(lines) >= _FEWEST:
+            break
+        stripped = raw.strip("\r\n\ufeff")
+        if not stripped.strip():
+            continue
+        mark = next((mark for mark in COMMENTS if stripped.lstrip().startswith(mark)), None)
+        body = stripped.lstrip().lstrip(mark).strip() if mark and mark != ";" else stripped
+        lines.append(Line(number, body, mark is not None and mark != ";"))
+    return lines
+
+
+def _decoded(begin: bytes) -> str:
+    """Text in UTF-8, or else in the code of an old Windows, where a micro or a degree is one byte."""
+    try:
+        return begin.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        if len(begin) - error.start < 4 and error.reason == "unexpected end of data":
+            return begin[: error.start].decode("utf-8-sig")
+        return begin.decode("cp1252", errors="replace")

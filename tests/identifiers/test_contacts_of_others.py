@@ -1,0 +1,112 @@
+"""On presses of a simulator that shares nothing with ours: what is called identified holds, whatever goes wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import palpate
+from identifiers.foreign_contacts import FAULTS, press
+from palpate.identifiers import ContactIdentifier, RestartingLeastSquares
+from palpate.identifiers.contact_identifier import NAMES
+from palpate.records import Record
+
+PARAMETERS = ("M", "B", "K")
+
+
+def identified(made, **changes):
+    one = ContactIdentifier(made.low_pass, made.rate, made.lag, sampling=made.sampling, **changes)
+    one.update_many(made.position, made.force)
+    return one
+
+
+def misses(made, found):
+    """By identified parameter, how many half-widths the truth is off the value."""
+    verdicts = found.verdicts()
+    out = {}
+    for name in PARAMETERS:
+        if verdicts[name] == "identified":
+            i, (low, high) = found.names.index(name), made.truth[name]
+            off = max(low - found.theta[i], found.theta[i] - high, 0.0)
+            out[name] = off / (1.96 * found.std[i]), off / max(low, 1e-9)
+    return out
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_nothing_is_confidently_wrong(fault):
+    """Confidently wrong: off by more than a quarter, or by three half-widths and 2 %."""
+    for seed in range(2000, 2003):
+        made = press(seed, fault)
+        for name, (widths, share) in misses(made, identified(made).estimate()).items():
+            assert share < 0.25, (seed, name, widths)
+            assert widths < 3 or share < 0.02, (seed, name, share)
+
+
+@pytest.mark.parametrize("fault", ["none", "dropped", "not a number", "loss of contact", "begins in air"])
+def test_a_stiffness_is_known_all_the_same(fault):
+    """Of five presses four at least, each to a tenth."""
+    known = 0
+    for seed in range(2010, 2015):
+        made = press(seed, fault)
+        found = identified(made).estimate()
+        known += found.verdicts()["K"] == "identified" and 1.96 * found.std[2] < 0.1 * found.theta[2]
+    assert known >= 4
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ("saturation", "it is saturated"),
+        ("chatter", "contact|the force does|not explained|change"),
+        ("surface changes", "a change was found|the force does|not explained"),
+        ("relaxing", "the force does|not explained|a change was found"),
+    ],
+)
+def test_what_takes_the_verdict_away_is_said(fault, reason):
+    refused = [identified(press(seed, fault)).estimate() for seed in range(2020, 2024)]
+    told = [found for found in refused if found.rejected]
+    assert len(told) >= 3
+    for found in told:
+        assert set(found.verdicts().values()) == {"rejected"}
+        assert any(part in found.rejected for part in reason.split("|")), found.rejected
+
+
+def test_a_loss_of_contact_is_found_and_so_is_the_next_touch():
+    made = press(2030, "loss of contact")
+    one = identified(made)
+    away = made.force < np.quantile(made.force, 0.02) + 6 * made.recipe["noise"]
+    begun = np.flatnonzero(np.diff(away.astype(int)) == 1)
+    assert 2 <= one.contacts <= len(begun) + 1
+
+
+def test_an_estimator_that_starts_again_is_trusted_again():
+    """After a change the blocks that its estimate rests on are those of the new surface."""
+    vague = np.diag([1e2, 1e8, 1e12, 1e6])
+    held = []
+    for seed in range(2040, 2044):
+        made = press(seed, "surface changes")
+        found = identified(made, estimator=RestartingLeastSquares(np.zeros(4), vague, names=NAMES)).estimate()
+        held += [widths < 1.5 for widths, _ in misses(made, found).values()]
+    assert held
+    assert all(held)
+
+
+@pytest.mark.parametrize("seed", [1, 3, 5, 8])
+def test_stream_and_log_agree(seed):
+    """Each within what both leave open."""
+    made = press(seed)
+    found = identified(made).estimate()
+    record = Record(
+        {"time": np.arange(len(made.force)) / made.rate, "position": made.position, "force": made.force},
+        {"time": "s", "position": "m", "force": "N"},
+    )
+    log = palpate.identify(record, lag=made.lag, force_filter=made.low_pass, bonded=True).parameters
+    verdicts, compared = found.verdicts(), 0
+    for name in PARAMETERS:
+        other = log.get(name)
+        if verdicts[name] == "identified" and other is not None and other.verdict == "identified":
+            i = found.names.index(name)
+            both = 1.96 * np.hypot(found.std[i], other.std)
+            assert abs(found.theta[i] - other.value) < 1.5 * both, name
+            compared += 1
+    assert compared or verdicts["K"] != "identified"

@@ -1,0 +1,228 @@
+"""Logs that would crash the program or exhaust the machine: refused in a line, soon, and with little memory."""
+
+from __future__ import annotations
+
+import bz2
+import contextlib
+import os
+import sqlite3
+import struct
+import zipfile
+import zlib
+
+import numpy as np
+import polars
+import pytest
+from scipy.io import savemat
+
+from logs.ros_bags import storage, wrench, write_bag
+from palpate.errors import InputError
+from palpate.logs import read_log, read_record
+from palpate.logs.bags import Bag
+from palpate.logs.kinds import kind_of
+from palpate.logs.limits import Limits
+from palpate.logs.own_runs import measured_by
+
+T = np.arange(50) / 100
+COLUMNS = {"time": "t", "position": "x", "force": "f"}
+SMALL = Limits(size=1e7)
+
+
+def refused(path, words, limits=None, **columns):
+    with pytest.raises(InputError, match=words) as caught:
+        read_log(path, limits=limits, **(columns or COLUMNS))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", [0, 65535])
+def test_a_tag_of_matlab_that_no_library_survives(tmp_path, kind):
+    path = tmp_path / "log.mat"
+    savemat(path, {"t": T, "x": T, "f": T}, do_compression=False)
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(struct.pack("<II", 9, 400), struct.pack("<II", kind, 400), 1))
+    refused(path, "cannot be read as a MATLAB file")
+
+
+def test_a_small_file_of_matlab_that_unpacks_to_much(tmp_path):
+    path = tmp_path / "log.mat"
+    savemat(path, {"t": np.zeros(4_000_000)}, do_compression=True)
+    assert path.stat().st_size < 40_000
+    refused(path, "more than 0.01 GB unpacked.*--max-size", SMALL)
+    assert len(read_log(path, rate=1, position="t", limits=Limits(size=1e8))) == 4_000_000
+
+
+def test_a_long_text_of_nothing(tmp_path):
+    path = tmp_path / "log.csv"
+    with path.open("wb") as file:
+        file.write(b"t,x,f\n" + b"".join(b"%d,%d,%d\n" % (k, k, k) for k in range(50)))
+        file.truncate(10**10)  # a file with holes: it takes no room on the disk
+    refused(path, "more than 2 GB")
+
+
+def test_a_first_line_without_an_end_and_a_cell_without_one(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("x" * 5_000_000 + "\n1,2,3\n")
+    refused(path, "first line of .* has over 4,000,000 bytes")
+    path.write_text("t,x,f," + "y" * 140_000 + "\n" + "".join(f"{k},{k},{k},1\n" for k in range(50)))
+    assert len(read_log(path, **COLUMNS)) == 50
+    path.write_text('t,x,f,"' + "y" * 140_000 + "\n" + "".join(f"{k},{k},{k},1\n" for k in range(50)))
+    assert len(read_log(path, **COLUMNS)) == 50
+
+
+@pytest.mark.parametrize("command", ["link", "folder", "pipe"])
+def test_only_files_are_opened(tmp_path, command):
+    path = tmp_path / "log.db3"
+    if command == "pipe":
+        os.mkfifo(path)
+    elif command == "link":
+        path.symlink_to("/dev/zero")
+    else:
+        path.mkdir()
+        (path / "a.db3").symlink_to("/dev/zero")
+    refused(path, "is a pipe or a device", force="/a.x", position="/a.y")
+
+
+def database(path, messages):
+    with sqlite3.connect(path) as own:
+        own.executescript(
+            "CREATE TABLE topics(id, name, type); INSERT INTO topics VALUES(1, '/a', 'geometry_msgs/msg/Point');"
+            + messages
+        )
+    own.close()
+    return path
+
+
+def test_a_view_that_never_ends(tmp_path):
+    path = database(
+        tmp_path / "a.db3",
+        "CREATE VIEW messages AS WITH RECURSIVE r(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM r)"
+        " SELECT n AS id, 1 AS topic_id, n AS timestamp, x'00' AS data FROM r;",
+    )
+    refused(path, "messages is not a plain table but a view", force="/a.x", position="/a.y")
+
+
+def test_a_table_that_makes_its_own_data(tmp_path):
+    path = database(
+        tmp_path / "a.db3",
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id, timestamp,"
+        " data BLOB GENERATED ALWAYS AS (zeroblob(900000000)));"
+        "INSERT INTO messages(topic_id, timestamp) VALUES (1, 1), (1, 2);",
+    )
+    refused(path, "cannot be read as a ROS 2 bag", force="/a.x", position="/a.y")
+
+
+def bag1_record(header, data):
+    fields = b"".join(struct.pack("<I", len(k) + 1 + len(v)) + k + b"=" + v for k, v in header.items())
+    return struct.pack("<I", len(fields)) + fields + struct.pack("<I", len(data)) + data
+
+
+@pytest.mark.parametrize(
+    ("says", "words"), [(1000, "cannot be read as a ROS 1 bag"), (10**8, "more than 0.01 GB")]
+)
+def test_a_chunk_of_a_bag_that_unpacks_to_much(tmp_path, says, words):
+    path = tmp_path / "log.bag"
+    about = {b"op": b"\x05", b"compression": b"bz2", b"size": struct.pack("<I", says)}
+    begin = {b"op": b"\x03", b"index_pos": bytes(8), b"conn_count": bytes(4), b"chunk_count": bytes(4)}
+    packed = bag1_record(about, bz2.compress(bytes(10**8)))
+    path.write_bytes(b"#ROSBAG V2.0\n" + bag1_record(begin, b" " * 99) + packed)
+    assert path.stat().st_size < 1000
+    refused(path, words, SMALL, force="/a.x", position="/a.y")
+
+
+def test_a_chunk_of_an_mcap_that_unpacks_to_much(tmp_path):
+    import lz4.frame
+
+    packed = lz4.frame.compress(bytes(10**8))
+    chunk = (
+        struct.pack("<QQQI", 0, 0, 10**8, 0)
+        + struct.pack("<I", 3)
+        + b"lz4"
+        + struct.pack("<Q", len(packed))
+        + packed
+    )
+    path = tmp_path / "log.mcap"
+    path.write_bytes(b"\x89MCAP0\r\n" + b"\x06" + struct.pack("<Q", len(chunk)) + chunk)
+    refused(path, "more than 0.01 GB", SMALL, force="/a.x", position="/a.y")
+
+
+METADATA = {
+    "no map": "- 1\n- 2\n",
+    "a number for a list": "rosbag2_bagfile_information:\n  relative_file_paths: 7\n",
+    "numbers for names": "rosbag2_bagfile_information:\n  relative_file_paths: [1, 2]\n",
+    "brackets": "[" * 1200,
+    "bytes": "\x01\x02",
+    "another list for a word": "rosbag2_bagfile_information:\n  compression_mode: [file]\n",
+}
+
+
+@pytest.mark.parametrize("kind", METADATA)
+def test_metadata_of_a_bag_that_is_spoiled(tmp_path, kind):
+    path = write_bag(tmp_path / "log", "mcap", [wrench("/ft", T, np.zeros((50, 3)))])
+    (path / "metadata.yaml").write_text(METADATA[kind])
+    with Bag(path, kind_of(path)) as bag:
+        assert bag.topics["/ft"].count == 50
+        assert "metadata.yaml is spoiled" in bag.troubles[0]
+
+
+def test_a_file_that_the_metadata_names_and_that_is_missing(tmp_path):
+    path = write_bag(tmp_path / "log", "sqlite", [wrench("/ft", T, np.zeros((50, 3)))])
+    about = path / "metadata.yaml"
+    name = storage(path).name
+    about.write_text(about.read_text().replace(f"- {name}", f"- {name}\n  - log_1.db3", 1))
+    with Bag(path, kind_of(path)) as bag:
+        assert "log_1.db3 is missing" in bag.troubles[0]
+
+
+@pytest.mark.parametrize(
+    "spoiled", ["[", "[]", '{"units": 3}', '{"units": {"t": 1}, "meta": {}}', "[" * 5000]
+)
+def test_metadata_of_ours_that_is_spoiled(tmp_path, spoiled):
+    path = tmp_path / "r.parquet"
+    polars.DataFrame({"t": T, "x": T, "f": T}).write_parquet(path, metadata={"palpate": spoiled})
+    for read in (read_record, lambda path: read_log(path, **COLUMNS)):
+        with pytest.raises(InputError, match="metadata of palpate that is spoiled"):
+            read(path)
+
+
+@pytest.mark.parametrize("instruments", ['{"force": 3}', '{"force": {"filter": 1, "delay_s": 0}}', '"x"'])
+def test_instruments_of_ours_that_are_spoiled(tmp_path, instruments):
+    path = tmp_path / "r.parquet"
+    about = f'{{"units": {{"t": "s"}}, "meta": {{"instruments": {instruments}}}}}'
+    polars.DataFrame({"t": T}).write_parquet(path, metadata={"palpate": about})
+    with pytest.raises(InputError, match="its instruments is spoiled"):
+        measured_by(path)
+
+
+def test_a_parquet_of_few_bytes_and_many_rows(tmp_path):
+    path = tmp_path / "r.parquet"
+    polars.DataFrame({name: np.zeros(3_000_000) for name in "txf"}).write_parquet(path)
+    assert path.stat().st_size < 100_000
+    refused(path, "more than 0.01 GB", SMALL)
+
+
+def test_a_spreadsheet_that_unpacks_to_much(tmp_path):
+    path = tmp_path / "log.xlsx"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("xl/workbook.xml", " " * 20_000_000)
+    refused(path, "more than 0.01 GB", SMALL)
+
+
+def test_noise_over_any_part_of_a_file_of_matlab(tmp_path):
+    """Each is read, or refused in a line; the process survives."""
+    path, rng = tmp_path / "log.mat", np.random.default_rng(0)
+    savemat(path, {"t": T, "x": T, "f": T}, do_compression=False)
+    whole = path.read_bytes()
+    for _ in range(4):
+        place = int(rng.integers(128, len(whole) - 8))
+        path.write_bytes(whole[:place] + rng.bytes(8) + whole[place + 8 :])
+        with contextlib.suppress(InputError):
+            assert len(read_log(path, **COLUMNS)) == len(T)
+
+
+def test_packed_noise(tmp_path):
+    path = tmp_path / "log.mat"
+    savemat(path, {"t": T}, do_compression=True)
+    whole = path.read_bytes()
+    noise = zlib.compress(bytes(np.random.default_rng(1).integers(0, 256, 300, dtype=np.uint8)))
+    path.write_bytes(whole[:128] + struct.pack("<II", 15, len(noise)) + noise)
+    refused(path, "cannot be read as a MATLAB file")

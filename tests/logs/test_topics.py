@@ -1,0 +1,255 @@
+"""`palpate topics`: all fields are listed, and the command that it proposes works when it is pasted."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from identification.synthetic_contacts import pressed
+from logs.ros_bags import BEGIN, joints, pose, wrench, write_bag
+from logs.test_laboratories import aurora, labview, saved
+from palpate.cli import main
+from palpate.cli._text import plain
+from palpate.contact_frame.vectors import matrices
+from palpate.logs import read_log, read_wrench_and_pose, write_record
+from palpate.logs.listing import list_log
+from palpate.records import Record
+
+TIME = np.arange(300) / 100
+MOVED = np.column_stack([TIME, np.cos(TIME), np.sin(TIME)])
+MEASURED = [
+    path
+    for path in sorted(Path("../shared/data").resolve().glob("*/*"))
+    if path.suffix in {".csv", ".mat", ".ddf"}
+]
+
+
+def read_as_proposed(path):
+    """Read a log by the words that are proposed for it, as `palpate identify` would."""
+    words = shlex.split(list_log(path).proposal.command(path))
+    assert words[:3] == ["palpate", "identify", str(path)]
+    said = dict(zip(words[3::2], words[4::2], strict=True))
+    said = {flag.removeprefix("--"): word for flag, word in said.items() if flag != "--wrench-frame"}
+    if "rate" in said:
+        said["rate"] = float(said["rate"])
+    return (read_wrench_and_pose if "wrench" in said else read_log)(path, **said)
+
+
+@pytest.mark.parametrize("path", MEASURED, ids=lambda path: path.name)
+def test_measured_logs_are_read_as_proposed(path):
+    assert np.nanstd(read_as_proposed(path)["force"]) > 0
+
+
+def test_the_example(root):
+    proposal = list_log(root / "examples/data/press.csv").proposal
+    assert proposal.words == ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
+    assert not proposal.guesses
+
+
+def press():
+    flat = pressed()
+    return flat["time"], flat["position"], flat["force"]
+
+
+TABLES = {
+    "no names": (lambda t, x, f: ("", (t, 1e3 * x, f)), "--time 0 --position 1:mm --force 2:N"),
+    "milliseconds": (
+        lambda t, x, f: ("time,x,f", (1e3 * t, x, f)),
+        "--time time:ms --position x:m --force f:N",
+    ),
+    "no time": (
+        lambda t, x, f: ("x_mm,Fz [N]", (1e3 * x, f)),
+        "--rate 1000 --position x_mm:mm --force 'Fz [N]:N'",
+    ),
+    "names of one's own": (
+        lambda t, x, f: ("stamp,-x,a:b,load", (t, 1e3 * x, 0 * t, f)),
+        "--time stamp --position 1:mm --force load:N",
+    ),
+    "three axes": (
+        lambda t, x, f: ("t,fx,fy,fz,x_mm,y_mm,z_mm", (t, 0.1 * f, 0.2 * f, f, 9 * x, 99 * x, 1e3 * x)),
+        "--time t --wrench fx:N,fy:N,fz:N --pose x_mm:mm,y_mm:mm,z_mm:mm --wrench-frame base",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_tables(tmp_path, kind):
+    make, words = TABLES[kind]
+    header, columns = make(*press())
+    path = tmp_path / "a log.csv"
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.9g")
+    if not header:
+        path.write_text(path.read_text().lstrip("\n"))
+    assert list_log(path).proposal.command(path) == f"palpate identify {shlex.quote(str(path))} {words}"
+    assert len(read_as_proposed(path)) == len(columns[0])
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (aurora, "--position AI0:mm --force AI1:mN"),
+        (labview, "--time X_Value --position Path:mm --force Load:Newtons"),
+    ],
+)
+def test_instruments(tmp_path, make, words):
+    path = saved(tmp_path, make())
+    assert list_log(path).proposal.command(path).endswith(words)
+    assert len(read_as_proposed(path)) == 40
+
+
+def test_bags(tmp_path):
+    rolled = [
+        wrench("/ft", TIME, MOVED),
+        wrench("/ft_raw", TIME[::2], MOVED[::2]),
+        pose("/pose", TIME, MOVED),
+    ]
+    path = write_bag(tmp_path / "two", "mcap", rolled)
+    found = list_log(path).proposal
+    assert found.words == ("--wrench", "/ft", "--pose", "/pose")
+    assert "there are /ft, /ft_raw" in found.guesses[0]
+    lift = joints("/joints", TIME, ["turn", "lift"], MOVED[:, :2], np.column_stack([0 * TIME, TIME]))
+    path = write_bag(tmp_path / "joints", "mcap", [lift])
+    assert list_log(path).proposal.words == (
+        "--position",
+        "/joints.position.lift:m",
+        "--force",
+        "/joints.effort.lift:N",
+    )
+    assert len(read_as_proposed(path)) == len(TIME)
+
+
+def own_types(path, texts, sent):
+    """A bag of messages of types of its own: topic, type and a function from a row's number to the message."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for kind, text in texts.items():
+        store.register(get_types_from_msg(text, kind))
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        links = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind, _ in sent}
+        for k in range(len(TIME)):
+            for topic, kind, make in sent:
+                when = BEGIN + round(1e9 * TIME[k])
+                writer.write(links[topic], when, store.serialize_cdr(make(store.types, k, when), kind))
+    return path
+
+
+def header(types, when, frame):
+    stamp = types["builtin_interfaces/msg/Time"](when // 10**9, when % 10**9)
+    return types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
+
+
+TURNS = np.array(
+    [[0.1, 0.2, 0.3, 0.927], [0.9, 0.1, -0.2, 0.3], [0.1, 0.9, 0.3, -0.2], [-0.2, 0.1, 0.9, 0.1]]
+)
+TURNS /= np.linalg.norm(TURNS, axis=1)[:, None]
+
+
+def franka(types, k, when):
+    transform = np.eye(4)
+    transform[:3, :3] = matrices(np.arange(4.0), TURNS)[k % 4]
+    transform[:3, 3] = MOVED[k]
+    return types["franka_msgs/msg/FrankaState"](
+        header(types, when, "base"), transform.flatten(order="F"), np.r_[MOVED[k], 0.1, 0.2, 0.3]
+    )
+
+
+def test_the_state_of_a_franka(tmp_path):
+    text = "std_msgs/Header header\nfloat64[16] O_T_EE\nfloat64[6] O_F_ext_hat_K\n"
+    kind = "franka_msgs/msg/FrankaState"
+    path = own_types(tmp_path / "franka", {kind: text}, [("/state", kind, franka)])
+    listing = list_log(path)
+    assert listing.entries[0].about == "--wrench /state --pose /state"
+    assert {"O_T_EE.15", "O_F_ext_hat_K.5"} <= set(listing.entries[0].fields)
+    record = read_as_proposed(path)
+    np.testing.assert_allclose(record["force_z"], MOVED[:, 2])
+    np.testing.assert_allclose(record["position_y"], MOVED[:, 1])
+    found = np.column_stack([record[f"quaternion_{axis}"] for axis in "xyzw"])
+    np.testing.assert_allclose(np.abs((found * TURNS[np.arange(len(TIME)) % 4]).sum(axis=1)), 1.0)
+
+
+def transforms(types, k, when):
+    def one(parent, child, place):
+        own = types["geometry_msgs/msg/Transform"](
+            types["geometry_msgs/msg/Vector3"](*place),
+            types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0),
+        )
+        return types["geometry_msgs/msg/TransformStamped"](header(types, when, parent), child, own)
+
+    found = [one("base", "camera", (1.0, 2.0, 3.0))] if k % 2 else []
+    return types["tf2_msgs/msg/TFMessage"]([*found, one("base", "tool0", MOVED[k])])
+
+
+def force(types, k, when):
+    vector = types["geometry_msgs/msg/Vector3"]
+    own = types["geometry_msgs/msg/Wrench"](vector(*MOVED[k]), vector(0.0, 0.0, 0.0))
+    return types["geometry_msgs/msg/WrenchStamped"](header(types, when, "tool0"), own)
+
+
+def test_frames_of_transforms(tmp_path):
+    sent = [("/tf", "tf2_msgs/msg/TFMessage", transforms), ("/ft", "geometry_msgs/msg/WrenchStamped", force)]
+    path = own_types(tmp_path / "tf", {}, sent)
+    entries = {entry.name: entry for entry in list_log(path).entries}
+    assert entries["/tf.tool0"].about == "--pose /tf.tool0 (in base)"
+    assert (entries["/tf.tool0"].count, entries["/tf.camera"].count) == (300, 150)
+    record = read_as_proposed(path)
+    np.testing.assert_allclose(record["position_z"], MOVED[:, 2])
+    assert record.meta["frames"]["position_x"] == "base"
+    one = read_log(path, force="/ft.wrench.force.z", position="/tf.tool0.transform.translation.x")
+    np.testing.assert_allclose(one["position"], MOVED[:, 0])
+
+
+def test_ten_thousand_columns(tmp_path):
+    """Each column used to be looked for in the file by itself."""
+    path = tmp_path / "wide.csv"
+    rows = 1e-3 * np.arange(10)[:, None] + np.arange(10_000)
+    np.savetxt(
+        path, rows, delimiter=",", header=",".join(f"c{i}" for i in range(10_000)), comments="", fmt="%.3f"
+    )
+    listing = list_log(path)
+    assert len(listing.entries) == 10_000
+    assert all(entry.count == 10 for entry in listing.entries)
+    assert listing.entries[7_000].about == "7000 to 7000.01"
+
+
+def test_a_run_needs_no_words(tmp_path):
+    columns = dict.fromkeys(("t", "x_measured", "force_sampled"), TIME)
+    path = write_record(Record(columns, dict.fromkeys(columns, "s")), tmp_path / "record.parquet")
+    assert list_log(path).proposal.command(path) == f"palpate identify {path}"
+
+
+def test_names_that_a_terminal_would_obey(tmp_path, capsys):
+    path = tmp_path / "log\x1b[2J.csv"
+    path.write_text("t,\x1b]0;owned\x07x,f\n" + "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(50)))
+    assert main(["topics", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert "\x1b" not in shown
+    assert "\x07" not in shown
+    assert "\\x1b]0;owned" in shown
+    assert plain("a\tb\u202e") == "a\tb\\x202e"
+
+
+def test_the_limits_are_options(tmp_path, capsys):
+    path = saved(tmp_path, "t,x,f\n" + "1,2,3\n" * 500)
+    assert main(["topics", str(path), "--max-size", "0.000001"]) == 2
+    assert "--max-size" in capsys.readouterr().err
+    words = [
+        "identify",
+        str(path),
+        "--time",
+        "t",
+        "--position",
+        "x",
+        "--force",
+        "f",
+        "--max-size",
+        "0.000001",
+    ]
+    assert main(words) == 2
+    assert "more than 1e-06 GB" in capsys.readouterr().err
+    assert main(["topics", str(path), "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)) == {"entries", "troubles", "identify"}
