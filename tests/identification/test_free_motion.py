@@ -48,11 +48,6 @@ def test_nothing_is_touched(motion, force):
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_plain_noise_is_no_contact(motion):
-    assert "no-contact" in identify(record(TIME, MOTIONS[motion], white())).codes
-
-
-@pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("filtered", [None, "butterworth3:120"])
 def test_a_force_that_drifts_shows_no_parameter(motion, filtered):
     if motion == "steps":

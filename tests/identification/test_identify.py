@@ -93,12 +93,20 @@ def test_a_standard_linear_solid_is_recognised():
     v = np.gradient(x, 1e-3)
     branch = d - low_pass_once(d, 0.23, 1e-3)
     force = np.where(x > 0, np.maximum(5600 * d + 13 * v + 6900 * branch, 0), 0)
-    found = identify(record(TIME, x, noisy(force)), lag=0.0)
-    assert found.model == "standard-linear-solid"
+    log = record(TIME, x, noisy(force))
+    found = identify(log, lag=0.0)
+    plain = found.model != "standard-linear-solid"
+    for name, truth in (("K", 5600), ("B", 13), ("K1", 6900), ("tau", 0.23)):
+        p = found.parameters.get(name)
+        if plain:  # two springs seen as one: its number belongs to the working point alone
+            assert p is None or p.verdict is not Verdict.IDENTIFIED
+        else:
+            assert holds(p, truth)
+    assert 5600 < found.working_point.stiffness.value < 12500
+    asked = identify(log, lag=0.0, model="standard-linear-solid")
     for name, truth in (("K", 5600), ("K1", 6900), ("tau", 0.23)):
-        assert found.parameters[name].verdict is Verdict.IDENTIFIED
-        assert found.parameters[name].value == pytest.approx(truth, rel=0.1)
-        assert holds(found.parameters[name], truth)
+        assert holds(asked.parameters[name], truth)
+        assert asked.estimate.theta[asked.estimate.names.index(name)] == pytest.approx(truth, rel=0.03)
 
 
 def test_a_hunt_crossley_contact_is_recognised():
@@ -261,7 +269,7 @@ def test_ten_rows_a_second():
     x = 2e-3 + 1e-3 * np.sin(2 * np.pi * 0.2 * time)
     found = identify(record(time, x, noisy(5000 * x)), bonded=True)
     assert "low-rate" in found.codes
-    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+    assert found.working_point.stiffness.value == pytest.approx(5000, rel=0.02)
     assert found.parameters["B"].verdict is not Verdict.IDENTIFIED
 
 

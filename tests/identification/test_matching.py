@@ -153,7 +153,7 @@ def test_each_contact_has_its_own_rows_and_what_is_between_has_none():
         assert left - 0.02 < own[-1] < left + 2 * LAG
     touch = question.with_touches
     assert set(touch.spans) == {0, 1}
-    np.testing.assert_array_equal(touch.motion.rows[touch.inside], question.motion.rows)
+    assert set(question.motion.rows) <= set(touch.motion.rows)
     assert touch.motion.rows[0] < question.motion.rows[0]
 
 
