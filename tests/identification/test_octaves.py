@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -27,7 +29,7 @@ def columns(rows, seed=0, p=3):
 
 def sums(own, *lengths):
     edges = np.cumsum([0, *(lengths or [len(own)])])
-    segments = [Segment(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
+    segments = [Segment(int(a), int(b)) for a, b in pairwise(edges)]
     return octaves_of(own, segments, DT, longest_of(segments))
 
 

@@ -58,7 +58,9 @@ def fit_without_series(found: Fit, series: float, series_std: float) -> Fit:
     check(found.theta[place["K"]], series)
     new, jacobian = _linearised(found.theta, place, series)
     moved = _seen_through(found.theta, place, series + series_std) - new
-    cov, fixed = (jacobian @ own @ jacobian.T + np.outer(moved, moved) for own in (found.cov, found.fixed_cov))
+    cov, fixed = (
+        jacobian @ own @ jacobian.T + np.outer(moved, moved) for own in (found.cov, found.fixed_cov)
+    )
     return replace(found, theta=new, cov=cov, fixed_cov=fixed)
 
 

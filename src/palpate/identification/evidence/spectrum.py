@@ -24,6 +24,8 @@ Complex = NDArray[np.complex128]
 PERIODS = 4
 """Periods in a block: the lines 3, 4, 5 of its transform are then the octave."""
 _LINES = np.array([3.0, 4.0, 5.0])
+_LOWEST, _HIGHEST = 2.0, 6.0
+"""Lines that Hann's window lets into these three; a motion elsewhere has only leaked into them."""
 _FEWEST = 16
 """Rows in a block."""
 _MOST = 24
@@ -66,7 +68,7 @@ class _Line:
 def dynamic_stiffness(
     problem: Problem, segments: list[Segment], lag: float, lag_std: float
 ) -> tuple[DynamicStiffness, ...]:
-    """Storage and loss in each octave that a contact is long enough for, lowest first.
+    """Storage and loss in each octave that a contact is long enough for and has motion in, lowest first.
 
     Args:
         problem: of the log.
@@ -84,7 +86,9 @@ def dynamic_stiffness(
         if length < _FEWEST:
             break
         blocks = _blocks(problem, channels, segments, length)
-        found.append(_octave(blocks, length, dt, variance, lag_std))
+        octave = _octave(blocks, length, dt, variance, lag_std)
+        if _LOWEST <= octave.frequency * length * dt <= _HIGHEST:
+            found.append(octave)
         length //= 2
     return tuple(found)
 
