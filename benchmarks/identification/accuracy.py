@@ -4,7 +4,9 @@
     python benchmarks/identification/accuracy.py foam-step --trials 2000
 
 Each trial is a press on the bench with a surface, a noise and a phase of the force sensor of its own. The errors and
-the half-widths are divided by the bound of their own trial, so that surfaces of all sizes can stand in one row.
+the half-widths are divided by the bound of their own trial, so that surfaces of all sizes can stand in one row. The
+first columns are of `ci95_if_model_holds`; `ci95`, on which verdicts rest, follows: how often it is given, its width
+over the other's, how often it holds the truth, and how often it does where the verdict is "identified".
 """
 
 from __future__ import annotations
@@ -57,7 +59,10 @@ class Line:
         coverage: share of 95 % intervals that hold the truth.
         width: median of the half-width over that of the bound.
         identified: share of verdicts "identified".
-        trusted: share of the 95 % intervals that hold the truth where the verdict is "identified"; None if it never is.
+        given: share of trials with a `ci95`.
+        robust_width: median of its half-width over that of `ci95_if_model_holds`.
+        robust_coverage: share of them that hold the truth; None if there is none.
+        trusted: the same where the verdict is "identified"; None if it never is.
         error: rms, in the parameter's unit.
     """
 
@@ -69,6 +74,9 @@ class Line:
     coverage: float
     width: float
     identified: float
+    given: float
+    robust_width: float | None
+    robust_coverage: float | None
     trusted: float | None
     error: float
 
@@ -83,6 +91,9 @@ def line(name: str, trials: list[Trial]) -> Line:
     rms = float(np.sqrt(np.mean(scaled**2)))
     inside = np.abs(error) <= _T * std
     identified = np.array([t.verdict.get(name) == "identified" for t in trials])
+    given = np.array([name in t.robust for t in trials])
+    low, high = np.array([t.robust.get(name, (np.nan, np.nan)) for t in trials]).T
+    held = (low <= truth) & (truth <= high)
     return Line(
         name,
         len(trials),
@@ -92,7 +103,10 @@ def line(name: str, trials: list[Trial]) -> Line:
         float(np.mean(inside)),
         float(np.median(std / np.maximum(bound, 1e-300))),
         float(np.mean(identified)),
-        float(np.mean(inside[identified])) if identified.any() else None,
+        float(np.mean(given)),
+        float(np.median(((high - low) / 2 / (_T * std))[given])) if given.any() else None,
+        float(np.mean(held[given])) if given.any() else None,
+        float(np.mean(held[identified])) if identified.any() else None,
         float(np.sqrt(np.mean(error**2))),
     )
 
@@ -103,6 +117,7 @@ def main() -> None:
     parser.add_argument("conditions", nargs="*", default=list(CONDITIONS), metavar="CONDITION")
     parser.add_argument("--trials", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0, help="of the first trial")
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
     parser.add_argument("--json", type=Path, help="write every figure there")
     asked = parser.parse_args()
     unknown = set(asked.conditions) - set(CONDITIONS)
@@ -113,11 +128,11 @@ def main() -> None:
         f"{asked.trials} trials each, seeds {seeds[0]} to {seeds[-1]}; errors and widths over the bound's deviation"
     )
     print(
-        f"{'':36}{'':5}{'rms':>7}{'bias/rms':>10}{'rms/truth':>11}{'cover':>8}{'width':>7}{'identified':>12}"
-        f"{'cover of those':>16}"
+        f"{'':36}{'':5}{'rms':>7}{'bias/rms':>10}{'rms/truth':>11}{'cover':>8}{'width':>7}"
+        f"{'ci95 given':>12}{'times':>7}{'cover':>8}{'identified':>12}{'cover':>8}"
     )
     figures = {}
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(asked.workers, mp_context=get_context("spawn")) as pool:
         for name in asked.conditions:
             begin = time.perf_counter()
             trials = list(pool.map(trial, [CONDITIONS[name]] * len(seeds), seeds, chunksize=4))
@@ -133,10 +148,13 @@ def _show(name: str, trials: list[Trial], seconds: float) -> dict[str, object]:
     lines = [line(parameter, trials) for parameter in parameters]
     for i, row in enumerate(lines):
         title = name if i == 0 else ""
-        trusted = "-" if row.trusted is None else f"{row.trusted:.1%}"
+        times = "-" if row.robust_width is None else f"{row.robust_width:.2f}"
+        held, trusted = (
+            "-" if share is None else f"{share:.1%}" for share in (row.robust_coverage, row.trusted)
+        )
         print(
             f"{title:36}{row.parameter:5}{row.rms:7.2f}{row.bias:10.2f}{row.relative:11.3%}{row.coverage:8.1%}"
-            f"{row.width:7.2f}{row.identified:12.1%}{trusted:>16}"
+            f"{row.width:7.2f}{row.given:12.1%}{times:>7}{held:>8}{row.identified:12.1%}{trusted:>8}"
             + (f"  rms {row.error * 1e3:.3f} ms" if row.parameter == "lag" else "")
         )
     confounded = float(np.mean(["lag-damping-confounded" in t.codes for t in trials]))

@@ -298,7 +298,7 @@ def trials(condition: Condition, seed: int, skipped: tuple[str, ...]) -> dict[st
     for name, method in METHODS.items():
         if name not in skipped:
             value, std = _or_none(method, case)
-            found[name] = replace(matched, value=value, std=std, verdict={}, codes=())
+            found[name] = replace(matched, value=value, std=std, verdict={}, robust={}, codes=())
     return found
 
 

@@ -46,13 +46,23 @@ class Condition:
 
 @dataclass(frozen=True)
 class Trial:
-    """One press and what was found, by name: truth, estimate, its deviation and the bound of that; lag in seconds."""
+    """One press and what was found, by name; lag in seconds.
+
+    Args:
+        truth: of the surface.
+        value, std: estimate and deviation if the model holds.
+        bound: of that deviation.
+        verdict: on each parameter.
+        robust: the interval that holds whatever the model, of the parameters that were given with a number.
+        codes: of the warnings.
+    """
 
     truth: dict[str, float]
     value: dict[str, float]
     std: dict[str, float]
     bound: dict[str, float]
     verdict: dict[str, str]
+    robust: dict[str, tuple[float, float]]
     codes: tuple[str, ...]
 
 
@@ -110,6 +120,7 @@ def trial(condition: Condition, seed: int) -> Trial:
         dict(zip(estimate.names, estimate.std.tolist(), strict=True)),
         _bound(record, truth, low_pass, condition, span),
         {name: str(p.verdict) for name, p in found.parameters.items()},
+        {name: p.ci95 for name, p in found.parameters.items() if p.ci95},
         found.codes,
     )
 

@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
+from identification.problems import problem
 from identification.sensor_logs import TRUTH, sensor_log
 from palpate.identification.estimators.errors_in_variables import compensation, resting
 from palpate.identification.estimators.fit import fit
-from palpate.identification.matching import matched_question, samples_of
 from palpate.identification.models import KELVIN_VOIGT_MASS, without_noise
-from palpate.identification.preparing import filter_and_contacts
 from palpate.identification.prior import Lag
-from palpate.identification.sampling import channels_of, held_force
 
 
 def regression(seed, noise, count=400):
@@ -103,12 +101,9 @@ def test_columns_of_very_different_size_are_taken_as_they_are():
 
 def fits(log):
     """As the identification fits it, and as if the position were exact."""
-    channels = channels_of(log.record)
-    samples = samples_of(channels, held_force(log.record, channels), log.low_pass)
-    coarse, chain, contacts = filter_and_contacts(channels, None, None)
-    asked = matched_question(samples, contacts, chain, coarse, Lag(log.lag), 0.25)
+    asked = problem(log.record, log.lag, force_filter=log.low_pass)
     return [
-        fit(KELVIN_VOIGT_MASS, motion, asked.force, asked.lag)
+        fit(KELVIN_VOIGT_MASS, motion, asked.force, Lag(log.lag))
         for motion in (asked.motion, without_noise(asked.motion))
     ]
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.synthetic_contacts import coloured, press_path, pressed, record
-from palpate.errors import InputError
+from identification.synthetic_contacts import coloured, press_path, record
 from palpate.identification import Verdict, identify
 
 TRUTH = {"K": 20_000.0, "B": 400.0, "M": 0.5}
@@ -33,86 +32,53 @@ def contradicts(parameter, truth):
     return not low <= truth <= high
 
 
-@pytest.mark.parametrize("rate", [250, 500, 1000, 4000])
-def test_a_mass_that_hides_behind_a_lag_is_in_the_interval(rate):
-    found = identify(heavy(rate))
-    assert found.model == "kelvin-voigt"
-    assert found.parameters["B"].value == pytest.approx(375, abs=3)  # the wrong one: B - K T at a lag of M/B
-    assert not contradicts(found.parameters["B"], TRUTH["B"])
-    assert "a mass of up to" in found.parameters["B"].reason
-    assert found.parameters["K"].value == pytest.approx(TRUTH["K"], rel=0.002)
-    assert abs(found.lag[0]) < 1.96 * found.lag[1]
+@pytest.mark.parametrize("rate", [250, 1000, 4000])
+@pytest.mark.parametrize("lag", [0.0, 0.005])
+def test_a_mass_that_hides_behind_a_lag_is_in_the_interval(rate, lag):
+    """Nobody tells the lag: M a looks like a lag of -M/B of B v, and K x late like a damping."""
+    found = identify(heavy(rate, lag=lag))
+    for name, truth in TRUTH.items():
+        assert not contradicts(found.parameters[name], truth), name
+    assert found.parameters["K"].value == pytest.approx(TRUTH["K"], rel=0.02)
+    assert abs(found.lag.value - lag) < found.lag.bound
 
 
-def test_a_force_before_the_position_is_the_sign_of_a_mass():
-    found = identify(heavy())
-    said = next(w.text for w in found.warnings if w.code.word == "lag-damping-confounded")
-    assert "before the position" in said
-    assert "lag-damping-confounded" not in identify(heavy(m=0.0)).codes
-
-
-def test_the_same_mass_behind_a_lag_that_is_there():
-    found = identify(heavy(lag=0.005))
-    assert not contradicts(found.parameters["B"], TRUTH["B"])
-    assert abs(found.lag[0] - 0.005) < 1.96 * found.lag[1]
-
-
-def test_a_tolerance_below_what_a_hidden_mass_can_do_identifies_no_damping():
-    found = identify(heavy(), tolerance=0.03)
+def test_a_tolerance_below_what_a_lag_can_do_identifies_no_damping():
+    found = identify(heavy(), tolerance=0.005)
     assert found.parameters["B"].verdict is Verdict.NOT_IDENTIFIABLE
-    assert "hides a mass" in found.parameters["B"].reason
-    assert found.parameters["K"].verdict is Verdict.IDENTIFIED
 
 
 def test_nothing_hides_behind_a_lag_that_is_calibrated():
     found = identify(heavy(), lag=0.0)
     for name, truth in TRUTH.items():
+        assert not contradicts(found.parameters[name], truth)
+    for name in ("K", "B"):
         assert found.parameters[name].verdict is Verdict.IDENTIFIED
-        assert found.parameters[name].value == pytest.approx(truth, rel=0.1)
-    assert found.parameters["B"].std < 0.002 * TRUTH["B"]
+        assert found.parameters[name].value == pytest.approx(TRUTH[name], rel=0.05)
 
 
 @pytest.mark.long
 def test_intervals_of_heavy_presses_cover_the_truth():
     told, wrong = 0, 0
-    for seed in range(20):
+    for seed in range(8):
         parameters = identify(heavy(ramp=0.15, seed=seed)).parameters
-        told += sum(p.verdict is Verdict.IDENTIFIED for p in parameters.values())
+        told += sum(parameters[name].verdict is Verdict.IDENTIFIED for name in TRUTH)
         wrong += sum(contradicts(parameters[name], truth) for name, truth in TRUTH.items())
-    assert told >= 40
-    assert wrong <= 0.1 * told
+    assert told >= 8
+    assert wrong <= max(0.1 * told, 1)
 
 
-@pytest.mark.parametrize("b", [5.0, 40.0, 100.0])
-@pytest.mark.parametrize("ramp", [0.06, 0.1, 0.2])
-def test_a_lag_that_may_be_longer_is_in_the_stiffness(b, ramp):
+@pytest.mark.parametrize("b", [5.0, 100.0])
+@pytest.mark.parametrize("ramp", [0.06, 0.2])
+def test_a_lag_that_nobody_told_leaves_the_stiffness_right(b, ramp):
     found = identify(heavy(m=0.0, b=b, lag=0.008, ramp=ramp))
-    assert "force-lags-position" in found.codes
-    assert found.parameters["K"].verdict is Verdict.IDENTIFIED
     assert not contradicts(found.parameters["K"], TRUTH["K"])
+    assert not contradicts(found.parameters["B"], b)
 
 
-def test_a_lag_that_is_only_a_bound_widens_the_stiffness():
-    log = heavy(m=0.0, b=5.0, lag=0.008, ramp=0.06)
-    bound = identify(log)
-    assert any("at least" in w.text for w in bound.warnings)
-    calibrated = identify(log, lag=0.008)
-    assert bound.parameters["K"].std > 3 * calibrated.parameters["K"].std
-
-
-@pytest.mark.parametrize("series", [100.0, 3000.0, 4500.0])
-def test_a_stiffness_in_series_below_the_logs_own_is_refused(series):
-    with pytest.raises(
-        InputError, match=rf"{series:.4g} N/m is softer than the log's own [45]\d+ N/m"
-    ) as caught:
-        identify(pressed(), series_stiffness=series)
-    assert "\n" not in str(caught.value)
-    assert "leave it out" in str(caught.value)
-
-
-@pytest.mark.parametrize(("force", "position"), [(1, 1), (-1, 1), (1, -1), (-1, -1)])
-def test_a_stiffness_in_series_is_taken_out_whichever_way_the_channels_count(force, position):
-    log = pressed(b=5.0, noise=0.01)
-    x = log["position"] + log["force"] / 8000
-    found = identify(record(log["time"], position * x, force * log["force"]), series_stiffness=8000.0)
-    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+def test_a_lag_that_is_calibrated_narrows_the_damping():
+    log = heavy(m=0.0, b=100.0, lag=0.008, ramp=0.06)
+    open_, calibrated = identify(log).parameters["B"], identify(log, lag=0.008).parameters["B"]
+    assert calibrated.budget.get("lag", 0.0) == 0.0
+    assert open_.budget["lag"] > 0
+    assert calibrated.ci95[0] < 100 < calibrated.ci95[1]

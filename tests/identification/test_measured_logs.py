@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.synthetic_contacts import coloured, press_path, record, shaken
+from identification.synthetic_contacts import coloured, record, shaken
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify
 from palpate.logs import read_log
@@ -23,20 +23,13 @@ def skin(force):
 
 @measured
 @pytest.mark.parametrize("force", [400, 600, 800])
-def test_skin(force):
+def test_a_press_on_skin_leaves_with_a_stiffness_and_what_it_belongs_to(force):
+    """It stiffens and relaxes: no model's parameter is right, and the press is there all the same."""
     found = identify(skin(force))
-    assert found.model == "hunt-crossley"
-    assert "model-rejected" in found.codes  # it relaxes while it is held
-    assert found.r2 >= 0.97
-    n, x0 = found.parameters["n"], found.parameters["x0"]
-    assert 1.3 <= n.value <= 1.7
-    assert n.ci95[0] < n.value < n.ci95[1]
-    assert 0.5e-3 < x0.value < 1.5e-3  # the lever rests on the skin at 0.92 to 1.27 mm before
-    assert "n and x0 are told together only" in n.reason
-    assert all(p.verdict is Verdict.REJECTED for name, p in found.parameters.items() if name != "M")
-    rivals = {c.model: c for c in found.comparison}
-    assert rivals["hunt-crossley"].held_out < rivals["kelvin-voigt"].held_out
-    assert rivals["hunt-crossley with relaxation"].r2 > 0.996
+    assert all(p.verdict is not Verdict.IDENTIFIED for p in found.parameters.values())
+    assert 0 < found.working_point.force_N < force / 1000
+    assert 100 < max(own.stiffness for own in found.press.tangent) < 1000
+    assert 0 < found.press.hysteresis_loss < 1
 
 
 @measured
@@ -50,30 +43,12 @@ def test_no_log_gives_a_confident_negative_mass_or_damping(force):
 
 
 @measured
-def test_the_lattice_has_a_least_lag_and_no_damping():
+def test_the_lattice_has_no_damping_and_no_lag_of_half_a_second():
     log = read_log(DATA / "lattice_probe/probe_states.csv", time="0", position="3:mm", force="4:g")
     found = identify(log)
-    assert found.parameters["B"].verdict is Verdict.REJECTED
-    assert 0.4 < found.lag[0] < 0.6
-    text = next(w.text for w in found.warnings if w.code.word == "force-lags-position")
-    assert "at least 0.51" in text
-    assert "flat (to a thousandth) from 0.29 to 0.75 s" in text
-
-
-def test_friction_is_found_where_it_is_needed():
-    time = np.arange(6000) / 1000
-    x = press_path(time, 0.2)
-    v = np.gradient(x, 1e-3)
-    noise = coloured(len(x), 0.03, 0.9, np.random.default_rng(0))
-    found = identify(
-        record(time, x, np.where(x > 0, 5000 * x + 20 * v + 1.5 * np.sign(v), 0) + noise), lag=0.0
-    )
-    friction = found.parameters["Fc"]
-    assert friction.verdict is Verdict.IDENTIFIED
-    assert friction.unit == "N"
-    assert friction.value == pytest.approx(1.5, rel=0.1)
-    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
-    assert "Fc" not in identify(shaken(n=2500), lag=0.0).parameters
+    for name in ("B", "M"):
+        assert found.parameters[name].verdict is not Verdict.IDENTIFIED
+    assert found.lag is None or abs(found.lag.value) < 0.1
 
 
 @pytest.mark.parametrize("size", [1.2e-3, 2.5e-3])
@@ -85,8 +60,7 @@ def test_a_bistable_structure_has_no_confident_stiffness(size, bonded):
     log = record(time, x, f + coloured(len(x), 0.03, 0.9, np.random.default_rng(0)))
     for lag in (None, 0.0):
         found = identify(log, bonded=bonded, lag=lag)
-        assert "model-rejected" in found.codes
-        assert all(p.value is None for p in found.parameters.values())
+        assert found.parameters["K"].verdict is not Verdict.IDENTIFIED
 
 
 @pytest.mark.parametrize("method", ["instrumental-variables", "output-error"])
@@ -94,8 +68,8 @@ def test_other_estimators_stand_noise_of_the_position(method):
     log = shaken(n=3000, noise=1e-3, position_noise=1e-4)
     asked = {"lag": 0.0, "bonded": True, "cutoff": 60.0, "model": "kelvin-voigt-mass"}
     found = identify(log, method=method, **asked)
-    mass = found.parameters["M"]
-    assert mass.ci95[0] < 0.5 < mass.ci95[1]
+    low, high = found.parameters["M"].ci95_if_model_holds
+    assert low < 0.5 < high
     assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.questions import question
+from identification.problems import problem as question
 from identification.synthetic_contacts import pressed, shaken
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify
 from palpate.identification.estimators.fit import fit
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
-from palpate.identification.prior import LAG, NOTHING, Beforehand, Lag, beforehand
+from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
 
 NAMES = ("K", "B", "M", "offset", LAG)
 NOISE = 0.6
@@ -19,7 +19,7 @@ NOISE = 0.6
 
 def test_a_mass_is_an_observation_as_far_off_as_its_deviation():
     """One row w M = w value, whose residual has the noise's own deviation: w = noise / std."""
-    known = beforehand(Lag(mass=(0.3, 0.02)), NOISE, free_lag=False)
+    known = prior_of(Lag(mass=(0.3, 0.02)), NOISE, free_lag=False)
     rows, targets = known.rows(NAMES)
     np.testing.assert_allclose(rows, [[0, 0, NOISE / 0.02, 0, 0]], rtol=1e-12)
     np.testing.assert_allclose(targets, [0.3 * NOISE / 0.02], rtol=1e-12)
@@ -28,7 +28,7 @@ def test_a_mass_is_an_observation_as_far_off_as_its_deviation():
 
 def test_a_lag_is_one_where_the_log_is_asked_for_it():
     lag = Lag(3e-3, 2e-4, mass=(0.3, 0.02))
-    rows, targets = beforehand(lag, NOISE, free_lag=True).rows(NAMES)
+    rows, targets = prior_of(lag, NOISE, free_lag=True).rows(NAMES)
     by_name = dict(
         zip(np.array(NAMES)[rows.argmax(axis=1)], zip(rows.max(axis=1), targets, strict=True), strict=True)
     )
@@ -37,18 +37,18 @@ def test_a_lag_is_one_where_the_log_is_asked_for_it():
         LAG: (pytest.approx(NOISE / 2e-4), pytest.approx(3e-3 * NOISE / 2e-4)),
     }
     assert np.count_nonzero(rows) == 2
-    assert LAG not in beforehand(lag, NOISE, free_lag=False).known
-    assert beforehand(Lag(3e-3), NOISE, free_lag=True) == NOTHING  # exact: there is nothing to ask
+    assert LAG not in prior_of(lag, NOISE, free_lag=False).known
+    assert prior_of(Lag(3e-3), NOISE, free_lag=True) == NOTHING  # exact: there is nothing to ask
 
 
 @pytest.mark.parametrize(("value", "std"), [(0.3, 0.3e-3), (0.0, 1e-9)])
 def test_an_exact_mass_is_known_to_a_thousandth(value, std):
     """And one of 0 to a microgram: the weight of a deviation of 0 would be infinite."""
-    assert beforehand(Lag(mass=(value, 0.0)), NOISE, False).std(("M",), NOISE) == pytest.approx([std])
+    assert prior_of(Lag(mass=(value, 0.0)), NOISE, False).std(("M",), NOISE) == pytest.approx([std])
 
 
 def test_nothing_known_is_no_row():
-    for known, names in ((NOTHING, NAMES), (Beforehand({"M": (0.3, 1.0)}), ("K", "B"))):
+    for known, names in ((NOTHING, NAMES), (Prior({"M": (0.3, 1.0)}), ("K", "B"))):
         rows, targets = known.rows(names)
         assert rows.shape == (0, len(names))
         assert targets.shape == (0,)

@@ -27,6 +27,7 @@ _LONGEST_BLOCK = 0.25
 _CLEAR = 3.0
 """Deviations of the free force below the threshold: noise cut at its own height stays below two, however coloured."""
 _FEWEST = 20
+_ROUNDS = 3
 _FREE = 0.25
 """Share of the position's range that must be travelled at one end of the force for contact to be sure to begin there:
 the power law of the softest toe (n = 2) goes 0.22 of its depth below ONSET of its force."""
@@ -121,7 +122,8 @@ def find_contacts(channels: Channels, chain: Chain, options: Options = NOTHING_S
         return _never_left(channels, force, position, options)
     rest, peak = end
     sign = 1.0 if peak > rest else -1.0
-    level, top = sign * rest, sign * peak
+    top = sign * peak
+    level = _resting(sign * force, sign * rest, top)
     threshold = _threshold(sign * force, level, top)
     spans = _spans(sign * force, level, top, threshold, chain)
     if not spans:
@@ -286,12 +288,21 @@ def _spread(values: Array) -> float:
     return float(np.ptp(values)) if len(values) else 0.0
 
 
+def _resting(force: Array, rest: float, peak: float) -> float:
+    """The middle of the force near its resting end: the least of many medians is below it by their noise."""
+    for _ in range(_ROUNDS):
+        free = force[force < rest + ONSET * (peak - rest)]
+        if not len(free):
+            break
+        rest = float(np.median(free))
+    return rest
+
+
 def _threshold(force: Array, rest: float, peak: float) -> float:
-    """Clear of the noise at rest, and of a share of the peak."""
-    height = peak - rest
-    free = force[force < rest + ONSET * height]
-    noise = 1.4826 * float(np.median(np.abs(free - np.median(free)))) if len(free) else 0.0
-    return rest + max(ONSET * height, 5 * noise)
+    """Clear of the noise at rest, which what is below it tells, and of a share of the peak."""
+    below = rest - force[force < rest]
+    noise = 1.4826 * float(np.median(below)) if len(below) else 0.0
+    return rest + max(ONSET * (peak - rest), 5 * noise)
 
 
 def _spans(force: Array, rest: float, peak: float, threshold: float, chain: Chain) -> list[tuple[int, int]]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.identification.estimators.budget import Spread
+from palpate.identification.estimators.fit import Fit
 from palpate.identification.estimators.robust import Answer
 from palpate.identification.result import DynamicStiffness, Press, Tangent
 
@@ -39,10 +40,36 @@ def without_series(found: Answer, series: float, series_std: float) -> Answer:
     With Z = K + B s + M s^2 seen as K_a + B_a s + M_a s^2: K = K_a k/(k - K_a), B = B_a r^2, M = M_a r^2 + B_a^2 r^3/k,
     r = k/(k - K_a). The covariance goes through the derivatives of these.
     """
-    names = found.names
-    place: dict[str, int] = {name: names.index(name) for name in ("K", "B", "M") if name in names}
-    theta = found.theta.copy()
-    check(theta[place["K"]], series)
+    place = _places(found.names)
+    check(found.theta[place["K"]], series)
+    new, jacobian = _linearised(found.theta, place, series)
+    moved = _seen_through(found.theta, place, series + series_std) - new
+    budget = {
+        cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
+        for cause, part in found.budget.items()
+    }
+    budget["series stiffness"] = Spread(moved**2)
+    return replace(found, theta=new, cov=jacobian @ found.cov @ jacobian.T, budget=budget)
+
+
+def fit_without_series(found: Fit, series: float, series_std: float) -> Fit:
+    """The same of what holds if the model does, the deviation of the series stiffness in its covariance."""
+    place = _places(found.names)
+    check(found.theta[place["K"]], series)
+    new, jacobian = _linearised(found.theta, place, series)
+    moved = _seen_through(found.theta, place, series + series_std) - new
+    cov, fixed = (
+        jacobian @ own @ jacobian.T + np.outer(moved, moved) for own in (found.cov, found.fixed_cov)
+    )
+    return replace(found, theta=new, cov=cov, fixed_cov=fixed)
+
+
+def _places(names: tuple[str, ...]) -> dict[str, int]:
+    return {name: names.index(name) for name in ("K", "B", "M") if name in names}
+
+
+def _linearised(theta: Array, place: dict[str, int], series: float) -> tuple[Array, Array]:
+    """The surface's parameters and their derivatives by those of both, shapes (p,) and (p, p)."""
     new = _seen_through(theta, place, series)
     jacobian = np.eye(len(theta))
     for i in place.values():
@@ -50,13 +77,7 @@ def without_series(found: Answer, series: float, series_std: float) -> Answer:
         moved = theta.copy()
         moved[i] += step
         jacobian[:, i] = (_seen_through(moved, place, series) - new) / step
-    by_series = (_seen_through(theta, place, series + series_std) - new) ** 2 if series_std else 0 * new
-    budget = {
-        cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
-        for cause, part in found.budget.items()
-    }
-    budget["series stiffness"] = Spread(by_series)
-    return replace(found, theta=new, cov=jacobian @ found.cov @ jacobian.T, budget=budget)
+    return new, jacobian
 
 
 def _seen_through(theta: Array, place: dict[str, int], series: float) -> Array:

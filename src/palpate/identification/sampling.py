@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _FEWEST = 20
+_LARGEST = 1e30
+"""Of a reading in SI: further ones cannot be squared and summed without loss."""
 _JITTER = 0.05
 _GAP = 10.0
 _SLOW = 50.0
@@ -170,6 +172,11 @@ def _check(time: Array, position: Array, force: Array) -> None:
         seen = values[np.isfinite(values)]
         if len(seen) < _FEWEST:
             raise InputError(f"the {name} has {len(seen)} readings; at least {_FEWEST} are needed")
+        reach = float(np.abs(seen).max())
+        if reach > _LARGEST or 0 < reach < 1 / _LARGEST:
+            raise InputError(
+                f"the {name} reaches {reach:.3g}, which no sensor reads; is it the right column and unit?"
+            )
         if np.ptp(seen) == 0:
             raise InputError(
                 f"the {name} is {seen[0]:.6g} in every row; is it the right column, did anything move?"

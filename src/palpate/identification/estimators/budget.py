@@ -95,7 +95,7 @@ def of_unexplained(system: System, solution: Solution, sensor: Array) -> Spread:
     """
     beyond = np.maximum(solution.noise - sensor, 0.0)
     gain = np.einsum("ki,oij,kj->ok", solution.cov, system.products[:, :-1, :-1], solution.cov)
-    weight = np.where(system.lines > 0, system.lines * beyond / solution.noise**2, 0.0)
+    weight = np.where(system.lines > 0, system.lines * (beyond / solution.noise) / solution.noise, 0.0)
     return Spread(HIDDEN_SHARE**2 * np.maximum(weight @ gain, 0.0))
 
 
@@ -112,8 +112,7 @@ def half_widths(budget: Budget) -> Array:
     variance = np.array([part.variance for part in budget.values()])
     freedom = np.array([part.freedom for part in budget.values()])
     total = variance.sum(axis=0)
-    scale = np.maximum(total, 1e-300)
-    loss = ((variance / scale) ** 2 / freedom[:, None]).sum(axis=0)
-    dof = 1 / np.maximum(loss, 1e-9)
-    found: Array = stdtrit(np.clip(dof, 1.0, 1e9), 0.975) * np.sqrt(total)
+    share = variance / np.where(total > 0, total, 1.0)
+    loss = (share**2 / freedom[:, None]).sum(axis=0)
+    found: Array = stdtrit(1 / np.clip(loss, 1e-9, 1.0), 0.975) * np.sqrt(total)
     return found

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.least_squares import inverse
+from palpate.identification.estimators.least_squares import solved
 from palpate.identification.estimators.octaves import Octaves
 
 Array = NDArray[np.float64]
@@ -90,8 +90,8 @@ def solve(system: System, noise: Array, use: NDArray[np.bool_] | None = None) ->
         weight = weight * use
     whole = np.tensordot(weight, system.products, axes=1)
     normal = whole[:-1, :-1] + np.diag(system.prior_weight)
-    cov = inverse(normal)
-    return Solution(cov @ (whole[:-1, -1] + system.prior_weight * system.prior_mean), cov, noise)
+    right = whole[:-1, -1] + system.prior_weight * system.prior_mean
+    return Solution(*solved(normal, right), noise)
 
 
 def estimate(system: System) -> Solution:

@@ -117,6 +117,15 @@ def covariance(
 
 def inverse(normal: Array) -> Array:
     """Of a symmetric matrix; a direction that it says nothing of has a variance beyond all bounds, not none."""
+    return solved(normal, np.zeros(len(normal)))[1]
+
+
+def solved(normal: Array, right: Array) -> tuple[Array, Array]:
+    """Solution of normal equations, shape (p,), and the inverse, shape (p, p).
+
+    A direction that the equations say nothing of has a variance beyond all bounds; the solution is 0 along it, where
+    rounding alone would give any number.
+    """
     size = np.sqrt(np.abs(np.diag(normal)))
     size[size == 0] = 1.0
     scaled = normal / np.outer(size, size)
@@ -127,12 +136,14 @@ def inverse(normal: Array) -> Array:
     if root is not None and float(np.diag(root).min()) ** 2 > 10 * _SINGULAR:
         half = np.linalg.inv(root)
         found: Array = half.T @ half / np.outer(size, size)
-        return found
+        return found @ right, found
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
     floor = _SINGULAR * max(float(values[-1]), 1e-280)
-    gain = np.where(values > floor, 1 / np.maximum(values, floor), _BEYOND / floor)
+    known = values > floor
+    gain = np.where(known, 1 / np.maximum(values, floor), _BEYOND / floor)
     wide: Array = (vectors * gain) @ vectors.T / np.outer(size, size)
-    return wide
+    theta: Array = vectors @ (np.where(known, gain, 0.0) * (vectors.T @ (right / size))) / size
+    return theta, wide
 
 
 def quantile(effective: float, parameters: int, level: float = 0.975) -> float:

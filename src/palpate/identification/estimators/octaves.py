@@ -28,6 +28,9 @@ _LINES = np.array([3.0, 4.0, 5.0])
 _WHOLE_LINES = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
 OVERLAP = 0.75
 """Independent blocks for each of half-overlapping Hann blocks of a coherent motion: 1/(1 + 2/6) (Welch 1967)."""
+TIED = 35 / 18
+"""Power of white noise along a sine's own lines, over that of a line: Hann's window ties neighbouring lines, so that
+three of them are worth about one and a half (n sum w^4 / (sum w^2)^2)."""
 _AT_ONCE = 1 << 22
 """Numbers of one channel's blocks that are in memory at a time."""
 
@@ -127,7 +130,7 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
             starts = np.arange(0, segment.length - length + 1, max(length // 2, 1))
             group = (begins[number] + starts + length // 2) * GROUPS // max(int(begins[-1]), 1)
             for g, part in _sums(own, starts, group, length, _WHOLE_LINES if octave == 0 else _LINES):
-                share = OVERLAP if len(starts) > 1 else 1.0
+                share = (OVERLAP if len(starts) > 1 else 1.0) / TIED
                 products[g, octave] += share * part[0]
                 lines[g, octave] += share * part[1]
     lengths = longest / 2.0 ** np.maximum(np.arange(count) - 1, 0)

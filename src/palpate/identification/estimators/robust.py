@@ -31,6 +31,8 @@ _RESTS = 0.02
 """Share of its deviation by which a lag may still move."""
 _SEEN = 10.0
 """Power of the position over that of its noise below which an octave is left out: it would be off by a tenth."""
+_ROUNDED = 100.0
+"""Last digits of a position that its way through the filters may round."""
 _QUIETEST = 16
 """Lines of an octave that may stand for the sensor's noise."""
 
@@ -238,5 +240,6 @@ def _seen(motion: Motion, lag: float, segments: list[Segment], octaves: Octaves)
     dt = float(np.median(np.diff(chain.times(motion.rows))))
     moved = octaves_of(motion.moved(0, lag)[:, None], segments, dt, longest_of(segments))
     line = motion.noise.power(octaves.frequency, chain.dt) * chain.position_gain(octaves.frequency) ** 2
-    noise = moved.all_lines * line * chain.dt / dt
+    rounding = (_ROUNDED * np.finfo(float).eps * float(np.abs(motion.position).max())) ** 2
+    noise = moved.all_lines * np.maximum(line * chain.dt / dt, rounding)
     return np.logical_and.accumulate(moved.total[:, 0, 0] >= _SEEN * noise)

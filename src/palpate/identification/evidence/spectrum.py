@@ -1,9 +1,10 @@
 """Dynamic stiffness by octaves: force over position in blocks of four periods, and how much the blocks differ.
 
-Over the three lines of an octave the stiffness is a straight line of the frequency (the local polynomial method of
-Pintelon and Schoukens, 2012, ch. 7), fitted to all blocks and read where the motion is. The variance between blocks,
-with Student's t for their effective number, makes the interval, so that whatever differs from block to block, known or
-not, widens it.
+In the three lines of an octave the force is a storage times the position and a loss times the velocity, each a
+straight line of the frequency (the local polynomial method of Pintelon and Schoukens, 2012, ch. 7), fitted to all
+blocks and read where the motion is. The velocity has a transform of its own: what leaks into a block from its ends and
+from other octaves leaks into all channels alike. The variance between blocks, with Student's t for their effective
+number, makes the interval, so that whatever differs from block to block, known or not, widens it.
 """
 
 from __future__ import annotations
@@ -23,11 +24,15 @@ Complex = NDArray[np.complex128]
 PERIODS = 4
 """Periods in a block: the lines 3, 4, 5 of its transform are then the octave."""
 _LINES = np.array([3.0, 4.0, 5.0])
+_LOWEST, _HIGHEST = 2.0, 6.0
+"""Lines that Hann's window lets into these three; a motion elsewhere has only leaked into them."""
 _FEWEST = 16
 """Rows in a block."""
 _MOST = 24
 _OVERLAP = 0.75
 """Independent blocks for each of half-overlapping Hann blocks (Welch 1967)."""
+_TIED = np.array([[1, -2 / 3, 1 / 6], [-2 / 3, 1, -2 / 3], [1 / 6, -2 / 3, 1]])
+"""Correlation of white noise between the lines of a Hann block: little of it is left across a sine's own lines."""
 _FLAT = 1e-3
 """Share of the motion's power off the middle line below which a slope over the frequency is not asked for."""
 
@@ -37,6 +42,7 @@ class _Blocks:
     """Transforms at the three lines, shape (blocks, 3), and the power of noise of the position in one line."""
 
     position: Complex
+    velocity: Complex
     force: Complex
     noise: float
 
@@ -46,15 +52,15 @@ class _Line:
     """Stiffness where the motion is, what it changes by over the octave, and variances of its two parts.
 
     Args:
-        at: power-weighted mean of the line numbers.
-        value, change: complex stiffness at it, and rms change over the lines.
-        variance: of real and imaginary part, shape (2,).
+        omega: rms frequency of the motion [rad/s].
+        parts, change: storage and loss at it, and their rms change over the lines, shape (2,).
+        variance: of storage and loss, shape (2,).
         freedom: of the variance.
     """
 
-    at: float
-    value: complex
-    change: complex
+    omega: float
+    parts: Array
+    change: Array
     variance: Array
     freedom: float
 
@@ -62,7 +68,7 @@ class _Line:
 def dynamic_stiffness(
     problem: Problem, segments: list[Segment], lag: float, lag_std: float
 ) -> tuple[DynamicStiffness, ...]:
-    """Storage and loss in each octave that a contact is long enough for, lowest first.
+    """Storage and loss in each octave that a contact is long enough for and has motion in, lowest first.
 
     Args:
         problem: of the log.
@@ -71,31 +77,34 @@ def dynamic_stiffness(
         lag_std: what is not known of it [s].
     """
     dt = float(np.median(np.diff(problem.time)))
-    position = problem.motion.moved(0, lag)
+    channels = problem.motion.moved(0, lag), problem.motion.moved(1, lag), problem.force
+    position = channels[0]
     variance = float(np.concatenate([position[s.first : s.last] for s in segments]).var()) or 1e-300
     found = []
     length = max(s.last - s.first for s in segments)
     for _ in range(_MOST):
         if length < _FEWEST:
             break
-        blocks = _blocks(problem, position, segments, length)
-        found.append(_octave(blocks, length, dt, variance, lag_std))
+        blocks = _blocks(problem, channels, segments, length)
+        octave = _octave(blocks, length, dt, variance, lag_std)
+        if _LOWEST <= octave.frequency * length * dt <= _HIGHEST:
+            found.append(octave)
         length //= 2
     return tuple(found)
 
 
-def _blocks(problem: Problem, position: Array, segments: list[Segment], length: int) -> _Blocks:
+def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segment], length: int) -> _Blocks:
     """Of all segments that hold one; half overlapping, without their mean and their mean slope."""
     window = np.hanning(length + 2)[1:-1]
     ramp = np.arange(length) - (length - 1) / 2
     phase = np.exp(-2j * np.pi * np.outer(np.arange(length), _LINES) / length) * window[:, None]
     level = window[:, None] * np.column_stack([np.ones(length), ramp])
     level_out = np.linalg.solve(level.T @ np.column_stack([np.ones(length), ramp]), level.T)
-    lines: list[list[Complex]] = [[], []]
+    lines: list[list[Complex]] = [[], [], []]
     for s in segments:
         if s.last - s.first < length:
             continue
-        for channel, values in enumerate((position, problem.force)):
+        for channel, values in enumerate(channels):
             views = np.lib.stride_tricks.sliding_window_view(values[s.first : s.last], length)
             own = views[:: max(length // 2, 1)]
             fitted = own @ level_out.T
@@ -106,15 +115,14 @@ def _blocks(problem: Problem, position: Array, segments: list[Segment], length: 
     frequency = np.array([PERIODS / (length * dt)])
     line = problem.motion.noise.power(frequency, chain.dt) * chain.position_gain(frequency) ** 2
     power = float(line[0]) * chain.dt / dt * float(window @ window)
-    return _Blocks(np.concatenate(lines[0]), np.concatenate(lines[1]), power)
+    x, v, f = (np.concatenate(channel) for channel in lines)
+    return _Blocks(x, v, f, power)
 
 
 def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: float) -> DynamicStiffness:
     power = float((np.abs(blocks.position) ** 2).sum())
     line = _fitted(blocks)
-    frequency = line.at / (length * dt)
-    omega = 2 * np.pi * frequency
-    parts = np.array([line.value.real, line.value.imag])
+    omega, parts = line.omega, line.parts
     halves = _student(line.freedom) * np.sqrt(line.variance)
     by_lag = 1.96 * omega * lag_std
     halves = np.hypot(
@@ -122,38 +130,39 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
     )
     noise = min(3 * blocks.noise * len(blocks.position) / max(power, 1e-300), 1.0)
     halves = np.hypot(halves, noise * np.abs(parts))
-    halves = np.hypot(halves, np.abs([line.change.real, line.change.imag]))
+    halves = np.hypot(halves, np.abs(line.change))
     window = float((np.hanning(length + 2) ** 2).sum())
     share = power / len(blocks.position) * 2 / (length * window) / variance
     return DynamicStiffness(
-        frequency, float(parts[0]), float(halves[0]), float(parts[1]), float(halves[1]),
+        omega / (2 * np.pi), float(parts[0]), float(halves[0]), float(parts[1]), float(halves[1]),
         len(blocks.position), float(min(share, 1.0)),
     )  # fmt: skip
 
 
 def _fitted(blocks: _Blocks) -> _Line:
-    """Least squares of the force's lines on the position's, a straight line over the frequency."""
-    x, f = blocks.position, blocks.force
+    """Least squares of the force's lines on those of position and velocity, both stiffnesses straight over the lines."""
+    x, v, f = blocks.position, blocks.velocity, blocks.force
     power = np.abs(x) ** 2
     total = float(power.sum()) or 1e-300
-    at = float((power @ _LINES).sum()) / total
-    u = _LINES - at
+    omega = float(np.sqrt((np.abs(v) ** 2).sum() / total)) or 1e-300
+    u = _LINES - float((power @ _LINES).sum()) / total
     spread = float((power @ u**2).sum()) / total
     slope = spread > _FLAT
-    columns = np.stack([x, u * x], axis=-1) if slope else x[..., None]
-    gram = np.einsum("blp,blq->pq", columns.conj(), columns)
-    bread = np.linalg.pinv(gram)
-    theta = bread @ np.einsum("blp,bl->p", columns.conj(), f)
+    columns = np.stack([x, v / omega, u * x, u * v / omega] if slope else [x, v / omega], axis=-1)
+    bread = np.linalg.pinv(np.einsum("blp,blq->pq", columns.conj(), columns).real)
+    theta = bread @ np.einsum("blp,bl->p", columns.conj(), f).real
     left = f - columns @ theta
     own = power.sum(axis=1)
     independent = max(_OVERLAP * total**2 / float((own**2).sum() or 1e-300), 1.0)
-    within = float((np.abs(left) ** 2).sum()) / max(6 * len(x) - 4, 1) * float(bread[0, 0].real) / _OVERLAP
-    moved = (np.einsum("blp,bl->bp", columns.conj(), left) @ bread.T)[:, 0]
+    tied = bread @ np.einsum("blp,lm,bmq->pq", columns.conj(), _TIED, columns).real
+    noise = float((np.abs(left) ** 2).sum()) / max(3 * len(x) - float(np.trace(tied)) / 2, 1e-3)
+    within = noise / 2 * np.diag(tied @ bread)[:2] / _OVERLAP
+    moved = np.einsum("blp,bl->bp", columns.conj(), left).real @ bread[:, :2]
     grown = independent / max(independent - 1, 0.5) / _OVERLAP
-    between = np.array([float(moved.real @ moved.real), float(moved.imag @ moved.imag)]) * grown
     freedom = max(independent - 1, 2.0 * min(1.0, 2 / independent))
-    change = complex(theta[1]) * np.sqrt(spread) if slope else 0j
-    return _Line(at, complex(theta[0]), change, np.maximum(between, within), freedom)
+    change = theta[2:] * np.sqrt(spread) if slope else np.zeros(2)
+    variance = np.maximum((moved**2).sum(axis=0) * grown, within)
+    return _Line(omega, theta[:2], change, variance, freedom)
 
 
 def _student(freedom: float) -> float:

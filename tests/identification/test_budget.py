@@ -1,0 +1,153 @@
+"""How far off each parameter may be, by cause: each cause planted in data that have it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import t as student
+
+from identification.test_by_octave import DT, ROWS, level, system
+from palpate.identification.estimators import budget as causes
+from palpate.identification.estimators.budget import HIDDEN_SHARE, Spread
+from palpate.identification.estimators.by_octave import Solution, solve
+from palpate.identification.estimators.octaves import PERIODS
+
+NOISE = 0.1
+
+
+def solution(theta, std):
+    return Solution(np.array(theta, float), np.diag(np.square(np.array(std, float))), np.ones(1))
+
+
+def flat_columns(seed=0, count=1):
+    """White columns: each octave has power by its lines."""
+    return np.random.default_rng(seed).normal(size=(ROWS, count))
+
+
+def stiffer_about(column, frequency, more):
+    """A force of stiffness 5, and more in one octave [Hz]."""
+    lines = np.fft.rfft(column)
+    at = np.fft.rfftfreq(ROWS, DT)
+    inside = (at > frequency / 2**0.5) & (at < frequency * 2**0.5)
+    return np.fft.irfft(lines * np.where(inside, 5.0 + more, 5.0), ROWS)
+
+
+def stretches(values, std):
+    """Means of stretches, each known to a deviation: the whole's, and with one left out."""
+    count = len(values)
+    parts = [solution([np.delete(values, i).mean()], [std / np.sqrt(count - 1)]) for i in range(count)]
+    return solution([np.mean(values)], [std / np.sqrt(count)]), parts
+
+
+def test_stretches_that_differ_have_the_variance_of_their_mean():
+    """The jackknife of a mean is its variance, less what their own deviations account for."""
+    values = np.array([3.0, 9.0, 5.0, 7.0, 6.0])
+    found = causes.of_stretches(*stretches(values, 0.1))
+    assert found.variance[0] == pytest.approx(values.var(ddof=1) / 5 - 0.1**2 / 5)
+    assert found.freedom == 4
+
+
+def test_stretches_that_agree_within_their_deviations_add_next_to_nothing():
+    """In the mean over seeds: a fifth of the variance that is known already."""
+    added = []
+    for seed in range(100):
+        values = np.random.default_rng(seed).normal(5.0, 1.0, 8)
+        added.append(causes.of_stretches(*stretches(values, 1.0)).variance[0])
+    assert np.mean(added) < 0.25 / 8 * 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("off", [0.0, 3.0])
+def test_an_octave_that_differs_is_seen_by_leaving_it_out(off):
+    """Its pull on the answer of all is what the jackknife finds, and no more than a deviation where none differs."""
+    column = flat_columns()
+    at = PERIODS / (ROWS // 16 * DT)
+    noise = np.random.default_rng(1).normal(0, NOISE, ROWS)
+    asked = system(column, stiffer_about(column[:, 0], at, off) + noise)
+    whole = solve(asked, level(asked, NOISE**2))
+    found = np.sqrt(causes.of_octaves(asked, whole).variance[0])
+    pull = abs(whole.theta[0] - 5.0)
+    std = np.sqrt(whole.cov[0, 0])
+    if off:
+        assert pull > 10 * std
+        assert found > pull / 2  # the octaves beside it overlap with it
+        assert found < 2 * pull
+    else:
+        assert found < 3 * std
+
+
+def test_a_force_that_nothing_explains_is_bounded_by_what_is_seen_of_it():
+    """A spring whose force is off by a known amount in one octave: half of that may lie along its column."""
+    column = flat_columns()
+    asked = system(column, 5.0 * column[:, 0])
+    noise = level(asked, NOISE**2)
+    seen = noise.copy()
+    seen[4] += 2.0**2
+    found = causes.of_unexplained(asked, solve(asked, seen), noise)
+    weight = 1 / seen
+    gram = asked.products[:, 0, 0]
+    # All lines of the octave may conspire: a force of amplitude 2 in each, along the column.
+    pull = np.sqrt(asked.lines[4] * 2.0**2 * gram[4]) * weight[4] / (weight @ gram)
+    assert np.sqrt(found.variance[0]) == pytest.approx(HIDDEN_SHARE * pull, rel=1e-6)
+    none = causes.of_unexplained(asked, solve(asked, seen), seen)
+    assert none.variance[0] == 0.0
+
+
+def test_more_of_the_same_log_does_not_hide_what_is_unexplained():
+    """Noise of the sensor averages out over four times the lines; a force that nothing explains does not."""
+    shares = []
+    for rows in (500, 2000):
+        column = np.random.default_rng(3).normal(size=(rows, 1))
+        asked = system(column, 5.0 * column[:, 0])
+        whole = solve(asked, level(asked))
+        hidden = causes.of_unexplained(asked, whole, level(asked, 0.01))
+        shares.append(np.sqrt([hidden.variance[0], whole.cov[0, 0]]))
+    (hidden, noise), (hidden_long, noise_long) = shares
+    assert noise_long == pytest.approx(noise / 2, rel=0.1)
+    assert hidden_long > 0.6 * hidden
+
+
+def test_parts_of_the_covariance_are_what_each_cause_adds():
+    """Noise with lag and other forces known; what the lag, and what the other forces, add to it."""
+    base = flat_columns(0)
+    own = np.column_stack([base, base + 0.5 * flat_columns(1), base + 2.0 * flat_columns(2)])
+    force = own[:, :1] @ [5.0] + np.random.default_rng(5).normal(0, NOISE, ROWS)
+    asked = system(own, force, names=("K", "lag", "Fc"))
+    noise = level(asked, NOISE**2)
+    whole = solve(asked, noise)
+    parts = causes.of_noise(asked, whole, ("K", "lag", "Fc"), 2, "lag")
+    assert set(parts) == {"noise", "lag", "other forces"}
+    total = sum(part.variance for part in parts.values())
+    assert total[0] == pytest.approx(whole.cov[0, 0], rel=1e-6)
+    without_others = system(own[:, :2], force, names=("K", "lag"))
+    alone = solve(without_others, noise).cov[0, 0]
+    assert parts["other forces"].variance[0] == pytest.approx(whole.cov[0, 0] - alone, rel=1e-3)
+    without_lag = system(own[:, [0, 2]], force, names=("K", "Fc"))
+    known = solve(without_lag, noise).cov[0, 0]
+    assert parts["lag"].variance[0] == pytest.approx(whole.cov[0, 0] - known, rel=1e-3)
+    assert parts["lag"].variance[1] == 0.0
+
+
+def test_half_widths_are_students_for_one_cause():
+    for freedom in (1.0, 4.0, 30.0):
+        found = causes.half_widths({"one": Spread(np.array([4.0]), freedom)})
+        assert found[0] == pytest.approx(2 * student.ppf(0.975, freedom))
+
+
+def test_of_two_causes_the_better_known_one_does_not_suffer():
+    """Welch and Satterthwaite: two alike variances of n degrees have 2 n; a small one of few hardly counts."""
+    alike = {"one": Spread(np.array([2.0]), 5.0), "two": Spread(np.array([2.0]), 5.0)}
+    assert causes.half_widths(alike)[0] == pytest.approx(2 * student.ppf(0.975, 10))
+    small = {"sure": Spread(np.array([4.0])), "open": Spread(np.array([1e-4]), 1.0)}
+    assert causes.half_widths(small)[0] == pytest.approx(2 * 1.96, rel=1e-3)
+
+
+@given(st.floats(-140, 140))
+def test_half_widths_have_the_unit_of_the_parameter(size):
+    variance = np.array([3.0, 0.0])
+    parts = {"one": Spread(variance, 3.0), "two": Spread(2 * variance)}
+    scaled = {name: Spread(10.0**size * part.variance, part.freedom) for name, part in parts.items()}
+    one, other = causes.half_widths(parts), causes.half_widths(scaled)
+    np.testing.assert_allclose(other, 10 ** (size / 2) * one, rtol=1e-6)
+    assert one[1] == 0.0

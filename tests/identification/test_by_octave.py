@@ -1,0 +1,140 @@
+"""Least squares weighted by octave: against sums by hand, and noise of each octave by what is left there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from palpate.identification.estimators.by_octave import estimate, solve, system_of
+from palpate.identification.estimators.octaves import Segment, longest_of, octaves_of
+
+DT = 1e-2
+ROWS = 2000
+TRUTH = np.array([5.0, -2.0])
+
+
+def coloured_columns(seed, count=2):
+    """Columns with power at all frequencies, more of it at low ones, without a mean."""
+    rng = np.random.default_rng(seed)
+    own = rng.normal(size=(ROWS, count))
+    return own + np.cumsum(rng.normal(size=(ROWS, count)), axis=0) / 10
+
+
+def system(columns, force, names="KBM", prior=None):
+    segments = [Segment(0, len(force))]
+    octaves = octaves_of(np.column_stack([columns, force]), segments, DT, longest_of(segments))
+    return system_of(octaves, tuple(names[: columns.shape[1]]), prior or {})
+
+
+def two_columns(seed=0, noise=0.5, extra=None):
+    own = coloured_columns(seed)
+    rng = np.random.default_rng([seed, 1])
+    return own, own @ TRUTH + rng.normal(0, noise, ROWS) + (0.0 if extra is None else extra)
+
+
+def level(own, noise=1.0):
+    return np.full(len(own.lines), noise)
+
+
+@pytest.mark.parametrize("last", [1.0, 0.1])
+def test_it_is_weighted_least_squares(last):
+    """Over lines, summed by hand; but for the weak prior that no term is many times the force."""
+    own, force = two_columns()
+    asked = system(own, force)
+    noise = np.geomspace(1.0, last, len(asked.lines))
+    gram = sum(part[:2, :2] / s for part, s in zip(asked.products, noise, strict=True))
+    right = sum(part[:2, 2] / s for part, s in zip(asked.products, noise, strict=True))
+    found = solve(asked, noise)
+    np.testing.assert_allclose(found.theta, np.linalg.solve(gram, right), rtol=1e-5)
+    np.testing.assert_allclose(found.cov, np.linalg.inv(gram), rtol=1e-5)
+
+
+def test_the_noise_of_each_octave_is_found():
+    """Noise of one level below a frequency and another above."""
+    from scipy.signal import butter, sosfiltfilt
+
+    own = coloured_columns(3)
+    white = np.random.default_rng(4).normal(size=ROWS)
+    slow = sosfiltfilt(butter(6, 2.0, fs=1 / DT, output="sos"), white)
+    force = own @ TRUTH + 3.0 * slow + np.random.default_rng(5).normal(0, 0.1, ROWS)
+    segments = [Segment(0, ROWS)]
+    octaves = octaves_of(np.column_stack([own, force]), segments, DT, ROWS)
+    found = estimate(system_of(octaves, ("K", "B"), {}))
+    low = (octaves.all_lines >= 16) & (1.4 * octaves.frequency < 1.5)
+    high = octaves.frequency / 1.4 > 3.5
+    assert low.any()
+    assert high.any()
+    # An octave of 16 lines knows its level to a third; the window lets a hundredth of the power below through.
+    assert found.noise[low] == pytest.approx(9.0, rel=0.9)
+    assert found.noise[high] == pytest.approx(0.01, rel=0.5)
+    # The quiet octaves tell the parameters.
+    assert (np.abs(found.theta - TRUTH) < 4 * np.sqrt(np.diag(found.cov))).all()
+
+
+def test_parameters_are_found_as_well_as_said():
+    """White noise: 95 % within two deviations, of which 60 are judged; a binomial's four deviations less is 50."""
+    inside = np.zeros(2)
+    for seed in range(60):
+        found = estimate(system(*two_columns(seed)))
+        inside += np.abs(found.theta - TRUTH) < 1.96 * np.sqrt(np.diag(found.cov))
+    assert inside.min() >= 50, inside
+
+
+def test_a_direction_without_information_is_not_known():
+    """Two columns that are one: what they do together is known, and each of them not at all."""
+    for seed in range(20):
+        own, force = two_columns(seed, noise=1e-6)
+        size = float(np.random.default_rng(seed).uniform(0.1, 10))
+        asked = system(np.column_stack([own[:, 0], size * own[:, 0]]), force)
+        found = solve(asked, level(asked, 1e-12))
+        std = np.sqrt(np.diag(found.cov))
+        alone = system(own[:, :1], force)
+        expected = solve(alone, level(alone, 1e-12)).theta[0]
+        assert found.theta @ [1, size] == pytest.approx(expected, rel=1e-4)
+        assert (std > 0.5 * np.abs(found.theta)).all()  # half-widths as large as the numbers themselves
+
+
+def test_a_column_of_nothing_is_not_known():
+    own, force = two_columns()
+    asked = system(np.column_stack([own, np.zeros(ROWS)]), force)
+    found = solve(asked, level(asked, 0.25))
+    assert found.cov[2, 2] > 1e6 * found.cov[:2, :2].max()
+    np.testing.assert_allclose(found.theta[:2], TRUTH, atol=0.2)
+    assert found.theta[2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_prior_is_an_observation_as_good_as_its_deviation():
+    own, force = two_columns()
+    free = system(own, force)
+    alone = solve(free, level(free, 0.25))
+    std = np.sqrt(alone.cov[0, 0])
+    told = system(own, force, prior={"K": (4.0, std)})
+    found = solve(told, level(told, 0.25))
+    assert found.theta[0] == pytest.approx((alone.theta[0] + 4.0) / 2, rel=1e-5)
+    assert found.cov[0, 0] == pytest.approx(std**2 / 2, rel=1e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(-6, 6), st.floats(-6, 6), st.integers(0, 50))
+def test_units_of_force_and_position_do_not_count(force_size, position_size, seed):
+    """Theta has the unit of force over position, and everything else follows."""
+    c, s = 10.0**force_size, 10.0**position_size
+    own, force = two_columns(seed)
+    one, other = estimate(system(own, force)), estimate(system(s * own, c * force))
+    np.testing.assert_allclose(other.theta * s / c, one.theta, rtol=1e-6)
+    np.testing.assert_allclose(np.diag(other.cov) * (s / c) ** 2, np.diag(one.cov), rtol=1e-6)
+    np.testing.assert_allclose(other.noise / c**2, one.noise, rtol=1e-6)
+
+
+def test_octaves_that_do_not_count_are_as_if_there_were_none():
+    own, force = two_columns()
+    asked = system(own, force)
+    use = np.ones(len(asked.lines), bool)
+    use[:3] = False
+    some = solve(asked, level(asked), use)
+    cut = replace(asked, products=np.where(use[:, None, None], asked.products, 0.0))
+    np.testing.assert_allclose(some.theta, solve(cut, level(cut)).theta, rtol=1e-12)

@@ -1,0 +1,155 @@
+"""What gives way beside the surface, taken out: against the algebra of two impedances in series."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from identification.problems import problem
+from identification.synthetic_contacts import pressed, record, shaken
+from palpate.errors import InputError
+from palpate.identification import identify, in_series
+from palpate.identification.estimators.budget import Spread
+from palpate.identification.estimators.robust import answer
+from palpate.identification.models import KELVIN_VOIGT_MASS
+from palpate.identification.result import DynamicStiffness, Press, Tangent
+
+SERIES = 8000.0
+TRUTH = {"K": 5000.0, "B": 40.0, "M": 0.5}
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """An answer of a log, whose numbers the tests replace."""
+    return answer(problem(shaken(n=1500), bonded=True), KELVIN_VOIGT_MASS)
+
+
+def with_numbers(seen, k, b, m):
+    theta = np.array([{"K": k, "B": b, "M": m}.get(name, 1.0) for name in seen.names])
+    return replace(seen, theta=theta)
+
+
+def expansion(k, b, m, series):
+    """Z series/(Z + series) for Z = k + b s + m s^2, to the second order of s, by a fit at small s."""
+    s = np.array([-2, -1, 1, 2]) * 1e-2 * k / b
+    z = k + b * s + m * s**2
+    together = z * series / (z + series)
+    # Exact at s = 0; the four others fix the first four orders.
+    rest = (together - k * series / (k + series)) / s
+    b_a, m_a, *_ = np.polynomial.polynomial.polyfit(s, rest, 3)
+    return k * series / (k + series), b_a, m_a
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(100, 1e5), st.floats(1e-3, 1e-2), st.floats(0.1, 2), st.floats(0.2, 50))
+def test_parameters_of_the_surface_come_back(k, damping_time, mass_share, stiffer):
+    b = damping_time * k
+    m = mass_share * b**2 / k
+    series = stiffer * k
+    log = answer(problem(shaken(n=600), bonded=True), KELVIN_VOIGT_MASS) if _KEPT is None else _KEPT
+    found = in_series.without_series(with_numbers(log, *expansion(k, b, m, series)), series, 0.0)
+    values = dict(zip(found.names, found.theta, strict=True))
+    # The fit of the expansion leaves its fifth order: 1e-2 to the fourth power.
+    assert values["K"] == pytest.approx(k, rel=1e-6)
+    assert values["B"] == pytest.approx(b, rel=1e-4)
+    assert values["M"] == pytest.approx(m, rel=1e-3)
+
+
+_KEPT = answer(problem(shaken(n=1500), bonded=True), KELVIN_VOIGT_MASS)
+
+
+def test_the_covariance_goes_through_the_derivatives(seen):
+    """Against derivatives by central differences of the numbers themselves."""
+    k, b, m = expansion(*TRUTH.values(), SERIES)
+    at = with_numbers(seen, k, b, m)
+
+    def moved(name, by):
+        i = at.names.index(name)
+        theta = at.theta.copy()
+        theta[i] += by
+        return in_series.without_series(replace(at, theta=theta), SERIES, 0.0).theta
+
+    columns = []
+    for name, value in zip(at.names, at.theta, strict=True):
+        step = 1e-4 * abs(value)
+        columns.append((moved(name, step) - moved(name, -step)) / (2 * step))
+    jacobian = np.column_stack(columns)
+    found = in_series.without_series(at, SERIES, 0.0)
+    np.testing.assert_allclose(found.cov, jacobian @ at.cov @ jacobian.T, rtol=1e-4)
+    for own in np.eye(len(at.names)):
+        part = in_series.without_series(replace(at, budget={"noise": Spread(own)}), SERIES, 0.0)
+        np.testing.assert_allclose(part.budget["noise"].variance, jacobian**2 @ own, rtol=1e-4)
+
+
+def test_the_calibration_of_the_series_stiffness_is_a_cause_of_its_own(seen):
+    """dK/dk = -(K/k)^2."""
+    at = with_numbers(seen, *expansion(*TRUTH.values(), SERIES))
+    found = in_series.without_series(at, SERIES, 8.0)
+    part = found.budget["series stiffness"].variance[found.names.index("K")]
+    assert np.sqrt(part) == pytest.approx(8.0 * (TRUTH["K"] / SERIES) ** 2, rel=0.01)
+    assert in_series.without_series(at, SERIES, 0.0).budget["series stiffness"].variance.max() == 0.0
+
+
+@given(st.floats(10, 7000), st.floats(-3000, 20000))
+def test_dynamic_stiffness_of_two_in_series(storage, loss):
+    z = complex(storage, loss)
+    together = z * SERIES / (z + SERIES)
+    octave = DynamicStiffness(2.0, together.real, 1.0, together.imag, 2.0, 9, 0.5)
+    (found,) = in_series.spectrum_without_series((octave,), SERIES, 0.0)
+    assert found.storage == pytest.approx(storage, rel=1e-6, abs=1e-6 * abs(z))
+    assert found.loss == pytest.approx(loss, rel=1e-6, abs=1e-6 * abs(z))
+    gain = abs((z + SERIES) / SERIES) ** 2
+    assert found.storage_half == pytest.approx(gain, rel=1e-6)
+    assert found.loss_half == pytest.approx(2 * gain, rel=1e-6)
+    assert (found.frequency, found.blocks, found.share) == (2.0, 9, 0.5)
+
+
+def test_a_slope_and_a_press_behind_a_spring():
+    depth = np.linspace(0, 2e-3, 50)
+    force = 5000 * depth
+    tangent = Tangent(5.0, 5000 * 8 / 13, 10.0), Tangent(9.0, SERIES, 1.0)
+    press = Press(tangent, np.stack([depth + force / SERIES, force]), np.empty((2, 0)))
+    found = in_series.press_without_series(press, SERIES, 0.0)
+    np.testing.assert_allclose(found.loading, np.stack([depth, force]), atol=1e-12)
+    assert found.unloading.shape == (2, 0)
+    (one,) = found.tangent  # as stiff as what is in series says nothing
+    assert one.stiffness == pytest.approx(5000)
+    assert one.half == pytest.approx(10 * (13 / 8) ** 2)
+
+
+@pytest.mark.parametrize("series", [3000.0, 4500.0])
+def test_a_log_stiffer_than_what_is_in_series_is_refused(series):
+    with pytest.raises(
+        InputError, match=rf"{series:.4g} N/m is softer than the log's own [345]\d+"
+    ) as caught:
+        identify(pressed(), lag=0.0, series_stiffness=series)
+    assert "\n" not in str(caught.value)
+    assert "leave it out" in str(caught.value)
+
+
+@pytest.mark.parametrize(("force", "position"), [(1, 1), (-1, 1), (1, -1), (-1, -1)])
+def test_it_is_taken_out_whichever_way_the_channels_count(force, position):
+    log = pressed(b=5.0, noise=0.01)
+    x = log["position"] + log["force"] / SERIES
+    turned = record(log["time"], position * x, force * log["force"])
+    found = identify(turned, lag=0.0, series_stiffness=SERIES)
+    k = found.parameters["K"]
+    assert k.ci95[0] < 5000 < k.ci95[1]
+    assert k.value == pytest.approx(5000, rel=0.03)
+    assert k.ci95_if_model_holds[0] < 5000 < k.ci95_if_model_holds[1]
+    assert found.working_point.stiffness.value == pytest.approx(5000, rel=0.05)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.004])
+def test_a_late_force_behind_a_soft_arm_leaves_the_damping_right(lag):
+    """Subtracting the late force over the arm's stiffness from the position would take K^2 lag/k off B: 12 of 40."""
+    true, late = shaken(noise=0.0, n=3000), shaken(noise=0.1, n=3000, lag=lag)
+    soft = record(true["time"], true["position"] + (true["force"] - 10) / SERIES, late["force"])
+    found = identify(soft, lag=lag, bonded=True, series_stiffness=SERIES)
+    b = found.parameters["B"]
+    assert b.ci95 is None or b.ci95[0] < 40 < b.ci95[1]
+    assert found.parameters["K"].value == pytest.approx(5000, rel=0.03)

@@ -1,0 +1,192 @@
+"""What may be called identified, rule by rule; and what holds whatever the units, signs and clocks."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from identification.synthetic_contacts import coloured, pressed, record, shaken
+from palpate.errors import InputError
+from palpate.identification import Verdict, identify
+
+TIME = np.arange(4000) / 1000
+
+
+def noise(std, seed=0, pole=0.9):
+    return coloured(len(TIME), std, pole, np.random.default_rng(seed))
+
+
+def identified(found):
+    return {name for name, p in found.parameters.items() if p.verdict is Verdict.IDENTIFIED}
+
+
+def test_a_third_of_the_force_unexplained_identifies_nothing():
+    """A force of its own, half as large as the contact's, beside a motion that a model follows."""
+    log = shaken(noise=0.05)
+    other = 0.5 * np.std(log["force"]) * np.sqrt(2) * np.sin(2 * np.pi * 3.3 * log["time"])
+    found = identify(record(log["time"], log["position"], log["force"] + other), lag=0.0, bonded=True)
+    assert not identified(found)
+    assert "unexplained" in found.parameters["K"].reason
+
+
+@pytest.mark.parametrize("frequency", [1.0, 5.0])
+def test_one_frequency_tells_the_dynamic_stiffness_and_not_stiffness_and_mass(frequency):
+    omega = 2 * np.pi * frequency
+    x = 1e-3 * np.sin(omega * TIME)
+    force = (5000 - 0.5 * omega**2) * x + 40e-3 * omega * np.cos(omega * TIME) + noise(0.02)
+    found = identify(record(TIME, x, force + 10), lag=0.0, bonded=True, model="kelvin-voigt-mass")
+    assert not {"K", "M"} <= identified(found)
+    point = found.working_point.stiffness
+    assert point.verdict is Verdict.IDENTIFIED
+    assert abs(point.value - (5000 - 0.5 * omega**2)) < 2 * (point.ci95[1] - point.value)
+    assert found.working_point.frequency_Hz == pytest.approx(frequency, rel=0.1)
+
+
+def test_a_falling_branch_is_not_turned_into_a_stiffness():
+    """Cut out of a bistable structure's log: one axis has no way to pin a sign."""
+    x = 1e-3 * np.sin(2 * np.pi * 1.3 * TIME) + 2e-4 * np.sin(2 * np.pi * 9 * TIME)
+    found = identify(record(TIME, x, 20 - 7500 * x + noise(0.05)), lag=0.0)
+    assert "K" not in identified(found)
+    point = found.working_point
+    assert point is None or point.stiffness.value is None or point.stiffness.value < 0 or (
+        point.stiffness.verdict is not Verdict.IDENTIFIED
+    )  # fmt: skip
+
+
+def test_a_lag_that_nobody_calibrated_keeps_damping_of_a_slow_sine_from_being_identified():
+    omega = 2 * np.pi
+    x = 1e-3 * np.sin(omega * TIME)
+    force = 10 + 5000 * x + 40e-3 * omega * np.cos(omega * TIME) + noise(0.02)
+    found = identify(record(TIME, x, force), bonded=True, model="kelvin-voigt")
+    assert "B" not in identified(found)
+    assert found.lag.kind == "prior"
+    assert "lag" in found.parameters["B"].budget
+
+
+def test_a_step_made_within_contact_identifies_nothing_of_what_rests():
+    """The position never moves while it counts: whatever is dropped has no small deviation."""
+    x = np.where(TIME < 2.0, 1e-3, 1.0001e-3)
+    found = identify(record(TIME, x, 1000 * x + noise(0.05)), lag=0.0, bonded=True)
+    for p in found.parameters.values():
+        assert p.verdict is not Verdict.IDENTIFIED or p.ci95[0] <= 1000 <= p.ci95[1]
+
+
+def test_a_mass_fixed_at_none_beside_a_force_filter():
+    log = pressed(k=5000.0, b=40.0)
+    found = identify(log, lag=0.0, mass=(0.0, 0.0), model="kelvin-voigt-mass")
+    assert abs(found.parameters["M"].value or 0.0) < 1e-6
+    for name, truth in (("K", 5000), ("B", 40)):
+        p = found.parameters[name]
+        assert p.ci95[0] < truth < p.ci95[1]
+
+
+@pytest.mark.parametrize("factor", [1e300, 1e-300, 1e150])
+@pytest.mark.parametrize("channel", ["position", "force"])
+def test_numbers_out_of_this_world_are_an_error_of_one_line(factor, channel):
+    log = pressed()
+    columns = {"time": log["time"], "position": log["position"], "force": log["force"]}
+    with pytest.raises(InputError, match=f"the {channel} reaches .* which no sensor reads") as caught:
+        identify(record(**(columns | {channel: factor * columns[channel]})), lag=0.0)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "bad", [{"lag": np.nan}, {"lag": np.inf}, {"lag": 5.0}, {"lag_std": np.nan, "lag": 0.0}]
+)
+def test_a_lag_that_is_none_is_an_error_of_one_line(bad):
+    with pytest.raises(InputError, match="lag") as caught:
+        identify(pressed(), **bad)
+    assert "\n" not in str(caught.value)
+
+
+LOG = pressed(noise=0.02, n=2500)
+PLAIN = identify(LOG, lag=0.0)
+
+
+def same(one, other, scales):
+    for name, scale in scales.items():
+        a, b = one.parameters[name], other.parameters[name]
+        assert b.verdict is a.verdict, name
+        if a.value is not None:
+            assert b.value == pytest.approx(scale * a.value, rel=1e-3), name
+            assert b.ci95 == pytest.approx([scale * end for end in a.ci95], rel=0.02), name
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.floats(-2, 2))
+def test_a_force_in_another_unit_scales_every_parameter(size):
+    c = 10.0**size
+    found = identify(record(LOG["time"], LOG["position"], c * LOG["force"]), lag=0.0)
+    same(PLAIN, found, dict.fromkeys("KBM", c))
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.floats(-2, 2), st.floats(-1e4, 1e4))
+def test_where_position_and_clock_begin_does_not_count(origin, clock):
+    found = identify(record(LOG["time"] + clock, LOG["position"] + origin, LOG["force"]), lag=0.0)
+    same(PLAIN, found, dict.fromkeys("KBM", 1.0))
+
+
+@pytest.mark.parametrize(("force", "position"), [(-1, 1), (1, -1), (-1, -1)])
+def test_channels_that_count_the_other_way_say_the_same(force, position):
+    found = identify(record(LOG["time"], position * LOG["position"], force * LOG["force"]), lag=0.0)
+    same(PLAIN, found, dict.fromkeys("KBM", 1.0))
+    assert ("force-sign-reversed" in found.codes) == (force < 0)
+    assert ("position-sign-reversed" in found.codes) == (position < 0)
+
+
+@pytest.mark.parametrize("told", [1, -1])
+def test_a_force_sign_that_is_told_is_kept_or_contradicted(told):
+    found = identify(LOG, lag=0.0, force_sign=told)
+    if told == 1:
+        same(PLAIN, found, dict.fromkeys("KBM", 1.0))
+    else:
+        assert "K" not in identified(found)
+
+
+NUMBER = (int, float)
+
+
+def test_the_json_is_the_contract():
+    """One object of plain values: every key there, of its type."""
+    said = json.loads(json.dumps(PLAIN.to_json()))
+    assert {
+        "model", "parameters", "contacts", "lag_s", "fit", "warnings", "working_point", "dynamic_stiffness",
+        "press", "models", "options",
+    } <= set(said)  # fmt: skip
+    for p in said["parameters"].values():
+        assert set(p) == {
+            "value", "std", "ci95", "ci95_if_model_holds", "budget", "unit", "verdict", "reason"
+        }  # fmt: skip
+        assert p["verdict"] in {"identified", "not identifiable", "rejected"}
+        assert p["reason"]
+        assert all(isinstance(half, NUMBER) and half >= 0 for half in p["budget"].values())
+        assert list(p["budget"].values()) == sorted(p["budget"].values(), reverse=True)
+        for interval in (p["ci95"], p["ci95_if_model_holds"]):
+            assert interval is None or interval[0] <= interval[1]
+        if p["verdict"] == "identified":
+            assert p["ci95"][0] < p["value"] < p["ci95"][1]
+            assert p["ci95"][1] - p["value"] <= 0.25 * abs(p["value"]) * (1 + 1e-9)
+    assert all(set(span) == {"start_s", "end_s"} for span in said["contacts"])
+    assert set(said["fit"]) == {"r2", "rmse_N", "n"}
+    assert all(set(w) == {"code", "text"} for w in said["warnings"])
+    assert said["options"]["tolerance"] == 0.25
+    assert said["lag_s"] is None
+
+
+@pytest.mark.parametrize(("lag", "kinds"), [(2e-3, {"told"}), (None, {"measured", "prior"})])
+def test_the_lag_says_what_it_is(lag, kinds):
+    said = identify(LOG, lag=lag).to_json()["lag_s"]
+    assert set(said) == {"value", "std", "bound", "kind"}
+    assert said["kind"] in kinds
+
+
+def test_no_contact_is_the_same_json():
+    found = identify(record(TIME, 1e-3 * np.sin(TIME), noise(0.05)))
+    said = json.loads(json.dumps(found.to_json()))
+    assert said["working_point"] is None or said["working_point"]["stiffness"]["verdict"] != "identified"
+    assert all(p["value"] is None for p in said["parameters"].values())
