@@ -241,9 +241,7 @@ def _free_end(force: Array, position: Array, dt: float) -> tuple[float, float] |
     travel = [
         max((_spread(position[a:b]) for a, b in own if b - a >= _DWELL), default=0.0) / whole for own in stays
     ]
-    free = [
-        t > _FREE or _flat(force, position, own, slope) for t, own in zip(travel, stays, strict=True)
-    ]
+    free = [t > _FREE or _flat(force, position, own, slope) for t, own in zip(travel, stays, strict=True)]
     if not any(free):
         return None
     if all(free):

@@ -6,6 +6,7 @@ import numpy as np
 
 from palpate.identification.contacts import Contacts
 from palpate.identification.estimators.fit import Fit
+from palpate.identification.estimators.robust import lag_open
 from palpate.identification.filters.state_variable import Chain, block_means
 from palpate.identification.options import Options
 from palpate.identification.prior import LAG
@@ -116,7 +117,7 @@ def _lag(choice: Choice) -> LagFound | None:
         told = prior.value != 0 or prior.std > 0
         return LagFound(prior.value, prior.std, 1.96 * prior.std, "told") if told else None
     half = found.half_of(LAG) if LAG in found.names else 1.96 * prior.std
-    if half <= _NARROWER * 1.96 * prior.std and choice.explains:
+    if half <= _NARROWER * 1.96 * prior.std and choice.explains and not lag_open(choice.problem):
         return LagFound(found[LAG], half / 1.96, half, "measured")
     return LagFound(prior.value, prior.std, 1.96 * prior.std, "prior")
 

@@ -114,6 +114,11 @@ def answer(problem: Problem, model: Model) -> Answer:
     return question.answered(solution)
 
 
+def lag_open(problem: Problem) -> bool:
+    """Whether neither a calibration nor the sensor's own low-pass tells the lag."""
+    return not problem.lag.known and not problem.motion.matched
+
+
 @dataclass(frozen=True)
 class _Question:
     problem: Problem
@@ -173,6 +178,8 @@ class _Question:
         budget["repetition"] = self._repetition(solution)
         budget["unexplained"] = causes.of_unexplained(self.system, solution, sensor)
         explained, left = self._explained(solution, sensor)
+        if lag_open(self.problem) and {"K", "B", LAG} <= set(self.names):
+            budget["lag"] = self._lag_of_damping(solution, budget["lag"])
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: Spread(part.variance[kept], part.freedom) for cause, part in budget.items()}
@@ -185,6 +192,17 @@ class _Question:
         noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
         return Answer(names, solution.theta[kept], cov, budget, fitted, explained, left, noise)
+
+    def _lag_of_damping(self, solution: Solution, found: Spread) -> Spread:
+        """A lag T counts as a damping of -K T: B knows of a lag nobody has calibrated what the prior says, no more.
+
+        Whatever else shifts the force in time moves the lag that a fit finds, and B with it.
+        """
+        variance = found.variance.copy()
+        i = self.names.index("B")
+        by_prior = (solution.theta[self.names.index("K")] * self.problem.lag.std) ** 2
+        variance[i] = max(variance[i], by_prior)
+        return Spread(variance, found.freedom)
 
     def _repetition(self, solution: Solution) -> Spread:
         """Stretches of the log left out one after the other."""
