@@ -1,17 +1,18 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format check bench trust docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench attack trust docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PIP_INSTALL := $(PIP) install --only-binary :all: --no-warn-script-location
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 # The Python to build .venv with; `make test PYTHON=python3.13` picks another.
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python3.14 python; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then echo $$p; break; fi; done)
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 16
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 18
 
 demo: .venv/run.stamp ## set up, identify a small log, press on foam, and say where the report is
 	@mkdir -p runs
@@ -19,8 +20,11 @@ demo: .venv/run.stamp ## set up, identify a small log, press on foam, and say wh
 	$(BIN)/palpate run foam-hybrid --out $(OUT) --force
 	@echo "The report is $(CURDIR)/$(OUT)/report.html"
 
-test: .venv/dev.stamp ## set up and run the tests
-	$(BIN)/python -m pytest
+test: .venv/dev.stamp ## set up and run the tests, on all cores
+	$(PYTEST)
+
+test-long: .venv/dev.stamp ## run the tests that take long: Monte-Carlo, whole figures of the thesis
+	$(PYTEST) -m long
 
 lint: .venv/dev.stamp ## lint, format, types, direction of imports
 	$(BIN)/ruff check
@@ -41,6 +45,9 @@ bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold s
 	$(BIN)/python benchmarks/many_runs.py
 	$(BIN)/python benchmarks/least_squares.py
 	$(BIN)/python benchmarks/cold_start.py
+
+attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hour of each experiment; into docs/reliability.md
+	$(BIN)/python benchmarks/attack/run.py --write
 
 trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
 	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md

@@ -12,6 +12,8 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parent.parent / "examples"
 EXAMPLES = sorted(FOLDER.glob("[0-9]*.py"))
+LONG = ("05", "06", "13")
+"""They compile a loop of their own, or march through many."""
 
 
 def test_examples_are_numbered_without_gaps():
@@ -20,7 +22,10 @@ def test_examples_are_numbered_without_gaps():
         assert re.fullmatch(rf"{number:02d}_[a-z0-9_]+\.py", path.name), path.name
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(p, marks=pytest.mark.long if p.stem[:2] in LONG else (), id=p.stem) for p in EXAMPLES],
+)
 def test_the_example_runs(path, tmp_path):
     assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), "an example says what it shows"
     ran = subprocess.run(

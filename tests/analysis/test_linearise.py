@@ -64,6 +64,7 @@ def swinging(loop):
     return next(mode for mode in loop.modes if mode.frequency > 0.0)
 
 
+@pytest.mark.long
 def test_a_neural_controller_is_the_integrator_that_its_gain_says():
     """Its 200 weights and the PI of ki = eta (A/2)^2 / tick have the same slowest motions, to 1 %."""
     neural, plain = linearise(load("foam-neural")), linearise(load("foam-pi"))

@@ -139,6 +139,7 @@ def test_the_original_hybrid_control_presses_where_its_posture_is_stable(surface
     assert c["force"].max() > 23.0  # it knows no inertia: it overshoots
 
 
+@pytest.mark.long
 @surfaces
 def test_self_tuning_improves_on_the_gains_it_starts_from(surface):
     tables = {"press": 15.0, "surface": surface, "force": STEPS}

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.quick import DURATION, PRESS, changed, quick
+from palpate._vector import Vec3
 from palpate.bench import bench as running
 from palpate.bench import build, load, names, part
 from palpate.environments import KelvinVoigt, SurfaceState
@@ -253,10 +254,18 @@ def test_no_gain_makes_a_motor_exceed_its_limit(kp, kv, kf, ki, limits):
         robot={"torque_limits": limits},
     )
     record = build(experiment).run(0.3)
-    steps = np.array([88.2, 9.8, 2.0]) / 2**11
-    for i, (limit, step, peak) in enumerate(zip(limits, steps, (88.2, 9.8, 2.0), strict=True), 1):
-        # The converter may round the limit up by half a step.
-        assert np.abs(record[f"torque{i}"]).max() <= min(limit, peak) + 0.5 * step + 1e-12
+    for i, (limit, peak) in enumerate(zip(limits, (88.2, 9.8, 2.0), strict=True), 1):
+        assert np.abs(record[f"torque{i}"]).max() <= min(limit, peak)
+
+
+def test_the_output_is_rounded_to_a_code_within_the_limit():
+    """16 N m lie between two codes of the output; the upper one, 16.02, is never sent."""
+    loop = build(quick("foam-hybrid")).loop
+    limits, step = loop.conditioning.arm.limits, loop.output.resolution
+    sent = loop.output.convert_within(Vec3(1e3, 1e3, 1e3), limits)
+    for value, limit, code in zip(sent, limits, step, strict=True):
+        assert limit - code < value <= limit
+    assert loop.output.convert_within(-1e3 * limits, limits) == -sent
 
 
 def test_faster_ticks_and_coarser_physics_are_the_same_press():

@@ -117,26 +117,33 @@ def test_the_version_is_that_of_the_package(capsys):
     assert capsys.readouterr().out.strip() == version("palpate")
 
 
+BARE = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+"""As a user has it: output is buffered, and flushed once more at exit."""
+
+
+def answered(*words, **streams):
+    """The program's code, and what it says on standard error if that is read."""
+    ran = subprocess.run([sys.executable, "-m", "palpate", *words], env=BARE, check=False, **streams)
+    return ran.returncode, (ran.stderr or b"").decode()
+
+
 def test_a_reader_that_leaves_is_no_error():
     reader, writer = os.pipe()
     os.close(reader)
-    ran = subprocess.run(
-        [sys.executable, "-m", "palpate", "--help"], stdout=writer, stderr=subprocess.PIPE, check=False
-    )
+    assert answered("--help", stdout=writer, stderr=subprocess.PIPE) == (141, "")
     os.close(writer)
-    assert ran.returncode == 141
-    assert ran.stderr == b""
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
-def test_a_full_disk_is_one_line():
+@pytest.mark.parametrize("words", [("--help",), ("run", "--list"), ("run", "foam-hybrid", "--print")])
+def test_a_full_disk_is_one_line(words):
     with Path("/dev/full").open("w") as full:
-        ran = subprocess.run(
-            [sys.executable, "-m", "palpate", "--help"], stdout=full, stderr=subprocess.PIPE, check=False
-        )
-    assert ran.returncode == 2
-    assert ran.stderr.decode().count("\n") == 1
-    assert "No space left" in ran.stderr.decode()
+        code, told = answered(*words, stdout=full, stderr=subprocess.PIPE)
+        assert code == 2
+        assert told.count("\n") == 1
+        assert "No space left" in told
+        assert answered(*words, stdout=full, stderr=full)[0] == 2
+        assert answered("no-such-command", stdout=subprocess.DEVNULL, stderr=full)[0] == 2
 
 
 def test_control_c_ends_a_running_command():

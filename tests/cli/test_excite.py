@@ -125,13 +125,15 @@ def test_the_experiment_is_one_that_palpate_run_takes(kind, elsewhere):
 
 
 def test_nothing_is_overwritten_unasked(capsys, elsewhere):
-    (elsewhere / "excite.csv").write_text("mine")
     words = (*ASKED, "--no-figure", "--duration", "4", "--out", "excite.csv")
+    assert main(["excite", *words]) == 0
     assert main(["excite", *words]) == 2
     assert "exists" in capsys.readouterr().err
-    assert (elsewhere / "excite.csv").read_text() == "mine"
     assert main(["excite", *words, "--replace"]) == 0
-    assert (elsewhere / "excite.csv").read_text().startswith("time_s")
+    (elsewhere / "excite.csv").write_text("mine")
+    assert main(["excite", *words, "--replace"]) == 2
+    assert "palpate did not write it" in capsys.readouterr().err
+    assert (elsewhere / "excite.csv").read_text() == "mine"
 
 
 def test_a_surface_without_a_mass(capsys):
@@ -192,7 +194,7 @@ BAD = [
     (("--out", "excite.mat"), ".csv or .parquet"),
     (("--out", "nowhere/excite.csv"), "there is no folder nowhere"),
     (("--experiment", "excite.json"), ".toml"),
-    (("--figure", "excite.pdf"), "the figure is a PNG"),
+    (("--figure", "excite.pdf"), "it is a PNG"),
 ]
 
 

@@ -189,6 +189,7 @@ def test_time_is_a_remedy_where_it_is_one():
     assert design(replace(found.question, duration=2 * np.ceil(longer.needed / 2))).feasible
 
 
+@pytest.mark.long
 def test_a_budget_of_change_that_binds_is_named():
     slow = replace(QUESTION, surfaces=KNOWN, budget=replace(LIMITS, rate=100.0), duration=4.0)
     changes = [remedy.change for remedy in remedies(design(slow))]

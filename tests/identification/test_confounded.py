@@ -57,6 +57,7 @@ def test_nothing_hides_behind_a_lag_that_is_calibrated():
         assert found.parameters[name].value == pytest.approx(TRUTH[name], rel=0.05)
 
 
+@pytest.mark.long
 def test_intervals_of_heavy_presses_cover_the_truth():
     told, wrong = 0, 0
     for seed in range(8):

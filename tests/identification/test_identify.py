@@ -51,6 +51,7 @@ def holds(parameter, truth):
     return parameter.ci95 is None or parameter.ci95[0] <= truth <= parameter.ci95[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pole", [0.0, 0.9, 0.99])
 def test_intervals_cover_the_truth_under_coloured_noise(pole):
     truth = {"K": 5000.0, "B": 40.0, "M": 0.5}
@@ -70,6 +71,7 @@ def test_intervals_cover_the_truth_under_coloured_noise(pole):
     assert min(plain.values()) >= 20, plain
 
 
+@pytest.mark.long
 def test_intervals_of_presses_cover_the_truth_without_a_known_lag():
     inside = dict.fromkeys("KB", 0)
     for seed in range(12):

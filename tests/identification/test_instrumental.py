@@ -34,6 +34,7 @@ def least_squares(force, position, cutoff):
     return np.linalg.lstsq(columns, chain(force)[300:])[0][:3]
 
 
+@pytest.mark.long
 def test_noise_of_the_position_pulls_least_squares_and_not_the_instruments():
     position, force = steady(oscillator)
     truth = np.array([K, B, M])

@@ -31,6 +31,16 @@ def test_it_is_odd_bounded_and_compiled_alike(force):
     assert abs(value) <= 200.0 - FORCE.resolution
 
 
+@given(st.floats(1e-3, 1e3), st.floats(-1e4, 1e4))
+def test_no_code_beyond_a_limit_is_sent_and_the_nearest_within_it_is(limit, force):
+    value = FORCE.convert_within(force, limit)
+    assert abs(value) <= limit
+    if abs(FORCE.convert(force)) <= limit:
+        assert value == FORCE.convert(force)
+    else:
+        assert abs(value) > limit - FORCE.resolution * (1 + 1e-9) or abs(value) == 200.0 - FORCE.resolution
+
+
 def test_zero_is_a_level():
     assert FORCE.convert(0.49 * FORCE.resolution) == 0.0
     assert FORCE.convert(0.51 * FORCE.resolution) == FORCE.resolution == 400.0 / 65536

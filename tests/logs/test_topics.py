@@ -15,7 +15,6 @@ from identification.synthetic_contacts import pressed
 from logs.ros_bags import BEGIN, joints, pose, wrench, write_bag
 from logs.test_laboratories import aurora, labview, saved
 from palpate.cli import main
-from palpate.cli._text import plain
 from palpate.contact_frame.vectors import matrices
 from palpate.logs import read_log, read_wrench_and_pose, write_record
 from palpate.logs.listing import list_log
@@ -230,7 +229,6 @@ def test_names_that_a_terminal_would_obey(tmp_path, capsys):
     assert "\x1b" not in shown
     assert "\x07" not in shown
     assert "\\x1b]0;owned" in shown
-    assert plain("a\tb\u202e") == "a\tb\\x202e"
 
 
 def test_the_limits_are_options(tmp_path, capsys):

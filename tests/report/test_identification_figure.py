@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from palpate.files import check_place
 from palpate.report.identification import draw, write_figure
-from palpate.report.ownership import check_ours
 from report.outcomes import OUTCOMES
 
 
@@ -62,7 +62,7 @@ def test_every_outcome_has_a_picture(outcome, tmp_path):
     picture = imread(path)
     assert picture.shape[1] == 1430
     assert picture[..., :3].std() > 0.05, "something is drawn"
-    check_ours(path)
+    check_place(path)
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import pytest
 
 from palpate.errors import InputError
+from palpate.files import check_place
 from palpate.identification.warning_codes import Code, Warn
 from palpate.report.identification_page import page, write_page
 from palpate.report.identification_words import ADVICE, headline
-from palpate.report.ownership import check_ours
 from report.outcomes import OUTCOMES
 
 VOID = {"meta", "br", "img", "hr", "link", "input"}
@@ -190,12 +190,12 @@ def test_how_the_log_was_read_stands_at_the_top(tmp_path):
 
 def test_a_page_may_replace_an_older_one_and_nothing_else(tmp_path):
     path = write_page(OUTCOMES["no_contact"](), tmp_path / "a.html", "log")
-    check_ours(path, "--report")
+    check_place(path, "--report")
     other = tmp_path / "b.html"
     other.write_text("<!doctype html><title>palpate identify, a diary</title>", encoding="utf-8")
     for taken in (other, tmp_path):
         with pytest.raises(InputError, match="--report"):
-            check_ours(taken, "--report")
+            check_place(taken, "--report")
 
 
 def test_a_page_that_fails_leaves_the_old_one(tmp_path):

@@ -11,10 +11,11 @@ from contextlib import contextmanager
 class LocalCluster:
     """A scheduler and workers, each a process of its own that a test may kill."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, words):
         self._file = folder / "scheduler.json"
         here = ("--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(self._file))
-        self.scheduler = _started("dask_scheduler", "--port", "0", *here)
+        self._words = words
+        self.scheduler = _started("dask_scheduler", "--port", "0", *here, *words)
         self.workers = []
         deadline = time.monotonic() + 60.0
         while not self._file.exists() or not self._file.read_text().endswith("}"):
@@ -26,7 +27,15 @@ class LocalCluster:
         """So many more workers, of one thread each."""
         for _ in range(workers):
             self.workers.append(
-                _started("dask_worker", self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+                _started(
+                    "dask_worker",
+                    self.address,
+                    "--nthreads",
+                    "1",
+                    "--no-nanny",
+                    "--no-dashboard",
+                    *self._words,
+                )
             )
 
     def stop(self):
@@ -42,9 +51,9 @@ def _started(program, *words):
 
 
 @contextmanager
-def local_cluster(folder, workers):
-    """A cluster with so many workers."""
-    cluster = LocalCluster(folder)
+def local_cluster(folder, workers, words=()):
+    """A cluster with so many workers; `words` go to its programs."""
+    cluster = LocalCluster(folder, words)
     try:
         cluster.start(workers)
         yield cluster

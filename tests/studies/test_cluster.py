@@ -1,5 +1,7 @@
 """A study on a Dask cluster of real processes: the same table as here, whatever dies on the way."""
 
+import shutil
+import subprocess
 import threading
 import time
 from types import SimpleNamespace
@@ -9,7 +11,7 @@ from distributed import KilledWorker
 
 from palpate.errors import InputError
 from palpate.studies import cluster as clusters
-from palpate.studies.cluster import Cluster, run_batch
+from palpate.studies.cluster import Certificates, Cluster, run_batch
 from palpate.studies.local import Local
 from palpate.studies.one import Job
 from palpate.studies.running import Work
@@ -83,9 +85,46 @@ def test_a_cluster_without_workers_is_told_of(tmp_path):
 
 def test_no_scheduler_is_told_of(monkeypatch):
     monkeypatch.setattr(clusters, "CONNECT", 0.5)
-    for address in ("tcp://127.0.0.1:9", "nonsense://x", "127.0.0.1:notaport"):
-        with pytest.raises(InputError, match="no Dask scheduler answers at"):
-            Cluster(address)
+    with pytest.raises(InputError, match="no Dask scheduler answers at"):
+        Cluster("tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["nonsense://x", "127.0.0.1:notaport", "tcp://127.0.0.1", "tcp://[::1", "tcp://a:8786/x", "", "tcp://:1"],
+)
+def test_an_address_that_is_none_is_refused_at_once(address):
+    with pytest.raises(InputError, match="is no address of a scheduler"):
+        Cluster(address)
+
+
+def test_certificates_and_tls_go_together(tmp_path):
+    with pytest.raises(InputError, match="tls:// needs --tls-ca"):
+        Cluster("tls://127.0.0.1:8786")
+    files = [tmp_path / name for name in ("ca.pem", "cert.pem", "key.pem")]
+    with pytest.raises(InputError, match=r"there is no file .*ca\.pem"):
+        Certificates(*files)
+    for path in files:
+        path.write_text("")
+    with pytest.raises(InputError, match="certificates are for tls"):
+        Cluster("tcp://127.0.0.1:8786", certificates=Certificates(*files))
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="certificates are made by openssl")
+def test_a_cluster_is_reached_through_tls(tmp_path):
+    """With the certificate that its authority signed, and not without."""
+    key, certificate = tmp_path / "key.pem", tmp_path / "cert.pem"
+    made = ("req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=palpate")
+    subprocess.run(["openssl", *made, "-keyout", key, "-out", certificate], check=True, capture_output=True)
+    words = ("--tls-ca-file", certificate, "--tls-cert", certificate, "--tls-key", key)
+    with local_cluster(tmp_path, workers=1, words=("--protocol", "tls", *map(str, words))) as running:
+        assert running.address.startswith("tls://")
+        with pytest.raises(InputError, match="tls:// needs"):
+            Cluster(running.address)
+        runner = Cluster(running.address, certificates=Certificates(certificate, certificate, key))
+        done = list(runner.run(jobs(1)))
+        runner.close()
+    assert [row.result for row, _ in done] == ["done"]
 
 
 def jobs(count):

@@ -16,7 +16,7 @@ from palpate.studies.maps import cells
 from palpate.studies.metrics import METRICS
 from palpate.studies.one import Row
 from palpate.studies.plan import MAIN
-from palpate.studies.presenting import interval, tables
+from palpate.studies.presenting import interval, present, tables
 from palpate.studies.ranking import Mean, rankings
 from palpate.studies.results import table
 from palpate.studies.rows import Rows
@@ -150,6 +150,26 @@ def test_figures_are_suggested_where_none_are_asked_for(plan, tmp_path):
     plain = planned(GRID[: GRID.index("[[maps]]")] + GRID[GRID.index("[parameters]") :])
     names = [one.name for one in drawing.figures(results(plain), plain)]
     assert names == ["map1", "curves1"]
+
+
+@pytest.mark.parametrize(
+    "parameters", ['"controller.ki" = { log = [1.0, 100.0], points = 3 }\n"surface.damping" = [60.0, 200.0]']
+)
+def test_runs_that_feel_no_surface_are_a_report_too(tmp_path, parameters):
+    """Nothing can be drawn over the logarithm of nothing; the figures are empty, and the rest is told."""
+    plan = planned(text(parameters, head="seeds = 2"))
+    rows = [
+        Row(i, plan.setting(i).at, "no contact", "no surface was felt", (None,), 0.1)
+        for i in range(len(plan))
+    ]
+    found = present(table(plan, rows), plan, tmp_path, "", "palpate study")
+    assert found.summary["results"] == {"no contact": len(plan)}
+    assert {path.name for path in tmp_path.iterdir()} >= {
+        "report.html",
+        "summary.json",
+        "curves1.png",
+        "map1.png",
+    }
 
 
 def test_a_figure_may_be_about_some_of_the_runs(plan):

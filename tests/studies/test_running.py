@@ -88,16 +88,17 @@ def test_another_study_in_the_folder_is_refused_unless_it_is_to_go(tmp_path, uni
 
 def test_a_folder_of_other_files_is_never_touched(tmp_path):
     (tmp_path / "thesis.docx").write_text("years of work")
-    for force in (False, True):
-        with pytest.raises(InputError, match="no results of a study"):
+    for force, said in ((False, "holds other files"), (True, "thesis.docx, which palpate did not write")):
+        with pytest.raises(InputError, match=said):
             work(GRID, tmp_path, Formula(formula)).done(force=force)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.docx"]
 
 
 def test_a_journal_of_other_making_is_not_removed_by_force(tmp_path):
     (tmp_path / "runs.jsonl").write_text("mine\n")
-    with pytest.raises(InputError, match="no journal of a study"):
-        work(GRID, tmp_path, Formula(formula)).done(force=True)
+    for force in (False, True):
+        with pytest.raises(InputError, match="palpate did not write"):
+            work(GRID, tmp_path, Formula(formula)).done(force=force)
     assert (tmp_path / "runs.jsonl").read_text() == "mine\n"
 
 

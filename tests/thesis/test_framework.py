@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +15,7 @@ import pytest
 
 import palpate.thesis
 from palpate.bench import changed, load
+from palpate.cli import main
 from palpate.errors import InputError
 from palpate.thesis.claims import Claim, decided, spread, with_wholes
 from palpate.thesis.measuring import STATE, measure
@@ -138,7 +140,7 @@ def test_a_finished_measurement_is_replaced_only_by_force(tmp_path):
 def test_a_folder_of_something_else_is_never_touched(tmp_path, force):
     (tmp_path / "letters.txt").write_text("dear")
     done = []
-    with pytest.raises(InputError, match="no measurement"):
+    with pytest.raises(InputError, match="palpate did not write" if force else "holds other files"):
         measured([toy("1.1", done)], tmp_path, force=force)
     assert names(tmp_path) == {"letters.txt"}
     assert not done
@@ -147,6 +149,15 @@ def test_a_folder_of_something_else_is_never_touched(tmp_path, force):
 @pytest.mark.parametrize("content", ["", "{}", "[1, 2]", "\x00\xff"])
 def test_a_broken_state_is_no_measurement(tmp_path, content):
     (tmp_path / STATE).write_text(content, encoding="latin-1")
+    with pytest.raises(InputError, match="palpate did not write it"):
+        measured([toy("1.1", [])], tmp_path)
+
+
+@pytest.mark.parametrize(
+    "rest", ["", ', "stamp": 3', ', "stamp": "s", "wanted": [], "command": "", "done": [1]']
+)
+def test_a_spoiled_state_is_no_measurement(tmp_path, rest):
+    (tmp_path / STATE).write_text(f'{{"written_by": "palpate 0.1.0"{rest}}}')
     with pytest.raises(InputError, match="another --out"):
         measured([toy("1.1", [])], tmp_path)
 
@@ -291,3 +302,34 @@ def test_a_run_cut_short_is_never_measured():
     threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
         runs.one(experiment)
+
+
+def test_ctrl_c_stops_the_runs_of_all_threads():
+    """Hours of simulated time are under way on other threads; they end within a look."""
+    experiment = changed(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
+    runs = Runs()
+    runs.one(changed(experiment, {"run.press": 0.1}))  # compiles
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    before, begun = threading.active_count(), time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        runs.over([(experiment, seed) for seed in range(4)], len)
+    timer.join()
+    assert time.monotonic() - begun < 20.0
+    assert threading.active_count() <= before
+
+
+def test_the_program_says_that_it_goes_on(tmp_path, capsys, monkeypatch):
+    """After a Ctrl-C where what is done is, and at the next start how much of it there is."""
+    done = []
+    toys = [toy("1.1", done), toy("1.2", done, KeyboardInterrupt)]
+    monkeypatch.setattr(palpate.thesis.study, "studies", lambda: toys)
+    assert main(["thesis", "--out", str(tmp_path / "t")]) == 130
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "is saved in" in told
+    assert "the same command goes on from there" in told
+    toys[1] = toy("1.2", done)
+    assert main(["thesis", "--out", str(tmp_path / "t")]) == 0
+    assert "1 of 2 are measured already" in " ".join(capsys.readouterr().out.split())
+    assert done == ["1.1", "1.2", "1.2"]

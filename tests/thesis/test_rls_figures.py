@@ -258,7 +258,7 @@ STUDIES = {
 """What these figures have come to, where it is no close matter."""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("study", STUDIES, ids=lambda s: s.NUMBER)
 def test_a_figure_stands(study, tmp_path):
     from palpate.report import style

@@ -111,7 +111,7 @@ class Bench:
         rows, ending = _Run(self.loop, seed, compiled, waiting, Watchman(self.losses)).rows(
             start_at(self.loop, self.q), total, None if press is None else round(press / tick), progress
         )
-        columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
+        columns = {name: _column(rows, i) for i, name in enumerate(COLUMNS)}
         told = {
             "instruments": {"force": self.loop.force.told(), "position": {"lag_s": self.loop.encoder.lag}}
         }
@@ -130,8 +130,8 @@ class _Run:
 
     def rows(
         self, state: LoopState, total: int, press: int | None, progress: Progress | None
-    ) -> tuple[NDArray[np.float64], Ending]:
-        """The rows of a run and why it ended."""
+    ) -> tuple[list[NDArray[np.float64]], Ending]:
+        """The rows of a run, chunk after chunk, and why it ended."""
         generator = np.random.default_rng(self.seed)
         chunks: list[NDArray[np.float64]] = []
         done, first, stop = 0, None, total
@@ -152,10 +152,9 @@ class _Run:
                     progress(done * self.loop.tick, "approach" if first is None else "contact")
             except KeyboardInterrupt:  # wherever in a round it comes
                 end = Ending(INTERRUPTED, f"interrupted at {done * self.loop.tick:.3f} s")
-        rows = np.concatenate(chunks) if chunks else np.empty((0, len(COLUMNS)))
         if end is None:
             end = Ending(NO_CONTACT, "no surface was felt") if first is None else Ending(DONE, "as asked for")
-        return rows, end
+        return chunks, end
 
     def _march(
         self, state: LoopState, k: int, noise: NDArray[np.float64], out: NDArray[np.float64]
@@ -167,6 +166,11 @@ class _Run:
         except NotCompiled as error:
             found = diagnosed(self.loop, state)
             raise found from found.__cause__ or error.__cause__
+
+
+def _column(rows: list[NDArray[np.float64]], i: int) -> NDArray[np.float64]:
+    """One column of all chunks, without another copy of them all."""
+    return np.concatenate([chunk[:, i] for chunk in rows]) if rows else np.empty(0)
 
 
 def _march_plain(

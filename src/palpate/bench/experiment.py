@@ -11,7 +11,7 @@ from msgspec import Meta
 from palpate.bench.controller_tables import ControllerTable, HybridController
 from palpate.bench.explaining import explained, not_finite
 from palpate.bench.part_table import NotNegative, NotNegativeTriple, Part, Positive, PositiveTriple, Triple
-from palpate.bench.toml_files import TomlFiles
+from palpate.bench.toml_files import TomlFiles, decoded
 from palpate.errors import InputError
 
 
@@ -222,10 +222,7 @@ def load(name: str) -> Experiment:
 
 def parse(text: str, where: str) -> Experiment:
     """An experiment from TOML; `where` names the text in errors."""
-    try:
-        return _converted(msgspec.toml.decode(text), where)
-    except msgspec.DecodeError as error:
-        raise InputError(f"{where}: not TOML: {error}") from error
+    return _converted(decoded(text, where), where)
 
 
 def changed(experiment: Experiment, changes: Mapping[str, Any]) -> Experiment:

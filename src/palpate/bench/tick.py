@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from palpate._jit import kernel, law, part
-from palpate._vector import ZERO3, Vec3, clip
+from palpate._vector import ZERO3, Vec3
 from palpate.bench.conditioning import Conditioning, ConditioningState
 from palpate.bench.estimators import Estimators, EstimatorsState
 from palpate.bench.force_input import ForceInput, ForceInputState
@@ -108,7 +108,7 @@ def think(loop, state, signals, sequence):
         wanted, approach = loop.approach.step(approach, sense, task, model)
         controller = loop.controller.rest(controller, sense)
     wanted += loop.compensation.torque(sense.qd)
-    applied = loop.output.convert(clip(wanted, arm.limits))
+    applied = loop.output.convert_within(wanted, arm.limits)
     return Command(wanted, applied), desired, approach, controller
 
 

@@ -15,6 +15,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code: 0 done; 1 ran, and the answer is no; 2 the input is wrong; 130 interrupted.
         Codes of the edge: 70 for a defect in palpate itself, 141 when the reader of the output has gone.
     """
+    if argv is None:
+        from palpate.cli import _interrupts, _streams
+
+        _interrupts.keep()
+        _streams.prepare()
     from palpate.cli._edge import guarded
     from palpate.cli._program import program
 

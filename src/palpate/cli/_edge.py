@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import errno
-import os
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from cyclopts import CycloptsError
 
+from palpate.cli import _streams
 from palpate.errors import PalpateError
+from palpate.text import shown
 
 DONE = 0
 WRONG_INPUT = 2
@@ -40,10 +42,18 @@ def guarded(command: Callable[[], Any]) -> int:
     """
     try:
         code = command()
-        sys.stdout.flush()
+        _streams.flush(sys.stdout)
     except BaseException as error:  # noqa: BLE001 - the last one out: exits and interrupts are codes too
-        return _code_of(error)
-    return DONE if code is None else int(code)
+        return _settled(_code_of(error))
+    return _settled(DONE if code is None else int(code))
+
+
+def _settled(code: int) -> int:
+    """The code, with nothing left in the streams that Python would try to write, and fail to, at exit."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):
+            _streams.flush(stream)
+    return code
 
 
 def _code_of(error: BaseException) -> int:
@@ -55,7 +65,8 @@ def _code_of(error: BaseException) -> int:
         case KeyboardInterrupt():
             return _say("interrupted", INTERRUPTED)
         case BrokenPipeError():
-            return _reader_gone()
+            _streams.drop(sys.stdout)
+            return READER_GONE
         case CycloptsError():
             return _say(f"{error} {_where_help_is(error)}", WRONG_INPUT)
         case PalpateError():
@@ -65,13 +76,15 @@ def _code_of(error: BaseException) -> int:
         case MemoryError():
             return _say(f"not enough memory for this input: {error or 'give a shorter one'}", WRONG_INPUT)
         case _:
-            traceback.print_exception(error)
+            with suppress(OSError):
+                traceback.print_exception(error)
             return _say("this is a defect of palpate, please report the lines above", DEFECT)
 
 
 def _say(text: str, code: int) -> int:
-    line = " ".join(text.split())
-    print(f"palpate: {line}", file=sys.stderr)  # noqa: T201
+    line = shown(" ".join(text.split()))
+    with suppress(OSError):  # standard error is full or closed: the code still tells
+        print(f"palpate: {line}", file=sys.stderr)  # noqa: T201
     return code
 
 
@@ -85,11 +98,3 @@ def _system_line(error: OSError) -> str:
     what = error.strerror or str(error) or type(error).__name__
     remedy = _REMEDIES.get(error.errno or 0, "check the path and try again")
     return f"{where}: {what}; {remedy}"
-
-
-def _reader_gone() -> int:
-    # Python flushes standard output once more at exit; there is nobody left to read it.
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
-    return READER_GONE

@@ -6,7 +6,9 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from palpate.cli._terminal import print_lines
 from palpate.errors import InputError
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from palpate.bench.toml_files import TomlFiles
@@ -16,7 +18,7 @@ def listed(files: TomlFiles, title: Callable[[str], str]) -> None:
     """Prints the names of all that come with palpate, each with its title."""
     width = 2 + max(map(len, files.names()))
     for name in files.names():
-        print(f"{name:<{width}}{title(name)}")  # noqa: T201
+        print_lines(f"{name:<{width}}{title(name)}")
 
 
 def source_of(files: TomlFiles, name: str | None, verb: str, printed: bool) -> str | None:
@@ -32,5 +34,5 @@ def source_of(files: TomlFiles, name: str | None, verb: str, printed: bool) -> s
     source = files.source(name)
     if not printed:
         return source
-    sys.stdout.write(source)
+    sys.stdout.write(shown(source))
     return None

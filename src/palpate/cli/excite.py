@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._places import check_folder, own_place
+from palpate.cli._terminal import console, place, print_json
 from palpate.errors import InputError
+from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.excitation import Budget, Design, ForceLoop, Question, Remedy, Sensors, SurfaceRange
@@ -302,7 +303,9 @@ def _picture(output: OutputOptions) -> Path | None:
     """Where the figure goes; found wrong before any work is done."""
     if output.no_figure or (output.figure is None and output.json):
         return None
-    return own_place(output.figure or Path("excite.png"), ".png", "--figure")
+    path = output.figure or Path("excite.png")
+    check_place(path, "--figure", ending=".png")
+    return path
 
 
 def _check_places(output: OutputOptions) -> None:
@@ -310,10 +313,10 @@ def _check_places(output: OutputOptions) -> None:
 
     if output.out is not None:
         check_ending(output.out)
-    if output.experiment is not None and output.experiment.suffix.lower() != ".toml":
-        raise InputError(f"{output.experiment}: an experiment is a .toml file; name it so")
+        check_place(output.out, "--out")
+    if output.experiment is not None:
+        check_place(output.experiment, "--experiment", ending=".toml")
     for path in filter(None, (output.out, output.experiment)):
-        check_folder(path)
         if path.exists() and not output.replace:
             raise InputError(f"{path} exists; choose another place, or add --replace")
 
@@ -334,31 +337,27 @@ def _answer(question: Question, rate: int, output: OutputOptions, picture: Path 
 
 
 def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
-    from palpate.logs import whole
+    from palpate.files import write_text
     from palpate.report import excitation_files as files
 
     if out is not None:
         files.write_force(found, out, float(rate))
     if experiment is not None:
-        with whole(experiment) as draft:
-            draft.write_text(files.experiment(found), encoding="utf-8")
+        write_text(experiment, files.experiment(found))
 
 
 def _print(
     found: Design, helps: list[Remedy], written: list[Path | None], picture: Path | None, json: bool
 ) -> None:
     if json:
-        from json import dumps
-
         from palpate.report.excitation_files import summary
 
-        print(dumps(summary(found, helps), allow_nan=False))  # noqa: T201
+        print_json(summary(found, helps))
         return
-    from rich.console import Console
-
     from palpate.report.excitation_table import show
 
-    console = Console(highlight=False, soft_wrap=True)
-    show(found, helps, console)
+    screen = console()
+    screen.soft_wrap = True
+    show(found, helps, screen)
     for path in (*filter(None, written), *([picture] if picture else [])):
-        console.print(f"written: {path}")
+        place(screen, "written:", path)

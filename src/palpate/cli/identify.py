@@ -10,9 +10,10 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._arm_options import ArmOptions, FrameOptions
 from palpate.cli._log_options import LogOptions, read
-from palpate.cli._places import own_place
+from palpate.cli._terminal import console, place, print_json
 from palpate.cli._values import with_std
 from palpate.errors import InputError
+from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
@@ -164,12 +165,16 @@ def _figure(log: Path, output: OutputOptions) -> Path | None:
     """Where the figure goes; found wrong before any work is done."""
     if output.no_figure or (output.figure is None and output.json):
         return None
-    return own_place(output.figure or Path(f"{log.stem}.identify.png"), ".png", "--figure")
+    path = output.figure or Path(f"{log.stem}.identify.png")
+    check_place(path, "--figure", ending=".png")
+    return path
 
 
 def _page(output: OutputOptions) -> Path | None:
     """Where the page goes; likewise."""
-    return None if output.report is None else own_place(output.report, ".html", "--report")
+    if output.report is not None:
+        check_place(output.report, "--report", ending=".html")
+    return output.report
 
 
 def _write(found: Identification, record: Record, log: Path, figure: Path | None, page: Path | None) -> None:
@@ -186,18 +191,14 @@ def _write(found: Identification, record: Record, log: Path, figure: Path | None
 
 def _print(found: Identification, record: Record, log: Path, written: list[Path], json: bool) -> None:
     if json:
-        from json import dumps
-
-        print(dumps(found.to_json(), allow_nan=False))  # noqa: T201
+        print_json(found.to_json())
         return
-    from rich.console import Console
-
     from palpate.contact_frame import told
     from palpate.report.identification_table import show
 
-    show(found, log.name, Console(highlight=False))
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    screen = console()
+    show(found, log.name, screen)
     for line in told(record.meta):
-        console.print(line)
+        screen.print(line, soft_wrap=True)
     for path in written:
-        console.print(f"{'figure' if path.suffix.lower() == '.png' else 'report'}: {path}")
+        place(screen, "figure:" if path.suffix.lower() == ".png" else "report:", path)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import shlex
-import sys
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from palpate.cli._folder import fresh_folder
+from palpate.cli._interrupts import noticed
 from palpate.cli._named import listed, source_of
+from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
 from palpate.errors import InputError
+from palpate.files import fresh_folder, signed, write_json, write_text
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -60,46 +62,62 @@ def run(
     if name is None or source is None:
         return 0
     folder = out if out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    title, summary = _run(name, source, seed, folder, force, json)
-    _tell(
-        title, summary, folder, json
-    )  # when all is in its place, so that a reader who has gone loses nothing
-    return 130 if summary["end"] == "interrupted" else 0 if summary["end"] == "done" else 1
+    from palpate.bench.ending import DONE, INTERRUPTED
+
+    with noticed() as interrupted:
+        ran = _run(name, source, seed, folder, force, json, interrupted)
+    # All is in its place, so that a reader of the output who has gone loses nothing.
+    _tell(ran, folder, json)
+    if ran.undrawn:
+        raise InputError(f"{ran.undrawn}; the record is in {folder}")
+    if interrupted() or ran.summary["end"] == INTERRUPTED:
+        return 130
+    return 0 if ran.summary["end"] == DONE else 1
+
+
+@dataclass(frozen=True)
+class _Ran:
+    """What a run came to, and why it could not be drawn, if it could not."""
+
+    title: str
+    summary: dict[str, Any]
+    undrawn: str
 
 
 def _run(
-    name: str, source: str, seed: int, folder: Path, force: bool, as_json: bool
-) -> tuple[str, dict[str, Any]]:
-    """Runs and writes the folder of results; the experiment's title, and the summary."""
-    from rich.console import Console
-
+    name: str,
+    source: str,
+    seed: int,
+    folder: Path,
+    force: bool,
+    as_json: bool,
+    interrupted: Callable[[], bool],
+) -> _Ran:
+    """Runs and writes the folder of results."""
     from palpate.bench import summarise
     from palpate.bench.experiment import parse
+    from palpate.logs import write_record
 
     with fresh_folder(folder, force=force) as fresh:
         experiment = parse(source, name)
-        command = f"palpate run {shlex.quote(name)} --seed {seed}"
-        record = _record(Console(stderr=as_json), name, experiment, seed)
+        command = shown(f"palpate run {shlex.quote(name)} --seed {seed}")
+        record = _record(console(stderr=as_json), name, experiment, seed, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
-        summary = {"experiment": Path(name).stem, "command": command, **summarise(record)}
-        _write(record, summary, experiment.title, experiment.about, source, fresh)
-    return experiment.title, summary
+        summary = signed({"experiment": shown(Path(name).stem), "command": command, **summarise(record)})
+        write_record(record, fresh / "record.parquet")
+        write_json(fresh / "summary.json", summary)
+        undrawn = ""
+        try:
+            if len(record):
+                _report(record, experiment.title, experiment.about, source, summary, fresh)
+        except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
+            undrawn = f"there was not enough room to draw it ({shown(str(error)) or type(error).__name__})"
+    return _Ran(experiment.title, summary, undrawn)
 
 
-def _write(
-    record: Record, summary: dict[str, Any], title: str, about: str, source: str, folder: Path
-) -> None:
-    import msgspec
-
-    from palpate.logs import write_record
-
-    write_record(record, folder / "record.parquet")
-    (folder / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n")
-    if len(record):
-        _report(record, title, about, source, summary, folder)
-
-
-def _record(console: Console, name: str, experiment: Any, seed: int) -> Record:
+def _record(
+    screen: Console, name: str, experiment: Any, seed: int, interrupted: Callable[[], bool]
+) -> Record:
     from rich.progress import BarColumn, Progress, TextColumn
 
     from palpate.bench import build
@@ -111,14 +129,16 @@ def _record(console: Console, name: str, experiment: Any, seed: int) -> Record:
         raise InputError(f"{name}: {error}") from error
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
     # Without a terminal there is nobody to watch it, and it would leave an empty line.
-    watched = console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=not watched) as progress:
+    watched = screen.is_terminal
+    with Progress(*columns, console=screen, transient=True, disable=not watched) as progress:
         bar = progress.add_task("starting", total=None, time="")
 
         def waiting() -> None:
             progress.console.print(COMPILING)
 
         def show(time: float, phase: str) -> None:
+            if interrupted():
+                raise KeyboardInterrupt  # here the bench ends the run, and keeps what there is of it
             progress.update(bar, description=f"{phase:9}", time=f"{time:6.1f} s simulated")
 
         return bench.run(
@@ -143,34 +163,24 @@ def _report(
         source=source,
         notes=notes(summary),
     )
-    (folder / "report.html").write_text(text, encoding="utf-8")
+    write_text(folder / "report.html", text)
 
 
-def _tell(title: str, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    import msgspec
-    from rich import box
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
+def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
     from palpate.report.run_tables import notes, tables
 
+    summary = ran.summary
     if as_json:
-        sys.stdout.write(msgspec.json.encode(summary).decode() + "\n")
+        print_json(summary)
         return
-    console = Console()
-    console.print(
-        f"[bold]{escape(title)}[/bold], seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
-    )
+    screen = console()
+    head(screen, ran.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
     for content in tables(summary):
-        table = Table(title=content.title, title_justify="left", title_style="italic", box=box.SIMPLE_HEAD)
-        for i, head in enumerate(content.head):
-            table.add_column(escape(head), justify="left" if i == 0 else "right")
-        for row in content.rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
+        show_table(screen, content)
     for note in notes(summary):
-        console.print(f"[yellow]{escape(note)}[/yellow]")
+        screen.print(note, style=STYLE)
     report = folder / "report.html"
-    place = f"report: {report}" if report.exists() else f"nothing to draw; the record is in {folder}"
-    console.print(place, soft_wrap=True, highlight=False)
+    if report.exists():
+        place(screen, "report:", report)
+    else:
+        place(screen, "nothing to draw; the record is in", folder)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 from cyclopts import Parameter
+
+from palpate.cli._terminal import print_json, print_lines, say
 
 
 def speed(*, json: Annotated[bool, Parameter(negative="")] = False) -> int:
@@ -17,16 +18,14 @@ def speed(*, json: Annotated[bool, Parameter(negative="")] = False) -> int:
     from palpate.bench.speed import EXPERIMENT, STEPS, measure
     from palpate.cli._waiting import COMPILING
 
-    figures = measure(waiting=lambda: print(COMPILING, file=sys.stderr))  # noqa: T201
+    figures = measure(waiting=lambda: say(COMPILING))
     if json:
-        import msgspec
-
-        sys.stdout.write(msgspec.json.encode(figures).decode() + "\n")
+        print_json(figures)
         return 0
-    print(  # noqa: T201
+    print_lines(
         f"one tick of {EXPERIMENT}, pressing and learning, {STEPS} steps of the physics included: "
-        f"{figures['ns_per_tick'] / 1e3:.2f} us on one core\n"
+        f"{figures['ns_per_tick'] / 1e3:.2f} us on one core",
         f"{figures['times_real_time']:.0f} times real time; {figures['ticks_per_s']:.3g} ticks a second "
-        f"on all {figures['cores']} cores"
+        f"on all {figures['cores']} cores",
     )
     return 0

@@ -7,20 +7,62 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from palpate.cli._named import listed, source_of
+from palpate.cli._terminal import STYLE, console, head, place, print_json, say, show_table
 from palpate.errors import InputError
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from palpate.studies.cluster import Cluster
     from palpate.studies.plan import Plan
     from palpate.studies.presenting import Findings
     from palpate.studies.running import Runner
+
+
+@Parameter(name="*", group=Group("A cluster", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class ClusterOptions:
+    """Where the runs go, if not to the cores of this machine.
+
+    Parameters
+    ----------
+    scheduler
+        Address of a Dask scheduler whose workers do the runs, tcp://HOST:PORT or tls://HOST:PORT. What they send
+        back may run anything here: name only a cluster that is trusted as this machine is.
+    tls_ca
+        Certificate of the authority that signed those of the cluster, a PEM file, for tls://.
+    tls_cert
+        Certificate of this machine, likewise.
+    tls_key
+        Its key, likewise.
+    """
+
+    scheduler: str | None = None
+    tls_ca: Path | None = None
+    tls_cert: Path | None = None
+    tls_key: Path | None = None
+
+    def cluster(self) -> Cluster | None:
+        """The cluster; None if none is named."""
+        from palpate.studies.cluster import Certificates, Cluster
+
+        files = (self.tls_ca, self.tls_cert, self.tls_key)
+        given = [path for path in files if path is not None]
+        if 0 < len(given) < len(files):
+            raise InputError("--tls-ca, --tls-cert and --tls-key go together")
+        if self.scheduler is None:
+            if given:
+                raise InputError("--tls-ca, --tls-cert and --tls-key are for --scheduler tls://HOST:PORT")
+            return None
+        return Cluster(self.scheduler, certificates=Certificates(*given) if given else None)
 
 
 def study(
@@ -28,7 +70,7 @@ def study(
     /,
     *,
     out: Path | None = None,
-    scheduler: str | None = None,
+    where: ClusterOptions | None = None,
     yes: Annotated[bool, Parameter(negative="")] = False,
     force: Annotated[bool, Parameter(negative="")] = False,
     list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
@@ -37,16 +79,23 @@ def study(
 ) -> int:
     """Run an experiment many times over a grid, a range or a random choice of parameters, or search for the best.
 
-    Args:
-        name: a study (see --list), or a TOML file of your own (see --print).
-        out: folder for results.parquet, report.html and the journal of runs; runs/study-NAME when left out. An
-            unfinished study there is gone on with.
-        scheduler: address of a Dask scheduler whose workers do the runs; all cores of this machine when left out.
-        yes: begin a study that takes very long without asking.
-        force: replace the results that stand there already.
-        list_: list the studies and stop.
-        print_: print the study's file, to copy and edit, and stop.
-        json: print the summary as JSON and nothing else.
+    Parameters
+    ----------
+    name
+        A study (see --list), or a TOML file of your own (see --print).
+    out
+        Folder for results.parquet, report.html and the journal of runs; runs/study-NAME when left out. An unfinished
+        study there is gone on with.
+    yes
+        Begin a study that takes very long without asking.
+    force
+        Replace the results that stand there already.
+    list_
+        List the studies and stop.
+    print_
+        Print the study's file, to copy and edit, and stop.
+    json
+        Print the summary as JSON and nothing else.
     """
     from palpate.studies import study as studies
 
@@ -58,65 +107,61 @@ def study(
         return 0
     folder = out if out is not None else Path("runs") / f"study-{Path(name).stem}"
     try:
-        found = _done(name, source, folder, scheduler, yes, force)
+        found = _done(name, source, folder, where or ClusterOptions(), yes, force)
     except KeyboardInterrupt:
         kept = f"what is done is saved in {folder}, and the same command goes on from there"
-        print(f"palpate: interrupted; {kept}", file=sys.stderr)  # noqa: T201
+        say(f"interrupted; {kept}")
         return 130
     _tell(found, folder, json)
     return 0 if found.summary["results"].get("done") else 1
 
 
-def _done(name: str, source: str, folder: Path, scheduler: str | None, yes: bool, force: bool) -> Findings:
+def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
-    from rich.console import Console
-
     from palpate.studies.plan import plan
     from palpate.studies.presenting import present
     from palpate.studies.running import Work, begun
     from palpate.studies.study import parse
 
-    console = Console(stderr=True)
+    screen = console(stderr=True)
     try:
         planned = plan(parse(source, name), name)
     except InputError as error:
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
     if not yes and (force or not begun(folder)):
-        _ask(planned, console, here=scheduler is None)
-    with _runner(scheduler, console) as runner, _progress(console, len(planned)) as show:
+        _ask(planned, screen, here=where.scheduler is None)
+    with _runner(where, screen) as runner, _progress(screen, len(planned)) as show:
         frame = Work(planned, source, folder, runner, show).done(force=force)
-    return present(frame, planned, folder, source, f"palpate study {shlex.quote(name)}")
+    return present(frame, planned, folder, source, shown(f"palpate study {shlex.quote(name)}"))
 
 
-def _ask(plan: Plan, console: Console, *, here: bool) -> None:
+def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
     """Asks whether to begin what takes very long on the cores here; of a cluster only the number of runs is known."""
     from palpate.cli._waiting import COMPILING
     from palpate.studies.cost import MANY, seconds_a_run, too_much
 
     if not here and len(plan) < MANY:
         return
-    warning = too_much(plan, seconds_a_run(plan, lambda: console.print(COMPILING)))
+    warning = too_much(plan, seconds_a_run(plan, lambda: screen.print(COMPILING)))
     if not warning:
         return
     if not sys.stdin.isatty():
         raise InputError(f"{warning}; make it smaller, or add --yes")
     from rich.prompt import Confirm
 
-    if not Confirm.ask(f"{warning}. Begin?", console=console, default=False):
+    if not Confirm.ask(f"{warning}. Begin?", console=screen, default=False):
         raise InputError("not begun; make the study smaller: fewer points, fewer seeds")
 
 
 @contextmanager
-def _runner(scheduler: str | None, console: Console) -> Iterator[Runner]:
-    if scheduler is None:
+def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
+    cluster = where.cluster()
+    if cluster is None:
         from palpate.cli._waiting import COMPILING
         from palpate.studies.local import Local
 
-        yield Local(waiting=lambda: console.print(COMPILING))
+        yield Local(waiting=lambda: screen.print(COMPILING))
         return
-    from palpate.studies.cluster import Cluster
-
-    cluster = Cluster(scheduler)
     try:
         yield cluster
     finally:
@@ -124,17 +169,17 @@ def _runner(scheduler: str | None, console: Console) -> Iterator[Runner]:
 
 
 @contextmanager
-def _progress(console: Console, total: int) -> Iterator[Callable[[int], None]]:
+def _progress(screen: Console, total: int) -> Iterator[Callable[[int], None]]:
     """A bar with the time left; without a terminal a line now and then."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("left")
-    watched = console.is_terminal
+    watched = screen.is_terminal
     with Progress(
-        *columns, console=console, transient=True, disable=not watched, speed_estimate_period=600
+        *columns, console=screen, transient=True, disable=not watched, speed_estimate_period=600
     ) as bar:
         task = bar.add_task("", total=total)
-        lines = Lines(console, total)
+        lines = Lines(screen, total)
 
         def show(finished: int) -> None:
             bar.update(task, completed=finished)
@@ -149,8 +194,8 @@ class Lines:
 
     EVERY = 60.0
 
-    def __init__(self, console: Console, total: int):
-        self._console, self._total = console, total
+    def __init__(self, screen: Console, total: int):
+        self._screen, self._total = screen, total
         self._begun = self._told = time.monotonic()
         self._first: int | None = None
 
@@ -164,30 +209,17 @@ class Lines:
             return
         self._told = now
         left = (now - self._begun) / (finished - self._first) * (self._total - finished)
-        self._console.print(f"{finished} of {self._total} runs, some {told(left)} left", soft_wrap=True)
+        self._screen.print(f"{finished} of {self._total} runs, some {told(left)} left", soft_wrap=True)
 
 
 def _tell(found: Findings, folder: Path, as_json: bool) -> None:
-    import msgspec
-    from rich import box
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
     if as_json:
-        sys.stdout.write(msgspec.json.encode(found.summary).decode() + "\n")
+        print_json(found.summary)
         return
-    console = Console()
-    console.print(f"[bold]{escape(found.summary['study'])}[/bold], {found.summary['runs']} runs")
+    screen = console()
+    head(screen, found.summary["study"], f", {found.summary['runs']} runs")
     for content in found.tables:
-        table = Table(
-            title=escape(content.title), title_justify="left", title_style="italic", box=box.SIMPLE_HEAD
-        )
-        for i, head in enumerate(content.head):
-            table.add_column(escape(head), justify="left" if i == 0 else "right")
-        for row in content.rows:
-            table.add_row(*map(escape, row))
-        console.print(table)
+        show_table(screen, content)
     for note in found.notes:
-        console.print(f"[yellow]{escape(note)}[/yellow]")
-    console.print(f"report: {folder / 'report.html'}", soft_wrap=True, highlight=False)
+        screen.print(note, style=STYLE)
+    place(screen, "report:", folder / "report.html")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
+from palpate.cli._terminal import console, place, print_lines, say, show_table
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -43,26 +45,29 @@ def thesis(
         everything = studies()
         width = 2 + max(len(known.NUMBER) for known in everything)
         for known in everything:
-            print(f"{known.NUMBER:<{width}}{known.TITLE}")  # noqa: T201
+            print_lines(f"{known.NUMBER:<{width}}{known.TITLE}")
         return 0
     chosen = studies() if figure is None else [study(figure)]
     folder = out if out is not None else Path("runs") / ("thesis" if figure is None else f"thesis-{figure}")
     command = f"palpate thesis{'' if figure is None else ' ' + figure} --seeds {seeds}"
-    _measure(chosen, folder, range(seeds), command, force)
+    try:
+        _measure(chosen, folder, range(seeds), command, force)
+    except KeyboardInterrupt:
+        say(f"interrupted; what is measured is saved in {folder}, and the same command goes on from there")
+        return 130
     return 0
 
 
 def _measure(chosen: Sequence[Study], folder: Path, seeds: Sequence[int], command: str, force: bool) -> None:
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from palpate.cli._waiting import COMPILING
     from palpate.thesis.measuring import measure
     from palpate.thesis.runs import Runs
 
-    console = Console()
+    screen = console()
     columns = BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
-    with Progress(*columns, console=console, transient=True) as progress:
+    with Progress(*columns, console=screen, transient=True) as progress:
         bar = progress.add_task("", total=len(chosen))
 
         def waiting() -> None:
@@ -71,20 +76,19 @@ def _measure(chosen: Sequence[Study], folder: Path, seeds: Sequence[int], comman
         def started(one: Study) -> None:
             progress.update(bar, completed=chosen.index(one), description=f"{one.NUMBER}  {one.TITLE}")
 
-        done = measure(chosen, Runs(seeds, waiting), folder, command=command, force=force, started=started)
-    _tell(console, done, folder)
+        def resumed(done: int) -> None:
+            progress.console.print(f"going on in {folder}: {done} of {len(chosen)} are measured already")
+
+        runs = Runs(seeds, waiting)
+        done = measure(chosen, runs, folder, command=command, force=force, started=started, resumed=resumed)
+    _tell(screen, done, folder)
 
 
-def _tell(console: Console, done: Sequence[Done], folder: Path) -> None:
-    from rich import box
-    from rich.markup import escape
-    from rich.table import Table
+def _tell(screen: Console, done: Sequence[Done], folder: Path) -> None:
+    from palpate.report.page import Table
 
-    table = Table(box=box.SIMPLE_HEAD)
-    for head in ("claim", "thesis", "measured", "verdict"):
-        table.add_column(head, overflow="fold")
-    for claim in (c for d in done for c in d.claims):
-        verdict = f"[{COLORS[claim.verdict]}]{claim.verdict}[/]"
-        table.add_row(escape(claim.id), escape(claim.thesis), escape(claim.measured), verdict)
-    console.print(table)
-    console.print(f"page: {folder / 'index.html'}", soft_wrap=True, highlight=False)
+    claims = [claim for one in done for claim in one.claims]
+    rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
+    table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
+    show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
+    place(screen, "page:", folder / "index.html")

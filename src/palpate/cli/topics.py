@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from palpate.cli._log_options import GB, limits_of
-from palpate.cli._text import plain
+from palpate.cli._terminal import print_json, print_lines
 
 if TYPE_CHECKING:
     from palpate.logs.listing import Entry, Listing
@@ -44,13 +44,11 @@ def topics(
     found = list_log(log, delimiter, limits_of(max_size, max_seconds))
     command = found.proposal.command(log)
     if json:
-        from json import dumps
-
         proposal = {"command": command, "guesses": list(found.proposal.guesses)}
         entries = [entry.to_json() for entry in found.entries]
-        print(dumps({"entries": entries, "troubles": found.troubles, "identify": proposal}))  # noqa: T201
+        print_json({"entries": entries, "troubles": found.troubles, "identify": proposal})
         return 0
-    print("\n".join(map(plain, [*_table(log, found), *_told(found, command)])))  # noqa: T201
+    print_lines(*_table(log, found), *_told(found, command))
     return 0
 
 

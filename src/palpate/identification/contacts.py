@@ -20,6 +20,8 @@ ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""
 _REACHED = 0.2
 _BLOCKS = 100
+_COVERED = 0.5
+"""Share of the force's range that short medians must cover to stand for it: those of an oscillation do not."""
 _LONGEST_BLOCK = 0.25
 """Of a median [s]: longer ones would hold whole presses of a long log."""
 _CLEAR = 3.0
@@ -29,6 +31,8 @@ _ROUNDS = 3
 _FREE = 0.25
 """Share of the position's range that must be travelled at one end of the force for contact to be sure to begin there:
 the power law of the softest toe (n = 2) goes 0.22 of its depth below ONSET of its force."""
+_DWELL = 8
+"""Samples that a force stays near an end of its range before it may rest there: an oscillation only turns."""
 _FLAT = 0.4
 """Slope near the resting force over that in contact, below which it is no contact: a toe of n = 2 has 0.44 at ONSET."""
 _SIGNED = 0.6
@@ -112,7 +116,7 @@ def find_contacts(channels: Channels, chain: Chain, options: Options = NOTHING_S
     force, position = chain(channels.force), chain(channels.position)
     end = None if options.bonded else _free_end(force, position, channels.dt)
     if end is None and options.bonded is False:
-        low, high = _ends(force, channels.dt)
+        low, high = _ends(_calm(force, position, channels.dt)[0])
         end = (low, high) if abs(low) <= abs(high) else (high, low)
     if end is None:
         return _never_left(channels, force, position, options)
@@ -203,30 +207,41 @@ def _oriented(
     return Contacts(tuple(spans), False, sign, way, level, threshold, tuple(warnings), signed=signed)
 
 
-def _ends(force: Array, dt: float) -> tuple[float, float]:
-    """The two ends of the force's range: those of short medians, which a chattering probe does not reach."""
+def _calm(force: Array, position: Array, dt: float) -> tuple[Array, Array]:
+    """Short medians of both, which a chattering probe does not reach; both as they are if they are all oscillation."""
     width = min(len(force) // _BLOCKS, int(_LONGEST_BLOCK / dt))
+    if width < 4:
+        return force, position
+    step = max(width // 4, 1)
+    views = [np.lib.stride_tricks.sliding_window_view(own, width)[::step] for own in (force, position)]
+    calm_force = np.median(views[0], axis=1)
     low, high = np.percentile(force, [0.1, 99.9])
-    if width >= 4:
-        views = np.lib.stride_tricks.sliding_window_view(force, width)[:: max(width // 4, 1)]
-        middle = np.median(views, axis=1)
-        if np.ptp(middle) > 0.2 * (high - low):
-            low, high = middle.min(), middle.max()
+    if np.ptp(calm_force) <= _COVERED * (high - low):
+        return force, position
+    return calm_force, np.median(views[1], axis=1)
+
+
+def _ends(force: Array) -> tuple[float, float]:
+    """The two ends of the force's range."""
+    low, high = np.percentile(force, [0.1, 99.9])
     return float(low), float(high)
 
 
 def _free_end(force: Array, position: Array, dt: float) -> tuple[float, float] | None:
     """Resting and peak force, if at one end of its range the position travels without it; None if it never does."""
-    low, high = _ends(force, dt)
+    force, position = _calm(force, position, dt)
+    low, high = _ends(force)
     height = high - low
     whole = _spread(position)
     if height <= 0 or whole <= 0:
         return (low, high) if abs(low) <= abs(high) else (high, low)
     near = (force < low + ONSET * height, force > high - ONSET * height)
-    travel = [_spread(position[end]) / whole for end in near]
     slope = height / max(_spread(position[~near[0] & ~near[1]]), 1e-300)
-    flat = [_flat(force[end], position[end], slope) for end in near]
-    free = [t > _FREE or f for t, f in zip(travel, flat, strict=True)]
+    stays = [_stretches(end) for end in near]
+    travel = [
+        max((_spread(position[a:b]) for a, b in own if b - a >= _DWELL), default=0.0) / whole for own in stays
+    ]
+    free = [t > _FREE or _flat(force, position, own, slope) for t, own in zip(travel, stays, strict=True)]
     if not any(free):
         return None
     if all(free):
@@ -237,16 +252,33 @@ def _free_end(force: Array, position: Array, dt: float) -> tuple[float, float] |
     return (low, high) if from_low else (high, low)
 
 
-def _flat(force: Array, position: Array, slope: float) -> bool:
-    """Whether force near one end of its range follows the position by much less than in contact."""
-    if len(force) < _FEWEST or np.ptp(position) == 0:
+def _stretches(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and past-the-last sample of each unbroken stretch."""
+    edges = np.diff(np.r_[0, inside.astype(np.int8), 0])
+    return list(zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True))
+
+
+def _flat(force: Array, position: Array, stays: list[tuple[int, int]], slope: float) -> bool:
+    """Whether, while the force stays near one end of its range, it follows the position much less than in contact.
+
+    Args:
+        force: shape (n,).
+        position: shape (n,).
+        stays: stretches in which the force stays there.
+        slope: of force over position in contact [N/m].
+    """
+    long = [(a, b) for a, b in stays if b - a >= _FEWEST]
+    if not long:
         return False
-    x = position - position.mean()
+    x = np.concatenate([position[a:b] - position[a:b].mean() for a, b in long])
+    f = np.concatenate([force[a:b] - force[a:b].mean() for a, b in long])
     size = float(x @ x)
-    own = float(x @ force) / size
-    left = force - force.mean() - own * x
-    few = max(len(force) / 8, 3.0)  # neighbours behind a filter are not independent
-    std = float(np.sqrt((left @ left) / len(force) / (size / len(force)) / few))
+    if size <= 0:
+        return False
+    own = float(x @ f) / size
+    left = f - own * x
+    few = max(len(f) / 8, 3.0)  # neighbours behind a filter are not independent
+    std = float(np.sqrt((left @ left) / size / few))
     return abs(own) + 2 * std < _FLAT * slope
 
 

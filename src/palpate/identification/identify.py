@@ -84,10 +84,10 @@ def identify(
     problem = problem_of(channels, chain, contacts, options)
     terms = replace(terms, band=highest_motion(problem.motion))
     choice = choose(problem, options)
-    if not (contacts.clear or bonded) and max(choice.answer.explained, choice.answer.fit.r2) < _FOLLOWS:
+    holds = estimated_by(method, choice.answer.fit.model, choice.problem, channels)
+    if not (contacts.clear or bonded) and max(choice.answer.explained, holds.r2) < _FOLLOWS:
         text = f"the force (rms {choice.answer.unexplained:.3g} N) does not follow the position: nothing seems touched"
         return nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
-    holds = estimated_by(method, choice.answer.fit.model, choice.problem, channels)
     evidence = evidence_of(problem, options, terms.stiffness_unit)
     if series_stiffness is not None:
         choice = replace(choice, answer=in_series.without_series(choice.answer, series_stiffness, series_std))

@@ -77,7 +77,7 @@ class Problem:
         touch: the rows with those before each touch; None if no touch is in the log.
         origin: position of the surface on the log's own scale [m].
         contacts: as found.
-        counted: the force is counted from where it rests out of contact.
+        counted: the force is counted from where it rests out of contact, and the rows begin before the touches.
     """
 
     motion: Motion

@@ -7,7 +7,7 @@ left out.
 from typing import Any, NamedTuple
 
 from palpate._jit import part
-from palpate._vector import clip
+from palpate._vector import clip, sign
 from palpate.signals.parameters import coerced, components, require
 from palpate.signals.quantise import quantise
 
@@ -35,6 +35,16 @@ class Converter(NamedTuple):
     def convert(self, u):
         """The quantity of the code nearest to u."""
         return clip(quantise(u, self.resolution), self.full_scale - self.resolution)
+
+    def convert_within(self, u, limit):
+        """The quantity of the code nearest to u of those that do not exceed the limit."""
+        return self.convert(clip(u, self.below(limit)))
+
+    def below(self, limit):
+        """The quantity of the largest code that is no more than the limit."""
+        nearest = quantise(limit, self.resolution)
+        beyond = sign(nearest - limit)
+        return nearest - 0.5 * (beyond + abs(beyond)) * self.resolution
 
     @property
     def resolution(self):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from palpate.files import whole
 from palpate.logs.arm_logs import read_wrench_and_pose
 from palpate.logs.read import columns_of, read_log
 from palpate.logs.store import read_record, write_record
-from palpate.logs.whole import whole
 
 __all__ = ["columns_of", "read_log", "read_record", "read_wrench_and_pose", "whole", "write_record"]

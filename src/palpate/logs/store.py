@@ -5,43 +5,54 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.files import SIGNATURE, whole
 from palpate.logs.limits import Budget, Limits
-from palpate.logs.whole import whole
 from palpate.records import Record
 
-KEY = "palpate"
+if TYPE_CHECKING:
+    from polars import DataFrame
 
 
 def write_record(record: Record, path: str | Path) -> Path:
     """Write a record so that the file is either whole or not there.
 
-    It is written beside its place under another name and then moved there in one step.
-
     Returns:
         The path written.
 
     Raises:
-        InputError: the folder does not exist, or the path is a folder.
+        InputError: the folder does not exist, or palpate may not write over what stands there.
     """
     import polars
 
     path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; name a file in it, such as {path / 'record.parquet'}")
-    if not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: there is no folder {path.parent}; make it first")
-    about = {KEY: json.dumps({"units": dict(record.units), "meta": dict(record.meta)}, allow_nan=False)}
-    frame = polars.DataFrame({name: np.asarray(column, float) for name, column in record.columns.items()})
-    with whole(path) as draft:
-        frame.write_parquet(draft, metadata=about)
+    about = json.dumps({"units": dict(record.units), "meta": dict(record.meta)}, allow_nan=False)
+    write_parquet(
+        polars.DataFrame({name: np.asarray(column, float) for name, column in record.columns.items()}),
+        about,
+        path,
+    )
     return path
+
+
+def write_parquet(frame: DataFrame, about: str, path: Path) -> None:
+    """Write a table as Parquet, whole or not at all, with a text about it in the file's own metadata.
+
+    Raises:
+        InputError: palpate may not write there.
+        OSError: the disk is full.
+    """
+    packed = BytesIO()  # what a library raises when the disk is full is its own affair
+    frame.write_parquet(packed, metadata={SIGNATURE: about})
+    with whole(path) as draft:
+        draft.write_bytes(packed.getbuffer())
 
 
 def read_record(path: str | Path, limits: Limits | None = None) -> Record:
@@ -86,7 +97,7 @@ def stored_about(path: Path) -> About | None:
     import polars
 
     with polars_says(path):
-        about = polars.read_parquet_metadata(path).get(KEY)
+        about = polars.read_parquet_metadata(path).get(SIGNATURE)
     try:
         return msgspec.json.decode(about, type=About) if about else None
     except (msgspec.DecodeError, RecursionError) as error:

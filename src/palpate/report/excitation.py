@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.excitation import Design
-from palpate.logs import whole
 from palpate.references.waves import Multisine
 from palpate.report import style
-from palpate.report.ownership import SIGNATURE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,10 +22,7 @@ _SHOWN = 4.0  # s of the desired force; more would be a block of ink
 
 def write_figure(found: Design, path: Path) -> Path:
     """Draw a design and write it as a PNG, whole or not at all."""
-    figure = draw(found)
-    with whole(path) as draft:
-        figure.savefig(draft, format="png", metadata={"Software": SIGNATURE})
-    return path
+    return style.save(draw(found), path)
 
 
 def draw(found: Design) -> Figure:

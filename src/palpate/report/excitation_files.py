@@ -8,8 +8,8 @@ from typing import Any
 
 from palpate.errors import InputError
 from palpate.excitation import Design, HybridLoop, Remedy
-from palpate.logs import whole
-from palpate.logs.store import write_record
+from palpate.files import FORCE, MADE, write_text
+from palpate.logs import write_record
 from palpate.records import Record
 from palpate.references.waves import Multisine
 
@@ -32,9 +32,8 @@ def write_force(found: Design, path: Path, rate: float) -> None:
         return
     import polars
 
-    table = polars.DataFrame({"time_s": time, "force_desired_N": force})
-    with whole(path) as draft:
-        table.write_csv(draft, float_precision=6)
+    table = polars.DataFrame(dict(zip(FORCE, (time, force), strict=True)))
+    write_text(path, table.write_csv(float_precision=6))
 
 
 def check_ending(path: Path) -> None:
@@ -53,7 +52,7 @@ def experiment(found: Design) -> str:
     middle = found.predictions[0].surface
     press = found.settle + found.seconds
     lines = [
-        "# Made by palpate excite.",
+        f"{MADE} excite.",
         'title = "A designed excitation"',
         "",
         "[run]",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import ceil
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
@@ -55,7 +54,7 @@ def _table(found: Design) -> Table:
         "force [N]",
         "travel",
     ):
-        table.add_column(escape(title), justify="right", no_wrap=True)
+        table.add_column(title, justify="right", no_wrap=True)
     for prediction in found.predictions:
         table.add_row(*_row(prediction, found))
     return table

@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.identification.result import Verdict
-from palpate.logs import whole
 from palpate.report import identification_fit as fit
 from palpate.report import identification_trust as trust
 from palpate.report import style
 from palpate.report.identification_growth import growth
 from palpate.report.identification_words import MARKS, headline, number, subtitle, unit
-from palpate.report.ownership import SIGNATURE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,9 +38,7 @@ def write_figure(found: Identification, path: Path, title: str) -> Path:
         title: what to call the log.
     """
     figure = draw(found, title)
-    with whole(path) as draft:
-        figure.savefig(draft, format="png", dpi=style.DPI, metadata={"Software": SIGNATURE})
-    return path
+    return style.save(figure, path)
 
 
 def draw(found: Identification, title: str) -> Figure:
@@ -65,7 +61,7 @@ def draw(found: Identification, title: str) -> Figure:
 
 def _head(figure: Any, found: Identification, title: str) -> None:
     """The log, the outcome, and each parameter with its verdict."""
-    figure.text(0.01, 0.97, title, fontsize=13, fontweight="bold", va="top")
+    figure.text(0.01, 0.97, style.literal(title), fontsize=13, fontweight="bold", va="top")
     figure.text(0.01, 0.75, headline(found), fontsize=11, va="top")
     figure.text(0.01, 0.56, subtitle(found), fontsize=9, va="top")
     said = [

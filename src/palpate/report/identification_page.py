@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from palpate.files import write_text
 from palpate.identification.result import Identification, Parameter, Traces
-from palpate.logs import whole
 from palpate.report import identification_captions as captions
 from palpate.report import identification_fit as fit
 from palpate.report import identification_trust as trust
@@ -44,8 +44,7 @@ def write_page(
         notes: lines on how the log was read, such as the frame that a wrench was turned into.
     """
     text = page(found, title, command, notes)
-    with whole(path) as draft:
-        draft.write_text(text, encoding="utf-8")
+    write_text(path, text)
     return path
 
 

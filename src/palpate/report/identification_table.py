@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
@@ -23,7 +22,7 @@ def show(found: Identification, name: str, console: Console) -> None:
         name: of the log.
         console: where to.
     """
-    console.print(f"[bold]{escape(name)}[/]: {_contacts(found)}")
+    console.print(Text.assemble((name, "bold"), f": {_contacts(found)}"))
     if found.n:
         console.print(_fit(found))
     console.print(_table(found))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from palpate.report.ownership import SIGNATURE
+from palpate.files import SIGNATURE
 
 
 @dataclass(frozen=True)

@@ -63,9 +63,11 @@ class Scale:
         """Ticks and label of `axis.xaxis` or `axis.yaxis`."""
         which.set_label_text(self.label)
         if not self.numeric:
-            which.set_ticks(self.places, [str(v).replace(", ", "\n") for v in self.values])
+            which.set_ticks(self.places, [style.literal(str(v)).replace(", ", "\n") for v in self.values])
         elif self.log:
             (axis.set_xscale if which is axis.xaxis else axis.set_yscale)("log")
+            if min(which.get_view_interval()) <= 0.0:  # there is nothing to be drawn over it
+                which.set_view_interval(*self.edges()[[0, -1]], ignore=True)
             self._ticks(which)
         elif 2 < len(self.values) <= 8:
             which.set_ticks(self.places, [f"{v:g}" for v in self.values])

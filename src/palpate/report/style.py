@@ -7,11 +7,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.logs import whole
+from palpate.files import SIGNATURE, whole
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
 INK = "#222222"
 BLUE, ORANGE, GREEN, RED, VIOLET, GREY = "#1f6fb4", "#e07b16", "#2a9254", "#c4342d", "#7b53a6", "#8a8a8a"
@@ -69,8 +71,39 @@ def legend(axis: Axes, **options: Any) -> None:
     axis.legend(fontsize=8.5, borderaxespad=0.2, **options)
 
 
+def literal(text: str) -> str:
+    """A text from outside as it is to be drawn: dollars are dollars, not formulas."""
+    return shown(text).replace("$", r"\$")
+
+
 def save(drawing: Figure, path: Path) -> Path:
     """Writes the figure as PNG, the file there whole or not at all."""
+    _spell_out(drawing)
     with whole(path) as draft:
-        drawing.savefig(draft, format="png")
+        drawing.savefig(draft, format="png", metadata={"Software": SIGNATURE})
     return path
+
+
+def _spell_out(drawing: Figure) -> None:
+    """A label of the user's that is no formula is drawn as it is written."""
+    from matplotlib.mathtext import MathTextParser
+
+    for text in _labels(drawing):
+        if text.get_text().count("$") > 1:
+            try:
+                MathTextParser("path").parse(text.get_text())
+            except ValueError:
+                text.set_parse_math(False)
+
+
+def _labels(drawing: Figure) -> Iterator[Text]:
+    """Titles, labels and legends; not the ticks, which are numbers."""
+    from matplotlib.text import Text
+
+    yield from drawing.texts
+    for axis in drawing.axes:
+        yield from (axis.xaxis.label, axis.yaxis.label)
+        yield from (one for one in axis.get_children() if isinstance(one, Text))
+        legend = axis.get_legend()
+        if legend is not None:
+            yield from legend.get_texts()

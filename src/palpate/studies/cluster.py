@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
+import socket
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
+from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from palpate.errors import InputError
 from palpate.studies.one import FAILED, Done, Job, Row, run_one
@@ -43,18 +46,41 @@ def run_batch(jobs: Sequence[Job], stamp: str) -> list[Done]:
     return [run_one(job) for job in jobs]
 
 
+@dataclass(frozen=True)
+class Certificates:
+    """Files by which a cluster and its client know each other, for tls://.
+
+    Args:
+        authority: that signed the certificates of both.
+        certificate, key: the client's own.
+    """
+
+    authority: Path
+    certificate: Path
+    key: Path
+
+    def __post_init__(self) -> None:
+        for path in (self.authority, self.certificate, self.key):
+            if not path.is_file():
+                raise InputError(f"there is no file {path}; name the certificates of the cluster")
+
+
 class Cluster:
     """Runs jobs on the workers of a Dask scheduler.
 
+    What its workers send back is unpickled here, which may run anything: a cluster is trusted as this machine is.
+
     Args:
-        address: of the scheduler, such as tcp://192.168.0.10:8786.
+        address: of the scheduler, such as tcp://192.168.0.10:8786, or tls://.
         patience: how long it may be without any worker [s].
+        certificates: for tls://.
 
     Raises:
-        InputError: the extra is not installed, or there is no scheduler at the address.
+        InputError: the extra is not installed, the address is none, or there is no scheduler at it.
     """
 
-    def __init__(self, address: str, patience: float = PATIENCE):
+    def __init__(self, address: str, patience: float = PATIENCE, certificates: Certificates | None = None):
+        host, port = _parsed(address, certificates)
         try:
             import distributed
         except ImportError as error:
@@ -63,7 +89,10 @@ class Cluster:
         self.address, self._patience = address, patience
         self._client: Any
         try:
-            self._client = _untyped(distributed).Client(address, timeout=CONNECT, set_as_default=False)
+            socket.create_connection((host, port), CONNECT).close()  # Dask would ask again and again
+            self._client = _untyped(distributed).Client(
+                address, timeout=CONNECT, set_as_default=False, security=_security(certificates)
+            )
         except (OSError, ValueError, RuntimeError, TimeoutError) as error:
             raise InputError(
                 f"no Dask scheduler answers at {address} ({_line(error)}); check the address"
@@ -84,6 +113,38 @@ class Cluster:
             yield from hand.all(_Batches(jobs))
         finally:
             hand.drop()
+
+
+def _parsed(address: str, certificates: Certificates | None) -> tuple[str, int]:
+    """Host and port of an address."""
+    wrong = InputError(f"{address!r} is no address of a scheduler; give tcp://HOST:PORT or tls://HOST:PORT")
+    try:
+        parts = urlsplit(address if "://" in address else f"tcp://{address}")
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        raise wrong from None
+    if parts.scheme not in {"tcp", "tls"} or not host or not port or parts.path or parts.query:
+        raise wrong
+    if (parts.scheme == "tls") != (certificates is not None):
+        raise InputError(
+            "tls:// needs --tls-ca, --tls-cert and --tls-key"
+            if certificates is None
+            else f"certificates are for tls://HOST:PORT, not for {address}"
+        )
+    return host, port
+
+
+def _security(certificates: Certificates | None) -> Any:
+    if certificates is None:
+        return None
+    import distributed
+
+    return _untyped(distributed).Security(
+        tls_ca_file=str(certificates.authority),
+        tls_client_cert=str(certificates.certificate),
+        tls_client_key=str(certificates.key),
+        require_encryption=True,
+    )
 
 
 class _Batches:

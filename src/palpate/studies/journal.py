@@ -11,11 +11,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
-from typing import IO, TypeVar
+from typing import TypeVar
 
 import msgspec
 
 from palpate.errors import InputError
+from palpate.files import check_place, whole
 from palpate.studies.one import Row
 
 NAME = "runs.jsonl"
@@ -115,22 +116,25 @@ class Journal:
 def opened(path: Path, head: Head) -> Iterator[Journal]:
     """The journal of a study at `path`: begun, or gone on with if it is the same study's.
 
+    The folder has to be this process's alone (`kept_folder`).
+
     Raises:
-        InputError: it is another study's, or of another version; another process is writing it; it cannot be written.
+        InputError: it is another study's, or of another version; it cannot be written.
     """
-    with path.open("ab") as lock:
-        _lock(lock, path)
-        if not _known(path, head):
-            _begin(path, head)
-        finished = Finished()
-        end = _end_of_head(path)
-        for row, at in _read(path):
-            end = at
-            if 0 <= row.run < head.runs:
-                finished.add(row.run)
-        _cut(path, end)
-        with path.open("ab", buffering=0) as file:
-            yield Journal(path, file, finished)
+    check_place(path)
+    if path.exists():
+        _check(path, head)
+    else:
+        _begin(path, head)
+    finished = Finished()
+    end = _end_of_head(path)
+    for row, at in _read(path):
+        end = at
+        if 0 <= row.run < head.runs:
+            finished.add(row.run)
+    _cut(path, end)
+    with path.open("ab", buffering=0) as file:
+        yield Journal(path, file, finished)
 
 
 def rows(path: Path) -> Iterator[Row]:
@@ -147,19 +151,13 @@ def head_of(path: Path) -> Head | None:
         return None
 
 
-def _known(path: Path, head: Head) -> bool:
-    """Whether the journal was begun, by this study and version."""
-    if path.stat().st_size == 0:
-        return False
+def _check(path: Path, head: Head) -> None:
+    """Refuse a journal that is not of this study and version."""
     there = head_of(path)
     if there is None:
-        if not path.read_bytes().count(b"\n"):  # killed while it wrote the head
-            return False
-        raise InputError(
-            f"{path} is no journal of a study; choose another --out, or add --force to begin anew"
-        )
+        raise InputError(f"{path} is no journal of a study; choose another --out")
     if there == head:
-        return True
+        return
     other = "another study" if there.study != head.study else "another version of palpate"
     which = (
         f"{there.title!r}, {there.runs} runs"
@@ -173,7 +171,7 @@ def _known(path: Path, head: Head) -> bool:
 
 def _begin(path: Path, head: Head) -> None:
     try:
-        with path.open("wb") as file:
+        with whole(path) as draft, draft.open("wb") as file:
             file.write(_line(msgspec.json.encode(head)))
             file.flush()
             os.fsync(file.fileno())
@@ -218,16 +216,3 @@ def _cut(path: Path, size: int) -> None:
         os.truncate(path, size)
     except OSError:  # a torn line at the end is passed over when it is read
         return
-
-
-def _lock(file: IO[bytes], path: Path) -> None:
-    try:
-        import fcntl
-    except ImportError:  # a system without such locks: two studies in one folder are then its user's care
-        return
-    try:
-        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        raise InputError(
-            f"another palpate study is at work in {path.parent}; wait for it, or choose another --out"
-        ) from None

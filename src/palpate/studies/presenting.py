@@ -8,11 +8,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import msgspec
 import numpy as np
 
 from palpate.bench.ending import DONE
-from palpate.logs import whole
+from palpate.files import signed, write_json, write_text
 from palpate.report.page import Table
 from palpate.report.study_page import study_page
 from palpate.studies.drawing import draw
@@ -50,7 +49,7 @@ class Findings:
 def present(frame: DataFrame, plan: Plan, folder: Path, source: str, command: str) -> Findings:
     """Writes figures, page and summary into the folder."""
     ranked = rankings(frame, plan)
-    told = {"command": command, **summary(frame, plan, ranked)}
+    told = signed({"command": command, **summary(frame, plan, ranked)})
     found = Findings(told, tables(frame, plan, ranked), notes(frame, plan, ranked))
     described = Table("What is measured", ("metric", "is"), [(m, _told(m)) for m in plan.study.metrics])
     page = study_page(
@@ -62,10 +61,8 @@ def present(frame: DataFrame, plan: Plan, folder: Path, source: str, command: st
         command=command,
         study=source,
     )
-    with whole(folder / PAGE) as draft:
-        draft.write_text(page, encoding="utf-8")
-    with whole(folder / SUMMARY) as draft:
-        draft.write_bytes(msgspec.json.format(msgspec.json.encode(found.summary), indent=2) + b"\n")
+    write_text(folder / PAGE, page)
+    write_json(folder / SUMMARY, found.summary)
     return found
 
 

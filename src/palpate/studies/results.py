@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from palpate.errors import InputError
-from palpate.logs import whole
+from palpate.logs.store import write_parquet
 from palpate.studies.metrics import METRICS
 from palpate.studies.one import Row
 from palpate.studies.plan import Plan
@@ -39,16 +39,13 @@ def write(frame: DataFrame, plan: Plan, path: Path) -> None:
     Raises:
         InputError: the disk is full.
     """
-    import polars
-
-    about = {name: {"unit": METRICS[name].unit, "text": METRICS[name].text} for name in plan.study.metrics}
-    metadata = {"palpate": msgspec.json.encode({"title": plan.study.title, "metrics": about}).decode()}
+    metrics = {name: {"unit": METRICS[name].unit, "text": METRICS[name].text} for name in plan.study.metrics}
+    about = msgspec.json.encode({"title": plan.study.title, "metrics": metrics}).decode()
     try:
-        with whole(path) as draft:
-            frame.write_parquet(draft, metadata=metadata)
-    except (OSError, polars.exceptions.PolarsError) as error:
+        write_parquet(frame, about, path)
+    except OSError as error:
         raise InputError(
-            f"{path}: {_line(error)}; the runs are saved: free some space, and the same command writes the table"
+            f"{path}: {error.strerror}; the runs are saved: free some space, and the same command writes the table"
         ) from error
 
 
@@ -71,9 +68,3 @@ def _schema(plan: Plan) -> dict[str, Any]:
     told = {name: kinds[kind] for name, kind in plan.columns.items()}
     metrics = dict.fromkeys(plan.study.metrics, polars.Float64)
     return {"run": polars.Int64, **told, "result": polars.String, "why": polars.String, **metrics}
-
-
-def _line(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from palpate.errors import InputError
-from palpate.logs import whole, write_record
+from palpate.files import MADE, kept_folder, write_text
+from palpate.logs import write_record
 from palpate.studies import journal, results, search
 from palpate.studies.journal import Head, Journal
 from palpate.studies.local import Local
@@ -19,8 +19,6 @@ from palpate.studies.sources import sources
 from palpate.studies.study import parse
 
 SOURCE, RECORDS = "study.toml", "records"
-MADE = (journal.NAME, search.NAME, results.NAME, SOURCE, "report.html", "summary.json")
-"""What a study writes beside figures and records."""
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -60,10 +58,11 @@ class Work:
         Raises:
             InputError: the folder holds something else and `force` is off, or the disk is full, or the cluster is gone.
         """
-        prepare(self.folder, force)
-        with journal.opened(self.folder / journal.NAME, head(self.plan)) as book:
-            with whole(self.folder / SOURCE) as draft:
-                draft.write_text(self.source, encoding="utf-8")
+        with (
+            kept_folder(self.folder, journal.NAME, force=force),
+            journal.opened(self.folder / journal.NAME, head(self.plan)) as book,
+        ):
+            write_text(self.folder / SOURCE, f"{MADE} study, as it was asked for.\n{self.source}")
             self.progress(len(book.finished))
             if self.plan.study.search is None:
                 self._run(
@@ -135,23 +134,3 @@ def head(plan: Plan) -> Head:
 
     study = hashlib.sha256(resolved(plan)).hexdigest()[:16]
     return Head(plan.study.title, study, str(__version__), sources(), len(plan))
-
-
-def prepare(folder: Path, force: bool) -> None:
-    """Makes the folder, or makes sure that it is a study's; with `force` what a study wrote there is removed.
-
-    Raises:
-        InputError: it is no folder, or holds other files.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is not a folder; choose another --out")
-    folder.mkdir(parents=True, exist_ok=True)
-    there = folder / journal.NAME
-    if not begun(folder) and any(p.name not in MADE for p in folder.iterdir()):
-        raise InputError(f"{folder} holds files that are no results of a study; choose another --out")
-    if force and begun(folder):
-        if journal.head_of(there) is None and there.stat().st_size:
-            raise InputError(f"{there} is no journal of a study; choose another --out")
-        records = list((folder / RECORDS).glob("*.parquet"))
-        for path in (*records, *folder.glob("*.png"), *(folder / name for name in MADE)):
-            path.unlink(missing_ok=True)

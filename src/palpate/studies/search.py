@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.errors import InputError
+from palpate.files import SIGNATURE, check_place
 from palpate.studies.axes import Axis
 from palpate.studies.plan import Plan
 
@@ -80,6 +81,7 @@ class Searching:
         return [(first + i, {a.name: _heard(a, p[a.name]) for a in self._axes}) for i, p in enumerate(asked)]
 
     def _stored(self, path: Path, name: str) -> OptunaStudy:
+        check_place(path)
         if path.exists() and not path.read_bytes().endswith(
             b"\n"
         ):  # torn: what is added would be spoiled too
@@ -92,11 +94,10 @@ class Searching:
 
     def _opened(self, path: Path, name: str) -> OptunaStudy:
         storages = self._optuna.storages
-        path.with_name(f"{path.name}.lock").unlink(missing_ok=True)  # of a process that was killed
-        backend = storages.journal.JournalFileBackend(str(path))
+        backend = storages.journal.JournalFileBackend(str(path), lock_obj=_unlocked(storages))
         study = self._optuna.create_study(
             storage=storages.JournalStorage(backend),
-            study_name=name,
+            study_name=f"{SIGNATURE} {name}",
             direction=self._direction,
             load_if_exists=True,
         )
@@ -118,6 +119,19 @@ def _optuna() -> Any:
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     warnings.filterwarnings("ignore", category=optuna.exceptions.ExperimentalWarning)
     return optuna
+
+
+def _unlocked(storages: Any) -> Any:
+    """No lock: the study's folder is its process's alone, and a lock of Optuna's outlives a process that is killed."""
+
+    class Unlocked(storages.journal.JournalFileOpenLock):
+        def acquire(self) -> bool:
+            return True
+
+        def release(self) -> None:
+            return None
+
+    return Unlocked("")
 
 
 def _distribution(axis: Axis) -> BaseDistribution:

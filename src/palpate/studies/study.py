@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from palpate.bench.explaining import explained, not_finite
-from palpate.bench.toml_files import TomlFiles
+from palpate.bench.toml_files import TomlFiles, decoded
 from palpate.errors import InputError, unknown
 from palpate.studies.metrics import METRICS
 from palpate.studies.tables import Against, Curves, Map, Parameter, Study
@@ -32,10 +32,7 @@ def load(name: str) -> Study:
 
 def parse(text: str, where: str) -> Study:
     """A study from TOML; `where` names the text in errors."""
-    try:
-        tables = msgspec.toml.decode(text)
-    except msgspec.DecodeError as error:
-        raise InputError(f"{where}: not TOML: {error}") from error
+    tables = decoded(text, where)
     try:
         study = _converted(tables)
         _check(study)

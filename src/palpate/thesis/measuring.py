@@ -6,13 +6,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from palpate._jit import sources_stamp
 from palpate.errors import InputError
-from palpate.logs import whole
+from palpate.files import check_place, kept_folder, signed, write_json, write_text
 from palpate.report import style
 from palpate.thesis.claims import Claim, with_wholes
 from palpate.thesis.page import index_page
@@ -51,54 +50,54 @@ def measure(
     command: str,
     force: bool = False,
     started: Callable[[Study], None] = lambda _: None,
+    resumed: Callable[[int], None] = lambda _: None,
 ) -> list[Done]:
     """Runs the studies and writes claims.json, index.html and a figure each into the folder, after each study.
 
-    A folder that holds an unfinished measurement of the same sources, studies and seeds is gone on with.
+    A folder that holds an unfinished measurement of the same sources, studies and seeds is gone on with; `resumed` is
+    told how many studies are done.
 
     Raises:
-        InputError: the folder holds anything else, and `force` is off.
+        InputError: the folder holds anything else, and `force` is off; another process is writing there.
     """
-    state = _state(studies, runs, folder, command, force)
-    _replace(folder / STATE, _json(state))  # from now on the folder is known for what it is
-    for study in studies:
-        if study.NUMBER in state.done:
-            continue
-        started(study)
-        begun = time.perf_counter()
-        data = study.run(runs)
-        claims = list(study.check(data))
-        style.save(study.plot(data), folder / f"{study.NUMBER}.png")
-        seconds = time.perf_counter() - begun
-        state.done[study.NUMBER] = Done(study.NUMBER, study.TITLE, study.CAPTION, claims, seconds)
-        _write(state, folder)
+    with kept_folder(folder, STATE, force=force):
+        state = _state(studies, runs, folder, command)
+        _write_state(state, folder)  # from now on the folder is known for what it is
+        if state.done:
+            resumed(len(state.done))
+        for study in studies:
+            if study.NUMBER not in state.done:
+                started(study)
+                state.done[study.NUMBER] = _measured(study, runs, folder)
+                _write(state, folder)
     return [state.done[number] for number in state.wanted]
 
 
-def _state(studies: Sequence[Study], runs: Runs, folder: Path, command: str, force: bool) -> State:
+def _measured(study: Study, runs: Runs, folder: Path) -> Done:
+    begun = time.perf_counter()
+    data = study.run(runs)
+    claims = list(study.check(data))
+    style.save(study.plot(data), folder / f"{study.NUMBER}.png")
+    return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
+
+
+def _state(studies: Sequence[Study], runs: Runs, folder: Path, command: str) -> State:
     wanted = [s.NUMBER for s in studies]
     stamp = f"{sources_stamp(*sorted(Path(__file__).parent.rglob('*.py')))} seeds {list(runs.seeds)}"
-    fresh = State(stamp, wanted, command)
-    if not folder.exists():
-        folder.mkdir(parents=True)
-        return fresh
-    if not folder.is_dir():
-        raise InputError(f"{folder} is not a folder; choose another --out")
-    if not any(folder.iterdir()):
-        return fresh
+    if not (folder / STATE).exists():
+        return State(stamp, wanted, command)
     old = _stored(folder)
     if old is None:
-        raise InputError(f"{folder} holds files that are no measurement of the thesis; choose another --out")
-    if old.stamp == stamp and old.wanted == wanted and len(old.done) < len(wanted):
-        return old
-    if not force:
+        raise InputError(f"{folder / STATE} is no measurement of the thesis; choose another --out")
+    if old.stamp != stamp or old.wanted != wanted or len(old.done) == len(wanted):
         raise InputError(
             f"{folder} holds a measurement already; choose another --out, or add --force to replace it"
         )
-    return fresh
+    return old
 
 
 def _stored(folder: Path) -> State | None:
+    check_place(folder / STATE)
     try:
         return msgspec.json.decode((folder / STATE).read_bytes(), type=State)
     except (OSError, msgspec.DecodeError):
@@ -109,15 +108,10 @@ def _write(state: State, folder: Path) -> None:
     """Everything that the folder says, each file whole or as it was."""
     finished = [state.done[n] for n in state.wanted if n in state.done]
     rows = with_wholes([claim for done in finished for claim in done.claims])
-    _replace(folder / "claims.json", _json([asdict(row) for row in rows]))
-    _replace(folder / "index.html", index_page(state, finished, folder).encode())
-    _replace(folder / STATE, _json(state))
+    write_json(folder / "claims.json", [asdict(row) for row in rows])
+    write_text(folder / "index.html", index_page(state, finished, folder))
+    _write_state(state, folder)
 
 
-def _json(value: Any) -> bytes:
-    return msgspec.json.format(msgspec.json.encode(value), indent=2) + b"\n"
-
-
-def _replace(path: Path, content: bytes) -> None:
-    with whole(path) as draft:
-        draft.write_bytes(content)
+def _write_state(state: State, folder: Path) -> None:
+    write_json(folder / STATE, signed(asdict(state)))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment, build
@@ -26,12 +27,15 @@ class Runs:
 
     seeds: Sequence[int] = tuple(range(10))
     waiting: Callable[[], None] | None = None
+    _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
 
     def one(self, experiment: Experiment, seed: int | None = None) -> Record:
         """The record of one run, for a figure; of the first seed unless another is given."""
         number = self.seeds[0] if seed is None else seed
         run = experiment.run
-        record = build(experiment).run(run.duration, number, press=run.press, waiting=self.waiting)
+        record = build(experiment).run(
+            run.duration, number, press=run.press, waiting=self.waiting, progress=self._look
+        )
         if record.meta["end"] == INTERRUPTED:  # a part of a run would be measured as if it were all of it
             raise KeyboardInterrupt
         return record
@@ -51,4 +55,12 @@ class Runs:
     def map(self, work: Callable[[Any], T], items: Sequence[Any]) -> list[T]:
         """`work` of each item, in their order, on all cores."""
         with ThreadPoolExecutor(cores()) as pool:
-            return list(pool.map(work, items))
+            try:
+                return list(pool.map(work, items))
+            except BaseException:
+                self._stopped.set()  # the other threads' runs end at their next look
+                raise
+
+    def _look(self, _: float, __: str) -> None:
+        if self._stopped.is_set():
+            raise KeyboardInterrupt

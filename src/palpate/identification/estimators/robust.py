@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from palpate.errors import InputError
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget, Spread
-from palpate.identification.estimators.by_octave import Solution, System, estimate, solve, system_of
+from palpate.identification.estimators.by_octave import Solution, System, estimate, system_of
 from palpate.identification.estimators.effects import FRICTION, effect_columns
 from palpate.identification.estimators.fit import Fit, fit, relinearised
 from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of, segments_of
@@ -170,7 +170,7 @@ class _Question:
         sensor = self._sensor(solution)
         budget = causes.of_noise(self.system, solution, self.names, self.own, LAG)
         budget["octaves"] = causes.of_octaves(self.system, solution)
-        budget["repetition"] = self._repetition(solution)
+        budget["repetition"] = causes.of_stretches(self.system, solution)
         budget["unexplained"] = causes.of_unexplained(self.system, solution, sensor)
         explained, left = self._explained(solution, sensor)
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
@@ -185,15 +185,6 @@ class _Question:
         noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
         return Answer(names, solution.theta[kept], cov, budget, fitted, explained, left, noise)
-
-    def _repetition(self, solution: Solution) -> Spread:
-        """Stretches of the log left out one after the other."""
-        octaves = self.octaves.only(self.use)
-        count = len(octaves.products)
-        if count < 2:
-            return Spread(np.zeros(self.system.size))
-        others = (system_of(octaves.without(g), self.names, self.prior) for g in range(count))
-        return causes.of_stretches(solution, [solve(other, solution.noise) for other in others])
 
     def _sensor(self, solution: Solution) -> Array:
         """Variance of a line by the sensor's own noise in each octave: out of contact, else the quietest octave's."""

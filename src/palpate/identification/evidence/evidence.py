@@ -27,10 +27,11 @@ def evidence_of(problem: Problem, options: Options, unit: str) -> Evidence:
         return (), None, None
     lag = problem.lag
     spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std)
-    press = press_of(problem, lag.value, segments)
+    whole = problem.with_touches or problem  # a press may be over before a filter has settled
+    press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
     if options.series_stiffness is not None:
         series = options.series_stiffness, options.series_std
         spectrum = in_series.spectrum_without_series(spectrum, *series)
         press = None if press is None else in_series.press_without_series(press, *series)
-    point = working_point(problem, spectrum, segments, options, unit)
+    point = working_point(whole, spectrum, options, unit)
     return spectrum, press, point

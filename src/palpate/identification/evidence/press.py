@@ -18,6 +18,8 @@ UPPER = 0.4
 """Share of the force above which a way in counts for its stiffness: below, a surface is still being met."""
 _LEVELS = (0.3, 0.5, 0.7, 0.9)
 _WIDE = 0.15
+_FULL = 0.95
+"""Share of the force at which a way in is over: what is left of it is rounding off."""
 _FEWEST = 6
 _STILL = 0.02
 """Share of the highest speed below which a probe rests: encoders and loops leave a per cent or so."""
@@ -51,7 +53,10 @@ class Slope:
 
 
 def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[Stroke]:
-    """The way in of each contact: up to its deepest row, at least half of the range of all."""
+    """The way in of each contact: up to its deepest row or nearly its peak force, at least half of the range of all.
+
+    What comes after the peak force is a hold: the probe creeps on under a constant force, or the force relaxes.
+    """
     motion = problem.motion
     channels = (motion.moved(0, lag), motion.moved(1, lag), problem.force, problem.time)
     depth = channels[0]
@@ -59,7 +64,10 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
     reach = max((float(np.ptp(depth[s.first : s.last])) for s in segments), default=0.0)
     for s in segments:
         own = depth[s.first : s.last]
-        top = s.first + int(np.argmax(own))
+        force = problem.force[s.first : s.last]
+        low, high = np.percentile(force, [2, 98])
+        full = int(np.argmax(force >= low + _FULL * (high - low)))
+        top = s.first + min(int(np.argmax(own)), max(full, _FEWEST))
         if top - s.first < _FEWEST or depth[top] - depth[s.first] < 0.5 * reach:
             continue
         begin = s.first + int(np.argmin(depth[s.first : top]))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.octaves import Segment
+from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.evidence.press import Slope, slope_of, strokes_in
 from palpate.identification.in_series import slope_without_series
 from palpate.identification.options import Options
@@ -24,7 +24,6 @@ _EXCITED = 0.05
 def working_point(
     problem: Problem,
     spectrum: Sequence[DynamicStiffness],
-    segments: list[Segment],
     options: Options,
     unit: str,
 ) -> WorkingPoint | None:
@@ -34,6 +33,7 @@ def working_point(
     surface (a probe that follows it, an inertia), and is passed over.
     """
     lag, tolerance = problem.lag.value, options.tolerance
+    segments = segments_of(problem.motion.rows, problem.spans)
     slope = slope_of(strokes_in(problem, lag, segments))
     if slope is not None and options.series_stiffness is not None:
         series = options.series_stiffness, options.series_std
@@ -55,7 +55,7 @@ def working_point(
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     force, depth = problem.force[inside], problem.motion.moved(0, lag)[inside]
-    rest = problem.contacts.resting
+    rest = 0.0 if problem.counted else problem.contacts.resting
     return WorkingPoint(
         _judged(value, half, tolerance, unit),
         float(force.mean() - rest),
@@ -93,8 +93,5 @@ def _judged(value: float, half: float, tolerance: float, unit: str) -> Parameter
     if share <= tolerance:
         reason = f"known to {100 * share:.2g} % (95 %), whatever the model"
         return Parameter(value, half / 1.96, interval, unit, Verdict.IDENTIFIED, reason)
-    if share < 1:
-        reason = f"known to {100 * share:.2g} % only (95 %)"
-        return Parameter(value, half / 1.96, interval, unit, Verdict.NOT_IDENTIFIABLE, reason)
-    reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g} {unit}; zero is within it"
-    return Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)
+    reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g} {unit}; wider than {tolerance:.0%}"
+    return Parameter(value, half / 1.96, interval, unit, Verdict.NOT_IDENTIFIABLE, reason)

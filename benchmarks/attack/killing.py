@@ -1,0 +1,175 @@
+"""Kills, Ctrl-C and full disks at any moment of a run and of a study: what is on the disk afterwards is whole."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+from samples import SAMPLES
+
+PROGRAM = (sys.executable, "-m", "palpate")
+
+
+def run_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
+    """`palpate run --force` over results, killed: the old ones or the new ones are there at the next start."""
+    _experiment(folder)
+    _ran("run", "e.toml", "--seed", "1", "--out", "out", cwd=folder)
+    told: Counter[str] = Counter()
+    for chance in _moments(count, seed, 6.0):
+        _interrupted(
+            signal.SIGKILL, chance, "run", "e.toml", "--seed", "2", "--out", "out", "--force", cwd=folder
+        )
+        again = _ran(
+            "run", "e.toml", "--seed", "3", "--out", "out", cwd=folder
+        )  # refused, and puts things right
+        told["refused as it should" if again.returncode == 2 else f"defect: code {again.returncode}"] += 1
+        told[_results(folder / "out")] += 1
+        told[_strays(folder, "out")] += 1
+    return told
+
+
+def run_interrupted(count: int, folder: Path, seed: int = 0) -> Counter[str]:
+    """`palpate run`, Ctrl-C: code 130 and what was simulated, or nothing because nothing was yet."""
+    _experiment(folder)
+    told: Counter[str] = Counter()
+    for number, chance in enumerate(_moments(count, seed, 6.0)):
+        out = folder / f"out{number}"
+        child = _interrupted(signal.SIGINT, chance, "run", "e.toml", "--out", out.name, cwd=folder)
+        if child.returncode == -signal.SIGINT:
+            told["ended before Python had begun"] += 1
+        elif child.returncode in {0, 130}:
+            told[_results(out) if out.exists() else "nothing simulated yet"] += 1
+        else:
+            told[f"defect: code {child.returncode}"] += 1
+        told[_strays(folder, out.name)] += 1
+    return told
+
+
+def study_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
+    """`palpate study`, killed and gone on with until it is done: the table is the same to the byte."""
+    ending, make = SAMPLES["study"]
+    make(folder / f"study{ending}")
+    text = (folder / "study.toml").read_text().replace("points = 3", "points = 60")
+    (folder / "study.toml").write_text(text)
+    _ran("study", "study.toml", "--out", "whole", cwd=folder)
+    whole, told = (folder / "whole/results.parquet").read_bytes(), Counter[str]()
+    for number, chance in enumerate(_moments(count, seed, 5.0)):
+        out = f"out{number // 4}"
+        signal_ = signal.SIGINT if number % 2 else signal.SIGKILL
+        _interrupted(signal_, chance, "study", "study.toml", "--out", out, cwd=folder)
+        if number % 4 == 3 or number == count - 1:
+            done = _ran("study", "study.toml", "--out", out, cwd=folder)
+            same = done.returncode == 0 and (folder / out / "results.parquet").read_bytes() == whole
+            told["resumed to the same table" if same else f"defect: {done.stderr[-200:]}"] += 1
+            told[_strays(folder / out, "")] += 1
+    return told
+
+
+def disks_full(count: int, folder: Path, seed: int = 0) -> Counter[str]:
+    """`palpate run` and `palpate study` where no file may be larger than some bytes: one line, code 2, nothing half."""
+    _experiment(folder)
+    SAMPLES["study"][1](folder / "study.toml")
+    told: Counter[str] = Counter()
+    chance = random.Random(seed)
+    for number in range(count):
+        command = ("run", "e.toml") if number % 2 else ("study", "study.toml")
+        out = folder / f"full{number}"
+        size = int(10 ** chance.uniform(1.5, 6.5))
+        done = _ran(*command, "--out", out.name, cwd=folder, largest=size)
+        lines = [line for line in done.stderr.splitlines() if line.startswith("palpate: ")]
+        if done.returncode == 2 and "Traceback" not in done.stderr and len(lines) == 1:
+            told["one line and code 2"] += 1
+        elif done.returncode == 0:
+            told["there was room"] += 1
+        else:
+            told[f"defect: code {done.returncode} at {size} bytes: {done.stderr[-200:]}"] += 1
+        if out.exists():
+            told[_whole_files(out)] += 1
+    return told
+
+
+def _experiment(folder: Path) -> None:
+    from palpate.bench import source
+
+    text = source("foam-hybrid").replace("press = 10.0", "press = 20.0")
+    (folder / "e.toml").write_text(text, encoding="utf-8")
+
+
+def _moments(count: int, seed: int, longest: float) -> list[float]:
+    chance = random.Random(seed)
+    return [chance.uniform(0.0, longest) for _ in range(count)]
+
+
+def _ran(*words: str, cwd: Path, largest: int | None = None) -> subprocess.CompletedProcess[str]:
+    def limit() -> None:
+        if largest is not None:
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+
+    return subprocess.run(
+        [*PROGRAM, *words],
+        cwd=cwd,
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        preexec_fn=limit,
+    )
+
+
+def _interrupted(number: int, after: float, *words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    child = subprocess.Popen(
+        [*PROGRAM, *words],
+        cwd=cwd,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    time.sleep(after)
+    if child.poll() is None:
+        child.send_signal(number)
+    out, err = child.communicate(timeout=300)
+    return subprocess.CompletedProcess(words, child.returncode, out, err)
+
+
+def _results(folder: Path) -> str:
+    from palpate.logs import read_record
+
+    try:
+        rows = len(read_record(folder / "record.parquet"))
+        told = json.loads((folder / "summary.json").read_text())
+        page = (folder / "report.html").read_text().rstrip().endswith("</html>") if rows else True
+    except (OSError, ValueError) as error:
+        return f"defect: {type(error).__name__} {error}"
+    return "whole results" if page and told["written_by"].startswith("palpate") else "defect: half results"
+
+
+def _strays(folder: Path, name: str) -> str:
+    found = sorted(path.name for path in folder.iterdir() if path.name.startswith(f".{name}"))
+    return f"defect: left behind {found}" if found else "nothing left behind"
+
+
+def _whole_files(folder: Path) -> str:
+    from palpate.files import ours
+
+    spoiled = [path.name for path in folder.rglob("*") if path.is_file() and not ours(path)]
+    return f"defect: half-written {spoiled}" if spoiled else "whole files only"
+
+
+KINDS = {
+    "run killed": run_killed,
+    "run, Ctrl-C": run_interrupted,
+    "study killed": study_killed,
+    "disk full": disks_full,
+}
+
+os.environ.setdefault("MPLBACKEND", "Agg")

@@ -1,0 +1,155 @@
+"""Reads spoiled files in a child process with limits of time and memory, and tells what became of each."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import resource
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mutate import mutated
+from samples import HEAD, NAMES, SAMPLES
+
+SECONDS, BYTES = 20.0, 4 << 30
+"""What one input may take of time, and a child of memory."""
+GOOD = ("read", "refused")
+
+
+@dataclass
+class Told:
+    """What became of the inputs of one kind."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    worst: float = 0.0
+    defects: list[str] = field(default_factory=list)
+
+    @property
+    def inputs(self) -> int:
+        """How many there were."""
+        return self.counts.total()
+
+    @property
+    def bad(self) -> int:
+        """How many were neither read nor refused in one line."""
+        return self.inputs - sum(self.counts[word] for word in GOOD)
+
+
+def attack(kind: str, seeds: range, folder: Path, seconds: float = SECONDS) -> Told:
+    """Reads one kind's spoiled files; a child that dies or hangs is a defect, and the next goes on behind it."""
+    told, left = Told(), seeds
+    while left:
+        for seed, outcome, took in _child(kind, left, folder, seconds):
+            told.counts[outcome.partition(":")[0]] += 1
+            told.worst = max(told.worst, took)
+            if outcome not in GOOD:
+                told.defects.append(f"{kind} {seed}: {outcome}")
+            left = range(seed + 1, seeds.stop)
+    return told
+
+
+def _child(kind: str, seeds: range, folder: Path, seconds: float) -> Iterator[tuple[int, str, float]]:
+    words = [sys.executable, __file__, kind, str(seeds.start), str(seeds.stop), str(folder)]
+    child = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert child.stdout is not None
+    assert child.stderr is not None
+    at, begun, allowed = seeds.start, time.monotonic(), 60.0 + seconds  # the first waits for imports
+    try:
+        while at < seeds.stop:
+            ready, _, _ = select.select([child.stdout], [], [], allowed)
+            line = child.stdout.readline() if ready else b""
+            took, begun, allowed = time.monotonic() - begun, time.monotonic(), seconds
+            if not line:
+                child.kill()
+                why = f"killed by signal {-child.wait()}" if ready else f"more than {seconds:g} s"
+                yield at, f"{'died' if ready else 'hung'}: {why}", took
+                return
+            outcome, took = json.loads(line)
+            yield at, outcome, took
+            at += 1
+    finally:
+        child.kill()
+        child.communicate()
+
+
+def _read(kind: str, path: Path) -> str:
+    """What a command makes of the file: read, refused in one line, or anything else."""
+    from palpate.errors import InputError
+
+    try:
+        if kind == "experiment":
+            from palpate.bench import build
+            from palpate.bench.experiment import load
+
+            build(load(str(path)))
+        elif kind == "study":
+            from palpate.studies.plan import plan
+            from palpate.studies.study import load as load_study
+
+            plan(load_study(str(path)), str(path))
+        elif kind == "journal":
+            from palpate.studies import journal
+
+            with journal.opened(path, HEAD()) as book:
+                list(book.rows())
+        else:
+            return _read_log(path)
+    except InputError as error:
+        return "refused" if str(error).strip() else "silent: an error without a word"
+    return "read"
+
+
+def _read_log(path: Path) -> str:
+    """By the program, which turns whatever happens into a code and a line."""
+    from palpate.cli import main
+
+    codes = []
+    columns = (f"--time={NAMES[0]}", f"--position={NAMES[1]}:mm", f"--force={NAMES[2]}:N")
+    for words in (
+        ["topics", str(path)],
+        ["identify", str(path), *_columns(path, columns), "--end", "0", "--json"],
+    ):
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            codes.append(main(words))
+        if codes[-1] not in {0, 1, 2} or (codes[-1] == 2 and err.getvalue().count("\n") != 1):
+            return f"defect: {words[0]} ended with {codes[-1]}: {(err.getvalue().splitlines() or ['?'])[-2:]}"
+        if any(ord(letter) < 32 and letter not in "\n\t" for letter in out.getvalue() + err.getvalue()):
+            return f"defect: {words[0]} printed a control character"
+    return "read" if codes[0] == 0 else "refused"
+
+
+def _columns(path: Path, columns: tuple[str, ...]) -> tuple[str, ...]:
+    return columns if path.suffix in {".csv", ".parquet", ".mat"} else ()
+
+
+def _serve(kind: str, seeds: range, folder: Path) -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ending, make = SAMPLES[kind]
+    whole = folder / f"whole-{kind.replace(' ', '')}{ending}"
+    if not whole.exists():
+        make(whole)
+    data, told = whole.read_bytes(), sys.stdout
+    for seed in seeds:
+        path = folder / f"log{ending}"
+        path.write_bytes(mutated(data, seed))
+        begun = time.monotonic()
+        try:
+            outcome = _read(kind, path)
+        except BaseException as error:  # noqa: BLE001 - whatever it is, it is a finding
+            outcome = f"defect: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        told.write(json.dumps((outcome, time.monotonic() - begun)) + "\n")
+        told.flush()
+
+
+if __name__ == "__main__":
+    _serve(sys.argv[1], range(int(sys.argv[2]), int(sys.argv[3])), Path(sys.argv[4]))

@@ -1,0 +1,108 @@
+"""Small files that are right, one of each kind that palpate reads: what the mutations begin with."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+N = 200
+TIME = np.arange(N) * 1e-3
+PLACE = 1e-3 * np.abs(np.sin(20.0 * TIME))
+FORCE = 5000.0 * PLACE
+TABLE = np.column_stack([TIME, 1e3 * PLACE, FORCE])
+NAMES = ("time_s", "position_mm", "force_N")
+
+
+def csv(path: Path) -> None:
+    """A table of text."""
+    np.savetxt(path, TABLE, delimiter=",", header=",".join(NAMES), comments="", fmt="%.7g")
+
+
+def parquet(path: Path) -> None:
+    """A table of somebody else's."""
+    import polars
+
+    polars.DataFrame(dict(zip(NAMES, TABLE.T, strict=True))).write_parquet(path)
+
+
+def record(path: Path) -> None:
+    """A record of palpate's own."""
+    from palpate.logs import write_record
+    from palpate.records import Record
+
+    units = {"time": "s", "position": "m", "force": "N"}
+    write_record(Record({"time": TIME, "position": PLACE, "force": FORCE}, units, {"seed": 0}), path)
+
+
+def mat(path: Path) -> None:
+    """Variables of MATLAB."""
+    from scipy.io import savemat
+
+    savemat(path, {"time_s": TIME, "position_mm": 1e3 * PLACE, "force_N": FORCE})
+
+
+def bag(kind: str) -> Callable[[Path], None]:
+    """A recorder's file: `bag1`, `mcap` or `sqlite`."""
+
+    def make(path: Path) -> None:
+        from logs.ros_bags import pose, storage, wrench, write_bag
+
+        along = np.outer(np.ones(N), [0.0, 0.0, 1.0])
+        sent = [wrench("/ft", TIME, FORCE[:, None] * along), pose("/pose", TIME, PLACE[:, None] * along)]
+        folder = path.with_name(f"{path.name}.whole")
+        storage(write_bag(folder, kind, sent)).replace(path)
+
+    return make
+
+
+def experiment(path: Path) -> None:
+    """An experiment."""
+    from palpate.bench import source
+
+    path.write_text(source("foam-neural"), encoding="utf-8")
+
+
+def study(path: Path) -> None:
+    """A study."""
+    from studies.small import SMALL
+
+    path.write_text(SMALL, encoding="utf-8")
+
+
+def journal(path: Path) -> None:
+    """Finished runs of a study."""
+    from palpate.studies import journal as journals
+    from palpate.studies.one import Row
+
+    with journals.opened(path, HEAD()) as book:
+        for run in range(10):
+            book.append(
+                Row(run, {"a": 0.1 * run, "seed": 0}, "done", "as asked for", (1.0 / (run + 1),), 0.01)
+            )
+
+
+def HEAD() -> object:
+    """Of the journal."""
+    from palpate.studies.journal import Head
+
+    return Head("T", "study", "0.1.0", "sources", 10)
+
+
+SAMPLES: dict[str, tuple[str, Callable[[Path], None]]] = {
+    "CSV": (".csv", csv),
+    "Parquet": (".parquet", parquet),
+    "record": (".parquet", record),
+    "MATLAB": (".mat", mat),
+    "ROS 1 bag": (".bag", bag("bag1")),
+    "MCAP": (".mcap", bag("mcap")),
+    "SQLite bag": (".db3", bag("sqlite")),
+    "experiment": (".toml", experiment),
+    "study": (".toml", study),
+    "journal": (".jsonl", journal),
+}
+"""By kind: the ending of its name, and who makes it."""

@@ -1,0 +1,88 @@
+"""The one place of output: whatever a command prints goes through here, and obeys nothing that is in it.
+
+A name from a log or a path may hold escape sequences, or brackets that rich would take for markup.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from palpate.text import shown
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from palpate.report.page import Table
+
+STYLE = "yellow"
+"""Of what a reader must not miss."""
+
+
+def print_lines(*lines: str) -> None:
+    """Print lines as they are, however long, for a reader or for another program."""
+    sys.stdout.write("".join(f"{shown(line)}\n" for line in lines))
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON value, in ASCII; numbers that are none are null."""
+    import json
+
+    import msgspec
+
+    plain = msgspec.json.decode(msgspec.json.encode(value))
+    sys.stdout.write(json.dumps(plain, allow_nan=False) + "\n")
+
+
+def say(text: str) -> None:
+    """Print a line about the program itself on standard error."""
+    print(f"palpate: {shown(' '.join(text.split()))}", file=sys.stderr)  # noqa: T201
+
+
+def console(*, stderr: bool = False) -> Console:
+    """A console of rich that takes no markup from texts; styles are given beside them."""
+    from rich.console import Console
+    from rich.segment import Segment
+
+    class Plain(Console):
+        def render(self, renderable: Any, options: Any = None) -> Iterable[Segment]:
+            for segment in super().render(renderable, options):
+                yield segment if segment.control else segment._replace(text=shown(segment.text))
+
+    return Plain(stderr=stderr, markup=False, emoji=False, highlight=False)
+
+
+def head(console: Console, title: str, rest: str) -> None:
+    """A title and what belongs to it, on one line."""
+    from rich.text import Text
+
+    console.print(Text.assemble((title, "bold"), rest))
+
+
+def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> None:
+    """A table: the first column names, the others hold figures.
+
+    Args:
+        console: where to.
+        table: what.
+        styles: of the rows' last cells, if they are to be told apart.
+    """
+    from rich import box
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    drawn = RichTable(
+        title=table.title or None, title_justify="left", title_style="italic", box=box.SIMPLE_HEAD
+    )
+    for i, title in enumerate(table.head):
+        drawn.add_column(title, justify="left" if i == 0 or styles else "right", overflow="fold")
+    for i, row in enumerate(table.rows):
+        last = Text(row[-1], style=styles[i] if styles else "")
+        drawn.add_row(*row[:-1], last)
+    console.print(drawn)
+
+
+def place(console: Console, what: str, where: object) -> None:
+    """Where something was written, unbroken, so that it can be copied."""
+    console.print(f"{what} {where}", soft_wrap=True)

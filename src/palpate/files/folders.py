@@ -1,0 +1,149 @@
+"""Folders of results: there whole or not at all, or kept and gone on with; never another's."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from palpate.errors import InputError
+from palpate.files.locks import HIDDEN, hidden, locking
+from palpate.files.ownership import ours
+
+_OLD = ".palpate-old"
+
+
+@contextmanager
+def fresh_folder(path: Path, *, force: bool) -> Iterator[Path]:
+    """Yield a hidden folder beside `path` to write into; it takes its place when the block ends well.
+
+    The place is checked before the block runs, so that no long run ends at a closed door. When the block
+    raises, the hidden folder is removed and what stood at `path` is untouched. What a process that was killed left
+    behind is put right first.
+
+    Args:
+        path: where the results shall stand.
+        force: replace the results that stand there already.
+
+    Raises:
+        InputError: `path` is taken, and `force` is off or there is anything in it that palpate did not write; or
+            another process of palpate is writing to it.
+    """
+    path = path.absolute()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = hidden(path)
+    draft.mkdir(exist_ok=True)
+    with locking(draft) as handle:
+        if handle is None:
+            raise _taken(path)
+        try:
+            _recovered(path)
+            _emptied(draft)
+            _check_fresh(path, force)
+            yield draft
+            _check_fresh(path, force)
+            _take_place(draft, path)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+
+
+@contextmanager
+def kept_folder(path: Path, begun: str, *, force: bool) -> Iterator[None]:
+    """Make a folder, or go on in one, and keep it for this process alone; drafts left in it are removed.
+
+    Args:
+        path: where the results are, or shall be.
+        begun: the file that tells that what is to be done there was begun.
+        force: remove what palpate wrote there.
+
+    Raises:
+        InputError: it is no folder, or a link; another process has it; it holds other files, and `force` is off or
+            there is anything among them that palpate did not write.
+    """
+    _check_folder(path)
+    path.mkdir(parents=True, exist_ok=True)
+    with locking(path) as handle:
+        if handle is None:
+            raise _taken(path)
+        for left in path.rglob(f".*{HIDDEN}"):
+            if left.is_file() and not left.is_symlink():
+                left.unlink()
+        if force:
+            check_all_ours(path)
+            (path / begun).unlink(missing_ok=True)  # first: what is left after a kill is then no results
+            _emptied(path)
+        elif not (path / begun).exists() and any(path.iterdir()):
+            raise InputError(
+                f"{path} holds other files; choose another --out, or add --force to replace results"
+            )
+        yield
+
+
+def check_all_ours(folder: Path) -> None:
+    """Refuse a folder in which there is anything that palpate did not write.
+
+    Raises:
+        InputError: there is, and which.
+    """
+    for place, folders, files in os.walk(folder):
+        inner = [Path(place, name) for name in folders]
+        for found in (*(p for p in inner if p.is_symlink()), *(Path(place, name) for name in files)):
+            if found.is_symlink() or not (found.name.endswith(HIDDEN) or ours(found)):
+                name = found.relative_to(folder)
+                raise InputError(
+                    f"{folder} holds {name}, which palpate did not write; move it, or choose another --out"
+                )
+
+
+def _check_folder(path: Path) -> None:
+    if path.is_symlink() or (path.exists() and not path.is_dir()):
+        kind = "a link" if path.is_symlink() else "not a folder"
+        raise InputError(f"{path} is {kind}; choose another --out")
+
+
+def _check_fresh(path: Path, force: bool) -> None:
+    _check_folder(path)
+    if not path.exists():
+        return
+    if not force:
+        raise InputError(f"{path} exists; choose another --out, or add --force to replace it")
+    check_all_ours(path)
+
+
+def _recovered(path: Path) -> None:
+    """Puts back the results of a process that was killed between taking them away and putting new ones there."""
+    old = hidden(path, _OLD)
+    if not old.is_dir() or old.is_symlink():
+        return
+    if path.exists():
+        shutil.rmtree(old)
+    else:
+        old.rename(path)
+
+
+def _take_place(draft: Path, path: Path) -> None:
+    if not path.exists():
+        draft.rename(path)
+        return
+    old = hidden(path, _OLD)
+    path.rename(old)
+    try:
+        draft.rename(path)
+    except OSError:
+        old.rename(path)
+        raise
+    shutil.rmtree(old)
+
+
+def _emptied(folder: Path) -> None:
+    for inner in folder.iterdir():
+        if inner.is_dir() and not inner.is_symlink():
+            shutil.rmtree(inner)
+        else:
+            inner.unlink()
+
+
+def _taken(path: Path) -> InputError:
+    return InputError(f"another palpate is at work in {path}; wait for it, or choose another --out")

@@ -1,0 +1,60 @@
+"""Files that are there whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import InputError
+from palpate.files.locks import hidden, locking
+from palpate.files.ownership import SIGNATURE, WRITTEN, check_place, ours
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Yield a draft beside `path` to write to; it takes the place in one step when the block ends well.
+
+    When the block raises, the draft is removed and what stood at `path` is untouched. The draft of a process that was
+    killed is written over by the next.
+
+    Raises:
+        InputError: palpate may not write there (`check_place`), or another process of palpate is doing so.
+    """
+    check_place(path)
+    draft = hidden(path)
+    with locking(draft, os.O_RDWR | os.O_CREAT) as handle:
+        if handle is None:
+            raise InputError(f"another palpate is writing {path}; wait for it, or choose another place")
+        try:
+            os.ftruncate(handle, 0)
+            yield draft
+            assert ours(draft), f"{path.name} was written without a mark of palpate"
+            check_place(path)
+            draft.replace(path)
+        except BaseException:
+            draft.unlink(missing_ok=True)
+            raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text as UTF-8, whole or not at all."""
+    with whole(path) as draft:
+        draft.write_text(text, encoding="utf-8", newline="\n")
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a value as JSON, whole or not at all; an object has to be `signed`."""
+    import msgspec
+
+    with whole(path) as draft:
+        draft.write_bytes(msgspec.json.format(msgspec.json.encode(value), indent=2) + b"\n")
+
+
+def signed(value: Mapping[str, Any]) -> dict[str, Any]:
+    """An object that is to be written as JSON, saying first who wrote it."""
+    from palpate import __version__
+
+    return {WRITTEN: f"{SIGNATURE} {__version__}", **value}

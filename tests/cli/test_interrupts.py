@@ -1,0 +1,98 @@
+"""A Ctrl-C is never lost: not in an import, not in a finaliser, not while results are written."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from cli.test_run import text_of
+from palpate.cli import main
+from palpate.cli._interrupts import noticed
+from palpate.logs import read_record
+from palpate.report import page as pages
+
+PRELUDE = """
+import os, signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from palpate.cli import _interrupts
+from palpate.cli._edge import guarded
+_interrupts.keep()
+"""
+
+
+def ended(code, *words):
+    """A process that runs the code and then sleeps as a command does."""
+    text = f"{PRELUDE}{code}\nraise SystemExit(guarded(lambda: time.sleep(20)))"
+    return subprocess.run(
+        [sys.executable, "-c", text, *words], capture_output=True, text=True, check=False, timeout=60
+    )
+
+
+def test_one_that_falls_into_a_finaliser_comes_again():
+    code = """
+class Left:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.001)
+
+left = Left()
+del left
+"""
+    ran = ended(code)
+    assert (ran.returncode, ran.stderr) == (130, "palpate: interrupted\n")
+
+
+def test_one_that_falls_into_an_import_waits_for_its_end(tmp_path):
+    (tmp_path / "heavy.py").write_text(
+        "import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(0.01)\nwhole = True\n"
+    )
+    ran = ended("sys.path.insert(0, sys.argv[1])\nimport heavy\nassert heavy.whole", str(tmp_path))
+    assert (ran.returncode, ran.stderr) == (130, "palpate: interrupted\n")
+
+
+def test_within_noticed_nothing_is_raised_and_it_is_told():
+    with noticed() as came:
+        assert not came()
+        os.kill(os.getpid(), signal.SIGINT)
+        deadline = time.monotonic() + 5.0
+        while not came():
+            assert time.monotonic() < deadline
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1.0)
+
+
+def test_results_that_are_being_written_are_written(tmp_path, monkeypatch):
+    """It comes while the page is made: everything is there, and the code says that it came."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")
+    page = pages.page
+
+    def interrupted(**words):
+        os.kill(os.getpid(), signal.SIGINT)
+        return page(**words)
+
+    monkeypatch.setattr(pages, "page", interrupted)
+    assert main(["run", "mine.toml", "--out", "results"]) == 130
+    assert (tmp_path / "results" / "report.html").is_file()
+    assert read_record(tmp_path / "results" / "record.parquet").meta["end"] == "done"
+
+
+@pytest.mark.parametrize("error", [MemoryError("Unable to allocate"), OSError(28, "No space left on device")])
+def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeypatch, capsys, error):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")
+
+    def full(**words):
+        raise error
+
+    monkeypatch.setattr(pages, "page", full)
+    assert main(["run", "mine.toml", "--out", "results"]) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert "the record is in results" in line
+    assert len(read_record(tmp_path / "results" / "record.parquet"))
+    assert not (tmp_path / "results" / "report.html").exists()

@@ -1,0 +1,125 @@
+"""Whatever a name holds, nothing in it is obeyed: not by the terminal, not by rich, not by matplotlib."""
+
+import io
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palpate.cli import _terminal, main
+from palpate.report import style
+from palpate.report.page import Table
+from palpate.text import shown
+
+EVIL = "\x1b]0;owned\x07\x1b[2J[bold]$x^{$\u202egnp.\udcff"
+COLUMNS = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
+
+
+@given(st.text(st.characters(categories=["L", "N", "P", "S", "Zs", "Cc", "Cf", "Cs"])))
+def test_what_is_shown_holds_nothing_that_is_obeyed(text):
+    safe = shown(text)
+    safe.encode("utf-8")
+    assert all(letter in "\n\t" or ord(letter) >= 32 for letter in safe)
+    assert not set("\x7f\x9b\u202e\u2028") & set(safe)
+    assert shown(safe) == safe
+    if text.isascii() and text.isprintable():
+        assert safe == text
+
+
+def test_letters_of_any_script_stay():
+    for text in ("Kraft [N] ± 3 µm", "力", "نیم‌فاصله", "é"):
+        assert shown(text) == text
+
+
+def test_a_console_obeys_neither_markup_nor_escapes(capsys):
+    screen = _terminal.console()
+    _terminal.head(screen, EVIL, EVIL)
+    _terminal.show_table(screen, Table(EVIL, (EVIL, "value"), [(EVIL, EVIL)]))
+    _terminal.place(screen, "report:", EVIL)
+    screen.print(EVIL, style="yellow")
+    _terminal.print_lines(EVIL)
+    _terminal.say(EVIL)
+    told = "".join(capsys.readouterr())
+    assert "\x1b" not in told
+    assert "\x07" not in told
+    assert "[bold]" in told
+    assert r"\x1b]0;owned\x07" in told
+
+
+def test_json_is_ascii_and_none_is_null(capsys):
+    _terminal.print_json({"name": "Kraft ± \x1b[2J", "value": float("nan")})
+    line = capsys.readouterr().out
+    assert line.isascii()
+    assert line.count("\n") == 1
+    assert json.loads(line) == {"name": "Kraft ± \x1b[2J", "value": None}
+
+
+def test_a_name_that_is_a_formula_is_drawn_as_a_name(tmp_path):
+    drawing, (axis,) = style.figure()
+    drawing.text(0.1, 0.9, style.literal("cost $5 to $x^{$.csv"))
+    axis.set_title("$bad{$", loc="left")
+    axis.set_xlabel("$K_e$ [N/m]")
+    axis.plot([0.0, 1.0], [0.0, 1.0], label=r"$\nothing{$")
+    axis.legend()
+    assert style.save(drawing, tmp_path / "a.png").stat().st_size > 5000
+
+
+def test_a_log_with_a_hostile_name(tmp_path, capsys, monkeypatch):
+    """Refused or not, its name comes out harmless."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a$x^{$b.csv", "[bold]a.csv", "\x1b[2Ja.csv"):
+        table = np.column_stack([np.arange(50) / 100, np.zeros(50), np.zeros(50)])
+        np.savetxt(name, table, delimiter=",", header="time_s,position_mm,force_N", comments="")
+        assert main(["topics", name]) == 0
+        assert "\x1b" not in "".join(capsys.readouterr())
+        assert main(["topics", f"no{name}"]) == 2
+        told = capsys.readouterr().err
+        assert "\x1b" not in told
+        assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("variables", "encoding", "told"),
+    [
+        ({"LANG": "C", "LC_ALL": "C"}, "utf-8", "± K"),
+        ({"PYTHONIOENCODING": "ascii"}, "ascii", "+- K"),
+        ({"PYTHONIOENCODING": "latin-1"}, "latin-1", "± K"),
+        ({"TERM": "xterm-256color", "HOME": "/proc/nobody"}, "utf-8", "± K"),
+    ],
+)
+def test_little_is_needed_of_the_environment(tmp_path, variables, encoding, told):
+    """With nothing but the way to programs: letters that the encoding lacks, a home that cannot be written."""
+    surface = ("--stiffness", "3000", "--damping", "50", "--force", "15", "--peak", "20")
+    ran = subprocess.run(
+        [sys.executable, "-m", "palpate", "excite", *surface],
+        env={"PATH": os.environ["PATH"], **variables},
+        cwd=tmp_path,
+        capture_output=True,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stderr == b""
+    assert told in ran.stdout.decode(encoding)
+    assert (tmp_path / "excite.png").is_file()
+
+
+def test_streams_that_were_closed_are_nowhere(tmp_path):
+    """No file that is opened later is taken for them."""
+    ran = subprocess.run(
+        f"'{sys.executable}' -m palpate run --list >&- 2>&- <&-", shell=True, check=False, cwd=tmp_path
+    )
+    assert ran.returncode == 0
+
+
+def test_a_stream_without_a_file_is_no_trouble(monkeypatch):
+    class Full(io.StringIO):
+        def flush(self):
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(sys, "stdout", Full())
+    assert main(["--version"]) == 2
