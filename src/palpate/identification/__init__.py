@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from palpate.identification.identify import identify
+from palpate.identification.pipeline import identify
 from palpate.identification.result import Comparison, Identification, Parameter, Verdict
 from palpate.identification.warning_codes import Code, Warn
 

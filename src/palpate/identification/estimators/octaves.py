@@ -148,23 +148,19 @@ def _sums(
     """Products and lines of the blocks of each group."""
     phase, level = _phase(length, numbers)
     width = own.shape[1]
-    found: dict[int, list[object]] = {}
+    found: dict[int, tuple[Array, int]] = {}
     some = max(_AT_ONCE // (length * width), 1)
     views = np.lib.stride_tricks.sliding_window_view(own, length, axis=0)
     for first in range(0, len(starts), some):
-        at = starts[first : first + some]
-        block = views[at]  # (blocks, p, length)
+        block = views[starts[first : first + some]]  # (blocks, p, length)
         lines = block @ phase - (block @ level[0]) @ level[1]
         real = np.concatenate([lines.real, lines.imag], axis=2)  # (blocks, p, 2 lines)
-        for g in np.unique(group[first : first + some]):
-            mine = real[group[first : first + some] == g]
-            flat = mine.transpose(0, 2, 1).reshape(-1, width)
-            if int(g) in found:
-                found[int(g)][0] += flat.T @ flat  # type: ignore[operator]
-                found[int(g)][1] += len(flat)  # type: ignore[operator]
-            else:
-                found[int(g)] = [flat.T @ flat, len(flat)]
-    return [(g, (np.asarray(part[0]), int(part[1]))) for g, part in found.items()]
+        mine = group[first : first + some]
+        for g in np.unique(mine).tolist():
+            flat = real[mine == g].transpose(0, 2, 1).reshape(-1, width)
+            products, count = found.get(g, (np.zeros((width, width)), 0))
+            found[g] = products + flat.T @ flat, count + len(flat)
+    return list(found.items())
 
 
 def _phase(
