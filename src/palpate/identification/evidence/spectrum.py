@@ -140,7 +140,7 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
 
 
 def _fitted(blocks: _Blocks) -> _Line:
-    """Least squares of the force's lines on those of position and velocity, both stiffnesses straight over the lines."""
+    """Least squares of the force on position and velocity, both stiffnesses straight lines of the frequency."""
     x, v, f = blocks.position, blocks.velocity, blocks.force
     power = np.abs(x) ** 2
     total = float(power.sum()) or 1e-300
