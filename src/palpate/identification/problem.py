@@ -157,7 +157,7 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
 
 
 MOST_ROWS = 1 << 17
-"""Rows that are fitted at most, in pieces spread over the log: more only average noise, which limits no answer by then."""
+"""Rows that are fitted at most, in pieces spread over the log: more average noise alone, which limits nothing then."""
 _PIECE = 1 << 14
 
 

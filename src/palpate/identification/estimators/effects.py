@@ -1,4 +1,4 @@
-"""Columns of force that no contact model has, but many a log: friction, hysteresis, stiffness that changes with depth."""
+"""Columns of force that no contact model has, but many a log: friction, hysteresis, stiffness that goes with depth."""
 
 from __future__ import annotations
 
