@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from palpate.files import check_place
 from palpate.report.identification.figure import draw, write_figure
 from palpate.report.identification.fit_panels import thinned
 from palpate.report.identification.words import said, sentence
-from palpate.files import check_place
 from report.outcomes import OUTCOMES
 
 

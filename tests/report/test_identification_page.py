@@ -11,12 +11,12 @@ from xml.etree import ElementTree
 import pytest
 
 from palpate.errors import InputError
+from palpate.files import check_place
 from palpate.identification.warning_codes import Code, Warn
 from palpate.report import style
 from palpate.report.identification.page import page, write_page
 from palpate.report.identification.source import Source, as_json
 from palpate.report.identification.words import ADVICE, interval, sentence
-from palpate.files import check_place
 from report.outcomes import OUTCOMES
 
 NASTY = "<script>alert(1)</script>"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from palpate.files import check_place
 from palpate.identification.pooling import pool
 from palpate.identification.result import Identification, Parameter, Traces, Verdict, WorkingPoint
 from palpate.report.identification.source import Source
@@ -16,7 +17,6 @@ from palpate.report.many.page import page, write_page
 from palpate.report.many.rows import LogRow, json_of
 from palpate.report.many.table import show
 from palpate.report.many.words import failures, sentence
-from palpate.files import check_place
 from report.test_identification_page import Reader
 
 NONE = np.empty(0)

@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.identification.result import Identification, Parameter, Traces, Verdict
 from palpate.files import write_text
+from palpate.identification.result import Identification, Parameter, Traces, Verdict
 from palpate.report.identification import captions
 from palpate.report.identification import evidence_panels as evidence
 from palpate.report.identification import fit_panels as fit

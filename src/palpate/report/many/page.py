@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.files import write_text
+from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.source import Source
 from palpate.report.identification.words import CALLED, facts_of, interval, said
