@@ -27,16 +27,22 @@ def quantity_of(axis):
 
 
 def test_the_panels_and_what_they_measure(found):
-    axes = axes_of(draw(found, "press.csv"))
+    pressed = replace(OUTCOMES["not_identifiable"](), dynamic_stiffness=found.dynamic_stiffness)
+    axes = axes_of(draw(pressed, "press.csv"))
     labels = {title: (axis.get_xlabel(), quantity_of(axis)) for title, axis in axes.items() if title}
     assert labels == {
         "Dynamic stiffness": ("", "storage [kN/m]"),
-        "Press": ("position [mm]", "force [N]"),
+        "Press": ("depth from touch [mm]", "force [N]"),
         "Force": ("", "force [N]"),
         "Misfit": ("time [s]", "misfit [N]"),
         "Is the misfit noise?": ("frequency [Hz]", "misfit [N/√Hz]"),
     }
     assert list(labels)[:2] == ["Dynamic stiffness", "Press"], "what the log shows stands before the model"
+
+
+def test_a_log_without_a_way_in_says_so(found):
+    bare = replace(found, press=None)
+    assert "no way into the surface" in quantity_of(axes_of(draw(bare, "log"))["Press"])
 
 
 def test_storage_and_loss_are_those_of_the_octaves(found):

@@ -215,7 +215,10 @@ def _judged(
     if half <= tolerance * value:
         verdict, reason = Verdict.IDENTIFIED, f"known to {share} (95 %): {terms}"
     else:
-        verdict, reason = Verdict.NOT_IDENTIFIABLE, f"known to {share} only (95 %), most of it {main}: {terms}"
+        verdict, reason = (
+            Verdict.NOT_IDENTIFIABLE,
+            f"known to {share} only (95 %), most of it {main}: {terms}",
+        )
     return Parameter(value, half / 1.96, (low, high), "Pa", verdict, reason, None, budget)
 
 

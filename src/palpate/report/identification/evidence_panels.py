@@ -117,7 +117,7 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
     style.panel(
         axes,
         labelled("force", traces.force_unit),
-        labelled("position" if own.loading[0].min() < 0 else "depth from touch", unit),
+        labelled("depth from touch" if _touches(found) else "position", unit),
     )
     x, f = own.loading
     _band_of(axes, own, scale)
@@ -128,6 +128,14 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
     if point is not None:
         _ring(axes, scale * point.depth_m, point.force_N)
     style.legend_above(axes)
+
+
+def _touches(found: Identification) -> bool:
+    """Whether positions count from a touch: the mean in contact then lies well inside the surface."""
+    point, press = found.working_point, found.press
+    if point is None or press is None:
+        return False
+    return point.depth_m > 0.25 * float(press.loading[0].max()) > 0
 
 
 def _band_of(axes: Axes, own: Press, scale: float) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -100,7 +102,10 @@ def _fit(found: Identification) -> str:
 def _table(found: Identification) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for title in ("", "value ± 95 %", "if the model holds", "unit", "verdict", "limited by"):
-        table.add_column(title, justify="right" if title == "value ± 95 %" else "left", no_wrap=True)
+        justify: Literal["left", "right"] = "right" if title == "value ± 95 %" else "left"
+        table.add_column(
+            title, justify=justify, no_wrap=title != "limited by", min_width=3 if title != "unit" else 5
+        )
     for name, p in found.parameters.items():
         style = STYLES[p.verdict]
         limit = next(iter(p.budget), NONE)

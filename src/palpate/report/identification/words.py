@@ -66,7 +66,7 @@ def sentence(found: Identification) -> str:
         return "The log shows no stiffness: no stretch in contact is long enough; log longer or press deeper."
     own, where = point.stiffness, place_of(found, point)
     limit = limited_by(found)
-    if own.value is None:
+    if own.value is None or own.ci95 is None or own.ci95[0] <= 0 <= own.ci95[1]:
         lost = _loss(found, point)
         start = f"{lost}, but no stiffness" if lost else "The log shows no stiffness"
         return f"{start} {where} ({own.reason}); {next_step(limit, point.source)}."
