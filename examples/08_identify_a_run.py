@@ -23,8 +23,9 @@ columns = {"time": run["t"], "position": run["x_measured"], "force": run["force_
 found = palpate.identify(Record(columns, {"time": "s", "position": "m", "force": "N"}))
 
 late = bench.loop.force.lag + bench.loop.conditioning.force.lag
-print(f"{found.model}; force late by {1e3 * found.lag[0]:.2f} ms, the instruments say {1e3 * late:.2f} ms")
+said = "unknown" if found.lag is None else f"{1e3 * found.lag.value:.2f} ± {1e3 * found.lag.bound:.2f} ms"
+print(f"{found.model}; force late by {said}, the instruments say {1e3 * late:.2f} ms")
 for name, parameter in found.parameters.items():
-    truth = bench.meta["truth"][name]["value"]
+    truth = bench.meta["truth"].get(name, {"value": 0.0})["value"]  # friction: the bench's surface has none
     value = "no number" if parameter.value is None else f"{parameter.value:.4g}"
     print(f"{name}: {value} {parameter.unit}, in truth {truth:g}: {parameter.verdict}")

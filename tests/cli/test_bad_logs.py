@@ -44,7 +44,7 @@ def inside(tmp_path, monkeypatch):
 
 def folder_without_a_bag(path):
     path.mkdir()
-    (path / "notes.txt").write_text("nothing")
+    (path / "notes.md").write_text("nothing")
 
 
 def no_messages(path):

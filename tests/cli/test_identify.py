@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import palpate
 from identification.synthetic_contacts import pressed
 from palpate import identify, read_log
 from palpate.cli import main
@@ -16,7 +18,7 @@ from palpate.identification.options import METHODS
 from palpate.identification.warning_codes import Code
 
 SKIN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_mN:mN")
-FIELDS = {"value", "std", "ci95", "unit", "verdict", "reason"}
+FIELDS = {"value", "std", "ci95", "ci95_if_model_holds", "budget", "unit", "verdict", "reason"}
 
 
 def ask(capsys, *words):
@@ -114,9 +116,25 @@ def test_lattice(measured, capsys):
 def test_the_contract_of_json(log, capsys):
     code, found = ask(capsys, log, *OWN)
     assert code == 0
-    assert set(found) == {"model", "parameters", "contacts", "lag_s", "fit", "warnings"}
+    assert set(found) >= {"file", "model", "models", "parameters", "contacts", "lag_s", "fit", "warnings"}
+    assert set(found) >= {"working_point", "dynamic_stiffness", "press", "options", "version", "sha256"}
+    assert found["file"] == str(log)
+    assert found["version"] == palpate.__version__
+    assert found["sha256"] == hashlib.sha256(log.read_bytes()).hexdigest()
+    assert found["options"]["position"] == "position_mm:mm"
     assert set(found["fit"]) == {"r2", "rmse_N", "n"}
-    assert set(found["lag_s"]) == {"value", "std"}
+    assert set(found["lag_s"]) == {"value", "std", "bound", "kind"}
+    assert set(found["working_point"]) == {"stiffness", "force_N", "depth_m", "frequency_Hz", "source"}
+    assert set(found["working_point"]["stiffness"]) == FIELDS | {"prediction95"}
+    assert set(found["dynamic_stiffness"][0]) == {
+        "Hz",
+        "storage",
+        "storage_half",
+        "loss",
+        "loss_half",
+        "blocks",
+    }
+    assert set(found["press"]) == {"tangent", "hysteresis_loss", "relaxation"}
     for p in found["parameters"].values():
         assert set(p) == FIELDS
         assert p["reason"]
@@ -137,6 +155,45 @@ def test_the_table_and_the_figure(log, capsys):
     capsys.readouterr()
 
 
+def test_the_terminal_begins_with_the_sentence(log, capsys):
+    assert main(["identify", str(log), *OWN, "--no-figure"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert printed.startswith("The stiffness is ")
+    assert (
+        printed.index("what limits it most is")
+        < printed.index("working point:")
+        < printed.index("value ± 95 %")
+    )
+
+
+def test_the_page_says_how_it_was_made(log, capsys):
+    assert main(["identify", str(log), *OWN, "--no-figure", "--report", "a.html"]) == 0
+    text = Path("a.html").read_text()
+    assert hashlib.sha256(log.read_bytes()).hexdigest() in text
+    assert "palpate identify" in text
+    assert "--report a.html" in text
+    assert palpate.__version__ in text
+
+
+@pytest.mark.parametrize("word", ["+1", "action", "-1", "reaction"])
+def test_the_sign_of_the_force_is_handed_on(log, capsys, word):
+    """Both words of an arm's wrench mean the same on one axis."""
+    sign = 1 if word in ("+1", "action") else -1
+    _, found = ask(capsys, log, *OWN, "--force-sign", word)
+    own = identify(read_log(log, **COLUMNS), force_sign=sign)
+    assert found["options"]["force_sign"] == sign
+    assert found["parameters"]["K"]["value"] == own.parameters["K"].value
+
+
+@pytest.mark.parametrize("words", [["--indenter", "sphere:10:mm"], ["--indenter", "sphere:10mm"]])
+def test_an_indenter_adds_youngs_modulus(log, capsys, words):
+    _, found = ask(capsys, log, *OWN, *words, "--poisson", "0.45:0.02")
+    own = found["parameters"]["E"]
+    assert own["unit"] == "Pa"
+    assert own["reason"]
+    assert found["options"]["indenter"] == words[1]
+
+
 def test_a_figure_of_somebody_else_is_not_written_over(log, capsys):
     other = log.parent / "press.identify.png"
     other.write_bytes(b"a holiday")
@@ -147,7 +204,7 @@ def test_a_figure_of_somebody_else_is_not_written_over(log, capsys):
 
 def test_a_lag_with_its_std(log, capsys):
     _, found = ask(capsys, log, *OWN, "--lag", "0.000:0.0005")
-    assert found["lag_s"] == {"value": 0.0, "std": 0.0005}
+    assert found["lag_s"] == {"value": 0.0, "std": 0.0005, "bound": pytest.approx(0.00098), "kind": "told"}
     assert found["parameters"]["B"]["std"] > 2
 
 
@@ -222,6 +279,20 @@ WRONG = {
         [*OWN, "--end", "0.0001"],
         "has 1 row with a time of its own.*check --time, --start and --end",
     ),
+    "no shape": ([*OWN, "--indenter", "ball:5:mm"], "needs sphere:RADIUS, punch:RADIUS or cone:HALF_ANGLE"),
+    "no size": ([*OWN, "--indenter", "sphere"], "needs sphere:RADIUS"),
+    "size of another kind": ([*OWN, "--indenter", "cone:5:mm"], "unit of length; a cone needs one of angle"),
+    "size is none": ([*OWN, "--indenter", "sphere:5e:mm"], "needs a number as its size"),
+    "no radius": ([*OWN, "--indenter", "punch:0:mm"], "radius of a punch must be more than 0"),
+    "flat cone": ([*OWN, "--indenter", "cone:95:deg"], "under 90 deg"),
+    "poisson alone": ([*OWN, "--poisson", "0.3"], "name it with --indenter"),
+    "poisson": (
+        [*OWN, "--indenter", "cone:70", "--poisson", "0.7"],
+        r"Poisson's ratio must be in \(-1, 0.5\]",
+    ),
+    "sign": ([*OWN, "--force-sign", "2"], "force-sign"),
+    "frame of one axis": ([*OWN, "--wrench-frame", "tool"], "this log has one axis"),
+    "twice": (["./press.csv", *OWN], "is named twice; a log counts once"),
     "figure is a folder": ([*OWN, "--figure", "."], "is a folder; name a file with --figure"),
     "report is a folder": ([*OWN, "--report", ".."], "is a folder; name a file with --report"),
     "figure kind": ([*OWN, "--figure", "a.pdf"], "PNG; name it a.png"),

@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
@@ -12,11 +13,22 @@ import pytest
 from palpate.errors import InputError
 from palpate.files import check_place
 from palpate.identification.warning_codes import Code, Warn
-from palpate.report.identification_page import page, write_page
-from palpate.report.identification_words import ADVICE, headline
+from palpate.report import style
+from palpate.report.identification.page import page, write_page
+from palpate.report.identification.source import Source, as_json
+from palpate.report.identification.words import ADVICE, interval, sentence
 from report.outcomes import OUTCOMES
 
-VOID = {"meta", "br", "img", "hr", "link", "input"}
+NASTY = "<script>alert(1)</script>"
+SOURCE = Source(
+    f"logs/press <1> & more{NASTY[1:]}.csv".replace("/script", "script"),
+    {"position": f"x{NASTY}:mm"},
+    "0" * 64,
+    f"palpate identify 'press <1>.csv' {NASTY}",
+    "2026-01-02T03:04:05+00:00",
+    (f"normal: {NASTY}",),
+)
+VOID = {"source", "meta", "br", "img", "hr", "link", "input"}
 NAMESPACES = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}  # names, not fetched
 
 
@@ -61,7 +73,7 @@ def found(request):
 
 @pytest.fixture(scope="module")
 def html(found):
-    return page(found, "press <1> & more.csv")
+    return page(found, SOURCE)
 
 
 @pytest.fixture(scope="module")
@@ -71,9 +83,15 @@ def read(html):
 
 def pictures(read):
     for image in read.of("img"):
-        kind, data = image["src"].split(";base64,")
-        assert kind == "data:image/svg+xml"
-        yield base64.b64decode(data).decode()
+        yield decoded(image["src"])
+    for source in read.of("source"):
+        yield decoded(source["srcset"])
+
+
+def decoded(address):
+    kind, data = address.split(";base64,")
+    assert kind == "data:image/svg+xml"
+    return base64.b64decode(data).decode()
 
 
 def test_every_outcome_has_its_verdicts_and_reasons(found, read):
@@ -81,21 +99,63 @@ def test_every_outcome_has_its_verdicts_and_reasons(found, read):
         assert name in read.text
         assert str(p.verdict) in read.text
         assert " ".join(p.reason.split()) in read.text
-    assert "press <1> & more.csv" in read.text, "escaped, and read back"
+    assert "press <1> & more" in read.text, "escaped, and read back"
+
+
+def test_the_first_screen_answers(found, read):
+    """Name, sentence and working point stand before everything else."""
+    told = " ".join(sentence(found).split())
+    assert told in read.text
+    for later in ("What limits it:", "Dynamic stiffness", "The model's parameters", "Models compared"):
+        if later in read.text:
+            assert read.text.index(told) < read.text.index(later)
+    if found.contacts:
+        assert read.text.index("Dynamic stiffness") < read.text.index("The model's parameters")
 
 
 def test_the_numbers_are_those_of_the_json(found, html, read):
+    point = found.working_point
     values = [p.value for p in found.parameters.values() if p.value is not None]
+    if point is not None and point.stiffness.value is not None:
+        values.insert(0, point.stiffness.value)
     assert [float(data["value"]) for data in read.of("data")] == values
     shown = re.search(r"<pre>(\{.*\})</pre>", html, re.DOTALL).group(1)
-    assert json.loads(shown.replace("&#34;", '"').replace("&gt;", ">").replace("&lt;", "<").replace(
-        "&#39;", "'").replace("&amp;", "&")) == json.loads(json.dumps(found.to_json()))  # fmt: skip
+    assert json.loads(unescape(shown)) == json.loads(json.dumps(as_json(found, SOURCE)))
 
 
 def test_what_has_no_number_shows_none(found, html):
-    without = [p for p in found.parameters.values() if p.value is None]
-    assert html.count('<p class="number">no number</p>') == len(without)
-    assert html.count('<p class="number">') == len(found.parameters)
+    point = [found.working_point.stiffness] if found.working_point else []
+    own = [*found.parameters.values(), *point]
+    assert html.count(">no number</p>") == sum(p.value is None for p in own)
+
+
+def test_both_intervals_and_the_budget_stand_with_each_parameter(found, read):
+    for p in found.parameters.values():
+        if p.ci95_if_model_holds is not None and p.value is not None:
+            assert interval(p.ci95_if_model_holds, p.unit) in read.text
+        for cause in p.budget:
+            assert cause in read.text
+
+
+def test_the_footer_says_how_to_make_it_again(read):
+    for part in ("0" * 64, "palpate identify 'press <1>.csv'", "2026-01-02T03:04:05+00:00", "position x"):
+        assert part in read.text
+
+
+def test_nothing_of_a_log_escapes_into_the_page(html, read):
+    """Names, notes, options and the command hold a script; the page holds none, and would run none."""
+    assert "<script" not in html
+    assert not read.of("script")
+    assert all(not name.startswith("on") for _, attrs in read.elements for name in attrs)
+    policy = next(attrs["content"] for attrs in read.of("meta") if "http-equiv" in attrs)
+    assert "default-src 'none'" in policy
+
+
+def test_controls_of_a_name_are_shown_as_text():
+    text = page(OUTCOMES["no_contact"](), Source("a\x1b[31m\u202e$x_{1.csv"))
+    assert "\x1b" not in text
+    assert "\u202e" not in text
+    assert "$x_{1" in text
 
 
 def test_every_warning_says_what_to_do(found, read):
@@ -123,20 +183,19 @@ def test_it_is_read_aloud_too(read):
         assert len(image["alt"]) > 40
     for head in read.of("th"):
         assert head["scope"] in {"col", "row"}
-    for drawing in read.of("svg"):
-        assert drawing["role"] == "img"
-        assert "95 % interval" in drawing["aria-label"]
+    for bar in (attrs for attrs in read.of("div") if attrs.get("class") == "bar"):
+        assert "95 % interval" in bar["aria-label"]
 
 
-def test_the_pictures_are_whole_and_have_a_dark_side(found, read):
+def test_the_pictures_are_whole_and_have_a_dark_side_and_a_narrow_one(found, read):
     drawn = list(pictures(read))
-    assert len(drawn) == (1 if not found.n else 6)
+    assert len(drawn) == 2 * (1 if not found.n else 5)
     for drawing in drawn:
         ElementTree.fromstring(drawing)
         assert "prefers-color-scheme:dark" in drawing
         for name in set(re.findall(r"var\((--c\d+)\)", drawing)):
             assert len(re.findall(rf"{name}:#", drawing)) == 2, "a colour by light and one by dark"
-        assert "#222222" not in drawing.replace("--c0:#222222", ""), "ink is turned everywhere"
+        assert style.INK not in drawing.replace(f"--c0:{style.INK}", ""), "ink is turned everywhere"
 
 
 def test_the_models_and_contacts_are_listed(found, read):
@@ -149,26 +208,13 @@ def test_the_models_and_contacts_are_listed(found, read):
 
 def test_the_same_identification_gives_the_same_page():
     found = OUTCOMES["not_identifiable"]()
-    assert page(found, "log") == page(found, "log")
-
-
-@pytest.mark.parametrize(
-    ("outcome", "told"),
-    [
-        ("identified", "Stiffness, damping and mass are identified."),
-        ("not_identifiable", "Stiffness and damping are identified; mass is not identifiable."),
-        ("rejected", "No model describes this log."),
-        ("no_contact", "Nothing is touched in this log."),
-    ],
-)
-def test_the_first_line_tells_the_outcome(outcome, told):
-    assert told in headline(OUTCOMES[outcome]())
+    assert page(found, SOURCE) == page(found, SOURCE)
 
 
 def test_without_a_unit_none_is_shown():
-    text = Reader(page(OUTCOMES["volts"](), "log")).text
-    for unit in ("[N]", "N/m", "kg", "[mm]"):
-        assert unit not in text
+    text = Reader(page(OUTCOMES["volts"](), SOURCE)).text
+    for unit in ("[N]", "N/m", " kg", "[mm]"):
+        assert unit not in text.split("The same as JSON")[0]
 
 
 def test_there_is_advice_for_every_warning():
@@ -177,19 +223,18 @@ def test_there_is_advice_for_every_warning():
 
 def test_an_identification_without_traces_has_a_page_without_pictures():
     bare = replace(OUTCOMES["no_contact"](), traces=None)
-    assert not Reader(page(bare, "log")).of("img")
+    assert not Reader(page(bare, SOURCE)).of("img")
 
 
-def test_how_the_log_was_read_stands_at_the_top(tmp_path):
-    path = write_page(
-        OUTCOMES["no_contact"](), tmp_path / "a.html", "log", notes=("normal: <x>", "tool: 1 kg")
-    )
+def test_how_the_log_was_read_is_told(tmp_path):
+    source = Source("log", notes=("normal: <x>", "tool: 1 kg"))
+    path = write_page(OUTCOMES["no_contact"](), tmp_path / "a.html", source)
     text = Reader(path.read_text(encoding="utf-8")).text
     assert "normal: <x> tool: 1 kg" in text
 
 
 def test_a_page_may_replace_an_older_one_and_nothing_else(tmp_path):
-    path = write_page(OUTCOMES["no_contact"](), tmp_path / "a.html", "log")
+    path = write_page(OUTCOMES["no_contact"](), tmp_path / "a.html", SOURCE)
     check_place(path, "--report")
     other = tmp_path / "b.html"
     other.write_text("<!doctype html><title>palpate identify, a diary</title>", encoding="utf-8")
@@ -200,11 +245,11 @@ def test_a_page_may_replace_an_older_one_and_nothing_else(tmp_path):
 
 def test_a_page_that_fails_leaves_the_old_one(tmp_path):
     found = OUTCOMES["no_contact"]()
-    path = write_page(found, tmp_path / "press.html", "press.csv")
+    path = write_page(found, tmp_path / "press.html", SOURCE)
     before = path.read_bytes()
-    assert before.decode() == page(found, "press.csv")
+    assert before.decode() == page(found, SOURCE)
     broken = replace(found, warnings=(Warn("no code", "no text"),))
     with pytest.raises(AttributeError):
-        write_page(broken, path, "press.csv")
+        write_page(broken, path, SOURCE)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]

@@ -1,27 +1,40 @@
 """An identification on the terminal."""
 
+from dataclasses import replace
+
 from rich.console import Console
 
-from palpate.report.identification_table import show
-from palpate.report.identification_words import number
+from palpate.identification.warning_codes import Code, Warn
+from palpate.report.identification.table import show
+from palpate.report.identification.words import number, said, sentence
 from palpate.report.numbers import between
 from report.outcomes import OUTCOMES
 
 
-def printed(found):
+def printed(found, name="press [1].csv"):
     console = Console(width=200, record=True, file=None, quiet=False, force_terminal=False)
     with console.capture() as capture:
-        show(found, "press [1].csv", console)
+        show(found, name, console)
     return capture.get()
 
 
-def test_each_parameter_has_its_number_interval_and_verdict():
+def test_the_sentence_is_the_first_line_and_the_working_point_follows():
+    found = OUTCOMES["identified"]()
+    text = " ".join(printed(found).split())
+    assert text.startswith(sentence(found))
+    point = found.working_point
+    assert text.index(f"working point: {said(point.stiffness)}") < text.index("value ± 95 %")
+
+
+def test_each_parameter_has_its_number_both_intervals_its_verdict_and_its_largest_cause():
     found = OUTCOMES["identified"]()
     lines = printed(found).splitlines()
     for name, p in found.parameters.items():
         (line,) = (own for own in lines if own.startswith(f"{name} "))
-        for part in (number(p), between(*p.ci95), p.unit, str(p.verdict)):
-            assert part in line
+        parts = [number(p) if p.value is not None else "-", p.unit, str(p.verdict), next(iter(p.budget))]
+        parts += [between(*p.ci95_if_model_holds)] if p.ci95_if_model_holds else []
+        assert all(part in line for part in parts), line
+    assert any(p.ci95_if_model_holds for p in found.parameters.values())
 
 
 def test_what_is_not_identified_has_its_reason_and_a_dash():
@@ -36,3 +49,14 @@ def test_a_log_without_contact_says_so():
     text = printed(OUTCOMES["no_contact"]())
     assert "press [1].csv: 0 contacts" in text
     assert "no-contact:" in text
+    assert text.startswith("Nothing is touched in this log")
+
+
+def test_nothing_of_a_log_is_obeyed_by_the_terminal():
+    """Names and warnings may hold escape sequences and what rich takes for markup."""
+    nasty = "\x1b]0;gone\x07[bold]x[/]"
+    found = replace(OUTCOMES["no_contact"](), warnings=(Warn(Code.MISSING_SAMPLES, f"column {nasty}"),))
+    text = printed(found, nasty)
+    assert "\x1b" not in text
+    assert "\x07" not in text
+    assert text.count("[bold]x[/]") == 2

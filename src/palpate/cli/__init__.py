@@ -20,7 +20,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         _interrupts.keep()
         _streams.prepare()
-    from palpate.cli._edge import guarded
-    from palpate.cli._program import program
+    import sys
 
+    from palpate.cli._edge import guarded
+    from palpate.cli._program import TYPED, program
+
+    TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
     return guarded(lambda: program()(argv))

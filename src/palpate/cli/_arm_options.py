@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _SIGNED = Parameter(allow_leading_hyphen=True)
 
 
-@Parameter(name="*", group=Group("Wrench and pose", sort_key=2))
+@Parameter(name="*", group=Group("Wrench and pose, and the sign of the force", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class FrameOptions:
     """Axes, points and signs of a wrench and a pose.
@@ -33,7 +33,8 @@ class FrameOptions:
     wrench_at
         The point that the torque is about, likewise; the pose's origin if not given.
     force_sign
-        action: what the tool exerts; reaction: what the surface exerts on the tool. Found if not given.
+        +1 or action: the force is what the tool exerts, and grows as it presses; -1 or reaction: what the surface
+        exerts on the tool. Found if not given.
     normal
         Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Found from the force if not given.
     gravity_compensated
@@ -46,10 +47,22 @@ class FrameOptions:
     sensor_rpy: Annotated[str | None, _SIGNED] = None
     tcp: Annotated[str | None, _SIGNED] = None
     wrench_at: Annotated[str | None, _SIGNED] = None
-    force_sign: Literal["action", "reaction"] | None = None
+    force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, _SIGNED] = None
     normal: Annotated[str | None, _SIGNED] = None
     gravity_compensated: Annotated[bool, Parameter(negative=())] = False
     free: str | None = None
+
+    @property
+    def sign(self) -> int | None:
+        """1 if the force grows as the tool presses, -1 if it falls; None if nothing was said."""
+        if self.force_sign is None:
+            return None
+        return -1 if self.force_sign in {"reaction", "-1"} else 1
+
+    @property
+    def of_space(self) -> bool:
+        """Whether anything was said that only a wrench and a pose have."""
+        return replace(self, force_sign=None) != FrameOptions()
 
     def frame(self) -> ContactFrame | None:
         """The contact frame; None if nothing was said."""
@@ -57,6 +70,11 @@ class FrameOptions:
 
         if self == FrameOptions():
             return None
+        sides: dict[int | None, Literal["action", "reaction"] | None] = {
+            None: None,
+            1: "action",
+            -1: "reaction",
+        }
         axes, colon, plain = (self.normal or "").rpartition(":")
         if colon and axes not in {"base", "tool"}:
             raise InputError(f"--normal needs x,y,z, base:x,y,z or tool:x,y,z, got {self.normal!r}")
@@ -65,7 +83,7 @@ class FrameOptions:
             sensor_rpy=vector("sensor-rpy", self.sensor_rpy, "angle"),
             tcp=vector("tcp", self.tcp, "length") or (0.0, 0.0, 0.0),
             wrench_at=vector("wrench-at", self.wrench_at, "length") or (0.0, 0.0, 0.0),
-            force_sign=self.force_sign,
+            force_sign=sides[self.sign],
             normal=vector("normal", plain or None, "number"),
             normal_frame="tool" if axes == "tool" else "base",
             gravity_compensated=self.gravity_compensated,

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
+from contextvars import ContextVar
+
 from cyclopts import App
+
+TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
+"""The words after the program's name, as they were typed."""
 
 # In the order of the help. Each is a function of its own name in the module of its own name,
 # and returns its exit code. The line is repeated here so that the help imports none of them.
@@ -15,6 +21,11 @@ COMMANDS = {
     "thesis": "Measure every figure and every claim of the thesis again.",
     "speed": "Measure what one tick of the closed loop costs here.",
 }
+
+
+def command() -> str:
+    """The whole command, as it can be typed again."""
+    return shlex.join(["palpate", *TYPED.get()])
 
 
 def _version() -> str:

@@ -1,15 +1,17 @@
-"""`palpate identify`: what did the robot touch, by a log of it?"""
+"""`palpate identify`: what did the robot touch, by a log of it, or by many?"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
 from palpate.cli._arm_options import ArmOptions, FrameOptions
-from palpate.cli._log_options import LogOptions, read
+from palpate.cli._indenter_options import IndenterOptions
+from palpate.cli._log_options import LogOptions
+from palpate.cli._one_log import OneLog, answered
 from palpate.cli._terminal import console, place, print_json
 from palpate.cli._values import with_std
 from palpate.errors import InputError
@@ -17,7 +19,7 @@ from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
-    from palpate.records import Record
+    from palpate.report.identification.source import Source
 
 _FLAG = Parameter(negative=())
 
@@ -77,7 +79,7 @@ class ModelOptions:
         return known | {name: getattr(self, name) for name in names}
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=5))
+@Parameter(name="*", group=Group("What is written", sort_key=6))
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions:
     """Where results go.
@@ -85,7 +87,8 @@ class OutputOptions:
     Parameters
     ----------
     figure
-        Where to write the figure, a PNG; LOG.identify.png in the current folder if not given.
+        Where to write the figure, a PNG; LOG.identify.png in the current folder if not given (of many logs,
+        pooled.identify.png).
     no_figure
         Write no figure.
     report
@@ -99,15 +102,28 @@ class OutputOptions:
     report: Path | None = None
     json: Annotated[bool, _FLAG] = False
 
+    def png(self, name: str) -> Path | None:
+        """Where the figure goes; found wrong before any work is done."""
+        if self.no_figure or (self.figure is None and self.json):
+            return None
+        path = self.figure or Path(f"{name}.identify.png")
+        check_place(path, "--figure", ending=".png")
+        return path
+
+    def page(self) -> Path | None:
+        """Where the page goes; likewise."""
+        if self.report is not None:
+            check_place(self.report, "--report", ending=".html")
+        return self.report
+
 
 def identify(
-    log: Path,
-    /,
-    *,
+    *logs: Path,
     source: LogOptions | None = None,
     frame: FrameOptions | None = None,
     arm: ArmOptions | None = None,
     fitted: ModelOptions | None = None,
+    pressed_by: IndenterOptions | None = None,
     output: OutputOptions | None = None,
 ) -> int:
     """Find what a robot touched, from a log: stiffness, damping, mass.
@@ -120,85 +136,66 @@ def identify(
 
     palpate identify press.mcap --wrench-frame tool --tcp 0,0,120:mm
 
+    Several logs, or a folder of them, are pooled: one table, the mean, and where the next press will fall:
+
+    palpate identify presses/ --time time_s --position position_mm:mm --force force_mN:mN
+
     Parameters
     ----------
-    log
-        Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; or the
-        record.parquet of a run.
+    logs
+        Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the record.parquet
+        of a run; a folder of logs.
     """
-    source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
-    fitted, output = fitted or ModelOptions(), output or OutputOptions()
-    figure, page = _figure(log, output), _page(output)
-    found, record = _identified(log, source, frame, arm, fitted)
+    from palpate.logs.gathered import gathered, is_folder_of_logs
+
+    pressed_by, output = pressed_by or IndenterOptions(), output or OutputOptions()
+    pressed_by.check()
+    asked = OneLog(
+        source or LogOptions(),
+        frame or FrameOptions(),
+        arm or ArmOptions(),
+        fitted or ModelOptions(),
+        pressed_by,
+    )
+    if not logs:
+        raise InputError(
+            "identify what? Name a log, several, or a folder of them (see: palpate identify --help)"
+        )
+    if len(logs) == 1 and not is_folder_of_logs(logs[0]):
+        return _one(logs[0], asked, output)
+    from palpate.cli._many_logs import many
+
+    return many(gathered(logs), asked, output.png("pooled"), output.page(), json=output.json)
+
+
+def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
+    figure, page = output.png(log.stem), output.page()
+    found, origin = asked.identified(log)
     if found.traces is None:
         figure = None
-    _write(found, record, log, figure, page)
-    _print(found, record, log, [path for path in (figure, page) if path is not None], output.json)
-    return 0 if found.found else 1
-
-
-def _identified(
-    log: Path, source: LogOptions, frame: FrameOptions, arm: ArmOptions, fitted: ModelOptions
-) -> tuple[Identification, Record]:
-    from palpate.contact_frame import identify_contact, robot_stiffness
-
-    known = fitted.known(log, source)
-    said, between = frame.frame(), arm.arm()
-    record = read(log, source, samples=known.get("force_filter") is not None)
-    in_space = "force_x" in record.columns
-    if said is not None and not in_space:
-        raise InputError(
-            "--wrench-frame, --tcp, --normal and their like are of a wrench and a pose; this log has one axis"
-        )
-    if arm.robot_stiffness_from is not None:
-        wall = arm.robot_stiffness_from
-        whole = read(
-            wall, replace(source, start=None, end=None), samples=known.get("force_filter") is not None
-        )
-        rigid = replace(between, position_from="tip")
-        pressed, _ = identify_contact(whole, replace(said, free=None) if said else None, rigid, **known)
-        between = replace(between, stiffness=robot_stiffness(pressed, wall.name))
-    return identify_contact(record, said, between, **known)
-
-
-def _figure(log: Path, output: OutputOptions) -> Path | None:
-    """Where the figure goes; found wrong before any work is done."""
-    if output.no_figure or (output.figure is None and output.json):
-        return None
-    path = output.figure or Path(f"{log.stem}.identify.png")
-    check_place(path, "--figure", ending=".png")
-    return path
-
-
-def _page(output: OutputOptions) -> Path | None:
-    """Where the page goes; likewise."""
-    if output.report is not None:
-        check_place(output.report, "--report", ending=".html")
-    return output.report
-
-
-def _write(found: Identification, record: Record, log: Path, figure: Path | None, page: Path | None) -> None:
     if figure is not None:
-        from palpate.report.identification import write_figure
+        from palpate.report.identification.figure import write_figure
 
         write_figure(found, figure, title=log.name)
     if page is not None:
-        from palpate.contact_frame import told
-        from palpate.report.identification_page import write_page
+        from palpate.report.identification.page import write_page
 
-        write_page(found, page, title=log.name, notes=told(record.meta))
+        write_page(found, page, origin)
+    _print(found, origin, [path for path in (figure, page) if path is not None], output.json)
+    return 0 if answered(found) else 1
 
 
-def _print(found: Identification, record: Record, log: Path, written: list[Path], json: bool) -> None:
+def _print(found: Identification, origin: Source, written: list[Path], json: bool) -> None:
     if json:
-        print_json(found.to_json())
+        from palpate.report.identification.source import as_json
+
+        print_json(as_json(found, origin))
         return
-    from palpate.contact_frame import told
-    from palpate.report.identification_table import show
+    from palpate.report.identification.table import show
 
     screen = console()
-    show(found, log.name, screen)
-    for line in told(record.meta):
+    show(found, origin.title, screen)
+    for line in origin.notes:
         screen.print(line, soft_wrap=True)
     for path in written:
         place(screen, "figure:" if path.suffix.lower() == ".png" else "report:", path)

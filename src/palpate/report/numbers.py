@@ -49,3 +49,40 @@ def _power(size: float) -> int:
 
 def _raised(power: int) -> str:
     return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+_PREFIXED = {"N", "m", "s", "Pa", "N/m", "N s/m", "N m", "N m/rad"}
+_SMALL_PREFIXED = {"N", "m", "s", "N m"}
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
+
+
+def quantity(value: float, unit: str, half: float | None = None, digits: int = 3) -> str:
+    """`46.6 kN/m`, `2.36 mm` or `5244 ± 105 N/m`: a number in SI with the prefix that keeps it short.
+
+    Args:
+        value: in SI.
+        unit: its own; `1` for none.
+        half: half-width of its 95 % interval.
+        digits: of a value without one.
+    """
+    factor, prefix = _prefix(value, unit)
+    number = plain(value / factor, digits) if half is None else with_half(value / factor, half / factor)
+    return f"{number} {prefix}{unit}" if unit != "1" else number
+
+
+def quantity_between(low: float, high: float, unit: str) -> str:
+    """`5139 to 5348 N/m`: the ends of an interval, with the prefix of the larger."""
+    factor, prefix = _prefix(max(abs(low), abs(high)), unit)
+    text = between(low / factor, high / factor)
+    return f"{text} {prefix}{unit}" if unit != "1" else text
+
+
+def _prefix(value: float, unit: str) -> tuple[float, str]:
+    size = abs(value)
+    if unit in _PREFIXED:
+        found = next(((f, p) for f, p in _PREFIXES if size >= 9.9995 * f), None)
+        if found:
+            return found
+    if unit in _SMALL_PREFIXED and 0 < size < 0.1:
+        return (1e-3, "m") if size >= 1e-4 else (1e-6, "µ")
+    return 1.0, ""

@@ -48,12 +48,12 @@ def captioned(figures: Mapping[Path, str]) -> list[dict[str, str]]:
     return [{"source": png(path), "caption": caption} for path, caption in figures.items()]
 
 
-def render(template: str, package: str = "palpate.report", **values: Any) -> str:
+def render(template: str, *packages: str, **values: Any) -> str:
     """A page from a template, which may extend `base.html`: how every page of palpate looks.
 
     Args:
         template: its file's name.
-        package: where it lies.
+        packages: where it and those that it extends lie, besides this one.
         values: what it shows; `base.html` itself wants a `title` and the `command` that made the page, and takes
             the `seconds` it took.
     """
@@ -61,7 +61,7 @@ def render(template: str, package: str = "palpate.report", **values: Any) -> str
 
     from palpate import __version__
 
-    folders = dict.fromkeys((package, "palpate.report"))
+    folders = dict.fromkeys((*packages, "palpate.report"))
     loader = ChoiceLoader([PackageLoader(folder, "") for folder in folders])
     environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return environment.get_template(template).render(version=__version__, signature=SIGNATURE, **values)

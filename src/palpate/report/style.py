@@ -15,21 +15,35 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
-INK = "#222222"
+INK, QUIET = "#1a1d21", "#59616c"
+K, B, M, F = "#2f8bf2", "#d07a05", "#9457b8", "#268c5e"
+"""One colour a quantity, the same by light and by dark: stiffness, damping, mass; force and contact."""
+MEASURED, FAIL, DOUBT = "#858d99", "#d23b47", "#9a7400"
 BLUE, ORANGE, GREEN, RED, VIOLET, GREY = "#1f6fb4", "#e07b16", "#2a9254", "#c4342d", "#7b53a6", "#8a8a8a"
 SAND = "#ddaa33"
-GRID = "#e6e6e6"
+GRID = "#e9ecf0"
 VEIL = "#d0d0d0"
 DPI = 110
+_NARROW = 5.6
+"""Inches under which a legend does not fit on one line."""
+_LONG = 15
+"""Letters of a label of which no three stand beside each other there."""
 
 
 @contextmanager
-def inked() -> Iterator[None]:
-    """Letters, ticks and frames of what is drawn inside are in ink, not in black, so that a page can turn them."""
+def inked(size: float | None = None) -> Iterator[None]:
+    """Letters, ticks and frames of what is drawn inside are in ink, not in black, so that a page can turn them.
+
+    Args:
+        size: of the letters [pt]; matplotlib's own if none is given.
+    """
     import matplotlib
 
-    parts = ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color")
-    with matplotlib.rc_context(dict.fromkeys(parts, INK)):
+    parts: dict[str, Any] = dict.fromkeys(
+        ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK
+    )
+    sizes = ("font.size", "axes.labelsize", "xtick.labelsize", "ytick.labelsize", "legend.fontsize")
+    with matplotlib.rc_context(parts | (dict.fromkeys(sizes, size) if size else {})):
         yield
 
 
@@ -53,6 +67,26 @@ def plain(axis: Axes) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
+def panel(axis: Axes, quantity: str, below: str = "") -> Axes:
+    """An instrument's face: no frame, a light grid, the quantity lying above the axis, the other at its lower right."""
+    axis.grid(visible=True, color=GRID, linewidth=0.8)
+    axis.set_axisbelow(True)
+    axis.spines[:].set_visible(False)
+    axis.tick_params(length=0, which="both", labelcolor=QUIET)
+    axis.annotate(
+        quantity,
+        (0, 1),
+        (0, 5),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        color=QUIET,
+        va="bottom",
+    )
+    if below:
+        axis.set_xlabel(below, loc="right", color=QUIET)
+    return axis
+
+
 def logarithmic(axis: Axes, which: str) -> None:
     """Powers of ten along `x` or `y` as plain numbers, with steps between where they are few; limits first."""
     from matplotlib.ticker import LogLocator, NullFormatter
@@ -69,6 +103,33 @@ def legend(axis: Axes, **options: Any) -> None:
     """The legend above the panel, out of the way of the data."""
     options = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 6, "frameon": False, **options}
     axis.legend(fontsize=8.5, borderaxespad=0.2, **options)
+
+
+def legend_above(axis: Axes) -> None:
+    """The legend over the line of the quantity, in rows where the panel is narrow."""
+    import matplotlib
+    from matplotlib.transforms import ScaledTranslation
+
+    handles, labels = axis.get_legend_handles_labels()
+    lift = 8 + 1.2 * float(matplotlib.rcParams["font.size"])
+    if not handles:
+        return
+    drawing = axis.figure.get_figure(root=True)
+    assert drawing is not None
+    above = axis.transAxes + ScaledTranslation(0, lift / 72, drawing.dpi_scale_trans)
+    narrow = drawing.get_figwidth() < _NARROW
+    axis.legend(
+        loc="lower left" if narrow else "lower right",
+        bbox_to_anchor=(0.0 if narrow else 1.0, 1.0),
+        bbox_transform=above,
+        ncols=6 if not narrow else 3 if max(map(len, labels)) < _LONG else 2,
+        frameon=False,
+        borderaxespad=0.0,
+        borderpad=0.0,
+        handlelength=1.5,
+        columnspacing=1.2,
+        labelcolor=QUIET,
+    )
 
 
 def literal(text: str) -> str:

@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BY_DARK = {
-    style.INK: "#e6e6e6",
-    style.GRID: "#34373b",
+    style.INK: "#e8eaed",
+    style.QUIET: "#a3abb6",
+    style.GRID: "#272d34",
     style.VEIL: "#4a4d52",
     style.BLUE: "#5ea6e6",
     style.ORANGE: "#f0a35b",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from palpate.identification.estimators.least_squares import noise_of
 from palpate.identification.estimators.octaves import Segment
+from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import Press, Relaxation, Tangent
 
@@ -99,9 +100,9 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
         rises.append(float(stroke.time[-1] - stroke.time[0]))
     if not slopes:
         return None
-    value, std, freedom = pooled(np.array(slopes), np.array(variances))
-    half = float(np.hypot(_student(freedom) * std, float(np.mean(changes))))
-    return Slope(value, half, float(np.mean(rises)), tuple(slopes))
+    mean = random_effects(np.array(slopes), np.array(variances))
+    half = float(np.hypot(mean.half, float(np.mean(changes))))
+    return Slope(mean.value, half, float(np.mean(rises)), tuple(slopes))
 
 
 def _line(x: Array, f: Array) -> tuple[float, float, float]:
@@ -125,31 +126,6 @@ def _at_rest(stroke: Stroke, rows: NDArray[np.intp]) -> float:
     size[size == 0] = 1.0
     theta, *_ = np.linalg.lstsq(columns / size, stroke.force[rows], rcond=1e-3)
     return float(theta[1] / size[1])
-
-
-def pooled(values: Array, variances: Array) -> tuple[float, float, float]:
-    """Mean of effects that differ, its deviation and degrees of freedom (Paule-Mandel, Hartung-Knapp).
-
-    Args:
-        values: of each, shape (n,).
-        variances: of each about its own truth, shape (n,).
-    """
-    n = len(values)
-    if n == 1:
-        return float(values[0]), float(np.sqrt(variances[0])), 4.0
-    own = np.maximum(variances, 1e-300)
-    between = 0.0
-    for _ in range(50):
-        weight = 1 / (own + between)
-        mean = float(weight @ values / weight.sum())
-        excess = float(weight @ (values - mean) ** 2) - (n - 1)
-        if excess <= 1e-9:
-            break
-        between += excess / float(weight**2 @ (values - mean) ** 2 or 1e-300)
-    weight = 1 / (own + between)
-    mean = float(weight @ values / weight.sum())
-    spread = float(weight @ (values - mean) ** 2) / (n - 1) / float(weight.sum())
-    return mean, float(np.sqrt(max(spread, 1 / float(weight.sum())))), float(n - 1)
 
 
 def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | None:
@@ -183,8 +159,8 @@ def _tangent(strokes: list[Stroke], level: float) -> Tangent | None:
         forces.append(float(low + level * (high - low)))
     if not slopes:
         return None
-    value, std, freedom = pooled(np.array(slopes), np.array(variances))
-    return Tangent(float(np.mean(forces)), value, _student(freedom) * std)
+    mean = random_effects(np.array(slopes), np.array(variances))
+    return Tangent(float(np.mean(forces)), mean.value, mean.half)
 
 
 def _unloading(problem: Problem, lag: float, segments: list[Segment]) -> tuple[Array, float | None]:
@@ -230,9 +206,3 @@ def _relaxation(problem: Problem, lag: float, segments: list[Segment]) -> Relaxa
 def _thin(x: Array, f: Array) -> Array:
     step = max(len(x) // _SHOWN, 1)
     return np.stack([x[::step], f[::step]])
-
-
-def _student(freedom: float) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(freedom, 1.0), 0.975))

@@ -1,4 +1,4 @@
-"""What an identification's signals hold by frequency: the force of each term of the model, and what is left."""
+"""What a model leaves of the force by frequency, and whether that is noise."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ _PER_OCTAVE = 3
 _FEWEST_BINS = 3
 _SEEN = 1.25
 """Where the filter chain has taken all but a hundredth of the power, as a share of its cut-off."""
-_SPRING = ("K", "K2", "K3")
 _FEWEST_TESTED = 30
 _PASSED = 0.5
 """Up to this share of its cut-off the chain passes more than half of the amplitude."""
@@ -150,23 +149,6 @@ def white(left: Spectrum, cutoff: float, level: float = 0.95) -> tuple[Array, Ar
     return expected, expected * low, expected * high
 
 
-def terms(traces: Traces) -> dict[str, Array]:
-    """The force that each term of the model stands for [N], by the parameter; a curved spring is one term."""
-    found: dict[str, Array] = {}
-    for name, column in traces.columns.items():
-        if name != "offset":
-            group = "K" if name in _SPRING else name
-            found[group] = found.get(group, 0.0) + traces.theta[name] * column
-    return found
-
-
-def moving(found: Identification, traces: Traces) -> dict[str, Spectrum]:
-    """Spectrum of the force of each term, by the parameter."""
-    band = band_of(found, traces)
-    found_ones = {name: spectrum(own, traces.fitted_time, band) for name, own in terms(traces).items()}
-    return {name: own for name, own in found_ones.items() if own is not None and own.power > 0}
-
-
 def leaving(found: Identification, traces: Traces) -> Spectrum | None:
     """Spectrum of what the model leaves."""
     return spectrum(traces.fitted_force - traces.predicted, traces.fitted_time, band_of(found, traces))
@@ -238,9 +220,3 @@ def _bartlett(frequency: Array, density: Array) -> float | None:
 def _gain(frequency: Array, cutoff: float) -> Array:
     """Of the filter chain, in power; one if there is none."""
     return (1 + (frequency / cutoff) ** 2) ** -ORDER if np.isfinite(cutoff) else np.ones(len(frequency))
-
-
-def reach(signal: Spectrum, left: Spectrum) -> float | None:
-    """Up to which frequency a signal stands above what is left of the force [Hz]; None if it nowhere does."""
-    above = np.flatnonzero(signal.density > left.density)
-    return float(signal.frequency[above[-1]]) if len(above) else None

@@ -1,0 +1,129 @@
+"""Many logs identified one after the other, and pooled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from palpate.cli._edge import INTERRUPTED
+from palpate.cli._one_log import OneLog, answered
+from palpate.cli._terminal import console, place, print_json, say
+from palpate.errors import InputError, PalpateError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from palpate.identification import Identification
+    from palpate.identification.pooling import Pooled
+    from palpate.report.many.rows import LogRow
+
+
+def many(logs: Sequence[Path], asked: OneLog, figure: Path | None, page: Path | None, *, json: bool) -> int:
+    """Identify many logs, print a row each and what they say together.
+
+    A log that fails is a row that says why, and the others go on. An interruption keeps what was done.
+
+    Returns:
+        0 if there is a number to read; 1 if there is none; 130 if it was interrupted.
+
+    Raises:
+        InputError: no log could be read; nothing is printed or written then.
+    """
+    from palpate.identification.pooling import pool
+
+    rows: list[LogRow] = []
+    interrupted = False
+    try:
+        with _progress(len(logs)) as step:
+            for log in logs:
+                step(log.name)
+                rows.append(_row(log, asked))
+    except KeyboardInterrupt:
+        interrupted = True
+    failed = [row for row in rows if row.found is None]
+    if not interrupted and len(failed) == len(rows):
+        one = len(rows) == 1
+        raise InputError(
+            failed[0].error if one else f"none of {len(rows)} logs can be identified: {failed[0].error}"
+        )
+    pooled = pool([row.found for row in rows], asked.fitted.tolerance)
+    if rows:
+        _print(rows, pooled, _write(rows, pooled, figure, page), json=json)
+    if interrupted:
+        say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
+        return INTERRUPTED
+    return 0 if pooled.found or any(row.found and answered(row.found) for row in rows) else 1
+
+
+def _row(log: Path, asked: OneLog) -> LogRow:
+    from palpate.report.identification.source import Source
+    from palpate.report.many.rows import LogRow
+
+    try:
+        found, source = asked.identified(log)
+    except (PalpateError, OSError, MemoryError) as error:
+        return LogRow(
+            Source(str(log), asked.told), None, " ".join((str(error) or type(error).__name__).split())
+        )
+    return LogRow(source, _light(found))
+
+
+def _light(found: Identification) -> Identification:
+    """Without the samples, of which a row needs none: a thousand logs fit into memory."""
+    import numpy as np
+
+    traces, none = found.traces, np.empty(0)
+    if traces is not None:
+        traces = replace(
+            traces, time=none, force=none, fitted_time=none, fitted_position=none, fitted_force=none, predicted=none,
+            columns={},
+        )  # fmt: skip
+    return replace(found, traces=traces, estimate=None)
+
+
+def _write(rows: Sequence[LogRow], pooled: Pooled, figure: Path | None, page: Path | None) -> list[Path]:
+    if figure is not None:
+        from palpate.report.many.forest import write_figure
+
+        write_figure(rows, pooled, figure)
+    if page is not None:
+        from palpate.report.many.page import write_page
+
+        write_page(rows, pooled, page)
+    return [path for path in (figure, page) if path is not None]
+
+
+def _print(rows: Sequence[LogRow], pooled: Pooled, written: Sequence[Path], *, json: bool) -> None:
+    if json:
+        from palpate.report.many.rows import json_of
+
+        print_json(json_of(rows, pooled))
+        return
+    from palpate.report.many.table import show
+
+    screen = console()
+    show(rows, pooled, screen)
+    for path in written:
+        place(screen, "figure:" if path.suffix.lower() == ".png" else "report:", path)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[str], None]]:
+    """A bar on a terminal's standard error; nothing elsewhere."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()
+    screen = console(stderr=True)
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task("", total=total)
+        begun = 0
+
+        def step(name: str) -> None:
+            nonlocal begun
+            bar.update(task, completed=begun, description=name)
+            begun += 1
+
+        yield step

@@ -1,0 +1,105 @@
+"""A log identified as the command line asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from palpate.cli._arm_options import ArmOptions, FrameOptions
+from palpate.cli._indenter_options import IndenterOptions
+from palpate.cli._log_options import LogOptions, read
+from palpate.cli._program import command
+from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from palpate.contact_frame import Arm
+    from palpate.identification import Identification
+    from palpate.report.identification.source import Source
+
+
+class Fitted(Protocol):
+    """What is asked of the identification itself."""
+
+    @property
+    def tolerance(self) -> float:
+        """Largest half-width of an identified parameter, as a share of its value."""
+        ...
+
+    def known(self, log: Path, options: LogOptions) -> dict[str, Any]:
+        """The keywords of `palpate.identify`."""
+        ...
+
+
+def answered(found: Identification) -> bool:
+    """Whether there is a number to read: at the working point, or of a parameter."""
+    point = [found.working_point.stiffness] if found.working_point else []
+    return any(p.value is not None for p in (*point, *found.parameters.values()))
+
+
+@dataclass(frozen=True)
+class OneLog:
+    """What is asked, the same of each log."""
+
+    source: LogOptions
+    frame: FrameOptions
+    arm: ArmOptions
+    fitted: Fitted
+    pressed_by: IndenterOptions
+
+    def identified(self, log: Path) -> tuple[Identification, Source]:
+        """Read a log and find what it touched, and say where that is from.
+
+        Raises:
+            InputError: the log or an option is wrong, in one line.
+        """
+        from palpate.contact_frame import identify_contact, told
+        from palpate.report.identification.source import Source, sha256_of
+
+        known = self.fitted.known(log, self.source)
+        samples = known.get("force_filter") is not None
+        record = read(log, self.source, samples=samples)
+        frame = self.frame.frame()
+        if "force_x" not in record.columns:
+            if self.frame.of_space:
+                raise InputError(
+                    "--wrench-frame, --tcp, --normal and their like are of a wrench and a pose; this log has one axis"
+                )
+            frame, known = None, known | {"force_sign": self.frame.sign}
+        between = self._between(known, samples)
+        found, along = identify_contact(record, frame, between, **known)
+        found = self.pressed_by.modulus(found, self.fitted.tolerance)
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        return found, Source(
+            str(log), self.told, sha256_of(log), command(), made=now, notes=tuple(told(along.meta))
+        )
+
+    def _between(self, known: dict[str, Any], samples: bool) -> Arm:
+        """The arm; of a press on a wall, with the stiffness that it shows."""
+        from palpate.contact_frame import identify_contact, robot_stiffness
+
+        between, wall = self.arm.arm(), self.arm.robot_stiffness_from
+        if wall is None:
+            return between
+        frame = self.frame.frame() if self.frame.of_space else None
+        whole = read(wall, replace(self.source, start=None, end=None), samples=samples)
+        rigid = replace(between, position_from="tip")
+        pressed, _ = identify_contact(whole, replace(frame, free=None) if frame else None, rigid, **known)
+        return replace(between, stiffness=robot_stiffness(pressed, wall.name))
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What was said about logs, frame, arm and indenter, as plain values."""
+        return {
+            own.name: _plain(value)
+            for part in (self.source, self.frame, self.arm, self.pressed_by)
+            for own in fields(part)
+            if (value := getattr(part, own.name)) != own.default
+        }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value)
+    return list(value) if isinstance(value, tuple) else value

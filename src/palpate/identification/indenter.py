@@ -1,0 +1,230 @@
+"""Young's modulus from the slope of a press, for a named indenter.
+
+Of an elastic half space, by the reduced modulus E* = E / (1 - nu^2) and the depth d:
+
+    sphere   F = 4/3 E* sqrt(R) d^(3/2)          Hertz, J. reine angew. Math. 92, 1882
+    cone     F = 2/pi E* tan(alpha) d^2          Sneddon, Int. J. Engng Sci. 3, 1965; alpha from the axis
+    punch    F = 2 a E* d                        Sneddon
+
+Each is F = c E* d^p, with a slope S = p F / d. So the slope at a force gives E* without the surface's place:
+E* = S^p / (p^p c F^(p-1)). The same by the depth from the touch is S / (p c d^(p-1)): the two differ where the touch is
+not where it was taken to be, or where the press is none of that indenter on that half space. What they differ by, and
+what the answer differs by from force to force, is in the interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import atanh, isfinite, pi, sqrt, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError
+from palpate.identification.result import Identification, Parameter, Press, Tangent, Verdict
+
+Array = NDArray[np.float64]
+
+ASSUMED = "a half space (deep and wide against the contact), small strain, no adhesion"
+"""What the laws rest on, and no press shows."""
+_UNTOLD = (0.75, 1.0)
+"""1 - nu^2 of materials that do not thicken when they are pulled: nu from 0.5 to 0."""
+
+
+@dataclass(frozen=True)
+class Indenter:
+    """A shape that presses.
+
+    Args:
+        shape: sphere, punch (flat, round) or cone.
+        size: radius [m]; of a cone the angle between its axis and its side [rad].
+    """
+
+    shape: str
+    size: float
+
+    def __post_init__(self) -> None:
+        if self.shape not in _LAWS:
+            raise InputError(f"an indenter is a {', a '.join(_LAWS)}, got {self.shape!r}")
+        if not (isfinite(self.size) and self.size > 0):
+            raise InputError(f"the {self._size} of a {self.shape} must be more than 0, got {self.size:g}")
+        if self.shape == "cone" and self.size >= pi / 2:
+            raise InputError(
+                f"the half angle of a cone must be under 90 deg, got {np.degrees(self.size):g} deg"
+            )
+
+    @property
+    def _size(self) -> str:
+        return "half angle" if self.shape == "cone" else "radius"
+
+    @property
+    def power(self) -> float:
+        """Of the depth in the law of force."""
+        return _LAWS[self.shape][0]
+
+    @property
+    def factor(self) -> float:
+        """Of E* d^p in the law of force [m^(2-p)]."""
+        return _LAWS[self.shape][1](self.size)
+
+    def contact_radius(self, depth: float) -> float:
+        """Radius of the contact at a depth [m]."""
+        if self.shape == "sphere":
+            return sqrt(self.size * depth)
+        return self.size if self.shape == "punch" else 2 / pi * depth * tan(self.size)
+
+    def __str__(self) -> str:
+        if self.shape == "cone":
+            return f"cone of {np.degrees(self.size):.4g} deg half angle"
+        return f"{self.shape} of {1e3 * self.size:.4g} mm radius"
+
+
+_LAWS: dict[str, tuple[float, Callable[[float], float]]] = {
+    "sphere": (1.5, lambda radius: 4 / 3 * sqrt(radius)),
+    "punch": (1.0, lambda radius: 2 * radius),
+    "cone": (2.0, lambda half_angle: 2 / pi * tan(half_angle)),
+}
+
+
+def with_modulus(
+    found: Identification,
+    indenter: Indenter,
+    poisson: tuple[float, float] | None = None,
+    tolerance: float = 0.25,
+) -> Identification:
+    """An identification with Young's modulus E [Pa] among its parameters.
+
+    Args:
+        found: with its press.
+        indenter: that pressed.
+        poisson: Poisson's ratio and its standard deviation; None for anything from 0 to 0.5, equally likely.
+        tolerance: largest half-width of an identified E's 95 % interval, as a share of its value.
+
+    Raises:
+        InputError: the log is not in N and m, or Poisson's ratio is impossible.
+    """
+    check_poisson(poisson)
+    units = (found.traces.force_unit, found.traces.position_unit) if found.traces else ("N", "m")
+    if units != ("N", "m"):
+        raise InputError(
+            f"an indenter needs force in N and position in m, this log has {units[0]} and {units[1]}"
+        )
+    modulus = _modulus(found.press, indenter, poisson, tolerance)
+    return replace(found, parameters={**found.parameters, "E": modulus})
+
+
+def check_poisson(poisson: tuple[float, float] | None) -> None:
+    """Refuse a Poisson's ratio that no isotropic material has."""
+    if poisson is None:
+        return
+    value, std = poisson
+    if not (-1 < value <= 0.5 and isfinite(std) and std >= 0):
+        raise InputError(
+            f"Poisson's ratio must be in (-1, 0.5] and its std 0 or more, got {value:g} and {std:g}"
+        )
+
+
+def _modulus(
+    press: Press | None, indenter: Indenter, poisson: tuple[float, float] | None, tolerance: float
+) -> Parameter:
+    refused = _refused(press)
+    if refused is not None or press is None:
+        return _none(refused or "")
+    p, c = indenter.power, indenter.factor
+    force, slope, half = np.array([(t.force, t.stiffness, t.half) for t in press.tangent]).T
+    by_force = slope**p / (p**p * c * force ** (p - 1))
+    own = p * half / slope * by_force
+    weight = own**-2 / (own**-2).sum()
+    depth, reduced = float(p * np.mean(force / slope)), float(weight @ by_force)
+    parts = {
+        "tangent": float(weight @ own),  # the slopes are of one way in: their errors do not average out
+        "the indenter's law": float(np.maximum(abs(by_force - reduced) - own, 0.0).max()),
+        "surface position": float(abs(_by_depth(press, slope, force, p, c) - reduced).max()),
+    }
+    if indenter.shape == "sphere":
+        if depth >= indenter.size:
+            deep, radius = 1e3 * depth, 1e3 * indenter.size
+            return _none(f"the press goes {deep:.3g} mm deep, beyond the sphere's radius of {radius:.3g} mm")
+        parts["small strain"] = abs(_beyond_hertz(depth / indenter.size) - 1) * reduced
+    share, parts["Poisson's ratio"] = _free_of_poisson(reduced, poisson)
+    parts = {cause: share * part for cause, part in parts.items()}
+    return _judged(share * reduced, parts, indenter, poisson, depth, tolerance)
+
+
+def _refused(press: Press | None) -> str | None:
+    """Why no slope of the press may be used; None if it may."""
+    if press is None or not press.tangent:
+        return "the log shows no way in, of which a slope could be taken"
+    flat = next((t for t in press.tangent if t.stiffness <= t.half), None)
+    if flat is not None:
+        return f"at {flat.force:.3g} N the force does not rise with the depth ({_shown(flat)})"
+    if len(press.tangent) < 2:
+        return "the slope is known at one force only, which does not show how it grows"
+    if press.tangent[0].force <= 0:
+        return "the force of the press is not above zero"
+    return None
+
+
+def _free_of_poisson(reduced: float, poisson: tuple[float, float] | None) -> tuple[float, float]:
+    """1 - nu^2, and the half-width of E* that stands for what is not known of it."""
+    if poisson is None:
+        return sum(_UNTOLD) / 2, (_UNTOLD[1] - _UNTOLD[0]) / sum(_UNTOLD) * reduced
+    share = 1 - poisson[0] ** 2
+    return share, 1.96 * abs(2 * poisson[0]) * poisson[1] / share * reduced
+
+
+def _by_depth(press: Press, slope: Array, force: Array, p: float, c: float) -> Array:
+    """E* by the depth from the touch that the log shows, at each force that it reaches [Pa], shape (n,)."""
+    depth, own = press.loading
+    at = np.interp(force, np.maximum.accumulate(own), depth)
+    at = np.maximum(at, 1e-3 * float(np.abs(depth).max()))  # a touch found late leaves a force at no depth
+    found: Array = slope / (p * c * at ** (p - 1))
+    return found
+
+
+def _beyond_hertz(strain: float) -> float:
+    """Force on a rigid sphere over Hertz's, which takes it for a paraboloid, by depth over radius (Sneddon)."""
+    low, high = 1e-9, 1 - 1e-12
+    for _ in range(80):
+        u = (low + high) / 2
+        low, high = (u, high) if u * atanh(u) < strain else (low, u)
+    return ((1 + u**2) * atanh(u) - u) / (4 / 3 * strain**1.5)
+
+
+def _judged(
+    value: float,
+    parts: dict[str, float],
+    indenter: Indenter,
+    poisson: tuple[float, float] | None,
+    depth: float,
+    tolerance: float,
+) -> Parameter:
+    half = float(np.hypot.reduce(list(parts.values())))
+    budget = {cause: part for cause, part in parts.items() if part > 1e-3 * half}
+    budget = dict(sorted(budget.items(), key=lambda item: -item[1]))
+    main = next(iter(budget), "noise")
+    ratio = "Poisson's ratio 0 to 0.5 (none told)" if poisson is None else f"Poisson's ratio {poisson[0]:g}"
+    radius = 1e3 * indenter.contact_radius(depth)
+    terms = f"a {indenter}, {ratio}, contact radius about {radius:.2g} mm; assumed: {ASSUMED}"
+    low, high = value - half, value + half
+    if low <= 0:
+        reason = f"the press does not follow a {indenter}: 95 % 0 to {high:.3g} Pa, most of it {main}"
+        return replace(_none(reason), budget=budget)
+    share = f"{100 * half / value:.2g} %"
+    if half <= tolerance * value:
+        verdict, reason = Verdict.IDENTIFIED, f"known to {share} (95 %): {terms}"
+    else:
+        verdict, reason = (
+            Verdict.NOT_IDENTIFIABLE,
+            f"known to {share} only (95 %), most of it {main}: {terms}",
+        )
+    return Parameter(value, half / 1.96, (low, high), "Pa", verdict, reason, None, budget)
+
+
+def _none(reason: str) -> Parameter:
+    return Parameter(None, None, None, "Pa", Verdict.NOT_IDENTIFIABLE, reason)
+
+
+def _shown(tangent: Tangent) -> str:
+    return f"{tangent.stiffness:.3g} ± {tangent.half:.3g} N/m"

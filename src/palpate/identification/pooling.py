@@ -1,0 +1,288 @@
+"""Many measurements of one quantity that differ by more than their own intervals: a random effect.
+
+Each press has an error of its own, with a variance that it states, and beside it the presses differ (another spot,
+another moisture). The variance between them is found by Paule and Mandel (J. Res. NBS 87, 1982), the mean's deviation
+by Hartung and Knapp (Statist. Med. 20, 2001), never below what equal effects would have (Roever, Knapp and Friede, BMC
+Med. Res. Methodol. 15, 2015); the next press by Higgins, Thompson and Spiegelhalter (J. R. Statist. Soc. A 172, 2009).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.result import Identification, Parameter, Verdict
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+_ROUNDS = 100
+_EXACT = 1e-12
+"""Share of the spread of the values below which a stated variance counts as none."""
+_ALONE = 4.0
+"""Degrees of freedom of a single effect's own variance, which nothing repeats."""
+POOLED = ("K", "B", "M", "E")
+"""Parameters that mean the same in each log."""
+SHARED = ("lag", "calibration", "series stiffness", "Poisson's ratio", "small strain")
+"""Causes that err alike in all logs of one rig: no number of logs makes them smaller."""
+_ALIKE = {"kelvin-voigt-mass": "kelvin-voigt"}
+"""Models whose parameters of one name are one quantity."""
+
+
+@dataclass(frozen=True)
+class Mean:
+    """Mean of effects that differ.
+
+    Args:
+        value: of the mean.
+        std: its standard deviation.
+        freedom: degrees of freedom of that.
+        between: standard deviation of the effects themselves, their own errors left aside.
+        count: of the effects.
+        share: of the mean's variance that is due to the effects' differences.
+    """
+
+    value: float
+    std: float
+    freedom: float
+    between: float
+    count: int
+    share: float = 0.0
+
+    @property
+    def half(self) -> float:
+        """95 % half-width of the mean."""
+        return student(self.freedom) * self.std
+
+    @property
+    def next_half(self) -> float | None:
+        """95 % half-width of where the next effect falls; None for fewer than three."""
+        if self.count < 3:
+            return None
+        return student(self.count - 2) * float(np.hypot(self.between, self.std))
+
+
+def random_effects(values: Array, variances: Array) -> Mean:
+    """Mean of effects that differ.
+
+    Args:
+        values: one of each effect, shape (n,).
+        variances: of their own errors, shape (n,).
+    """
+    n = len(values)
+    if n == 1:
+        return Mean(float(values[0]), float(np.sqrt(variances[0])), _ALONE, 0.0, 1)
+    scale = float(max(np.ptp(values) ** 2, variances.max())) or 1.0
+    centre = float(values.mean())
+    y, own = (values - centre) / np.sqrt(scale), np.maximum(variances / scale, _EXACT)
+    between = _between(y, own)
+    weight = 1 / (own + between)
+    mean = float(weight @ y / weight.sum())
+    spread = float(weight @ (y - mean) ** 2) / (n - 1)
+    std = np.sqrt(max(spread, 1.0) / float(weight.sum()) * scale)
+    share = between * float(weight @ weight) / float(weight.sum())
+    size = float(np.sqrt(scale))
+    return Mean(centre + mean * size, float(std), n - 1.0, float(np.sqrt(between)) * size, n, share)
+
+
+def _between(y: Array, own: Array) -> float:
+    """Variance between effects at which their weighted spread is what it should be: n - 1 (Newton from below)."""
+    between = 0.0
+    for _ in range(_ROUNDS):
+        weight = 1 / (own + between)
+        left = y - float(weight @ y / weight.sum())
+        excess = float(weight @ left**2) - (len(y) - 1)
+        if excess <= 1e-9 * len(y):
+            break
+        between += excess / float(weight**2 @ left**2)
+    return between
+
+
+def student(freedom: float) -> float:
+    """Two-sided 95 % quantile of Student's t."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(freedom, 1.0), 0.975))
+
+
+@dataclass(frozen=True)
+class PooledParameter:
+    """One parameter over all logs.
+
+    Args:
+        parameter: mean, interval and verdict.
+        prediction95: where the next log's own falls; None for fewer than three.
+        between: standard deviation between logs, in the parameter's unit.
+        logs: places of those that it is from.
+    """
+
+    parameter: Parameter
+    prediction95: Interval | None
+    between: float | None
+    logs: tuple[int, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        own = self.parameter.to_json()
+        return own | {
+            "prediction95": list(self.prediction95) if self.prediction95 else None,
+            "between_std": self.between,
+            "logs": list(self.logs),
+        }
+
+
+@dataclass(frozen=True)
+class PooledPoint:
+    """The stiffness at the working point over all logs, and the range of what it belongs to.
+
+    Args:
+        stiffness: as of a parameter.
+        force_N, depth_m, frequency_Hz: least and largest of the logs.
+    """
+
+    stiffness: PooledParameter
+    force_N: Interval
+    depth_m: Interval
+    frequency_Hz: Interval
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        ranges = {name: list(getattr(self, name)) for name in ("force_N", "depth_m", "frequency_Hz")}
+        return {"stiffness": self.stiffness.to_json()} | ranges
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """What many logs say together.
+
+    Args:
+        count: of the logs.
+        parameters: by name.
+        working_point: None if no log has one.
+    """
+
+    count: int
+    parameters: dict[str, PooledParameter]
+    working_point: PooledPoint | None
+
+    @property
+    def found(self) -> bool:
+        """Whether there is anything with a number."""
+        own = [p.parameter.value for p in self.parameters.values()]
+        point = self.working_point.stiffness.parameter.value if self.working_point else None
+        return any(value is not None for value in (*own, point))
+
+    def to_json(self) -> dict[str, Any]:
+        """The plain values under `pooled` of `palpate identify --json` for many logs."""
+        return {
+            "count": self.count,
+            "working_point": self.working_point.to_json() if self.working_point else None,
+            "parameters": {name: p.to_json() for name, p in self.parameters.items()},
+        }
+
+
+def pool(logs: Sequence[Identification | None], tolerance: float = 0.25) -> Pooled:
+    """Pool identifications of one thing.
+
+    Args:
+        logs: one of each; None for a log that could not be read.
+        tolerance: largest half-width of an identified mean's 95 % interval, as a share of its value.
+    """
+    own = {
+        name: _pooled([_one(found, name) for found in logs], tolerance)
+        for name in POOLED
+        if any(found is not None and name in found.parameters for found in logs)
+    }
+    return Pooled(len(logs), own, _point(logs, tolerance))
+
+
+def _point(logs: Sequence[Identification | None], tolerance: float) -> PooledPoint | None:
+    points = [found.working_point if found else None for found in logs]
+    there = [point for point in points if point is not None]
+    if not there:
+        return None
+    stiffness = _pooled([(point.stiffness, "") if point else None for point in points], tolerance)
+    used = [p for i in stiffness.logs if (p := points[i]) is not None] or there
+
+    def range_of(values: list[float]) -> Interval:
+        return min(values), max(values)
+
+    return PooledPoint(
+        stiffness,
+        range_of([p.force_N for p in used]),
+        range_of([p.depth_m for p in used]),
+        range_of([p.frequency_Hz for p in used]),
+    )
+
+
+def _one(found: Identification | None, name: str) -> tuple[Parameter, str] | None:
+    """A log's parameter and the model that gives it its meaning."""
+    if found is None or name not in found.parameters:
+        return None
+    return found.parameters[name], "" if name == "E" else _ALIKE.get(found.model, found.model)
+
+
+@dataclass(frozen=True)
+class _Given:
+    """One log's number: value, 95 % half-widths by what it errs by itself and with all logs, and what it is."""
+
+    value: float
+    own: float
+    shared: float
+    kind: tuple[str, str]
+
+    @classmethod
+    def of(cls, p: Parameter, meaning: str) -> _Given | None:
+        """None for a parameter without a number, or one that is rejected."""
+        if p.value is None or p.ci95 is None or p.verdict is Verdict.REJECTED:
+            return None
+        half = (p.ci95[1] - p.ci95[0]) / 2
+        shared = min(float(np.hypot.reduce([p.budget.get(cause, 0.0) for cause in SHARED])), half)
+        return cls(p.value, float(np.sqrt(half**2 - shared**2)), shared, (p.unit, meaning))
+
+
+def _pooled(own: Sequence[tuple[Parameter, str] | None], tolerance: float) -> PooledParameter:
+    """Pool the numbers of one meaning that most logs give: one unit, one model; what is rejected is left out."""
+    given = {i: found for i, pair in enumerate(own) if pair is not None and (found := _Given.of(*pair))}
+    unit = next((pair[0].unit for pair in own if pair is not None), "1")
+    kinds = [found.kind for found in given.values()]
+    kind = max(kinds, key=kinds.count, default=(unit, ""))
+    used = {i: found for i, found in given.items() if found.kind == kind}
+    if len(used) < 2:
+        few = f"{len(used)} of {len(own)} logs give{'s' * (len(used) == 1)} it a number; pooling takes two or more"
+        none = Parameter(None, None, None, kind[0], Verdict.NOT_IDENTIFIABLE, few)
+        return PooledParameter(none, None, None, tuple(used))
+    values, halves, shared = np.array([(g.value, g.own, g.shared) for g in used.values()]).T
+    mean, alike = random_effects(values, (halves / 1.96) ** 2), float(shared.mean())
+    prediction = None
+    if mean.next_half is not None:
+        again = float(np.hypot(mean.next_half, alike))
+        prediction = mean.value - again, mean.value + again
+    return PooledParameter(
+        _judged(mean, alike, len(own), kind, tolerance), prediction, mean.between, tuple(used)
+    )
+
+
+def _judged(mean: Mean, alike: float, count: int, kind: tuple[str, str], tolerance: float) -> Parameter:
+    """A verdict on a mean; `alike` is the 95 % half-width of what all logs err by together."""
+    half = float(np.hypot(mean.half, alike))
+    share = half / abs(mean.value) if mean.value else np.inf
+    interval = (mean.value - half, mean.value + half)
+    of = f"{mean.count} of {count} logs{f', as of {kind[1]}' if kind[1] else ''}"
+    parts = {
+        "between logs": mean.half * float(np.sqrt(mean.share)),
+        "each log": mean.half * float(np.sqrt(1 - mean.share)),
+        "alike in all logs": alike,
+    }
+    budget = {cause: part for cause, part in sorted(parts.items(), key=lambda item: -item[1]) if part > 0}
+    if share >= 1:
+        reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g}; zero is within it ({of})"
+        return Parameter(None, None, None, kind[0], Verdict.NOT_IDENTIFIABLE, reason, None, budget)
+    verdict = Verdict.IDENTIFIED if share <= tolerance else Verdict.NOT_IDENTIFIABLE
+    only = "" if verdict is Verdict.IDENTIFIED else " only"
+    reason = f"known to {100 * share:.2g} %{only} (95 %), from {of}"
+    return Parameter(mean.value, half / 1.96, interval, kind[0], verdict, reason, None, budget)

@@ -1,0 +1,64 @@
+"""Many logs at once: files, and folders of files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from palpate.errors import InputError
+from palpate.logs.kinds import STORAGES
+
+ENDINGS = {
+    ".csv", ".tsv", ".txt", ".dat", ".ddf", ".lvm", ".xlsx", ".parquet", ".mat", ".bag", *STORAGES
+}  # fmt: skip
+"""Of the files that are taken for logs in a folder."""
+
+
+def is_folder_of_logs(path: Path) -> bool:
+    """Whether a path is a folder, and not itself one log as a ROS 2 bag is."""
+    if not path.is_dir():
+        return False
+    return not any((path / "metadata.yaml").is_file() or file.suffix in STORAGES for file in path.iterdir())
+
+
+def gathered(paths: Sequence[Path]) -> tuple[Path, ...]:
+    """The logs that paths name: a file as it is, a folder by its files, in the order of their names and numbers.
+
+    Raises:
+        InputError: a folder holds none, or a log is named twice: pooled, it would count twice.
+    """
+    found: list[Path] = []
+    for path in paths:
+        found.extend(_of_folder(path) if is_folder_of_logs(path) else [path])
+    seen: dict[Path, Path] = {}
+    for path in found:
+        if path.resolve() in seen:
+            raise InputError(f"{path} is named twice; a log counts once, leave one of them out")
+        seen[path.resolve()] = path
+    return tuple(found)
+
+
+def _of_folder(folder: Path) -> list[Path]:
+    logs = [
+        path
+        for path in sorted(folder.iterdir(), key=_by_number)
+        if not path.name.startswith(".")
+        and (
+            path.suffix.lower() in ENDINGS
+            if path.is_file()
+            else path.is_dir() and not is_folder_of_logs(path)
+        )
+    ]
+    if not logs:
+        raise InputError(
+            f"{folder} is a folder and no ROS 2 bag, and holds no log; logs are told by their endings: "
+            f"{', '.join(sorted(ENDINGS))}"
+        )
+    return logs
+
+
+def _by_number(path: Path) -> list[tuple[int, str]]:
+    """`press_40` before `press_250`."""
+    parts = re.split(r"(\d+)", path.name)
+    return [(int(part), "") if i % 2 else (0, part) for i, part in enumerate(parts)]

@@ -1,0 +1,1 @@
+"""An identification on paper: its page, its figure, its table on the terminal."""

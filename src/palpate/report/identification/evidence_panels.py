@@ -1,0 +1,185 @@
+"""Panels of what the log shows before any model: storage and loss by frequency, and force over depth."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.result import DynamicStiffness, Identification, Press, Tangent, Traces
+from palpate.report import style
+from palpate.report.identification.fit_panels import empty, labelled, length_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+_BAND: dict[str, Any] = {"alpha": 0.22, "lw": 0}
+_HEAD = 1.25
+"""Room above what is told."""
+_ENDS = 2**0.5
+_KILO = 2e3
+"""N/m from which on an axis is in kN/m."""
+
+
+def storage(axes: Axes, found: Identification, traces: Traces) -> None:
+    """The part of the dynamic stiffness in phase with the position, by octave, and the model's K - w^2 M."""
+    octaves = found.dynamic_stiffness
+    if not octaves:
+        empty(axes, "too short a contact for a spectrum")
+        return
+    values = np.array([(o.storage, o.storage_half) for o in octaves])
+    K, M = _value(found, "K"), _value(found, "M") or 0.0
+    model = None if K is None else (lambda w: K - w**2 * M)
+    scale = _part(axes, found, values, style.K, "storage", model, "K − ω²M" if M else "model K")
+    point = found.working_point
+    if point is not None and point.stiffness.value is not None and point.source == "octave":
+        _ring(axes, point.frequency_Hz, point.stiffness.value / scale)
+    style.legend_above(axes)
+
+
+def loss(axes: Axes, found: Identification, traces: Traces) -> None:
+    """The part in quadrature, and the model's w B."""
+    octaves = found.dynamic_stiffness
+    if not octaves:
+        empty(axes, "")
+        return
+    values = np.array([(o.loss, o.loss_half) for o in octaves])
+    B = _value(found, "B")
+    _part(axes, found, values, style.B, "loss", None if B is None else (lambda w: w * B), "model ωB")
+    axes.set_xlabel("frequency [Hz]", loc="right", color=style.QUIET)
+    style.legend_above(axes)
+
+
+def _part(
+    axes: Axes, found: Identification, values: Array, colour: str, name: str, model: Any, called: str
+) -> float:
+    """Points, band and model of one part; returns what the axis counts in."""
+    octaves = found.dynamic_stiffness
+    frequency = np.array([o.frequency for o in octaves])
+    told = shown_by(octaves, name)
+    unit = found.working_point.stiffness.unit if found.working_point else "1"
+    scale, unit = scaled_unit(unit, values[told, 0] if told.any() else values[:, 0])
+    value, half = values.T / scale
+    style.panel(axes, labelled(name, unit))
+    axes.fill_between(
+        frequency, value - half, value + half, where=list(told), color=colour, label="95 %", **_BAND
+    )
+    axes.errorbar(frequency[told], value[told], half[told], color=colour, fmt="none", lw=1, capsize=2)
+    axes.plot(frequency[told], value[told], "o", ms=4.5, color=colour, label="measured")
+    axes.plot(frequency[~told], value[~told], "o", ms=4.5, mfc="none", color=colour)
+    fine = np.geomspace(frequency[0] / _ENDS, frequency[-1] * _ENDS, 200)
+    if model is not None:
+        axes.plot(fine, model(2 * np.pi * fine) / scale, color=style.INK, lw=1.2, label=called)
+    axes.set_xlim(fine[0], fine[-1])
+    axes.set_ylim(*_limits(value, half, told))
+    _silent(axes, frequency, told)
+    style.logarithmic(axes, "x")
+    return scale
+
+
+def shown_by(octaves: tuple[DynamicStiffness, ...], part: str) -> NDArray[np.bool_]:
+    """Which octaves tell a part more narrowly than the stiffness there is large, shape (n,)."""
+    size = np.array([np.hypot(o.storage, o.loss) for o in octaves])
+    half = np.array([getattr(o, f"{part}_half") for o in octaves])
+    found: NDArray[np.bool_] = half < size
+    return found
+
+
+def _limits(value: Array, half: Array, told: NDArray[np.bool_]) -> tuple[float, float]:
+    """Zero and the points that are told in sight, with as much of their bands as is no larger than they are."""
+    if not told.any():
+        told = half == half.min()
+    size = float(np.abs(value[told]).max())
+    reach = np.minimum(half, size / 2)
+    low, high = float((value - reach)[told].min()), float((value + reach)[told].max())
+    low, high = min(low, 0.0), max(high, 0.0)
+    room = (_HEAD - 1) * (high - low)
+    return low - (room if low < 0 else 0.0), high + room
+
+
+def _silent(axes: Axes, frequency: Array, told: NDArray[np.bool_]) -> None:
+    """Octaves that the log does not tell lie in a shade."""
+    for i, f in enumerate(frequency[~told]):
+        name = "not shown" if i == 0 else None
+        axes.axvspan(f / _ENDS, f * _ENDS, color=style.MEASURED, alpha=0.14, lw=0, label=name)
+
+
+def press(axes: Axes, found: Identification, traces: Traces) -> None:
+    """Force over depth: the way in and out, its slopes with their bands, the working point."""
+    own = found.press
+    if own is None:
+        empty(axes, "no way into the surface in this log")
+        return
+    scale, unit = length_of(traces)
+    style.panel(
+        axes,
+        labelled("force", traces.force_unit),
+        labelled("depth from touch" if _touches(found) else "position", unit),
+    )
+    x, f = own.loading
+    _band_of(axes, own, scale)
+    axes.plot(scale * x, f, color=style.INK, lw=1.6, label="way in")
+    if own.unloading.shape[1]:
+        axes.plot(scale * own.unloading[0], own.unloading[1], color=style.MEASURED, lw=1.6, label="way out")
+    point = found.working_point
+    if point is not None:
+        _ring(axes, scale * point.depth_m, point.force_N)
+    style.legend_above(axes)
+
+
+def _touches(found: Identification) -> bool:
+    """Whether positions count from a touch: the mean in contact then lies well inside the surface."""
+    point, press = found.working_point, found.press
+    if point is None or press is None:
+        return False
+    return point.depth_m > 0.25 * float(press.loading[0].max()) > 0
+
+
+def _band_of(axes: Axes, own: Press, scale: float) -> None:
+    """The slopes, each over the part of the way in that it is of."""
+    reach = float(np.ptp(own.loading[0])) / (2.5 * max(len(own.tangent), 1))
+    low, high = float(own.loading[1].min()), float(own.loading[1].max())
+    for i, tangent in enumerate(own.tangent):
+        at = _depth_at(own, tangent)
+        u = np.linspace(-reach, reach, 3)
+        line = tangent.force + tangent.stiffness * u
+        half = np.minimum(tangent.half * np.abs(u), high - low)
+        axes.fill_between(scale * (at + u), line - half, line + half, color=style.K, **_BAND)
+        axes.plot(scale * (at + u), line, color=style.K, lw=2.4, label="slope, 95 %" if i == 0 else None)
+    edge = 0.08 * (high - low) or 1.0
+    axes.set_ylim(min(low, 0.0) - edge, high + edge)
+
+
+def _depth_at(own: Press, tangent: Tangent) -> float:
+    """Depth at which the way in passes a slope's force [m]."""
+    x, f = own.loading
+    return float(x[int(np.argmin(np.abs(f - tangent.force)))])
+
+
+def _ring(axes: Axes, x: float, y: float) -> None:
+    axes.plot(
+        [x],
+        [y],
+        "o",
+        ms=10,
+        mfc="none",
+        mec=style.INK,
+        mew=1.8,
+        label="working point",
+        zorder=5,
+        clip_on=False,
+    )
+
+
+def _value(found: Identification, name: str) -> float | None:
+    p = found.parameters.get(name)
+    return p.value if p is not None and p.unit in {"N/m", "N s/m", "kg", "1", "N m/rad"} else None
+
+
+def scaled_unit(unit: str, values: Array) -> tuple[float, str]:
+    """What an axis counts in: kN/m where that is shorter."""
+    large = unit == "N/m" and float(np.abs(values).max()) >= _KILO
+    return (1e3, "kN/m") if large else (1.0, unit)

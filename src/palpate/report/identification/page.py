@@ -1,0 +1,290 @@
+"""The page of an identification: the answer, what the log shows, the model's parameters, and how far to trust them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.files import write_text
+from palpate.identification.result import Identification, Parameter, Traces, Verdict
+from palpate.report.identification import captions
+from palpate.report.identification import evidence_panels as evidence
+from palpate.report.identification import fit_panels as fit
+from palpate.report.identification import trust_panels as trust
+from palpate.report.identification.causes import cause, next_step
+from palpate.report.identification.figure import Panel, both_parts, one
+from palpate.report.identification.source import Source, as_json
+from palpate.report.identification.words import (
+    CALLED,
+    NO_NUMBER,
+    advice,
+    facts_of,
+    interval,
+    limited_by,
+    model_line,
+    said,
+    sentence,
+    subtitle,
+    units_of,
+)
+from palpate.report.numbers import plain, quantity, with_half
+from palpate.report.page import embedded, render
+from palpate.report.svg import svg
+from palpate.text import shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Drawn = Callable[[Identification, Traces, int, int], "Figure"]
+
+TONES = {Verdict.IDENTIFIED: "ok", Verdict.NOT_IDENTIFIABLE: "warn", Verdict.REJECTED: "fail"}
+_COLOURED = ("K", "B", "M")
+_WIDE, _HALF, _NARROW = 1150, 560, 360
+"""Pixels of a panel: of a page's width, of half of it, of a telephone's."""
+_SHARE = 0.25
+"""Of the value: the ends of the bar that shows how narrow an interval is, the same on all cards."""
+_MOST_CONTACTS = 20
+
+
+def write_page(found: Identification, path: Path, source: Source) -> Path:
+    """Write the page of an identification, whole or not at all; it opens without a network and runs nothing.
+
+    Args:
+        found: what to show; figures need its traces.
+        path: of the HTML file.
+        source: where it is from.
+    """
+    text = page(found, source)
+    write_text(path, text)
+    return path
+
+
+def page(found: Identification, source: Source) -> str:
+    """The page of an identification as HTML."""
+    listed = found.contacts[:_MOST_CONTACTS]
+    return render(
+        "identification.html",
+        "palpate.report.identification",
+        title=source.title,
+        sentence=sentence(found),
+        model_line=model_line(found),
+        subtitle=subtitle(found),
+        notes=[shown(note) for note in source.notes],
+        point=_point(found),
+        first=_evidence(found),
+        cards=[_card(name, p) for name, p in found.parameters.items()],
+        warnings=[
+            {"code": w.code.word, "text": shown(w.text), "advice": advice(w.code)} for w in found.warnings
+        ],
+        figures=_figures(found),
+        models=_models(found),
+        octaves=_octaves(found),
+        unit=_of(found.working_point.stiffness.unit if found.working_point else "1"),
+        force_unit=_of(units_of(found)[0]),
+        contacts=listed,
+        more=len(found.contacts) - len(listed),
+        json=json.dumps(as_json(found, source), indent=1),
+        source=source,
+        options=", ".join(f"{shown(str(k))} {shown(str(v))}" for k, v in _told(found, source).items()),
+        file=shown(source.file),
+        command=shown(source.command),
+    )
+
+
+def _told(found: Identification, source: Source) -> dict[str, Any]:
+    return {**source.options, **found.options}
+
+
+def _point(found: Identification) -> dict[str, Any] | None:
+    """The card of the working point."""
+    point = found.working_point
+    if point is None:
+        return None
+    own, limit = point.stiffness, limited_by(found)
+    force, depth, frequency = facts_of(found, point)
+    return {
+        "number": split(own),
+        "tone": TONES[own.verdict],
+        "verdict": str(own.verdict),
+        "interval": interval(own.ci95, own.unit),
+        "force": force,
+        "depth": depth,
+        "frequency": frequency,
+        "next": interval(point.prediction95, own.unit),
+        "reason": shown(own.reason),
+        "limit": f"{cause(limit, point.source)}. {next_step(limit, point.source).capitalize()}.",
+        "scale": _scale(own, found),
+        "source": {"octave": "the most excited octave", "press": "the slope of the way in"}.get(
+            point.source, shown(point.source)
+        ),
+    }
+
+
+def _scale(p: Parameter, found: Identification) -> str:
+    """What a scale that is off would do, if nobody has told the calibration."""
+    if p.value is None or found.options.get("calibration"):
+        return ""
+    share = quantity(abs(p.value) / 100, p.unit, digits=2)
+    return f"A scale of force or position that is off by 1 % would add ± {share}; no log shows it."
+
+
+def _card(name: str, p: Parameter) -> dict[str, Any]:
+    return {
+        "name": name,
+        "called": CALLED.get(name, ""),
+        "colour": name if name in _COLOURED else "other",
+        "value": p.value,
+        "number": split(p),
+        "tone": TONES[p.verdict],
+        "verdict": str(p.verdict),
+        "reason": shown(p.reason),
+        "interval": interval(p.ci95, p.unit),
+        "own": interval(p.ci95_if_model_holds, p.unit),
+        "bar": _bar(p),
+        "budget": _budget(p),
+    }
+
+
+def split(p: Parameter) -> dict[str, Any]:
+    """A number, its half-width and its unit, to be written large and less large."""
+    if p.value is None:
+        return {"value": None, "text": NO_NUMBER, "half": "", "unit": ""}
+    text = said(p)
+    plus, _, unit = text.rpartition(" ") if p.unit != "1" else (text, "", "")
+    if p.unit != "1" and " " in p.unit:  # N s/m: two words
+        head, _, first = plus.rpartition(" ")
+        plus, unit = head, f"{first} {unit}"
+    value, _, half = plus.partition(" ± ")
+    return {"value": p.value, "text": value, "half": half, "unit": unit}
+
+
+def _bar(p: Parameter) -> dict[str, float] | None:
+    """Where the intervals lie on a line from a quarter below the value to a quarter above it [%]."""
+    if p.value is None or p.ci95 is None or not p.value or not all(map(math.isfinite, p.ci95)):
+        return None
+
+    def place(x: float) -> float:
+        share = (x - p.value) / abs(p.value) / _SHARE if p.value else 0.0
+        return round(50 + 50 * max(-1.0, min(1.0, share)), 2)
+
+    low, high = (place(x) for x in p.ci95)
+    found = {"left": low, "width": round(max(high - low, 0.5), 2)}
+    if p.ci95_if_model_holds is not None:
+        a, b = (place(x) for x in p.ci95_if_model_holds)
+        found |= {"own_left": a, "own_width": round(max(b - a, 0.5), 2)}
+    return found
+
+
+def _budget(p: Parameter) -> list[dict[str, Any]]:
+    """The causes of an interval, largest first, on one scale; what is not known is hatched."""
+    parts = sorted(p.budget.items(), key=lambda item: -item[1])
+    assumed = "calibration" not in p.budget and p.value is not None and p.unit not in {"1", "s"}
+    longest = max([half for _, half in parts] + ([abs(p.value or 0) / 100] if assumed else []), default=0.0)
+    rows = [_row(shown(name), half, longest, p, assumed=False) for name, half in parts]
+    if assumed and p.value is not None:
+        rows.append(_row("scale, if 1 %", abs(p.value) / 100, longest, p, assumed=True))
+    return rows
+
+
+def _row(name: str, half: float, longest: float, p: Parameter, *, assumed: bool) -> dict[str, Any]:
+    share = half / longest if longest > 0 else 0.0
+    return {
+        "name": name,
+        "half": quantity(half, p.unit, digits=2),
+        "width": round(100 * share, 1),
+        "assumed": assumed,
+        "first": share >= 1 and not assumed,
+    }
+
+
+def _evidence(found: Identification) -> list[dict[str, str]]:
+    """What the log shows before any model."""
+    if found.traces is None or not found.contacts:
+        return []
+    return [
+        _figure(found, "Dynamic stiffness", both_parts, captions.spectrum, (_HALF, 430)),
+        _figure(found, "Press", partial(one, evidence.press), captions.press, (_HALF, 430)),
+    ]
+
+
+def _figures(found: Identification) -> list[dict[str, str]]:
+    """How the model follows the log, in the order to be read."""
+    traces = found.traces
+    if traces is None:
+        return []
+    if not len(traces.fitted_time):
+        return [_panel(found, "Force over time", fit.force, captions.untouched, (_WIDE, 260))]
+    return [
+        _panel(found, "Force over time", fit.force, captions.force, (_WIDE, 260)),
+        _panel(found, "Misfit over time", fit.residual, captions.residual, (_HALF, 260)),
+        _panel(found, "Is the misfit noise?", trust.residual_spectrum, captions.noise, (_HALF, 260)),
+    ]
+
+
+def _panel(
+    found: Identification,
+    title: str,
+    panel: Panel,
+    caption: Callable[[Identification, Traces], str],
+    size: tuple[int, int],
+) -> dict[str, str]:
+    return _figure(found, title, partial(one, panel), caption, size)
+
+
+def _figure(
+    found: Identification,
+    title: str,
+    drawn: Drawn,
+    caption: Callable[[Identification, Traces], str],
+    size: tuple[int, int],
+) -> dict[str, str]:
+    """A picture at the two widths at which it is looked at, so that its letters keep their size."""
+    assert found.traces is not None
+    words = caption(found, found.traces)
+    wide, narrow = (
+        embedded(svg(drawn(found, found.traces, *own)), "image/svg+xml")
+        for own in (size, (_NARROW, min(size[1], 330)))
+    )
+    return {
+        "title": title,
+        "wide": wide,
+        "narrow": narrow,
+        "alt": f"{title}. {words}",
+        "caption": words,
+        "full": "full" if size[0] > _HALF else "",
+    }
+
+
+def _octaves(found: Identification) -> list[list[str]]:
+    """The dynamic stiffness as rows of text."""
+    return [
+        [
+            plain(o.frequency, 3),
+            with_half(o.storage, o.storage_half),
+            with_half(o.loss, o.loss_half),
+            str(o.blocks),
+            f"{100 * o.share:.2g} %",
+        ]
+        for o in found.dynamic_stiffness
+    ]
+
+
+def _models(found: Identification) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": c.model,
+            "chosen": math.isclose(c.rmse, found.rmse, rel_tol=1e-9),
+            "r2": f"{c.r2:.4f}",
+            "rmse": plain(c.rmse, 3),
+            "note": shown(c.note),
+        }
+        for c in found.comparison
+    ]
+
+
+def _of(unit: str) -> str:
+    return "" if unit == "1" else f" [{unit}]"

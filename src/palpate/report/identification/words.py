@@ -1,0 +1,201 @@
+"""What an identification says, in words: the sentence first, then what each number is and what limits it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from palpate.identification.result import Identification, Parameter, Verdict, WorkingPoint
+from palpate.identification.warning_codes import Code
+from palpate.report.identification.causes import cause, next_step
+from palpate.report.numbers import plain, quantity, quantity_between, with_half
+
+CALLED = {
+    "K": "stiffness",
+    "B": "damping",
+    "M": "mass",
+    "E": "Young's modulus",
+    "K1": "second stiffness",
+    "K2": "quadratic stiffness",
+    "K3": "cubic stiffness",
+    "tau": "relaxation time",
+    "n": "exponent",
+    "Fc": "Coulomb friction",
+    "x0": "place of the surface",
+}
+MARKS = {Verdict.IDENTIFIED: "✓", Verdict.NOT_IDENTIFIABLE: "?", Verdict.REJECTED: "✕"}
+NO_NUMBER = "no number"
+
+ADVICE = {
+    Code.FORCE_LAGS_POSITION: "Measure the lag, by a knock on something stiff or with a known mass, and give --lag.",
+    Code.LAG_DAMPING_CONFOUNDED: "Give a measured --lag, or press again with a wider band, as a chirp has it.",
+    Code.SERIES_COMPLIANCE: "Measure the position nearer to the surface, or calibrate what lies between more closely.",
+    Code.LOW_EXCITATION: "Press faster, deeper or more often; for a mass, shake the probe in contact.",
+    Code.MODEL_REJECTED: "Take no number here for a constant of the surface; try a stretch of it (--start, --end).",
+    Code.NONLINEAR_STIFFNESS: "Use K only near the mean position, and K2 and K3 with it elsewhere.",
+    Code.HELD_SAMPLES: "Nothing; a log at the sensor's own rate would be as good.",
+    Code.MISSING_SAMPLES: "Check the log where readings are missing; name other marks of none with --missing.",
+    Code.IRREGULAR_TIME: "Log with the sensor's own clock if you can.",
+    Code.SATURATED: "Press less, or use a sensor of a larger range.",
+    Code.UNIT_GUESS: "Say the units, as in --position position_mm:mm.",
+    Code.FORCE_SIGN_REVERSED: "Nothing, if the column is the right one.",
+    Code.POSITION_SIGN_REVERSED: "Nothing, if the column is the right one.",
+    Code.LOW_RATE: "Log faster: damping and mass need it first.",
+    Code.NO_CONTACT: "Check the column of the force; say --bonded if the probe is fixed to the surface.",
+    Code.CONTACT_AT_START: "Begin the log a second before the touch.",
+    Code.NEGATIVE_STIFFNESS: "Check the signs and the columns.",
+    Code.CLOCKS_DISAGREE: "Stamp both topics with one clock, or measure the lag between them and give --lag.",
+    Code.LOG_CUT_SHORT: "Nothing, if the contacts are whole; else record again and close the bag.",
+    Code.UNIT_STATED: "Nothing, if the file is right; else say the unit, as in --force force_mN:mN.",
+    Code.TIME_DOUBTFUL: "Say the unit of the time, as --time t:ms, or give --rate.",
+    Code.LINES_SKIPPED: "Look at these lines; if they are rows, mend them and identify again.",
+    Code.COLUMNS_SWAPPED: "Check --position and --force; exchange them if they are swapped.",
+    Code.FRAME_GUESS: "Say it with --wrench-frame.",
+    Code.NORMAL_UNCERTAIN: "Give the contact's normal, or press harder along it and slide less.",
+}
+"""What to do about a warning."""
+
+UNTOUCHED = "Nothing is touched in this log"
+
+
+def sentence(found: Identification) -> str:
+    """What is known, where it holds, what limits it, and so what to do next."""
+    if not found.contacts:
+        return f"{UNTOUCHED}: {_first_reason(found)}."
+    point = found.working_point
+    if point is None:
+        return "The log shows no stiffness: no stretch in contact is long enough; log longer or press deeper."
+    own, where = point.stiffness, place_of(found, point)
+    limit = limited_by(found)
+    if own.value is None or own.ci95 is None or own.ci95[0] <= 0 <= own.ci95[1]:
+        lost = _loss(found, point)
+        start = f"{lost}, but no stiffness" if lost else "The log shows no stiffness"
+        return f"{start} {where} ({own.reason}); {next_step(limit, point.source)}."
+    only = "" if own.verdict is Verdict.IDENTIFIED else f", known to {_share(own)} only,"
+    return (
+        f"The stiffness is {said(own)}{only} {where}; what limits it most is {cause(limit, point.source)}:"
+        f" {next_step(limit, point.source)}."
+    )
+
+
+def _loss(found: Identification, point: WorkingPoint) -> str:
+    """That the loss is known where the stiffness is not, as of a damper."""
+    own = next((o for o in found.dynamic_stiffness if o.frequency == point.frequency_Hz), None)
+    if point.source != "octave" or own is None or not own.loss_half < own.loss:
+        return ""
+    return f"The log shows a loss of {quantity(own.loss, point.stiffness.unit, own.loss_half)}"
+
+
+def place_of(found: Identification, point: WorkingPoint) -> str:
+    """`at 13 N, 2.4 mm deep and 0.57 Hz`."""
+    force, depth, frequency = facts_of(found, point)
+    deep = " deep" if point.depth_m > 0 else " from the middle of the motion"
+    return f"at {force}, {depth}{deep} and {frequency}"
+
+
+def facts_of(found: Identification, point: WorkingPoint) -> tuple[str, str, str]:
+    """Force, depth and frequency of the working point, with their units."""
+    force, position = units_of(found)
+    return (
+        quantity(point.force_N, force),
+        quantity(abs(point.depth_m), position),
+        f"{plain(point.frequency_Hz, 2)} Hz",
+    )
+
+
+def units_of(found: Identification) -> tuple[str, str]:
+    """Units of force and position of the log."""
+    if found.traces is not None:
+        return found.traces.force_unit, found.traces.position_unit
+    return ("1", "1") if any(p.unit == "1" for n, p in found.parameters.items() if n == "K") else ("N", "m")
+
+
+def limited_by(found: Identification) -> str | None:
+    """Largest cause of the working point's interval; None if nobody has told one."""
+    point = found.working_point
+    return next(iter(point.stiffness.budget), None) if point is not None else None
+
+
+def model_line(found: Identification) -> str:
+    """What the model's parameters are worth, in one line."""
+    if not found.contacts or not found.n:
+        return ""
+    start = "No model describes this log. " if Code.MODEL_REJECTED.word in found.codes else ""
+    verdicts = [
+        f"{listed([CALLED.get(name, name) for name in names])} {'is' if len(names) == 1 else 'are'} {verdict}"
+        for verdict in Verdict
+        if (names := [name for name, p in found.parameters.items() if p.verdict is verdict])
+    ]
+    text = "; ".join(verdicts)
+    return f"{start}By the model {found.model}, {text}."
+
+
+def subtitle(found: Identification) -> str:
+    """The fit and what it is worth, in one line."""
+    if not found.n:
+        return "no contact"
+    count = len(found.contacts)
+    force = units_of(found)[0]
+    parts = [
+        f"{found.model}, R² {found.r2:.4f}",
+        f"rms misfit {quantity(found.rmse, force)}",
+        f"{found.n} samples of {count} contact{'s' * (count != 1)}",
+        f"filters {plain(found.cutoff, 3)} Hz",
+    ]
+    if found.lag:
+        parts.append(lag_of(found))
+    return ", ".join(parts)
+
+
+def lag_of(found: Identification) -> str:
+    """How late the force is, and who says so."""
+    lag = found.lag
+    if lag is None:
+        return "no lag known"
+    value = with_half(1e3 * lag.value, 1e3 * lag.bound) if lag.bound else plain(1e3 * lag.value, 3)
+    who = {"told": "as told", "measured": "as this log shows", "prior": "assumed, as sensors have it"}
+    return f"force late by {value} ms ({who.get(lag.kind, lag.kind)})"
+
+
+def number(p: Parameter) -> str:
+    """A parameter's value and the half-width of its 95 % interval; or that there is none."""
+    if p.value is None:
+        return NO_NUMBER
+    return with_half(p.value, (p.ci95[1] - p.ci95[0]) / 2) if p.ci95 else plain(p.value)
+
+
+def said(p: Parameter) -> str:
+    """The same with its unit."""
+    if p.value is None:
+        return NO_NUMBER
+    return quantity(p.value, p.unit, (p.ci95[1] - p.ci95[0]) / 2 if p.ci95 else None, 4)
+
+
+def interval(ends: tuple[float, float] | None, unit: str) -> str:
+    """The ends of an interval with their unit; nothing if there is none."""
+    return "" if ends is None else quantity_between(*ends, unit)
+
+
+def advice(code: Code) -> str:
+    """What to do about a warning; what it means, where nobody has written that down."""
+    return ADVICE.get(code, code.value)
+
+
+def unit(p: Parameter) -> str:
+    """A unit as it is shown: nothing for plain numbers."""
+    return "" if p.unit == "1" else p.unit
+
+
+def listed(names: Sequence[str]) -> str:
+    """`a, b and c`."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _share(p: Parameter) -> str:
+    if p.value is None or p.ci95 is None or not p.value:
+        return "?"
+    return f"{50 * (p.ci95[1] - p.ci95[0]) / abs(p.value):.2g} %"
+
+
+def _first_reason(found: Identification) -> str:
+    own = next((warn.text for warn in found.warnings if warn.code is Code.NO_CONTACT), "")
+    return own.partition(":")[0].rstrip(".") or "the force does not leave its rest"

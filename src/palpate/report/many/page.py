@@ -1,0 +1,109 @@
+"""The page of many identifications: what they say together, a row each, and forest plots."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from palpate.files import write_text
+from palpate.identification.pooling import Pooled, PooledParameter
+from palpate.report.identification.page import TONES, split
+from palpate.report.identification.source import Source
+from palpate.report.identification.words import CALLED, facts_of, interval, said
+from palpate.report.many import forest
+from palpate.report.many.rows import POINT, LogRow, drawn, json_of, quantities
+from palpate.report.many.words import failures, place, sentence
+from palpate.report.numbers import quantity
+from palpate.report.page import embedded, render
+from palpate.report.svg import svg
+from palpate.text import shown
+
+_COLOURED = {POINT: "K", "K": "K", "B": "B", "M": "M"}
+_HALF, _NARROW = 560, 360
+
+
+def write_page(rows: Sequence[LogRow], pooled: Pooled, path: Path) -> Path:
+    """Write the page of many identifications, whole or not at all; it opens without a network and runs nothing."""
+    text = page(rows, pooled)
+    write_text(path, text)
+    return path
+
+
+def page(rows: Sequence[LogRow], pooled: Pooled) -> str:
+    """The page as HTML."""
+    source = rows[0].source if rows else Source("")
+    point = pooled.working_point
+    return render(
+        "many.html",
+        "palpate.report.many",
+        "palpate.report.identification",
+        title=f"{len(rows)} logs",
+        sentence=sentence(rows, pooled),
+        failures=failures(rows),
+        place=place(rows, point) if point else "",
+        cards=[_card(name, own, pooled) for name, own in quantities(pooled).items()],
+        names=list(quantities(pooled)),
+        rows=[_row(row, pooled) for row in rows],
+        figures=[_figure(rows, pooled, name) for name in drawn(rows, pooled)],
+        json=json.dumps(json_of(rows, pooled), indent=1),
+        source=Source("", source.options, None, source.command, source.made),
+        file="",
+        options=", ".join(f"{shown(str(k))} {shown(str(v))}" for k, v in source.options.items()),
+        command=shown(source.command),
+    )
+
+
+def _card(name: str, own: PooledParameter, pooled: Pooled) -> dict[str, Any]:
+    p = own.parameter
+    return {
+        "name": "Stiffness" if name == POINT else name,
+        "called": "at the working point" if name == POINT else CALLED.get(name, ""),
+        "colour": _COLOURED.get(name, "other"),
+        "number": split(p),
+        "tone": TONES[p.verdict],
+        "verdict": str(p.verdict),
+        "interval": interval(p.ci95, p.unit),
+        "next": interval(own.prediction95, p.unit),
+        "between": "" if own.between is None else quantity(own.between, p.unit, digits=2),
+        "count": f"{len(own.logs)} of {pooled.count}",
+        "reason": shown(p.reason),
+    }
+
+
+def _row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
+    found = row.found
+    point = found.working_point if found else None
+    values = [row.value_of(name) for name in quantities(pooled)]
+    return {
+        "name": row.source.title,
+        "sha256": row.source.sha256,
+        "error": shown(row.error),
+        "cells": [said(p) if p is not None and p.value is not None else "–" for p in values],
+        "place": ", ".join(facts_of(found, point)) if found and point else "–",
+        "model": found.model if found else "–",
+        "tone": TONES[point.stiffness.verdict] if point else "fail" if found is None else "warn",
+        "verdict": str(point.stiffness.verdict) if point else "no contact" if found else "not identified",
+        "codes": ", ".join(found.codes) if found else "",
+    }
+
+
+def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]:
+    title = "Stiffness at the working point" if name == POINT else f"{name}, {CALLED.get(name, name)}"
+    wide, narrow = (
+        embedded(svg(forest.one(rows, pooled, name, width)), "image/svg+xml") for width in (_HALF, _NARROW)
+    )
+    own = quantities(pooled)[name].parameter
+    words = (
+        f"Pooled: {said(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its own,"
+        " the brackets hold where the next press falls. Pale: not pooled."
+    )
+    return {
+        "title": title,
+        "wide": wide,
+        "narrow": narrow,
+        "alt": f"{title}. {words}",
+        "caption": words,
+        "full": "",
+    }

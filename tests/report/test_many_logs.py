@@ -1,0 +1,121 @@
+"""Many identifications on paper: rows, the forest plot, the page and the terminal."""
+
+import json
+import re
+from html import unescape
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from palpate.files import check_place
+from palpate.identification.pooling import pool
+from palpate.identification.result import Identification, Parameter, Traces, Verdict, WorkingPoint
+from palpate.report.identification.source import Source
+from palpate.report.many.forest import draw, write_figure
+from palpate.report.many.page import page, write_page
+from palpate.report.many.rows import LogRow, json_of
+from palpate.report.many.table import show
+from palpate.report.many.words import failures, sentence
+from report.test_identification_page import Reader
+
+NONE = np.empty(0)
+NASTY = "a<script>$x_{1 \x1b[31m.csv"
+
+
+def row(name, stiffness, half=40.0):
+    own = Parameter(
+        stiffness, half / 1.96, (stiffness - half, stiffness + half), "N/m", Verdict.IDENTIFIED, "so"
+    )
+    point = WorkingPoint(own, 10.0 + stiffness / 1000, 2e-3, 1.5, "octave")
+    traces = Traces(NONE, NONE, NONE, NONE, NONE, NONE)
+    found = Identification(
+        "kelvin-voigt", {"K": own}, ((0.0, 1.0),), None, 0.99, 0.1, 9, (), traces=traces, working_point=point
+    )
+    return LogRow(Source(name, {"time": "t"}, "f" * 64, f"palpate identify {NASTY}"), found)
+
+
+@pytest.fixture
+def rows():
+    failed = LogRow(Source(NASTY), None, "there is no file <b>; check the path")
+    return [row(f"press_{i}.csv", k) for i, k in enumerate((5000.0, 5300.0, 4800.0, 5100.0))] + [failed]
+
+
+@pytest.fixture
+def pooled(rows):
+    return pool([own.found for own in rows])
+
+
+def test_the_sentence_holds_mean_next_press_place_and_cause(rows, pooled):
+    own = pooled.working_point.stiffness
+    text = sentence(rows, pooled)
+    assert text.startswith("Over 4 of 5 logs the stiffness is 50")
+    for part in (
+        "the next press will be from",
+        "14.8 N to 15.3 N",
+        "2 mm deep",
+        "1.5 Hz",
+        "what limits it most is",
+    ):
+        assert part in text
+    assert own.prediction95[0] < own.parameter.ci95[0]
+    assert failures(rows) == "1 of 5 logs could not be identified; their rows say why."
+
+
+def test_without_a_number_it_says_so():
+    none = [LogRow(Source("a.csv"), None, "no")]
+    assert "None of 1 logs" in sentence(none, pool([None]))
+
+
+def test_the_json_has_a_row_each_and_what_is_pooled(rows, pooled):
+    own = json.loads(json.dumps(json_of(rows, pooled), allow_nan=False))
+    assert [log["file"] for log in own["logs"]] == [r.source.file for r in rows]
+    assert own["logs"][-1]["error"].startswith("there is no file")
+    assert own["logs"][0]["parameters"]["K"]["value"] == 5000
+    assert own["pooled"]["parameters"]["K"]["logs"] == [0, 1, 2, 3]
+    assert own["pooled"]["working_point"]["stiffness"]["prediction95"]
+
+
+def test_the_page_shows_each_log_and_the_mean(rows, pooled):
+    html = page(rows, pooled)
+    read = Reader(html)
+    assert sentence(rows, pooled) in read.text
+    for r in rows[:-1]:
+        assert r.source.title in read.text
+    assert "there is no file <b>; check the path" in read.text
+    assert len(read.of("img")) == 2
+    assert "<script" not in html
+    assert "\x1b" not in html
+    shown = re.search(r"<pre>(\{.*\})</pre>", html, re.DOTALL).group(1)
+    assert json.loads(unescape(shown)) == json.loads(json.dumps(json_of(rows, pooled)))
+
+
+def test_the_forest_has_a_row_a_log_and_the_pooled_one(rows, pooled):
+    figure = draw(rows, pooled)
+    figure.canvas.draw()
+    axis = figure.axes[0]
+    names = [label.get_text() for label in axis.get_yticklabels()]
+    assert names[0] == "pooled"
+    assert names[::-1][:4] == [f"press_{i}.csv" for i in range(4)]
+    points = [float(line.get_xdata()[0]) for line in axis.lines if line.get_marker() == "o"]
+    assert points == [5000, 5300, 4800, 5100]
+    diamond = axis.patches[-1].get_xy()
+    low, high = pooled.working_point.stiffness.parameter.ci95
+    assert (diamond[:, 0].min(), diamond[:, 0].max()) == pytest.approx((low, high))
+
+
+def test_both_files_are_whole_and_ours(rows, pooled, tmp_path):
+    check_place(write_figure(rows, pooled, tmp_path / "a.png"), "--figure")
+    check_place(write_page(rows, pooled, tmp_path / "a.html"), "--report")
+
+
+@pytest.mark.parametrize("width", [80, 160])
+def test_the_terminal_shows_each_log_and_the_mean(rows, pooled, width):
+    console = Console(width=width, force_terminal=False)
+    with console.capture() as capture:
+        show(rows, pooled, console)
+    text = capture.get()
+    assert " ".join(text.split()).startswith(sentence(rows, pooled))
+    assert "5000 ± 40" in text
+    assert "there is no file <b>" in text
+    assert "\x1b" not in text
