@@ -266,7 +266,7 @@ def taken(law, known, stage, w, f, force):
         return Learned(known.slow, known.fast, since, known.origin, known.found, known.std)
     rate = (f.y - f.y0) / law.tick
     phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
-    moving = known.found.x * law.cap * rate * law.tick
+    moving = min(max(known.found.x, 0.0), 1.0) * law.cap * rate * law.tick
     weight = 1.0 / (w.variance + moving * moving / 12.0)
     fast = known.fast.taking(phi, force, weight, 1.0 - law.tick / law.theta)
     if stage.phase == LOCKED:

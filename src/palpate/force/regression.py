@@ -7,8 +7,12 @@ from palpate._vector import ZERO3, Mat3, Vec3, outer, solve, sqrt
 
 NOTHING = Mat3(ZERO3, ZERO3, ZERO3)
 AXIS_K, AXIS_B, BOTH, AXIS_C = Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(1.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0)
-VAGUE = 1e-4
-"""Information on stiffness and damping before the first sample: a deviation of a hundred caps."""
+PRIOR = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 0.01))
+"""Information that never fades: stiffness and damping deviate from 0 by about the cap, the offset by about 10 N.
+
+It keeps the equations solvable where the tip moves evenly, so that damping and offset are one.
+"""
+UNKNOWN = 1e3
 
 
 @part
@@ -20,7 +24,8 @@ class Fit(NamedTuple):
 
     def taking(self, phi, force, weight, keep):
         """With one more sample of that weight [1/N^2], the old ones faded by `keep`."""
-        return Fit(keep * self.N + weight * outer(phi, phi), keep * self.r + (weight * force) * phi)
+        N = keep * self.N + (1.0 - keep) * PRIOR + weight * outer(phi, phi)
+        return Fit(N, keep * self.r + (weight * force) * phi)
 
     def solved(self):
         """K, B/theta and the offset."""
@@ -28,7 +33,8 @@ class Fit(NamedTuple):
 
     def std(self, direction):
         """Standard deviation of a combination of the three."""
-        return sqrt(max(direction @ solve(self.N, direction), 0.0))
+        variance = direction @ solve(self.N, direction)
+        return sqrt(variance) if variance > 0.0 else UNKNOWN  # also where rounding left no variance
 
     def undamped(self):
         """K where B is held at 0, and its standard deviation."""
@@ -41,8 +47,7 @@ class Fit(NamedTuple):
 def fit_from(offset, std):
     """What is known at a touch: nothing of K and B, and of the offset that it is this +- std [N]."""
     c = 1.0 / (std * std)
-    N = Mat3(Vec3(VAGUE, 0.0, 0.0), Vec3(0.0, VAGUE, 0.0), Vec3(0.0, 0.0, c))
-    return Fit(N, Vec3(0.0, 0.0, c * offset))
+    return Fit(PRIOR + c * Mat3(ZERO3, ZERO3, AXIS_C), Vec3(0.0, 0.0, c * offset))
 
 
 @law
@@ -52,4 +57,4 @@ def without_offset(fit, share):
     across = Vec3(N.r1.z, N.r2.z, 0.0)
     slopes = Mat3(Vec3(N.r1.x, N.r1.y, 0.0), Vec3(N.r2.x, N.r2.y, 0.0), ZERO3) - outer(across, across) / c
     r = Vec3(fit.r.x, fit.r.y, 0.0) - (fit.r.z / c) * across
-    return Fit(share * slopes + Mat3(ZERO3, ZERO3, VAGUE * AXIS_C), share * r)
+    return Fit(share * slopes + PRIOR, share * r)
