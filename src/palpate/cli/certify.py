@@ -103,7 +103,9 @@ def _made(
     gains = load_gains(path)
     surfaces = None if stiffness is None else spread("--stiffness", stiffness, "stiffness")
     if surfaces is not None and not 0.0 < surfaces[0] < surfaces[1]:
-        raise InputError(f"--stiffness must be an interval above 0 N/m with its lower end first, got {stiffness!r}")
+        raise InputError(
+            f"--stiffness must be an interval above 0 N/m with its lower end first, got {stiffness!r}"
+        )
     time = None if damping_time is None else spread("--damping-time", damping_time, "time")
     if time is not None and not 0.0 == time[0] <= time[1]:
         raise InputError(f"--damping-time must be 0:T in seconds, got {damping_time!r}")

@@ -116,7 +116,9 @@ def _known(found: Path | None, stiffness: str | None, source: LogOptions) -> Kno
         raise InputError("give a file or --stiffness, not both")
     if found is None:
         if stiffness is None:
-            raise InputError("tune for what? Give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH")
+            raise InputError(
+                "tune for what? Give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"
+            )
         low, high = spread("--stiffness", stiffness, "stiffness")
         return Known((low, high))
     if found.suffix.lower() == ".json":
@@ -130,7 +132,9 @@ def _object(path: Path) -> dict[str, Any]:
     with path.open("rb") as file:
         data = file.read(_LARGEST + 1)
     if len(data) > _LARGEST:
-        raise InputError(f"{path}: more than {_LARGEST} bytes are not what palpate identify prints; check the path")
+        raise InputError(
+            f"{path}: more than {_LARGEST} bytes are not what palpate identify prints; check the path"
+        )
     try:
         value = loads(data)
     except (JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -147,7 +151,9 @@ def _identified(log: Path, source: LogOptions) -> dict[str, Any]:
 
     record = read(log, source, samples=False)
     if "force" not in record.columns or "position" not in record.columns:
-        raise InputError(f"{log}: tune takes a log of one axis; run palpate identify --json on it and give that")
+        raise InputError(
+            f"{log}: tune takes a log of one axis; run palpate identify --json on it and give that"
+        )
     known: dict[str, Any] = measured_by(log) if source.plain and is_run(log) else {}
     return identify(record, **known).to_json()
 

@@ -59,7 +59,7 @@ class Sensor(Table):
     """Standard deviation of a reading [N]."""
     full_scale: Positive
     """Largest force that it reads [N]."""
-    low_pass: str = "none"
+    low_pass: str = "none"  # noqa: S105 - a filter
     """Before the sampling, as butterworth3:120."""
 
 

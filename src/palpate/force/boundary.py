@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -95,9 +97,9 @@ def stable_between(start: Array, end: Array, high: float = np.inf) -> list[tuple
     inside = [s for s in crossings(start, b, c) if s < high]
     edges = [0.0, *inside, high]
     found: list[tuple[float, float]] = []
-    for low, top in zip(edges, edges[1:], strict=False):
+    for low, top in pairwise(edges):
         middle = (
-            (low * top) ** 0.5 if 0.0 < low and top < np.inf else 0.5 * top if top < np.inf else 2 * low + 1.0
+            (low * top) ** 0.5 if low > 0.0 and top < np.inf else 0.5 * top if top < np.inf else 2 * low + 1.0
         )
         if radius(start + middle * (end - start)) < 1.0:
             if found and found[-1][1] == low:

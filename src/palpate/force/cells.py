@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.force.sampled_loop import Law, SampledLoop, held
+from palpate.force.sampled_loop import Law, SampledLoop
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,8 @@ class Prover:
         if self.relative:
             low, high = low * self._gain(box.high), high * self._gain(box.low)
         return [
-            (Law(g, self.kept), loss) for g, loss in product(dict.fromkeys((low, high)), range(self.jitter + 1))
+            (Law(g, self.kept), loss)
+            for g, loss in product(dict.fromkeys((low, high)), range(self.jitter + 1))
         ]
 
     def _gain(self, bound: float) -> float:
@@ -111,7 +112,7 @@ class Prover:
             worst = max(worst, float(np.linalg.norm(L.T @ Phi @ back, 2)))
             size = max(size, float(np.linalg.norm(Phi)))
         n = len(L)
-        return worst + self.curvature(box, L, back), 16.0 * n * EPS * condition * size
+        return worst + self.curvature(box, L, np.asarray(back)), 16.0 * n * EPS * condition * size
 
     def curvature(self, box: Box, L: Array, back: Array) -> float:
         """How far within the box the matrix may lie from its corners' hull, in the norm of L; 0 where it is affine.

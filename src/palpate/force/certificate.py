@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -20,7 +21,7 @@ from palpate.force.gains import Gains
 from palpate.force.lag import ultimate_gain
 from palpate.force.sampled_loop import SampledLoop
 
-FORM = "palpate force certificate 1"
+FORM: Literal["palpate force certificate 1"] = "palpate force certificate 1"
 _LARGEST = 1 << 26
 SOFTEST = 1e-3
 """Of the cap: as far down as a held gain is proved by default."""
@@ -143,7 +144,9 @@ class Certificate(Table):
         ):
             if mine != other:
                 what = f" ({mine:g} and {other:g})" if isinstance(mine, float) else ""
-                raise InputError(f"the certificate is of another {name}{what} than the gains; certify them again")
+                raise InputError(
+                    f"the certificate is of another {name}{what} than the gains; certify them again"
+                )
 
     def check(self) -> Verdict:
         """Whether it holds, by norms alone."""
@@ -190,7 +193,7 @@ def _cuts(ends: np.ndarray, low: float, high: float) -> list[tuple[float, float]
         return [(low, high)]
     inside = np.unique(np.clip(ends, low, high))
     all_of = np.unique(np.concatenate([inside, [low, high]]))
-    return [(float(a), float(b)) for a, b in zip(all_of, all_of[1:], strict=False)]
+    return [(a, b) for a, b in pairwise(all_of.tolist())]
 
 
 def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None) -> Claim | None:
@@ -226,10 +229,12 @@ def _starts(box: Box) -> list[Box]:
     edges.append(box.low)
     if box.low == box.high:
         return [box]
-    return [Box(a, b, box.least, box.most) for b, a in zip(edges, edges[1:], strict=False)]
+    return [Box(a, b, box.least, box.most) for b, a in pairwise(edges)]
 
 
-def held_claim(gains: Gains, low: float, high: float, most: float, jitter: int = 0, margin: float = 1.0) -> Claim:
+def held_claim(
+    gains: Gains, low: float, high: float, most: float, jitter: int = 0, margin: float = 1.0
+) -> Claim:
     """That the loop with K_u = cap is stable on surfaces as the measured position feels them.
 
     Args:
@@ -315,7 +320,9 @@ def certify(
     return Certificate(form=FORM, gains=gains, claims=tuple(claims))
 
 
-def _felt(gains: Gains, stiffness: tuple[float, float] | None, most: float, margin: float) -> tuple[float, float]:
+def _felt(
+    gains: Gains, stiffness: tuple[float, float] | None, most: float, margin: float
+) -> tuple[float, float]:
     if stiffness is not None:
         low, high = stiffness
         if gains.arm.kind == "position":

@@ -100,7 +100,7 @@ def put_state(a, s):
     put_vector(a, 44, k.found)
     put_vector(a, 47, k.std)
     a[50], a[51] = s.bound.stiffness, s.bound.tau
-    a[52], a[53], a[54], a[55], a[56], a[57] = b.care, b.sign, b.peak, b.before, b.count, b.calm
+    a[52], a[53], a[54], a[55], a[56], a[57] = b.care, b.sign, b.peak, b.before, b.swings, b.calm
 
 
 STATE = 58

@@ -47,7 +47,9 @@ def safe_step(numbers, state, desired, force, position, missed):
     if state[_BLIND] > lag or missed > lag:  # too long to go on from what was known
         renewed(control, state)
     elif state[_BLIND] > 0.0 or missed > 0.0:
-        state[42] = 0.0 if state[42] >= 0.0 else -1.0  # the low-pass has to forget the gap before anything is learned
+        state[42] = (
+            0.0 if state[42] >= 0.0 else -1.0
+        )  # the low-pass has to forget the gap before anything is learned
     trouble = LATE if missed > 0.0 or state[_BLIND] > 0.0 else FINE
     state[_BLIND] = 0.0
     state[_UNCHANGED] = state[_UNCHANGED] + 1.0 if force == state[3] and state[0] > 0.0 else 0.0
@@ -172,7 +174,7 @@ class ForceLoop:
             position: of the tip along the normal as the arm's encoders have it, growing into the surface [m].
             missed: ticks that were lost since the last call.
         """
-        return self._one(self._numbers, self._state, self._desired, force, position, missed)  # type: ignore[no-any-return]
+        return self._one(self._numbers, self._state, self._desired, force, position, missed)
 
     @property
     def estimate(self) -> SurfaceEstimate | None:
@@ -212,7 +214,9 @@ class ForceLoop:
     def state(self, numbers: Any) -> None:
         given = np.array(numbers, dtype=np.float64)
         if given.shape != self._state.shape or not np.isfinite(given).all() or float(given[15]) not in PHASES:
-            raise InputError(f"a state is {len(self._state)} finite numbers from ForceLoop.state; give those back")
+            raise InputError(
+                f"a state is {len(self._state)} finite numbers from ForceLoop.state; give those back"
+            )
         self._state[:] = given
 
     def _bind(self) -> None:
@@ -230,4 +234,3 @@ class ForceLoop:
     def __setstate__(self, known: dict[str, Any]) -> None:
         self.__dict__.update(known)
         self._bind()
-

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.force.arm import Arm
+from palpate.force.arm import Arm, PositionLoop
 from palpate.force.boundary import stable_between
 from palpate.force.sampled_loop import Law, SampledLoop
 
@@ -52,5 +52,6 @@ def lag_of(arm: Arm) -> float:
 def sum_of_lags(arm: Arm) -> float:
     """The lags of inner loop, delays, sensor and hold added up, as an engineer would [s]."""
     inner = arm.inner
-    own = inner.damping / (pi * inner.bandwidth) if arm.kind == "position" else inner.damping / inner.stiffness  # type: ignore[union-attr]
+    position = isinstance(inner, PositionLoop)
+    own = inner.damping / (pi * inner.bandwidth if position else inner.stiffness)
     return own + inner.delay + arm.low_pass.lag + 0.5 / arm.sensor.sampling + 0.5 * arm.tick

@@ -176,7 +176,7 @@ class Backstop(NamedTuple):
     sign: float  # of the error
     peak: float  # since its last change [N]
     before: float  # of the swing before [N]
-    count: float
+    swings: float
     calm: float  # ticks since it acted
 
 
@@ -253,7 +253,9 @@ def begun(law, known, stage, w, f):
         level = max(w.mean, sqrt(w.variance))
         fit = fit_from(0.5 * level, 0.5 * level + sqrt(w.variance))
         return Learned(fit, fit, 0.0, f.y, ZERO3, ZERO3)
-    return Learned(without_offset(known.slow, 0.25), known.fast, known.since, known.origin, known.found, known.std)
+    return Learned(
+        without_offset(known.slow, 0.25), known.fast, known.since, known.origin, known.found, known.std
+    )
 
 
 @law
@@ -319,10 +321,10 @@ def guarded(law, b, stage, w, desired, before):
     if stage.phase == AIR or abs(desired - before) > STEP * abs(desired):
         return Backstop(care, 0.0, 0.0, 0.0, 0.0, calm)
     side = 1.0 if error > level else -1.0 if error < -level else 0.0
-    if side == 0.0 or side == b.sign:
+    if side in (0.0, b.sign):
         peak = max(b.peak, abs(error)) if side == b.sign else b.peak
-        return Backstop(care, b.sign, peak, b.before, b.count, calm)
-    count = b.count + 1.0 if b.before > 0.0 and b.peak > 0.8 * b.before else 0.0
-    if count >= 2.0:
+        return Backstop(care, b.sign, peak, b.before, b.swings, calm)
+    swings = b.swings + 1.0 if b.before > 0.0 and b.peak > 0.8 * b.before else 0.0
+    if swings >= 2.0:
         return Backstop(max(0.5 * care, 0.05), side, abs(error), 0.0, 0.0, 0.0)
-    return Backstop(care, side, abs(error), b.peak, count, calm)
+    return Backstop(care, side, abs(error), b.peak, swings, calm)

@@ -71,7 +71,7 @@ def _interior(matrices: Sequence[Array]) -> Array | None:
             gradient[m] = weight
             for D, Phi in [(flat, None), (-flat, None), *zip(images, matrices, strict=True)]:
                 F = _value(P, s, D, Phi, flat)
-                _add(gradient, hessian, np.linalg.inv(F), D, Phi is not None)
+                _add(gradient, hessian, np.asarray(np.linalg.inv(F)), D, Phi is not None)
             step = _newton(hessian, gradient)
             if step is None:
                 return P if _contracts(P, matrices) else None
@@ -89,7 +89,10 @@ def _interior(matrices: Sequence[Array]) -> Array | None:
 
 
 def _newton(hessian: Array, gradient: Array) -> Array | None:
-    """The step, by Cholesky (`numpy.linalg.solve` starts threads for a matrix of this size); None where rounding won."""
+    """The step, by Cholesky; None where rounding won.
+
+    `numpy.linalg.solve` starts threads for a matrix of this size.
+    """
     from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
     scale = 1.0 / np.sqrt(np.diag(hessian))
@@ -125,16 +128,17 @@ def _add(gradient: Array, hessian: Array, G: Array, D: Array, slack: bool) -> No
         hessian[m, m] += np.trace(square)
 
 
-def _along(
-    P: Array, s: float, step: Array, basis: Array, matrices: Sequence[Array]
-) -> tuple[Array, float]:
+def _along(P: Array, s: float, step: Array, basis: Array, matrices: Sequence[Array]) -> tuple[Array, float]:
     """As far along a step as all constraints stay met."""
     n = len(P)
     dP, ds = np.tensordot(step[:-1], basis, axes=1), float(step[-1])
     length = 1.0
     for _ in range(40):
         Q, t = P + length * dP, s + length * ds
-        if all(_positive(F) for F in (Q, np.eye(n) - Q, *(Q - Phi.T @ Q @ Phi + t * np.eye(n) for Phi in matrices))):
+        if all(
+            _positive(F)
+            for F in (Q, np.eye(n) - Q, *(Q - Phi.T @ Q @ Phi + t * np.eye(n) for Phi in matrices))
+        ):
             return (Q, t) if length == 1.0 else (P + 0.9 * length * dP, s + 0.9 * length * ds)
         length *= 0.7
     return P, s

@@ -6,7 +6,12 @@ from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, outer, solve, sqrt
 
 NOTHING = Mat3(ZERO3, ZERO3, ZERO3)
-AXIS_K, AXIS_B, BOTH, AXIS_C = Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(1.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0)
+AXIS_K, AXIS_B, BOTH, AXIS_C = (
+    Vec3(1.0, 0.0, 0.0),
+    Vec3(0.0, 1.0, 0.0),
+    Vec3(1.0, 1.0, 0.0),
+    Vec3(0.0, 0.0, 1.0),
+)
 PRIOR = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 0.01))
 """Information that never fades: stiffness and damping deviate from 0 by about the cap, the offset by about 10 N.
 

@@ -27,7 +27,11 @@ def sentence(claim: Claim, gains_kind: str) -> str:
             f"with the gain held at K_u = cap{factor}: every surface whose K + B/theta, as the measured position feels "
             f"it, is {claim.low:.4g} to {claim.high:.4g} N/m, {times}; K and B may change within a cell every tick"
         )
-    which = "every constant stiffness" if gains_kind == "position" else f"every constant stiffness from {claim.low:.4g} to {claim.high:.4g} N/m"
+    which = (
+        "every constant stiffness"
+        if gains_kind == "position"
+        else f"every constant stiffness from {claim.low:.4g} to {claim.high:.4g} N/m"
+    )
     jitter = f", a reading's age changing by {claim.jitter} tick" if claim.jitter else ""
     return (
         f"whatever the estimator does while g theta K_eff/alpha stays within {claim.shares[0]:g} to {claim.shares[1]:g}"

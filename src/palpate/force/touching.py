@@ -122,7 +122,9 @@ def moved(world, surface, body, held, t, h, noise, at):
     place = surface.place + swing
     K = surface.stiffness if t < surface.change else surface.later
     if world.torque > 0.0:
-        force = contact_of_mass(surface, K, body.x - place, body.v - surface.sway * surface.frequency * cos(surface.frequency * t))
+        force = contact_of_mass(
+            surface, K, body.x - place, body.v - surface.sway * surface.frequency * cos(surface.frequency * t)
+        )
         v = body.v + h * (held - force) / world.first
         x = body.x + h * v
         p = 0.0

@@ -12,7 +12,7 @@ import numpy as np
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop
 from palpate.force.certificate import Certificate, certify, exact_interval
-from palpate.force.gains import ALPHA, Gains, approach_speed
+from palpate.force.gains import Gains, approach_speed
 from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
 from palpate.force.steps import Margins, Step, margins, step_of
 
@@ -85,7 +85,7 @@ class Tuning:
 
     @property
     def exact(self) -> tuple[float, float]:
-        """The surfaces without damping on which the loop with K_u = cap is stable [N/m]."""
+        """The surfaces without damping on which the loop with K_u = cap is stable [N/m]; exact for a position arm."""
         return self._own(*exact_interval(self.gains))
 
     def _own(self, low: float, high: float) -> tuple[float, float]:
@@ -164,7 +164,9 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
         found = found.get("pooled") or {}
     parameters = found.get("parameters")
     if not isinstance(parameters, Mapping):
-        raise InputError(f"{source}: not what palpate identify --json prints; give that, a log, or --stiffness A:B")
+        raise InputError(
+            f"{source}: not what palpate identify --json prints; give that, a log, or --stiffness A:B"
+        )
     point = found.get("working_point")
     stiffness = point.get("stiffness") if isinstance(point, Mapping) else None
     K = stiffness if isinstance(stiffness, Mapping) and _interval(stiffness) else parameters.get("K")
@@ -246,7 +248,7 @@ def tune(
         certify(gains, adapting=prove_adapting),
         steps,
         margins(gains, gains.seen_cap),
-        tuple(_warnings(arm, known, gains)),
+        tuple(_warnings(arm, known)),
     )
     _check_peak(found, peak)
     _check_surface_speed(gains, surface_speed)
@@ -277,37 +279,21 @@ def _cap(arm: Arm, known: Known | None, cap: float | None, theta: float) -> floa
     return needed if cap is None else cap
 
 
-def _warnings(arm: Arm, known: Known | None, gains: Gains) -> list[tuple[str, str]]:
+def _warnings(arm: Arm, known: Known | None) -> list[tuple[str, str]]:
     found = []
     if known is not None and known.source != "told" and known.stiffness[1] > 3.0 * known.stiffness[0]:
-        found.append(
-            (
-                "wide-estimate",
-                f"the estimate's interval of {known.stiffness[0]:.4g} to {known.stiffness[1]:.4g} N/m is as wide as "
-                "the gain margin: excite more (palpate excite), or leave it to the law",
-            )
+        low, high = known.stiffness
+        text = (
+            f"the estimate's interval of {low:.4g} to {high:.4g} N/m is as wide as the gain margin: "
+            "excite more (palpate excite), or leave it to the law"
         )
+        found.append(("wide-estimate", text))
     if isinstance(arm.inner, PositionLoop) and arm.delay_ticks > arm.inner.delay * arm.rate + 1e-6:
-        found.append(
-            (
-                "delay-rounded",
-                f"the delay of {1e3 * arm.inner.delay:g} ms is no whole number of ticks; {arm.delay_ticks} were taken",
-            )
-        )
+        text = f"the delay of {1e3 * arm.inner.delay:g} ms is no whole number of ticks; {arm.delay_ticks} were taken"
+        found.append(("delay-rounded", text))
     if arm.kind == "torque":
-        found.append(
-            (
-                "no-damping-proved",
-                "for a torque arm stability is proved on surfaces without damping (B = 0) only; "
-                "damped ones are tried by simulation",
-            )
-        )
-    found.append(
-        (
-            "tare",
-            "tare the sensor in the air first: the law takes a lasting reading for a touch, and a negative one delays it",
-        )
-    )
+        text = "for a torque arm stability is proved without damping of the surface (B = 0) unless certify is asked"
+        found.append(("no-damping-proved", text))
     return found
 
 

@@ -16,7 +16,7 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
     """What there is to know, name and value."""
     gains, arm = told.gains, told.gains.arm
     slowest = max(step.settling for step in told.steps)
-    low, high = told.exact
+    (low, high), at = told.exact, told.margins
     found = [
         ("arm", f"{arm.title} ({arm.kind}, {arm.rate:g} Hz)"),
         ("lag theta", f"{1e3 * gains.theta:.3g} ms"),
@@ -29,7 +29,7 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
         ("overshoot", f"{100 * told.overshoot:.2g} %, stiffness known"),
         (
             "margins",
-            f"gain {told.margins.gain:.3g}, phase {told.margins.phase:.3g} deg, delay {1e3 * told.margins.delay:.3g} ms",
+            f"gain {at.gain:.3g}, phase {at.phase:.3g} deg, delay {1e3 * at.delay:.3g} ms",
         ),
         ("stable, exact", f"{low:.4g} to {high:.4g} N/m, gain held, B = 0"),
     ]
