@@ -52,6 +52,5 @@ def lag_of(arm: Arm) -> float:
 def sum_of_lags(arm: Arm) -> float:
     """The lags of inner loop, delays, sensor and hold added up, as an engineer would [s]."""
     inner = arm.inner
-    position = isinstance(inner, PositionLoop)
-    own = inner.damping / (pi * inner.bandwidth if position else inner.stiffness)
+    own = inner.damping / (pi * inner.bandwidth if isinstance(inner, PositionLoop) else inner.stiffness)
     return own + inner.delay + arm.low_pass.lag + 0.5 / arm.sensor.sampling + 0.5 * arm.tick

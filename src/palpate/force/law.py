@@ -306,7 +306,7 @@ def from_slow(law, w, known):
         alone, error = known.slow.undamped()
         most = max(most, (1.0 + law.eps) * alone + room * error)
     least = (p.y - room * sd.y) / (p.x + room * sd.x) if p.x > 0.0 else 0.0
-    return Bound(min(max(law.cap * most, law.floor), law.cap), min(max(least, 0.0), 3.0) * law.theta)
+    return Bound(min(max(law.cap * most, law.floor), law.cap), min(max(least, 0.0), 1.0) * law.theta)
 
 
 @law

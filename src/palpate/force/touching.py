@@ -22,7 +22,8 @@ class Surface(NamedTuple):
         sway: amplitude of its own motion [m].
         frequency: of that [rad/s].
         later: K after `change` [N/m].
-        change: time of that [s].
+        change: time of that [s]; the force stays, what is in contact then being as deep as that takes.
+        depth: of the surface's own deflection then [m].
     """
 
     stiffness: float
@@ -33,6 +34,7 @@ class Surface(NamedTuple):
     frequency: float
     later: float
     change: float
+    depth: float
 
 
 @part
@@ -120,18 +122,23 @@ def moved(world, surface, body, held, t, h, noise, at):
     """The body a step later: `held` is the commanded position or the torque as a force."""
     swing = surface.sway * sin(surface.frequency * t)
     place = surface.place + swing
-    K = surface.stiffness if t < surface.change else surface.later
+    K, p = surface.stiffness, body.p
+    if t >= surface.change:
+        K = surface.later
+        deeper = surface.depth * (1.0 - surface.stiffness / surface.later)
+        place += deeper
+        if t - h < surface.change:
+            p -= deeper
     if world.torque > 0.0:
         force = contact_of_mass(
             surface, K, body.x - place, body.v - surface.sway * surface.frequency * cos(surface.frequency * t)
         )
         v = body.v + h * (held - force) / world.first
         x = body.x + h * v
-        p = 0.0
     else:
         v = body.v + h * (world.first * (held - body.x) - world.second * body.v)
         x = body.x + h * v
-        force, p = contact_of_position(world, surface, K, x - place, body.p, h)
+        force, p = contact_of_position(world, surface, K, x - place, p, h)
     z = world.E @ body.z + force * world.e
     reading, samples = body.reading, body.samples
     if t + h >= world.phase + samples / world.sampling:

@@ -64,7 +64,8 @@ def world_of(arm: Arm, *, noise: float, phase: float = 0.0) -> World:
 def surface(stiffness: float, damping: float = 0.0, **others: float) -> Surface:
     """A surface at 0; `others` as `Surface` has them."""
     numbers: dict[str, float] = {
-        "exponent": 1.0, "place": 0.0, "sway": 0.0, "frequency": 0.0, "later": stiffness, "change": 1e9, **others,
+        "exponent": 1.0, "place": 0.0, "sway": 0.0, "frequency": 0.0, "later": stiffness, "change": 1e9, "depth": 0.0,
+        **others,
     }  # fmt: skip
     return Surface(float(stiffness), float(damping), **{k: float(v) for k, v in numbers.items()})
 
