@@ -81,9 +81,8 @@ def changes(rig: Rig, seed: int) -> None:
         stepped = rows[round(8.0 * rig.arm.rate) :, 0].max()
         outside = np.flatnonzero(np.abs(force - 20.0) > 1.0)
         again = (outside[-1] + 1) / rig.arm.rate if len(outside) else 0.0
-        print(
-            f"    {K / 1e3:g} -> {later / 1e3:g} kN/m{'':<8}{force.max():8.2f} N{force.min():8.2f} N{again:8.3f} s{stepped:9.2f} N"
-        )
+        what = f"{K / 1e3:g} -> {later / 1e3:g} kN/m"
+        print(f"    {what:<20}{force.max():8.2f} N{force.min():8.2f} N{again:8.3f} s{stepped:9.2f} N")
 
 
 def sways(rig: Rig, seed: int) -> None:
@@ -114,9 +113,8 @@ def hours(rig: Rig, told: argparse.Namespace) -> None:
         ratio = float(np.sqrt(np.mean(last**2) / np.mean(first**2)))
         growing, worst = growing + (ratio > GROWING), max(worst, ratio)
         largest = max(largest, float(np.abs(error[round(10.0 * rig.arm.rate) :]).max() / draw.F))
-    print(
-        f"  one-hour runs that grow: {growing} of {told.hours}; largest ratio {worst:.3f}, largest error {share(largest)}"
-    )
+    ratio_and_error = f"largest ratio {worst:.3f}, largest error {share(largest)}"
+    print(f"  one-hour runs that grow: {growing} of {told.hours}; {ratio_and_error}")
 
 
 if __name__ == "__main__":

@@ -5,10 +5,10 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
-from force.gained import gains_of
 from hypothesis import given
 from hypothesis import strategies as st
 
+from force.gained import gains_of
 from palpate.errors import InputError
 from palpate.force.boundary import radius
 from palpate.force.cells import Box, Prover
@@ -38,7 +38,7 @@ def test_it_proves_what_it_says_and_holds(proof):
     verdict = proof.check()
     assert verdict.holds
     assert [c.kind for c in proof.claims] == ["held", "adapting"]
-    assert 0.0 < 1.0 - verdict.contraction
+    assert 1.0 - verdict.contraction > 0.0
     assert verdict.rounding < 1e-3 * (1.0 - verdict.contraction)  # arithmetic decides nothing
 
 
@@ -64,7 +64,10 @@ def test_just_outside_is_unstable(proof):
 def test_what_is_not_stable_is_not_proved():
     gains = gains_of()
     high = 1.01 * exact_interval(gains)[1]
-    assert proved_claim(gains, held_claim(gains, 0.9 * high, high, 0.0), [Box(0.98 * high, high, 0.0, 0.0)]) is None
+    assert (
+        proved_claim(gains, held_claim(gains, 0.9 * high, high, 0.0), [Box(0.98 * high, high, 0.0, 0.0)])
+        is None
+    )
 
 
 @pytest.mark.parametrize(
@@ -123,7 +126,8 @@ def test_a_gain_that_goes_anywhere_inside_makes_nothing_grow(proof):
     loop, rng = SampledLoop(gains.arm).later(claim.jitter), np.random.default_rng(0)
     unit = gains.alpha / gains.theta / gains.arm.series
     corners = [
-        [loop.phi(gains.arm.series, 0.0, Law(s * unit), loss) for loss in range(claim.jitter + 1)] for s in claim.shares
+        [loop.phi(gains.arm.series, 0.0, Law(s * unit), loss) for loss in range(claim.jitter + 1)]
+        for s in claim.shares
     ]
     for _ in range(20):
         x = rng.normal(size=loop.size)
