@@ -34,13 +34,18 @@ def tune(
     replace: Annotated[bool, _FLAG] = False,
     report: Path | None = None,
     json: Annotated[bool, _FLAG] = False,
-    source: LogOptions | None = None,
+    time: str | None = None,
+    rate: float | None = None,
+    position: str | None = None,
+    log_force: str | None = None,
 ) -> int:
     """Tune a force loop for an arm, and prove where it is stable.
 
     From what palpate identify --json printed, straight from a log, or from a range of stiffness alone:
 
     palpate tune found.json --arm ur5e --force 20 --out gains.toml
+
+    palpate tune press.csv --time time_s --position position_mm:mm --log-force force_N:N --arm ur5e --force 20
 
     palpate tune --stiffness 1e2:1e6 --arm fr3 --force 10 --out gains.toml
 
@@ -71,6 +76,14 @@ def tune(
         Where to write a page with everything, an HTML file.
     json
         Print one JSON object and nothing else.
+    time
+        Of a log: its column of the time, as for palpate identify.
+    rate
+        Of a log without a time: rows per second.
+    position
+        Of a log: its column of the position, as position_mm:mm.
+    log_force
+        Of a log: its column of the force, as force_mN:mN.
     """
     _one_thread()
     page = None if report is None else own_place(report, ".html", "--report")
@@ -84,7 +97,7 @@ def tune(
     told = tuned(
         one,
         quantity("--force", force, "force"),
-        _known(found, stiffness, source or LogOptions()),
+        _known(found, stiffness, LogOptions(time=time, rate=rate, position=position, force=log_force)),
         cap=None if stiffness_cap is None else quantity("--stiffness-cap", stiffness_cap, "stiffness"),
         peak=None if peak is None else quantity("--peak", peak, "force"),
         surface_speed=surface_speed,

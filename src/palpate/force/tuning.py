@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop
-from palpate.force.certificate import Certificate, certify, exact_interval
+from palpate.force.certificate import FORM, Certificate, certify, exact_interval
 from palpate.force.gains import Gains, approach_speed
 from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
 from palpate.force.steps import Margins, Step, margins, step_of
@@ -242,17 +242,11 @@ def tune(
     soft = min(known.stiffness[0] if known else SOFTEST, stiffest)
     felt = arm.seen(soft) if arm.kind == "position" else soft
     steps = step_of(gains, felt), step_of(gains, gains.seen_cap)
-    found = Tuning(
-        gains,
-        known,
-        certify(gains, adapting=prove_adapting),
-        steps,
-        margins(gains, gains.seen_cap),
-        tuple(_warnings(arm, known)),
-    )
+    nothing = Certificate(form=FORM, gains=gains, claims=())
+    found = Tuning(gains, known, nothing, steps, margins(gains, gains.seen_cap), tuple(_warnings(arm, known)))
     _check_peak(found, peak)
     _check_surface_speed(gains, surface_speed)
-    return found
+    return replace(found, certificate=certify(gains, adapting=prove_adapting))
 
 
 def _check(force: float, known: Known | None, cap: float | None) -> None:
