@@ -16,6 +16,12 @@ from rich.progress import track
 from rivals import rivals
 from touches import Draw, Rig
 
+ABOUT = """First touches on unknown surfaces, 1e2 ... 1e6 N/m, damping ratio 0.01 ... 1, 10 ... 40 N, noise up to 0.6 N;
+{touches} for each law, the same for all; seed {seed}. Made by `make leaderboard`; what each law is stands in
+`benchmarks/force/rivals.py`, a re-telling of its idea for one direction, not its authors' code.
+
+Fixed gains are tuned for 7 kN/m and not retuned: a law may do better where its gains are tuned for the surface at hand,
+which is what this asks it to do without. Judge by the tails; by medians the point estimate looks as good as any."""
 HEAD = (
     "| law | unsettled | settling p99 [s] | overshoot p99 | most | contacts lost | largest error in an hour |"
 )
