@@ -79,7 +79,7 @@ class World(NamedTuple):
 
 
 @part
-class Body(NamedTuple):
+class BodyState(NamedTuple):
     x: float
     v: float
     p: float  # surface's own deflection [m]
@@ -145,7 +145,7 @@ def moved(world, surface, body, held, t, h, noise, at):
         reading = world.c @ z + world.d * force + world.noise * noise[at + int(samples) % 8]
         reading = min(max(reading, -world.full_scale), world.full_scale)
         samples += 1.0
-    return Body(x, v, p, force, z, reading, samples)
+    return BodyState(x, v, p, force, z, reading, samples)
 
 
 @law
@@ -163,7 +163,7 @@ def touch(world, surface, control, start, desired, noise, line, out):
         out: shape (n, 4).
     """
     state = control.start()
-    body = Body(start, 0.0, 0.0, 0.0, ZERO3, world.noise * noise[0], 0.0)
+    body = BodyState(start, 0.0, 0.0, 0.0, ZERO3, world.noise * noise[0], 0.0)
     command, h = start, world.tick / world.steps
     line[:] = start if world.torque == 0.0 else 0.0
     for k in range(len(desired)):
