@@ -2,9 +2,9 @@
 
     python benchmarks/force/on_the_bench.py [--seeds 4] [--friction 1]
 
-Foam-like to stiff springs and dampers, a relaxing solid, Hunt and Crossley's law: 20 N asked, 4 s of contact. None of the
-surfaces was used for tuning; the gains of the others are the bench's, not retuned. Settled: within 5 % of 20 N for good,
-the force a mean over 10 ms.
+Springs and dampers from soft to stiff, a relaxing solid, Hunt and Crossley's law: 20 N asked, 4 s of contact. None of
+the surfaces was used for tuning; the gains of the others are the bench's, not retuned. Settled: within 5 % of 20 N for
+good, the force a mean over 10 ms.
 """
 
 from __future__ import annotations
