@@ -84,8 +84,9 @@ def test_gains_certificate_and_check(capsys, elsewhere):
     )
     capsys.readouterr()
     assert "another cap" in refused(capsys, "certify", "other.toml", "--check", "proof.json")
-    spoiled = (elsewhere / "proof.json").read_text().replace('"shares":[1.0,1.0]', '"shares":[1.0,3.0]')
-    (elsewhere / "spoiled.json").write_text(spoiled)
+    spoiled = json.loads((elsewhere / "proof.json").read_text())
+    spoiled["claims"][0]["shares"] = [1.0, 3.0]
+    (elsewhere / "spoiled.json").write_text(json.dumps(spoiled))
     assert main(["certify", "--check", "spoiled.json"]) == 1
     (elsewhere / "none.json").write_text("{}")
     capsys.readouterr()

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from palpate.cli._places import check_folder
+from palpate.cli._terminal import console, print_json, print_lines
 from palpate.cli.tune import _one_thread
 from palpate.errors import InputError
+from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.force import Certificate
@@ -72,7 +73,7 @@ def certify(
     if gains is None:
         raise InputError("certify what? Give the gains that palpate tune wrote, or --check CERTIFICATE")
     if out is not None:
-        check_folder(out)
+        check_place(out, "--out")
         if out.suffix.lower() != ".json":
             raise InputError(f"{out}: a certificate is a .json file; name it so")
         if out.exists() and not replace:
@@ -94,8 +95,6 @@ def _made(
     out: Path | None,
     json: bool,
 ) -> int:
-    from rich.console import Console
-
     from palpate.excitation.quantities import spread
     from palpate.force import certify as proved
     from palpate.force import load_gains
@@ -109,8 +108,7 @@ def _made(
     time = None if damping_time is None else spread("--damping-time", damping_time, "time")
     if time is not None and not 0.0 == time[0] <= time[1]:
         raise InputError(f"--damping-time must be 0:T in seconds, got {damping_time!r}")
-    console = Console(stderr=True, highlight=False, markup=False)
-    with console.status("proving") as status:
+    with console(stderr=True).status("proving") as status:
         made = proved(
             gains,
             surfaces,
@@ -121,10 +119,7 @@ def _made(
             progress=lambda what: status.update(f"proving {what}"),
         )
     if out is not None and made.claims:
-        from palpate.logs import whole
-
-        with whole(out) as draft:
-            made.save(draft)
+        made.save(out)
     _print(made, made.check(), json)
     return 0 if len(made.claims) == (1 if held_only else 2) else 1
 
@@ -142,16 +137,10 @@ def _checked(path: Path, gains: Path | None, json: bool) -> int:
 
 def _print(certificate: Certificate, verdict: Verdict, json: bool) -> None:
     if json:
-        from json import dumps
-
         from palpate.force.telling import told
 
-        print(dumps(told(certificate, verdict), allow_nan=False))  # noqa: T201
+        print_json(told(certificate, verdict))
         return
-    from rich.console import Console
-
     from palpate.force.telling import lines
 
-    console = Console(highlight=False, markup=False, soft_wrap=True)
-    for line in lines(certificate, verdict):
-        console.print(line)
+    print_lines(*lines(certificate, verdict))

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from palpate.cli._log_options import LogOptions
-from palpate.cli._places import check_folder, own_place
+from palpate.cli._terminal import console, place, print_json
 from palpate.errors import InputError
+from palpate.files import check_place, write_text
 
 if TYPE_CHECKING:
     from palpate.force import Known, Tuning
@@ -86,7 +87,8 @@ def tune(
         Of a log: its column of the force, as force_mN:mN.
     """
     _one_thread()
-    page = None if report is None else own_place(report, ".html", "--report")
+    if report is not None:
+        check_place(report, "--report", ending=".html")
     if out is not None:
         _check_out(out, replace)
     from palpate.excitation.quantities import quantity
@@ -103,8 +105,8 @@ def tune(
         surface_speed=surface_speed,
         prove_adapting=one.kind == "position",
     )
-    _write(told, out, page)
-    _print(told, [p for p in (out, page) if p is not None], json)
+    _write(told, out, report)
+    _print(told, [p for p in (out, report) if p is not None], json)
     return 0 if told.proved else 1
 
 
@@ -114,9 +116,7 @@ def _one_thread() -> None:
 
 
 def _check_out(out: Path, replace: bool) -> None:
-    if out.suffix.lower() != ".toml":
-        raise InputError(f"{out}: gains are a .toml file; name it so")
-    check_folder(out)
+    check_place(out, "--out", ending=".toml")
     if out.exists() and not replace:
         raise InputError(f"{out} exists; choose another place, or add --replace")
 
@@ -173,10 +173,7 @@ def _identified(log: Path, source: LogOptions) -> dict[str, Any]:
 
 def _write(told: Tuning, out: Path | None, page: Path | None) -> None:
     if out is not None:
-        from palpate.logs import whole
-
-        with whole(out) as draft:
-            draft.write_text(told.gains.to_toml(), encoding="utf-8")
+        write_text(out, told.gains.to_toml())
     if page is not None:
         from palpate.report.force_page import write_page
 
@@ -185,15 +182,11 @@ def _write(told: Tuning, out: Path | None, page: Path | None) -> None:
 
 def _print(told: Tuning, written: list[Path], json: bool) -> None:
     if json:
-        from json import dumps
-
-        print(dumps(told.to_json(), allow_nan=False))  # noqa: T201
+        print_json(told.to_json())
         return
-    from rich.console import Console
-
     from palpate.report.force_table import show
 
-    console = Console(highlight=False, markup=False, soft_wrap=True)
-    show(told, console)
+    screen = console()
+    show(told, screen)
     for path in written:
-        console.print(f"written: {path}")
+        place(screen, "written:", path)

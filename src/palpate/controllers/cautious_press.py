@@ -84,6 +84,7 @@ def cautious_on_bench(tick, spring, damping, force, cap, room):
         room: force by which the spring may be drawn beyond what is felt [N].
     """
     own = load_arm("thesis")
+    assert isinstance(own.inner, TorqueLoop)
     inner = TorqueLoop(
         mass=own.inner.mass, stiffness=float(spring[0]), damping=float(damping[0]), delay=float(tick)
     )

@@ -13,10 +13,10 @@ import numpy as np
 from msgspec import Meta
 
 from palpate.errors import InputError
+from palpate.files import signed, write_json
 from palpate.force.arm import Table
 from palpate.force.cells import Box, Prover
 from palpate.force.cover import Cell, covered
-from palpate.force.files import write_whole
 from palpate.force.gains import Gains
 from palpate.force.lag import ultimate_gain
 from palpate.force.sampled_loop import SampledLoop
@@ -104,6 +104,7 @@ class Certificate(Table):
     form: Literal["palpate force certificate 1"]
     gains: Gains
     claims: tuple[Claim, ...]
+    written_by: str = ""
 
     @classmethod
     def load(cls, path: Path) -> Certificate:
@@ -117,7 +118,7 @@ class Certificate(Table):
         if len(data) > _LARGEST:
             raise InputError(f"{path}: more than {_LARGEST} bytes are no certificate; check the path")
         try:
-            return msgspec.json.decode(data, type=cls)
+            return msgspec.structs.replace(msgspec.json.decode(data, type=cls), written_by="")
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise InputError(f"{path}: no certificate of palpate certify: {error}") from None
         except InputError as error:
@@ -125,7 +126,7 @@ class Certificate(Table):
 
     def save(self, path: Path) -> None:
         """Writes the file, whole or not at all."""
-        write_whole(path, msgspec.json.encode(self).decode())
+        write_json(path, signed({k: v for k, v in msgspec.to_builtins(self).items() if v != ""}))
 
     def check_of(self, gains: Gains) -> None:
         """Refuses to speak of other gains.

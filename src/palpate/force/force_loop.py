@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from palpate._jit import kernel, law
 from palpate.errors import InputError
+from palpate.files import write_text
 from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
 from palpate.force.gains import Gains, load_gains
 from palpate.force.law import AIR, LEARNING, LOCKED
@@ -141,9 +142,7 @@ class ForceLoop:
 
     def save(self, path: str | Path) -> None:
         """Writes the gains, the file there whole or not at all."""
-        from palpate.force.files import write_whole
-
-        write_whole(Path(path), self.gains.to_toml())
+        write_text(Path(path), self.gains.to_toml())
 
     def reset(self) -> None:
         """Back into the air, knowing nothing."""

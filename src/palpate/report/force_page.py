@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.files import write_text
 from palpate.force.steps import BAND, frequency_response
 from palpate.force.telling import UNCOVERED
 from palpate.force.tuning import RIGID, Tuning
-from palpate.logs import whole
 from palpate.report import style
 from palpate.report.force_table import rows
 from palpate.report.page import Table, embedded, render
@@ -29,9 +29,7 @@ _SHOWN = (1.0, 1e7)
 
 def write_page(told: Tuning, path: Path) -> Path:
     """Writes the page, whole or not at all; it opens without a network."""
-    text = page(told)
-    with whole(path) as draft:
-        draft.write_text(text, encoding="utf-8")
+    write_text(path, page(told))
     return path
 
 
