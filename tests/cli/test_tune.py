@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from force.gained import gains_of
 from palpate.cli import main
 from palpate.force import ForceLoop
 
@@ -70,7 +71,7 @@ def test_the_contract_of_json(capsys, elsewhere):
 
 
 def test_gains_certificate_and_check(capsys, elsewhere):
-    assert main(["tune", *RANGE, "--out", "gains.toml"]) == 0
+    (elsewhere / "gains.toml").write_text(gains_of().to_toml())
     assert main(["certify", "gains.toml", "--held-only", "--out", "proof.json", "--json"]) == 0
     capsys.readouterr()
     assert main(["certify", "--check", "proof.json", "--json"]) == 0
@@ -79,10 +80,7 @@ def test_gains_certificate_and_check(capsys, elsewhere):
     assert told["contraction"] > 1e3 * told["rounding"]
     assert main(["certify", "gains.toml", "--check", "proof.json"]) == 0
     assert "holds" in capsys.readouterr().out
-    assert (
-        main(["tune", "--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "20", "--out", "other.toml"]) == 0
-    )
-    capsys.readouterr()
+    (elsewhere / "other.toml").write_text(gains_of(cap=1e4).to_toml())
     assert "another cap" in refused(capsys, "certify", "other.toml", "--check", "proof.json")
     spoiled = json.loads((elsewhere / "proof.json").read_text())
     spoiled["claims"][0]["shares"] = [1.0, 3.0]
@@ -94,9 +92,7 @@ def test_gains_certificate_and_check(capsys, elsewhere):
 
 
 def test_what_cannot_be_proved_is_exit_code_1(capsys, elsewhere):
-    assert (
-        main(["tune", "--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "20", "--out", "gains.toml"]) == 0
-    )
+    (elsewhere / "gains.toml").write_text(gains_of(cap=1e4).to_toml())
     assert (
         main(["certify", "gains.toml", "--held-only", "--stiffness", "1e4:2e5", "--out", "proof.json"]) == 1
     )
@@ -214,10 +210,7 @@ def test_a_bad_identification_is_one_line(capsys, elsewhere, text, says):
     ],
 )
 def test_bad_words_to_certify(capsys, elsewhere, words, says):
-    assert (
-        main(["tune", "--stiffness", "1e2:1e3", "--arm", "fr3", "--force", "20", "--out", "gains.toml"]) == 0
-    )
-    capsys.readouterr()
+    (elsewhere / "gains.toml").write_text(gains_of("fr3").to_toml())
     text = (elsewhere / "gains.toml").read_text()
     (elsewhere / "bad.toml").write_text(text.replace("cautious 1", "cautious 0"))
     assert says in refused(capsys, "certify", *words)
@@ -225,5 +218,5 @@ def test_bad_words_to_certify(capsys, elsewhere, words, says):
 
 def test_what_stands_there_is_not_replaced_unasked(capsys, elsewhere):
     (elsewhere / "gains.toml").write_text("mine")
-    assert "exists" in refused(capsys, "tune", *RANGE, "--out", "gains.toml")
+    assert "did not write it" in refused(capsys, "tune", *RANGE, "--out", "gains.toml")
     assert (elsewhere / "gains.toml").read_text() == "mine"

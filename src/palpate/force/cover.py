@@ -44,9 +44,8 @@ def proved_cell(prover: Prover, box: Box) -> Cell | None:
 
 
 def covered(prover: Prover, box: Box, depth: int = 14) -> tuple[list[Cell], list[Box]]:
-    """Cells that prove the box, and what of it is left unproved after so many cuts."""
+    """Cells that prove the box; and, where it cannot be proved, the first piece that is not after so many cuts."""
     cells: list[Cell] = []
-    left: list[Box] = []
     waiting = [(box, depth)]
     while waiting:
         here, cuts = waiting.pop()
@@ -54,10 +53,10 @@ def covered(prover: Prover, box: Box, depth: int = 14) -> tuple[list[Cell], list
         if cell is not None:
             cells.append(cell)
         elif cuts == 0:
-            left.append(here)
+            return cells, [here]
         else:
             waiting.extend((half, cuts - 1) for half in here.halves(prover.theta))
-    return cells, left
+    return cells, []
 
 
 def _middle(prover: Prover, box: Box) -> Array:
