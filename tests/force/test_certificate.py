@@ -13,6 +13,7 @@ from palpate.errors import InputError
 from palpate.force.boundary import radius
 from palpate.force.cells import Box, Prover
 from palpate.force.certificate import (
+    FORM,
     Certificate,
     adapting_claim,
     certify,
@@ -185,3 +186,10 @@ def test_an_adapting_claim_of_a_position_arm_speaks_of_every_stiffness():
     assert claim.low == claim.high
     # The same matrices but for the unit of force: found anew, it is proved too.
     assert proved_claim(other, msgspec.structs.replace(again, cells=())) is not None
+
+
+def test_a_soft_cap_is_proved_as_well():
+    gains = gains_of(cap=50.0)
+    claim = proved_claim(gains, held_claim(gains, 0.5 * gains.seen_cap, gains.seen_cap, 0.0))
+    assert claim is not None
+    assert Certificate(form=FORM, gains=gains, claims=(claim,)).check().holds

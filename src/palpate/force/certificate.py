@@ -73,7 +73,8 @@ class Claim(Table):
 
     def prover(self, gains: Gains) -> Prover:
         """What has to contract."""
-        loop = SampledLoop(gains.arm).later(self.jitter)
+        own = gains.seen_cap if gains.arm.kind == "position" else None
+        loop = SampledLoop(gains.arm, self.jitter, own)
         unit = gains.alpha if self.kind == "adapting" else gains.gain
         ends = self.shares[0] * unit, self.shares[1] * unit
         return Prover(loop, gains.theta, ends, self.jitter, relative=self.kind == "adapting")

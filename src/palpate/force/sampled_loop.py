@@ -42,10 +42,12 @@ class SampledLoop:
     Args:
         arm: what moves.
         extra: ticks of delay beyond the arm's own.
+        unit: k0 [N/m]; the series stiffness if left out. Near the surface's own, all numbers are of one size.
     """
 
     arm: Arm
     extra: int = 0
+    unit: float | None = None
 
     def later(self, ticks: int) -> SampledLoop:
         """The same loop with so many more ticks of delay."""
@@ -53,8 +55,8 @@ class SampledLoop:
 
     @property
     def force_unit(self) -> float:
-        """k0 [N/m]: forces are counted in k0 times a metre, so that all numbers are of one size."""
-        return self.arm.series
+        """k0 [N/m]: forces are counted in k0 times a metre."""
+        return self.arm.series if self.unit is None else self.unit
 
     @cached_property
     def rate_unit(self) -> float:
