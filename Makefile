@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench attack trust docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench attack trust leaderboard docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -51,6 +51,9 @@ attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hou
 
 trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
 	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md
+
+leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
+	$(BIN)/python benchmarks/force/leaderboard.py --touches 200 --out docs/force-leaderboard.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean

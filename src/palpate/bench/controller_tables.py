@@ -10,6 +10,7 @@ from msgspec import Meta
 from palpate._vector import Vec3
 from palpate.bench.part_table import NotNegative, NotNegativeTriple, Part, Positive, PositiveTriple, Triple
 from palpate.controllers import (
+    CautiousPress,
     DecoupledHybrid,
     Hybrid,
     Impedance,
@@ -17,6 +18,7 @@ from palpate.controllers import (
     ProportionalIntegral,
     RaibertCraig,
     SelfTuning,
+    cautious_on_bench,
     join,
     self_tuning,
 )
@@ -136,8 +138,24 @@ class SelfTuningController(Part, tag="self-tuning", tag_field="kind"):
     """Time constant of the force rate [s]."""
 
 
+class CautiousController(Part, tag="cautious", tag_field="kind"):
+    """A stiff spring whose far end the cautious force law moves; it learns the surface and needs to be told none."""
+
+    spring: PositiveTriple = (1e5, 2e4, 4.0)
+    """K_p, K_y, K_phi [N/m, N/m, N m/rad]."""
+    damping: NotNegativeTriple = (1450.0, 1000.0, 0.1)
+    """Of the three."""
+    force: Positive = 20.0
+    """The smallest that is asked for [N]."""
+    cap: Positive = 4e5
+    """The stiffest surface that there may be [N/m]."""
+    room: Positive = 80.0
+    """Farthest that the spring is drawn beyond what is felt [N]."""
+
+
 ControllerTable = (
-    HybridController
+    CautiousController
+    | HybridController
     | NeuralController
     | ProportionalIntegralController
     | RaibertCraigController
@@ -148,7 +166,7 @@ ControllerTable = (
 
 
 def controller_of(table: ControllerTable, tick: float, wall: float) -> Any:
-    """The controller of a table. Two have a compiled loop of their own; all others share one.
+    """The controller of a table. Three have a compiled loop of their own; all others share one.
 
     Args:
         table: of the experiment.
@@ -156,7 +174,7 @@ def controller_of(table: ControllerTable, tick: float, wall: float) -> Any:
         wall: x of the undeformed surface [m].
     """
     one = made(table, tick, wall)
-    return one if isinstance(one, Hybrid | SelfTuning) else join(one)
+    return one if isinstance(one, CautiousPress | Hybrid | SelfTuning) else join(one)
 
 
 @singledispatch
@@ -202,6 +220,11 @@ def _(c: DecoupledHybridController, tick: float, wall: float) -> DecoupledHybrid
 def _(c: ImpedanceController, tick: float, wall: float) -> Impedance:
     target = Vec3(float(wall + c.beyond), 0.0, 0.0)
     return Impedance(triple(c.mass), triple(c.damping), triple(c.stiffness), target)
+
+
+@made.register
+def _(c: CautiousController, tick: float, wall: float) -> CautiousPress:
+    return cautious_on_bench(tick, c.spring, c.damping, c.force, c.cap, c.room)
 
 
 @made.register

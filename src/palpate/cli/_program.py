@@ -16,6 +16,8 @@ COMMANDS = {
     "identify": "Find what a robot touched, from a log: stiffness, damping, mass.",
     "topics": "List what a log holds: topics, variables, columns.",
     "excite": "Design a force that shows what a surface is, and say how well beforehand.",
+    "tune": "Tune a force loop for an arm, and prove where it is stable.",
+    "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "thesis": "Measure every figure and every claim of the thesis again.",

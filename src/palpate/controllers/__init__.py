@@ -5,6 +5,7 @@ A controller is a part: a frozen NamedTuple of gains with ``start()``, the state
 """
 
 from palpate.controllers.any_controller import AnyController, join
+from palpate.controllers.cautious_press import CautiousPress, cautious_on_bench
 from palpate.controllers.controller import controller
 from palpate.controllers.decoupled_hybrid import DecoupledHybrid
 from palpate.controllers.hybrid import Hybrid
@@ -17,6 +18,7 @@ from palpate.controllers.self_tuning import SelfTuning
 
 __all__ = [
     "AnyController",
+    "CautiousPress",
     "DecoupledHybrid",
     "Hybrid",
     "Impedance",
@@ -25,6 +27,7 @@ __all__ = [
     "RaibertCraig",
     "ResolvedAcceleration",
     "SelfTuning",
+    "cautious_on_bench",
     "controller",
     "join",
 ]

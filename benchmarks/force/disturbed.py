@@ -1,0 +1,121 @@
+"""What the law does when what it was told is wrong, when the surface changes or moves, and in an hour.
+
+    python benchmarks/force/disturbed.py [--touches 200] [--hours 10] [--arms ur5e fr3] [--seed 0]
+
+Wrong priors: the stiffness cap and theta divided or multiplied. Changes in mid-press and sways of the surface as in the
+rows. An hour: the rms error of its last ten minutes over that of the first ten after the touch; growing is above 1.2.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+from rich.progress import track
+from touches import Draw, Rig, share
+
+PRIORS = (("as told", 1.0, 1.0), ("cap x 20", 20.0, 1.0), ("cap / 20", 0.05, 1.0), ("theta x 2", 1.0, 2.0),
+          ("theta / 2", 1.0, 0.5), ("cap / 10, theta / 2", 0.1, 0.5))  # fmt: skip
+CHANGES = ((7e3, 62e3), (62e3, 7e3), (1e3, 1e6), (1e6, 1e3))
+SWAYS = ((1e-3, 0.5), (1e-4, 2.0))
+STIFFNESSES = (1e3, 7e3, 62e3)
+GROWING = 1.2
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--touches", type=int, default=200)
+    parser.add_argument("--hours", type=int, default=10)
+    parser.add_argument("--arms", nargs="+", default=["ur5e", "fr3"])
+    parser.add_argument("--seed", type=int, default=0)
+    told = parser.parse_args()
+    for name in told.arms:
+        rig = Rig(name)
+        print(f"\n{rig.arm.title}")
+        priors(rig, told)
+        changes(rig, told.seed)
+        sways(rig, told.seed)
+        hours(rig, told)
+
+
+def priors(rig: Rig, told: argparse.Namespace) -> None:
+    print(
+        f"  wrong priors, {told.touches} first touches each: settled, p99 settling, largest overshoot, lost"
+    )
+    for name, cap, lag in PRIORS:
+        found = []
+        for i in track(range(told.touches), name, transient=True):
+            draw = rig.draw(np.random.default_rng([told.seed, i]))
+            gains = rig.gains(draw.F, draw.noise, cap * rig.arm.limits.stiffness, lag * rig.theta)
+            judged = rig.judge(
+                draw, rig.run(draw, gains.cautious(), [told.seed, i, 1], 8.0, approach=gains.approach)
+            )
+            found.append((judged.settling, judged.overshoot, judged.lost))
+        settling, over, lost = np.array(found).T
+        done = np.isfinite(settling).sum()
+        late = np.nanpercentile(settling, 99) if done else np.nan
+        print(f"    {name:<22}{done:>5}  {late:6.2f} s  {share(over.max()):>10}  {(lost > 0).sum()}")
+
+
+def changes(rig: Rig, seed: int) -> None:
+    print(
+        "  change of stiffness under 20 N, the force kept: largest and smallest force after, settled again after;"
+    )
+    print("  then the desired force steps to 25 N: largest force")
+    for K, later in CHANGES:
+        draw = Draw(K, 2.0 * 0.05 * np.sqrt(K), 20.0, 0.1, 0.0, 0.05)
+        gains = rig.gains(20.0, 0.1)
+        wanted = np.full(round(11.0 * rig.arm.rate), 20.0)
+        wanted[round(8.0 * rig.arm.rate) :] = 25.0
+        rows = rig.run(
+            draw,
+            gains.cautious(),
+            [seed, 2],
+            desired=wanted,
+            approach=gains.approach,
+            later=later,
+            change=3.0,
+            depth=20.0 / K,
+        )
+        force = rows[round(3.0 * rig.arm.rate) : round(8.0 * rig.arm.rate), 0]
+        stepped = rows[round(8.0 * rig.arm.rate) :, 0].max()
+        outside = np.flatnonzero(np.abs(force - 20.0) > 1.0)
+        again = (outside[-1] + 1) / rig.arm.rate if len(outside) else 0.0
+        what = f"{K / 1e3:g} -> {later / 1e3:g} kN/m"
+        print(f"    {what:<20}{force.max():8.2f} N{force.min():8.2f} N{again:8.3f} s{stepped:9.2f} N")
+
+
+def sways(rig: Rig, seed: int) -> None:
+    print("  surface that moves under 20 N: rms error, smallest force, ticks without contact")
+    for amplitude, hertz in SWAYS:
+        for K in STIFFNESSES:
+            draw = Draw(K, 2.0 * 0.1 * np.sqrt(K), 20.0, 0.1, 0.0, 0.1)
+            gains = rig.gains(20.0, 0.1)
+            rows = rig.run(
+                draw, gains.cautious(), [seed, 3], 20.0, approach=gains.approach, sway=amplitude,
+                frequency=2.0 * np.pi * hertz,
+            )  # fmt: skip
+            force = rows[len(rows) // 4 :, 0]
+            rms = float(np.sqrt(np.mean((force - 20.0) ** 2)))
+            what = f"+-{1e3 * amplitude:g} mm, {hertz:g} Hz, {K / 1e3:g} kN/m"
+            print(f"    {what:<28}{rms:8.3f} N{force.min():8.2f} N{(force <= 0.0).sum():8d}")
+
+
+def hours(rig: Rig, told: argparse.Namespace) -> None:
+    growing, worst, largest = 0, 0.0, 0.0
+    for i in track(range(told.hours), "hours", transient=True):
+        rng = np.random.default_rng([told.seed, 5, i])
+        draw = rig.draw(rng)
+        gains = rig.gains(draw.F, draw.noise)
+        rows = rig.run(draw, gains.cautious(), [told.seed, 6, i], 3600.0, approach=gains.approach)
+        error, ten = rows[:, 0] - draw.F, round(600.0 * rig.arm.rate)
+        first, last = error[round(10.0 * rig.arm.rate) :][:ten], error[-ten:]
+        ratio = float(np.sqrt(np.mean(last**2) / np.mean(first**2)))
+        growing, worst = growing + (ratio > GROWING), max(worst, ratio)
+        largest = max(largest, float(np.abs(error[round(10.0 * rig.arm.rate) :]).max() / draw.F))
+    ratio_and_error = f"largest ratio {worst:.3f}, largest error {share(largest)}"
+    print(f"  one-hour runs that grow: {growing} of {told.hours}; {ratio_and_error}")
+
+
+if __name__ == "__main__":
+    main()

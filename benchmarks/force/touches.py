@@ -1,0 +1,98 @@
+"""Draws of first touches, and how one is judged: what the studies of this folder share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from palpate.force.arm import load_arm
+from palpate.force.gains import Gains, approach_speed
+from palpate.force.lag import lag_of, sum_of_lags
+from palpate.force.worlds import pressed, surface, world_of
+
+SECONDS = 4.0
+BAND = 0.05
+"""Of F_d: settled is what stays within, by the true force."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One first touch: stiffness, damping, desired force, noise, phase of the sensor's clock, damping ratio."""
+
+    K: float
+    B: float
+    F: float
+    noise: float
+    phase: float
+    zeta: float
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Settling time [s] (NaN if not), overshoot, losses of contact, smallest K_u/K once a third of F_d was there."""
+
+    settling: float
+    overshoot: float
+    lost: int
+    least: float
+
+
+class Rig:
+    """An arm with its lag, worked out once."""
+
+    def __init__(self, name: str):
+        self.arm = load_arm(name)
+        self.theta, self.added = lag_of(self.arm), sum_of_lags(self.arm)
+
+    def draw(self, rng, stiffness=(1e2, 1e6), noise=(0.05, 0.2)) -> Draw:
+        """Stiffness, damping ratio and noise even in their logarithms; force and phase even."""
+        K = float(np.exp(rng.uniform(*np.log(stiffness))))
+        zeta = float(np.exp(rng.uniform(np.log(0.01), 0.0)))
+        mass = self.arm.inner.mass if self.arm.kind == "torque" else 1.0
+        force, sigma = float(rng.uniform(10.0, 40.0)), float(np.exp(rng.uniform(*np.log(noise))))
+        phase = float(rng.uniform(0.0, 1.0 / self.arm.sensor.sampling))
+        return Draw(K, 2.0 * zeta * np.sqrt(K * mass), force, sigma, phase, zeta)
+
+    def gains(self, force, noise, cap=None, theta=None) -> Gains:
+        """For this press; cap and theta may be wrong on purpose."""
+        cap, theta = cap or self.arm.limits.stiffness, theta or self.theta
+        arm = msgspec.structs.replace(self.arm, sensor=msgspec.structs.replace(self.arm.sensor, noise=noise))
+        return Gains(
+            arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale,
+            approach=approach_speed(arm, force, theta, cap),
+        )  # fmt: skip
+
+    def run(self, draw, control, seed, seconds=SECONDS, desired=None, approach=0.002, **others):
+        """The rows of a press with any law."""
+        world = world_of(self.arm, noise=draw.noise, phase=draw.phase)
+        wanted = np.full(round(seconds * self.arm.rate), draw.F) if desired is None else desired
+        return pressed(world, surface(draw.K, draw.B, **others), control, 0.3 * approach, wanted, seed)
+
+    def judge(self, draw, rows) -> Judged:
+        """What a run came to."""
+        force, rate = rows[:, 0], self.arm.rate
+        if not (force > 0.0).any() or not np.isfinite(force).all():
+            return Judged(np.nan, np.inf if not np.isfinite(force).all() else 0.0, 0, np.nan)
+        start = int(np.argmax(force > 0.0))
+        outside = np.flatnonzero(np.abs(force - draw.F) > BAND * draw.F)
+        last = outside[-1] + 1 if len(outside) else start
+        settled = last < len(force) - round(0.3 * rate)
+        firm = int(np.argmax(force > 0.5 * draw.F)) if (force > 0.5 * draw.F).any() else len(force)
+        lost = int(((force[firm:-1] > 0.0) & (force[firm + 1 :] <= 0.0)).sum())
+        felt = draw.K if self.arm.kind == "torque" else self.arm.seen(draw.K)
+        pressing = rows[force > draw.F / 3.0, 1]
+        least = float(pressing.min() / felt) if len(pressing) else np.nan
+        return Judged(
+            (last - start) / rate if settled else np.nan, float(force.max() / draw.F - 1.0), lost, least
+        )
+
+    def travel(self, draw) -> float:
+        """F/(K v_max) [s]."""
+        return draw.F / draw.K / self.arm.limits.speed
+
+
+def share(value: float) -> str:
+    """As a percentage."""
+    return f"{100.0 * value:.2f} %"

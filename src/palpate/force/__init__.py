@@ -1,0 +1,21 @@
+"""Force control that certifies itself: gains, the proof of where they are stable, and a law that stays inside."""
+
+from palpate.force.arm import Arm, load_arm
+from palpate.force.certificate import Certificate, certify
+from palpate.force.force_loop import ForceLoop
+from palpate.force.gains import Gains, load_gains
+from palpate.force.tuning import Known, Tuning, known_from, tune
+
+__all__ = [
+    "Arm",
+    "Certificate",
+    "ForceLoop",
+    "Gains",
+    "Known",
+    "Tuning",
+    "certify",
+    "known_from",
+    "load_arm",
+    "load_gains",
+    "tune",
+]

@@ -1,0 +1,212 @@
+"""What a force loop has to know of an arm: how its tip follows a command, what its sensor does, what limits it."""
+
+from __future__ import annotations
+
+import math
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import msgspec
+from msgspec import Meta
+
+from palpate.errors import InputError, unknown
+from palpate.signals.low_pass import LowPass
+
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+T = TypeVar("T")
+_LARGEST = 1 << 16
+"""Bytes of an arm's file."""
+
+
+class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A table of an arm's file: its keys and no others."""
+
+
+class PositionLoop(Table, tag="position", tag_field="kind"):
+    """A tip that follows a commanded position as w^2/(s^2 + 2 z w s + w^2), late by a delay."""
+
+    bandwidth: Positive
+    """w/2 pi [Hz]."""
+    damping: Positive
+    """z."""
+    delay: NotNegative
+    """Between sending a command and the arm's loop having it [s]."""
+    stiffness: Positive
+    """Of the arm itself, between what its encoders see and the surface [N/m]."""
+
+
+class TorqueLoop(Table, tag="torque", tag_field="kind"):
+    """A tip under K_p (x_c - x) - D xdot, which makes it a position with a spring in series."""
+
+    mass: Positive
+    """Of the tip [kg]."""
+    stiffness: Positive
+    """K_p [N/m]."""
+    damping: Positive
+    """D [N s/m]."""
+    delay: NotNegative
+    """From reading the encoders to the torque [s]."""
+
+
+class Sensor(Table):
+    """The force sensor, as the control loop reads it."""
+
+    sampling: Positive
+    """Fresh readings a second [Hz]."""
+    noise: Positive
+    """Standard deviation of a reading [N]."""
+    full_scale: Positive
+    """Largest force that it reads [N]."""
+    low_pass: str = "none"  # noqa: S105 - a filter
+    """Before the sampling, as butterworth3:120."""
+
+
+class Limits(Table):
+    """What the arm may do."""
+
+    speed: Positive
+    """Of the tip along the normal [m/s]."""
+    stiffness: Positive = 1e6
+    """The stiffest surface that there may be, K + B/theta [N/m]."""
+
+
+class Arm(Table):
+    """An arm as its force loop sees it.
+
+    Raises:
+        InputError: numbers that do not fit together.
+    """
+
+    title: str
+    rate: Annotated[float, Meta(ge=20, le=20000)]
+    """Ticks a second [Hz]."""
+    inner: PositionLoop | TorqueLoop
+    sensor: Sensor
+    limits: Limits
+
+    def __post_init__(self) -> None:
+        low_pass = LowPass.parse(self.sensor.low_pass)
+        if low_pass.roll_off > 3:
+            raise InputError(
+                f"{self.title}: the sensor's low-pass {low_pass} has order {low_pass.roll_off}; the force loop takes "
+                "one up to the third order: describe it by one of the same lag"
+            )
+        if self.delay_ticks > 100:
+            raise InputError(
+                f"{self.title}: a delay of {self.inner.delay:g} s is {self.delay_ticks} ticks; at most 100 are taken: "
+                "run the force loop slower"
+            )
+
+    @property
+    def kind(self) -> str:
+        """`position` or `torque`."""
+        return "position" if isinstance(self.inner, PositionLoop) else "torque"
+
+    @property
+    def tick(self) -> float:
+        """Time between ticks [s]."""
+        return 1.0 / self.rate
+
+    @property
+    def low_pass(self) -> LowPass:
+        """Of the sensor."""
+        return LowPass.parse(self.sensor.low_pass)
+
+    @property
+    def delay_ticks(self) -> int:
+        """The inner loop's delay in whole ticks, rounded up."""
+        return _ticks(self.inner.delay * self.rate)
+
+    @property
+    def sensor_ticks(self) -> int:
+        """Age that a reading may have when it is used, in whole ticks, rounded up."""
+        return max(_ticks(self.rate / self.sensor.sampling), 1)
+
+    @property
+    def series(self) -> float:
+        """Stiffness between the commanded position and the surface [N/m]."""
+        return self.inner.stiffness
+
+    def seen(self, stiffness: float) -> float:
+        """K_eff: the surface's stiffness and the series' in one, as the command feels them [N/m]."""
+        return stiffness / (1.0 + stiffness / self.series)
+
+    def surface(self, seen: float) -> float:
+        """The surface's own stiffness from K_eff [N/m]; infinite where that reaches the series stiffness."""
+        return seen / (1.0 - seen / self.series) if seen < self.series else math.inf
+
+
+def _ticks(ticks: float) -> int:
+    return math.ceil(ticks - 1e-9)
+
+
+def names() -> list[str]:
+    """The arms that come with palpate."""
+    return sorted(f.name.removesuffix(".toml") for f in files("palpate.force").joinpath("arms").iterdir())
+
+
+def load_arm(name: str) -> Arm:
+    """An arm by its name, or from a TOML file.
+
+    Raises:
+        InputError: no such arm or file, TOML that does not parse, an unknown or missing key, a value out of range.
+    """
+    if name in names():
+        text = files("palpate.force").joinpath("arms", f"{name}.toml").read_text(encoding="utf-8")
+        return parse_arm(text, name)
+    path = Path(name)
+    if path.suffix.lower() != ".toml":
+        raise unknown("arm", name, [*names(), "a TOML file"])
+    return parse_arm(read_small(path, "an arm"), name)
+
+
+def read_small(path: Path, what: str) -> str:
+    """The text of a file that a person wrote.
+
+    Raises:
+        InputError: it is far too long for what it should be, or no text.
+    """
+    with path.open("rb") as file:
+        data = file.read(_LARGEST + 1)
+    if len(data) > _LARGEST:
+        raise InputError(f"{path}: more than {_LARGEST} bytes are not {what}; check the path")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file; check the path") from None
+
+
+def parse_arm(text: str, where: str) -> Arm:
+    """An arm from TOML; `where` names the text in errors."""
+    return from_toml(text, where, Arm)
+
+
+def from_toml(text: str, where: str, kind: type[T]) -> T:
+    """A table of this kind from TOML.
+
+    Raises:
+        InputError: TOML that does not parse, an unknown or missing key, a value out of range or not finite.
+    """
+    try:
+        tables = msgspec.toml.decode(text)
+        _check_finite(tables, "")
+        return msgspec.convert(tables, kind)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{where}: {error}") from None
+    except msgspec.DecodeError as error:
+        raise InputError(f"{where}: not TOML: {error}") from None
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _check_finite(value: object, path: str) -> None:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"{path} must be finite, got {value}")
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_finite(inner, f"{path}.{key}" if path else str(key))
+    if isinstance(value, list):
+        for inner in value:
+            _check_finite(inner, path)

@@ -1,0 +1,184 @@
+"""A tuned loop as one value and one TOML file: the arm, the force, and the numbers of the law."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from palpate._vector import Mat3, Vec3
+from palpate.errors import InputError
+from palpate.force.arm import Arm, Positive, Table, TorqueLoop, from_toml, read_small
+from palpate.force.law import Cautious
+from palpate.force.sampled_loop import filter_of
+
+Array = NDArray[np.float64]
+
+ALPHA = 0.42
+"""Of L = alpha e^(-s theta)/(theta s): 0.42 gives a gain margin of pi/(2 alpha) = 3.7.
+
+Measured by benchmarks/force/first_touches.py: 0.45 overshoots by 9 % on the stiffest surfaces, 0.36 is a
+quarter slower.
+"""
+LAW = "cautious 1"
+"""Changes with the law; a certificate of another one is refused."""
+_TOUCH = 0.3
+"""Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch."""
+_SLOWEST = 0.02
+"""K_u below which the speed limit, not the gain, rules, as a share of alpha F_d/(theta v_max)."""
+_FORGOTTEN = 5.0
+
+
+class Gains(Table):
+    """A tuned loop.
+
+    Raises:
+        InputError: a force that noise hides or the sensor cannot read, limits that do not fit.
+    """
+
+    arm: Arm
+    force: Positive
+    """F_d, the smallest that will be asked for [N]."""
+    theta: Positive
+    """Whole lag of the loop [s]."""
+    cap: Positive
+    """Largest K + B/theta of any surface that there may be [N/m]."""
+    approach: Positive
+    """Speed in the air [m/s]."""
+    force_limit: Positive
+    """Above which the tip withdraws [N]."""
+    alpha: Annotated[float, Meta(gt=0, le=1)] = ALPHA
+    law: str = LAW
+
+    def __post_init__(self) -> None:
+        if self.law != LAW:
+            raise InputError(f"these gains are for the law {self.law!r}, this is {LAW!r}; tune again")
+        least = 8.0 * self.arm.sensor.noise
+        if self.force < least:
+            raise InputError(
+                f"a force of {self.force:g} N is below 8 standard deviations of the sensor's noise ({least:g} N); "
+                "ask for more, or use a quieter sensor"
+            )
+        if not self.force < self.force_limit <= self.arm.sensor.full_scale:
+            raise InputError(
+                f"the force limit must lie between the force of {self.force:g} N and the sensor's full scale of "
+                f"{self.arm.sensor.full_scale:g} N, got {self.force_limit:g} N"
+            )
+        if self.arm.sensor.sampling < 4.0 / self.theta:
+            raise InputError(
+                f"the sensor's {self.arm.sensor.sampling:g} readings a second are fewer than 4 in the loop's lag of "
+                f"{1e3 * self.theta:.3g} ms; use a faster sensor"
+            )
+
+    @property
+    def seen_cap(self) -> float:
+        """The cap as the measured position feels it [N/m]."""
+        return self.arm.seen(self.cap) if self.arm.kind == "position" else self.cap
+
+    @property
+    def compliance(self) -> float:
+        """Of the spring between commanded and measured position [m/N]."""
+        return 0.0 if self.arm.kind == "position" else 1.0 / self.arm.series
+
+    @property
+    def highest_gain(self) -> float:
+        """g on the softest surface that the law heeds; `gain` is that on the stiffest [m/(s N)]."""
+        return self.alpha / self.theta * (self.compliance + 1.0 / self.floor)
+
+    @property
+    def gain(self) -> float:
+        """g at K_u = cap [m/(s N)]."""
+        return self.alpha / self.theta * (self.compliance + 1.0 / self.seen_cap)
+
+    @property
+    def floor(self) -> float:
+        """Lowest K_u [N/m]."""
+        return max(_SLOWEST * self.alpha * self.force / (self.theta * self.arm.limits.speed), 1.0)
+
+    def cautious(self) -> Cautious:
+        """The law's numbers."""
+        arm = self.arm
+        low_pass = arm.low_pass
+        memory = _FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick
+        E, e0, e1, c = followed(arm)
+        numbers: dict[str, Any] = {
+            "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,
+            "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed, "approach": self.approach,
+            "noise": arm.sensor.noise, "memory": memory + 1.0 / arm.sensor.sampling,
+            "period": max(1.0 / arm.sensor.sampling, arm.tick), "E": E, "e0": e0, "e1": e1, "c": c,
+            "d": 0.0 if low_pass.sections else 1.0, "z": 2.0, "eps": 0.03, "full_scale": arm.sensor.full_scale,
+            "force_limit": self.force_limit, "locking": 1.0, "bounding": 1.0, "backing": 1.0,
+        }  # fmt: skip
+        return Cautious(**numbers)
+
+    @cached_property
+    def digest(self) -> str:
+        """Of everything that a proof rests on: arm, rate, lag, law and gain."""
+        return hashlib.sha256(msgspec.json.encode(self, order="deterministic")).hexdigest()
+
+    def to_toml(self) -> str:
+        """The file's text."""
+        return "# Made by palpate tune; ForceLoop.load takes it.\n" + _toml(msgspec.to_builtins(self))
+
+
+def load_gains(path: Path) -> Gains:
+    """Gains from the file that `palpate tune` wrote.
+
+    Raises:
+        InputError: no such file, another law, a number out of range.
+    """
+    return from_toml(read_small(path, "gains"), str(path), Gains)
+
+
+def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: float = ALPHA) -> float:
+    """Highest speed in the air [m/s]: what the law asks for with K_u = cap, and what the tip's mass allows.
+
+    Args:
+        arm: what moves.
+        force: F_d [N].
+        theta: [s].
+        cap: K_cap of the surface [N/m].
+        alpha: gain in units of 1/theta.
+    """
+    speed = min(arm.limits.speed, alpha * force / (theta * arm.seen(cap)))
+    if isinstance(arm.inner, TorqueLoop):
+        speed = min(speed, _TOUCH * force / float(np.sqrt(cap * arm.inner.mass)))
+    return speed
+
+
+def followed(arm: Arm) -> tuple[Mat3, Vec3, Vec3, Vec3]:
+    """The sensor's low-pass on a position that runs straight between ticks: z' = E z + e0 x + e1 x', read by c."""
+    from scipy.linalg import expm
+
+    A, b, c = filter_of(arm.low_pass)
+    n = len(b)
+    M = np.zeros((n + 2, n + 2))
+    M[:n, :n], M[:n, n], M[n, n + 1] = A * arm.tick, b * arm.tick, 1.0
+    both = expm(M)
+    wide = np.zeros((3, 3))
+    wide[:n, :n] = both[:n, :n]
+    full, ramp = both[:n, n], both[:n, n + 1]
+    return Mat3(*map(_three, wide)), _three(full - ramp), _three(ramp), _three(c)
+
+
+def _three(values: Array) -> Vec3:
+    return Vec3(*(float(v) for v in np.concatenate([values, np.zeros(3 - len(values))])))
+
+
+def _toml(table: dict[str, Any], path: str = "") -> str:
+    plain = {k: v for k, v in table.items() if not isinstance(v, dict)}
+    lines = [f"[{path}]"] if path and plain else []
+    lines += [f"{key} = {_value(value)}" for key, value in plain.items()]
+    text = "\n".join(lines) + "\n\n" if lines else ""
+    inner = (_toml(v, f"{path}.{k}" if path else k) for k, v in table.items() if isinstance(v, dict))
+    return text + "".join(inner)
+
+
+def _value(value: Any) -> str:
+    return msgspec.json.encode(value).decode() if isinstance(value, str) else repr(value)

@@ -1,0 +1,65 @@
+"""Least squares of the force on what the sensor saw of the position: stiffness and damping with their uncertainty."""
+
+from typing import NamedTuple
+
+from palpate._jit import law, part
+from palpate._vector import ZERO3, Mat3, Vec3, outer, solve, sqrt
+
+NOTHING = Mat3(ZERO3, ZERO3, ZERO3)
+AXIS_K, AXIS_B, BOTH, AXIS_C = (
+    Vec3(1.0, 0.0, 0.0),
+    Vec3(0.0, 1.0, 0.0),
+    Vec3(1.0, 1.0, 0.0),
+    Vec3(0.0, 0.0, 1.0),
+)
+PRIOR = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 0.01))
+"""Information that never fades: stiffness and damping deviate from 0 by about the cap, the offset by about 10 N.
+
+It keeps the equations solvable where the tip moves evenly, so that damping and offset are one.
+"""
+UNKNOWN = 1e3
+
+
+@part
+class Fit(NamedTuple):
+    """Information matrix and vector of (K, B/theta) in caps and the offset [N]: N p = r."""
+
+    N: Mat3
+    r: Vec3
+
+    def taking(self, phi, force, weight, keep):
+        """With one more sample of that weight [1/N^2], the old ones faded by `keep`."""
+        N = keep * self.N + (1.0 - keep) * PRIOR + weight * outer(phi, phi)
+        return Fit(N, keep * self.r + (weight * force) * phi)
+
+    def solved(self):
+        """K, B/theta and the offset."""
+        return solve(self.N, self.r)
+
+    def std(self, direction):
+        """Standard deviation of a combination of the three."""
+        variance = direction @ solve(self.N, direction)
+        return sqrt(variance) if variance > 0.0 else UNKNOWN  # also where rounding left no variance
+
+    def undamped(self):
+        """K where B is held at 0, and its standard deviation."""
+        a, b, c = self.N.r1.x, self.N.r1.z, self.N.r3.z
+        free = a - b * b / c
+        return (self.r.x - b * self.r.z / c) / free, sqrt(1.0 / max(free, 1e-300))
+
+
+@law
+def fit_from(offset, std):
+    """What is known at a touch: nothing of K and B, and of the offset that it is this +- std [N]."""
+    c = 1.0 / (std * std)
+    return Fit(PRIOR + c * Mat3(ZERO3, ZERO3, AXIS_C), Vec3(0.0, 0.0, c * offset))
+
+
+@law
+def without_offset(fit, share):
+    """A share of what is known of K and B; nothing of the offset."""
+    N, c = fit.N, fit.N.r3.z
+    across = Vec3(N.r1.z, N.r2.z, 0.0)
+    slopes = Mat3(Vec3(N.r1.x, N.r1.y, 0.0), Vec3(N.r2.x, N.r2.y, 0.0), ZERO3) - outer(across, across) / c
+    r = Vec3(fit.r.x, fit.r.y, 0.0) - (fit.r.z / c) * across
+    return Fit(share * slopes + PRIOR, share * r)

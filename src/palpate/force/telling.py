@@ -1,0 +1,76 @@
+"""What a certificate says, in words and as plain JSON values."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+from palpate.force.certificate import Certificate, Claim, Verdict
+
+UNCOVERED = (
+    "the damping compensation tau while it adapts",
+    "g theta K_eff/alpha outside the shares given, as on a soft surface before the first estimate",
+    "limits of speed and torque",
+    "loss of contact: the proofs are of the loop in contact",
+    "a sensor that samples between ticks otherwise than with a whole tick's jitter",
+    "the peak at the touch, which is a formula",
+    "the arm's own compliance between its encoders and the tip beside damping of the surface",
+)
+
+
+def sentence(claim: Claim, gains_kind: str) -> str:
+    """A claim in words."""
+    times = f"B/K from {claim.least:g} to {claim.most:.4g} s" if claim.most > 0.0 else "no damping (B = 0)"
+    if claim.kind == "held":
+        factor = f", or up to {claim.shares[1]:g} times that gain" if claim.shares[1] > 1.0 else ""
+        return (
+            f"with the gain held at K_u = cap{factor}: every surface whose K + B/theta, as the measured position feels "
+            f"it, is {claim.low:.4g} to {claim.high:.4g} N/m, {times}; K and B may change within a cell every tick"
+        )
+    which = (
+        "every constant stiffness"
+        if gains_kind == "position"
+        else f"every constant stiffness from {claim.low:.4g} to {claim.high:.4g} N/m"
+    )
+    jitter = f", a reading's age changing by {claim.jitter} tick" if claim.jitter else ""
+    return (
+        f"whatever the estimator does while g theta K_eff/alpha stays within {claim.shares[0]:g} to {claim.shares[1]:g}"
+        f"{jitter}: {which}, {times}"
+    )
+
+
+def lines(certificate: Certificate, verdict: Verdict) -> list[str]:
+    """The certificate in words."""
+    kind = certificate.gains.arm.kind
+    found = [f"proved stable, {sentence(c, kind)} ({len(c.cells)} cells)" for c in certificate.claims]
+    if not found:
+        found = ["nothing could be proved"]
+    state = "holds" if verdict.holds else f"does not hold: {verdict.why}"
+    found.append(
+        f"the certificate {state}; {verdict.cells} cells contract by at least {1.0 - verdict.contraction:.3g} a tick, "
+        f"rounding is at most {verdict.rounding:.2g}"
+    )
+    return [*found, "not covered: " + "; ".join(UNCOVERED)]
+
+
+def told(certificate: Certificate, verdict: Verdict) -> dict[str, Any]:
+    """The certificate as plain JSON values, without its norms."""
+    return {
+        "holds": verdict.holds,
+        "why": verdict.why,
+        "cells": verdict.cells,
+        "contraction": 1.0 - verdict.contraction if isfinite(verdict.contraction) else None,
+        "rounding": verdict.rounding,
+        "claims": [
+            {
+                "kind": c.kind,
+                "felt_stiffness": [c.low, c.high],
+                "damping_time": [c.least, c.most],
+                "gain_shares": list(c.shares),
+                "jitter_ticks": c.jitter,
+                "cells": len(c.cells),
+            }
+            for c in certificate.claims
+        ],
+        "uncovered": list(UNCOVERED),
+    }

@@ -1,0 +1,315 @@
+"""From what is known of arm and surface to gains, what they will do, and where they are proved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import InputError
+from palpate.force.arm import Arm, PositionLoop, TorqueLoop
+from palpate.force.certificate import FORM, Certificate, certify, exact_interval
+from palpate.force.gains import Gains, approach_speed
+from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
+from palpate.force.steps import Margins, Step, margins, step_of
+
+RIGID = 1e9
+"""What is stiffer is said to be this stiff [N/m]."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of the surface.
+
+    Args:
+        stiffness: K, lowest and highest [N/m].
+        damping: B, lowest and highest [N s/m].
+        value: K itself [N/m]; None where only a range was given.
+        source: where that comes from.
+    """
+
+    stiffness: tuple[float, float]
+    damping: tuple[float, float] = (0.0, 0.0)
+    value: float | None = None
+    source: str = "told"
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """A tuned loop: what `palpate tune` says.
+
+    Args:
+        gains: what `ForceLoop` takes.
+        known: of the surface, if anything.
+        certificate: what is proved.
+        steps: the touch on the softest and on the stiffest surface, K_u being their stiffness.
+        margins: on the stiffest surface.
+        warnings: code and text.
+    """
+
+    gains: Gains
+    known: Known | None
+    certificate: Certificate
+    steps: tuple[Step, Step]
+    margins: Margins
+    warnings: tuple[tuple[str, str], ...] = field(default=())
+
+    @property
+    def proved(self) -> bool:
+        """Whether anything is."""
+        return any(c.kind == "held" for c in self.certificate.claims)
+
+    @property
+    def overshoot(self) -> float:
+        """Over F_d, at the worse of the two ends."""
+        return max(step.overshoot for step in self.steps)
+
+    @property
+    def peak(self) -> float:
+        """Force to expect at the touch [N], by the linear loop; a formula, not a bound."""
+        gains = self.gains
+        peak = gains.force * (1.0 + self.overshoot)
+        if isinstance(gains.arm.inner, TorqueLoop):
+            peak = max(peak, gains.approach * float(np.sqrt(gains.cap * gains.arm.inner.mass)))
+        return peak
+
+    def surface_stiffness(self, kind: str) -> tuple[float, float] | None:
+        """The proved interval of K + B/theta of the surface itself for a kind of claim [N/m]."""
+        for claim in self.certificate.claims:
+            if claim.kind == kind:
+                return self._own(claim.low, claim.high)
+        return None
+
+    @property
+    def exact(self) -> tuple[float, float]:
+        """The surfaces without damping on which the loop with K_u = cap is stable [N/m]; exact for a position arm."""
+        return self._own(*exact_interval(self.gains))
+
+    def _own(self, low: float, high: float) -> tuple[float, float]:
+        arm = self.gains.arm
+        if arm.kind == "torque":
+            return low, high
+        return arm.surface(low), min(arm.surface(high), RIGID)
+
+    def to_json(self) -> dict[str, Any]:
+        """As `palpate tune --json` prints it."""
+        gains, arm = self.gains, self.gains.arm
+        held = next((c for c in self.certificate.claims if c.kind == "held"), None)
+        adapting = next((c for c in self.certificate.claims if c.kind == "adapting"), None)
+        known = self.known
+        return {
+            "arm": arm.title,
+            "kind": arm.kind,
+            "rate_hz": arm.rate,
+            "theta_s": gains.theta,
+            "lags_added_s": sum_of_lags(arm),
+            "gains": {
+                "law": gains.law,
+                "alpha": gains.alpha,
+                "force_N": gains.force,
+                "stiffness_cap": gains.cap,
+                "gain_at_cap_m_per_s_N": gains.gain,
+                "force_limit_N": gains.force_limit,
+            },
+            "approach_speed_m_s": gains.approach,
+            "peak_N": self.peak,
+            "settling_s": _number(max(step.settling for step in self.steps)),
+            "overshoot": self.overshoot,
+            "margins": {
+                "gain": self.margins.gain,
+                "phase_deg": _number(self.margins.phase),
+                "delay_s": _number(self.margins.delay),
+            },
+            "proved": {
+                "stiffness": list(self.surface_stiffness("held") or ()) or None,
+                "damping_time": [held.least, held.most] if held else None,
+                "jitter_ticks": adapting.jitter if adapting else 0,
+                "adapting": None
+                if adapting is None
+                else {
+                    "gain_share": list(adapting.shares),
+                    "damping_time": [adapting.least, adapting.most],
+                    "stiffness": list(self.surface_stiffness("adapting") or ())
+                    if arm.kind == "torque"
+                    else "every",
+                },
+            },
+            "exact": {"stiffness": list(self.exact)},
+            "estimate": None
+            if known is None
+            else {
+                "stiffness": known.value,
+                "stiffness_interval": list(known.stiffness),
+                "damping_interval": list(known.damping),
+                "source": known.source,
+            },
+            "warnings": [{"code": code, "text": text} for code, text in self.warnings],
+        }
+
+
+def _number(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def known_from(found: Mapping[str, Any], source: str) -> Known:
+    """What an identification says of the surface, from the object that `palpate identify --json` prints.
+
+    Raises:
+        InputError: no such object, or one without a stiffness in N/m that can be bounded.
+    """
+    if "logs" in found:
+        found = found.get("pooled") or {}
+    parameters = found.get("parameters")
+    if not isinstance(parameters, Mapping):
+        raise InputError(
+            f"{source}: not what palpate identify --json prints; give that, a log, or --stiffness A:B"
+        )
+    point = found.get("working_point")
+    stiffness = point.get("stiffness") if isinstance(point, Mapping) else None
+    K = stiffness if isinstance(stiffness, Mapping) and _interval(stiffness) else parameters.get("K")
+    interval = _interval(K) if isinstance(K, Mapping) else None
+    if not isinstance(K, Mapping) or interval is None:
+        why = K.get("reason") if isinstance(K, Mapping) else "it has no stiffness"
+        raise InputError(
+            f"{source}: the stiffness has no interval ({why}); excite more (palpate excite), or give --stiffness A:B"
+        )
+    unit = K.get("unit")
+    if unit not in (None, "N/m"):
+        raise InputError(
+            f"{source}: the stiffness is in {unit}; name the log's units (as --force f:N) so that it is in N/m"
+        )
+    low, high = interval
+    if not high > 0.0:
+        raise InputError(f"{source}: a stiffness of {low:g} to {high:g} N/m is none that one can press on")
+    B = parameters.get("B")
+    damping = (_interval(B) if isinstance(B, Mapping) else None) or (0.0, 0.0)
+    value = K.get("value")
+    return Known(
+        (max(low, SOFTEST), high),
+        (max(damping[0], 0.0), max(damping[1], 0.0)),
+        float(value) if isinstance(value, int | float) and isfinite(value) else None,
+        source,
+    )
+
+
+def _interval(parameter: Mapping[str, Any]) -> tuple[float, float] | None:
+    for key in ("prediction95", "ci95"):
+        ends = parameter.get(key)
+        if (
+            isinstance(ends, list | tuple)
+            and len(ends) == 2
+            and all(isinstance(end, int | float) and isfinite(end) for end in ends)
+        ):
+            return float(ends[0]), float(ends[1])
+    return None
+
+
+def tune(
+    arm: Arm,
+    force: float,
+    known: Known | None = None,
+    *,
+    cap: float | None = None,
+    peak: float | None = None,
+    surface_speed: float | None = None,
+    prove_adapting: bool = True,
+) -> Tuning:
+    """Gains for an arm that presses with a force, and what is proved of them.
+
+    Args:
+        arm: what moves.
+        force: F_d, the smallest that will be asked for [N].
+        known: of the surface; the arm's own limit of stiffness if nothing is.
+        cap: stiffest surface that there may be, K + B/theta [N/m]; by default what is known, or the arm's limit.
+        peak: highest force that is allowed at the touch [N].
+        surface_speed: of a surface that moves by itself [m/s].
+        prove_adapting: prove the adapting law too, which takes a torque arm a minute.
+
+    Raises:
+        InputError: numbers that cannot be met, with what can.
+    """
+    _check(force, known, cap)
+    theta = lag_of(arm)
+    stiffest = _cap(arm, known, cap, theta)
+    limit = arm.sensor.full_scale if peak is None else min(peak, arm.sensor.full_scale)
+    gains = Gains(
+        arm=arm, force=force, theta=theta, cap=stiffest, force_limit=limit,
+        approach=approach_speed(arm, force, theta, stiffest),
+    )  # fmt: skip
+    soft = min(known.stiffness[0] if known else SOFTEST, stiffest)
+    felt = arm.seen(soft) if arm.kind == "position" else soft
+    steps = step_of(gains, felt), step_of(gains, gains.seen_cap)
+    nothing = Certificate(form=FORM, gains=gains, claims=())
+    found = Tuning(gains, known, nothing, steps, margins(gains, gains.seen_cap), tuple(_warnings(arm, known)))
+    _check_peak(found, peak)
+    _check_surface_speed(gains, surface_speed)
+    return replace(found, certificate=certify(gains, adapting=prove_adapting))
+
+
+def _check(force: float, known: Known | None, cap: float | None) -> None:
+    if not 0.0 < force < inf:
+        raise InputError(f"the force must be above 0 N (it presses), got {force:g} N")
+    if known is not None and not 0.0 < known.stiffness[0] <= known.stiffness[1] < inf:
+        low, high = known.stiffness
+        raise InputError(
+            f"the stiffness must be an interval above 0 N/m with its lower end first, got {low:g} to {high:g} N/m"
+        )
+    if cap is not None and not 0.0 < cap < inf:
+        raise InputError(f"the stiffness cap must be above 0 N/m, got {cap:g} N/m")
+
+
+def _cap(arm: Arm, known: Known | None, cap: float | None, theta: float) -> float:
+    if known is None:
+        return arm.limits.stiffness if cap is None else cap
+    needed = known.stiffness[1] + known.damping[1] / theta
+    if cap is not None and cap < needed:
+        raise InputError(
+            f"the stiffness cap of {cap:g} N/m is below what was identified, K + B/theta up to {needed:.4g} N/m; "
+            "raise it"
+        )
+    return needed if cap is None else cap
+
+
+def _warnings(arm: Arm, known: Known | None) -> list[tuple[str, str]]:
+    found = []
+    if known is not None and known.source != "told" and known.stiffness[1] > 3.0 * known.stiffness[0]:
+        low, high = known.stiffness
+        text = (
+            f"the estimate's interval of {low:.4g} to {high:.4g} N/m is as wide as the gain margin: "
+            "excite more (palpate excite), or leave it to the law"
+        )
+        found.append(("wide-estimate", text))
+    if isinstance(arm.inner, PositionLoop) and arm.delay_ticks > arm.inner.delay * arm.rate + 1e-6:
+        text = f"the delay of {1e3 * arm.inner.delay:g} ms is no whole number of ticks; {arm.delay_ticks} were taken"
+        found.append(("delay-rounded", text))
+    if arm.kind == "torque":
+        text = "for a torque arm stability is proved without damping of the surface (B = 0) unless certify is asked"
+        found.append(("no-damping-proved", text))
+    return found
+
+
+def _check_peak(found: Tuning, peak: float | None) -> None:
+    if peak is None or found.peak <= peak:
+        return
+    gains = found.gains
+    raise InputError(
+        f"no approach speed keeps the peak under {peak:g} N: at {1e3 * gains.approach:.3g} mm/s the press itself "
+        f"overshoots to {found.peak:.4g} N; ask for at most {gains.force * peak / found.peak:.4g} N, or allow "
+        f"{found.peak:.4g} N"
+    )
+
+
+def _check_surface_speed(gains: Gains, speed: float | None) -> None:
+    if speed is None:
+        return
+    if not 0.0 <= speed < inf:
+        raise InputError(f"the surface's speed must be 0 m/s or more, got {speed:g} m/s")
+    most = gains.force * gains.gain
+    if speed >= most:
+        raise InputError(
+            f"contact with a surface that moves at {1e3 * speed:.4g} mm/s cannot be kept: at {gains.force:g} N on "
+            f"{gains.cap:.4g} N/m the limit is {1e3 * most:.4g} mm/s; press harder, or lower --stiffness-cap"
+        )

@@ -1,0 +1,92 @@
+"""An arm's world for the simulator, and one run in it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._vector import Mat3, Vec3
+from palpate.force.arm import Arm, PositionLoop
+from palpate.force.sampled_loop import filter_of, held
+from palpate.force.touching import Surface, World, compiled_touch
+
+Array = NDArray[np.float64]
+
+STEP = {"position": 2e-4, "torque": 5e-5}
+"""Of the physics [s]."""
+ENCODER = 1e-6
+"""Resolution of the measured position [m]."""
+
+
+def world_of(arm: Arm, *, noise: float, phase: float = 0.0) -> World:
+    """The world of an arm.
+
+    Args:
+        arm: what moves.
+        noise: standard deviation of a reading [N].
+        phase: when the sensor samples first [s].
+    """
+    inner = arm.inner
+    steps = max(round(arm.tick / STEP[arm.kind]), 1)
+    A, b, c = filter_of(arm.low_pass)
+    E, e = held(A, b, arm.tick / steps)
+    if isinstance(inner, PositionLoop):
+        w = 2.0 * math.pi * inner.bandwidth
+        first, second = w * w, 2.0 * inner.damping * w
+    else:
+        first, second = inner.mass, inner.damping
+    wide = np.zeros((3, 3))
+    wide[: len(b), : len(b)] = E
+    return World(
+        torque=float(arm.kind == "torque"),
+        first=float(first),
+        second=float(second),
+        stiffness=float(inner.stiffness),
+        delay=arm.delay_ticks,
+        tick=arm.tick,
+        steps=steps,
+        speed=float(arm.limits.speed),
+        E=Mat3(*(_three(row) for row in wide)),
+        e=_three(e),
+        c=_three(c),
+        d=0.0 if len(b) else 1.0,
+        sampling=float(arm.sensor.sampling),
+        phase=float(phase),
+        noise=float(noise),
+        full_scale=float(arm.sensor.full_scale),
+        step=ENCODER,
+    )
+
+
+def surface(stiffness: float, damping: float = 0.0, **others: float) -> Surface:
+    """A surface at 0; `others` as `Surface` has them."""
+    numbers: dict[str, float] = {
+        "exponent": 1.0, "place": 0.0, "sway": 0.0, "frequency": 0.0, "later": stiffness, "change": 1e9, "depth": 0.0,
+        **others,
+    }  # fmt: skip
+    return Surface(float(stiffness), float(damping), **{k: float(v) for k, v in numbers.items()})
+
+
+def pressed(world: World, touched: Surface, control: Any, gap: float, desired: Array, seed: Any) -> Array:
+    """A run from the air: force on the surface (mean of each tick), K_u, position and commanded speed, shape (n, 4).
+
+    Args:
+        world: arm and sensor.
+        touched: the surface.
+        control: a part with start(), step(state, desired, force, position) and told(state).
+        gap: between tip and surface at the start [m].
+        desired: F_d at each tick [N], shape (n,).
+        seed: of the noise.
+    """
+    n = len(desired)
+    out = np.zeros((n, 4))
+    noise = np.random.default_rng(seed).standard_normal(8 * (n + 1))
+    compiled_touch(world, touched, control, -gap, desired, noise, np.zeros(world.delay + 1), out)
+    return out
+
+
+def _three(values: Array) -> Vec3:
+    return Vec3(*(float(v) for v in np.concatenate([values, np.zeros(3 - len(values))])))

@@ -1,0 +1,53 @@
+"""What `palpate tune` prints."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from palpate.force.telling import UNCOVERED, sentence
+from palpate.force.tuning import Tuning
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def rows(told: Tuning) -> list[tuple[str, str]]:
+    """What there is to know, name and value."""
+    gains, arm = told.gains, told.gains.arm
+    slowest = max(step.settling for step in told.steps)
+    (low, high), at = told.exact, told.margins
+    found = [
+        ("arm", f"{arm.title} ({arm.kind}, {arm.rate:g} Hz)"),
+        ("lag theta", f"{1e3 * gains.theta:.3g} ms"),
+        ("force", f"{gains.force:g} N"),
+        ("stiffest surface", f"{gains.cap:.4g} N/m (K + B/theta)"),
+        ("gain on it", f"{1e3 * gains.gain:.4g} mm/s per N"),
+        ("approach", f"at most {1e3 * gains.approach:.3g} mm/s"),
+        ("peak at touch", f"{told.peak:.4g} N to expect (no bound)"),
+        ("settling", f"{slowest:.3g} s, stiffness known" if isfinite(slowest) else "-"),
+        ("overshoot", f"{100 * told.overshoot:.2g} %, stiffness known"),
+        (
+            "margins",
+            f"gain {at.gain:.3g}, phase {at.phase:.3g} deg, delay {1e3 * at.delay:.3g} ms",
+        ),
+        ("stable, exact", f"{low:.4g} to {high:.4g} N/m, gain held, B = 0"),
+    ]
+    if told.known is not None:
+        a, b = told.known.stiffness
+        found.append(("surface", f"{a:.4g} to {b:.4g} N/m ({told.known.source})"))
+    found += [("proved", sentence(c, arm.kind)) for c in told.certificate.claims] or [("proved", "nothing")]
+    return found
+
+
+def show(told: Tuning, console: Console) -> None:
+    """Prints it."""
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False, pad_edge=False)
+    for name, value in rows(told):
+        table.add_row(name, value)
+    console.print(table)
+    for code, text in told.warnings:
+        console.print(f"{code}: {text}")
+    console.print("not covered by a proof: " + "; ".join(UNCOVERED))

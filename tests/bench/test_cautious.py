@@ -1,0 +1,35 @@
+"""The cautious force law on the bench: with friction, on surfaces it was not told of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate._vector import Mat3, Vec3
+from palpate.bench.build import build
+from palpate.bench.experiment import changed, load
+from palpate.controllers.cautious_press import without_last_joint
+
+
+@pytest.mark.parametrize(("K", "B"), [(1.3e3, 20.0), (1.1e4, 120.0), (1.2e5, 200.0)])
+def test_it_settles_under_friction_on_any_surface(K, B):
+    surface = {"surface.stiffness": K, "surface.damping": B, "surface.mass": 0.05, "run.press": 2.0}
+    record = build(changed(load("foam-cautious"), surface)).run(30.0, seed=11, press=2.0)
+    assert record.meta["end"] == "done"
+    force = record["force"][record["phase"] == 1.0]
+    assert abs(force[-500:].mean() - 20.0) < 0.3  # 1.5 %: half a second of noise and stick
+    assert force.max() < 1.1 * 20.0
+
+
+def test_the_last_joint_is_left_out_of_x_and_y():
+    J = np.array([[-0.3, -0.2, -0.05], [0.4, 0.3, 0.1], [1.0, 1.0, 1.0]])
+    J_w = np.array(without_last_joint(Mat3(*(Vec3(*row) for row in J.tolist()))))
+    assert J_w[:2, 2].tolist() == [0.0, 0.0]
+    rates = np.array([0.1, -0.3, 0.7])
+    rates[2] = -rates[0] - rates[1]  # the last link keeps its angle: J_w is then J
+    np.testing.assert_allclose(J_w @ rates, J @ rates, atol=1e-15)
+
+
+def test_experiments_come_with_it():
+    for name in ("foam-cautious", "rubber-cautious"):
+        assert type(load(name).controller).__name__ == "CautiousController"

@@ -1,0 +1,222 @@
+"""`palpate tune` and `palpate certify` as a user types them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from force.gained import gains_of
+from palpate.cli import main
+from palpate.force import ForceLoop
+
+RANGE = ("--stiffness", "1e2:1e6", "--arm", "ur5e", "--force", "20")
+
+
+def found(K=5000.0, half=200.0, unit="N/m", B=20.0, **others):
+    def one(value, width, of):
+        return {
+            "value": value, "std": width / 2, "ci95": [value - width, value + width], "unit": of,
+            "verdict": "identified", "reason": "",
+        }  # fmt: skip
+
+    return {
+        "model": "kelvin-voigt",
+        "parameters": {"K": one(K, half, unit), "B": one(B, 5.0, "N s/m")},
+        **others,
+    }
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def ask(capsys, *words):
+    code = main(["tune", *map(str, words), "--json"])
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    return code, json.loads(printed.out)
+
+
+def refused(capsys, *words):
+    assert main(list(map(str, words))) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    return printed.err
+
+
+def test_the_contract_of_json(capsys, elsewhere):
+    code, told = ask(capsys, *RANGE, "--out", "gains.toml", "--report", "page.html")
+    assert code == 0
+    assert {
+        "arm", "kind", "rate_hz", "theta_s", "gains", "approach_speed_m_s", "peak_N", "settling_s", "overshoot",
+        "margins", "proved", "exact", "estimate", "warnings",
+    } <= set(told)  # fmt: skip
+    assert set(told["margins"]) == {"gain", "phase_deg", "delay_s"}
+    low, high = told["proved"]["stiffness"]
+    assert low < 1e2
+    assert high >= 1e6
+    assert told["exact"]["stiffness"][1] >= high
+    assert told["proved"]["jitter_ticks"] == 1
+    assert told["margins"]["gain"] > 3.0
+    assert 0.0 < told["overshoot"] < 0.1
+    page = (elsewhere / "page.html").read_text(encoding="utf-8")
+    assert "Nyquist" in page
+    assert "not covered" in page.lower()
+    loop = ForceLoop.load("gains.toml")
+    assert 0.0 < loop.update(0.0, 0.0) <= told["approach_speed_m_s"]
+
+
+def test_gains_certificate_and_check(capsys, elsewhere):
+    (elsewhere / "gains.toml").write_text(gains_of().to_toml())
+    assert main(["certify", "gains.toml", "--held-only", "--out", "proof.json", "--json"]) == 0
+    capsys.readouterr()
+    assert main(["certify", "--check", "proof.json", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["holds"] is True
+    assert told["contraction"] > 1e3 * told["rounding"]
+    assert main(["certify", "gains.toml", "--check", "proof.json"]) == 0
+    assert "holds" in capsys.readouterr().out
+    (elsewhere / "other.toml").write_text(gains_of(cap=1e4).to_toml())
+    assert "another cap" in refused(capsys, "certify", "other.toml", "--check", "proof.json")
+    spoiled = json.loads((elsewhere / "proof.json").read_text())
+    spoiled["claims"][0]["shares"] = [1.0, 3.0]
+    (elsewhere / "spoiled.json").write_text(json.dumps(spoiled))
+    assert main(["certify", "--check", "spoiled.json"]) == 1
+    (elsewhere / "none.json").write_text("{}")
+    capsys.readouterr()
+    assert "no certificate" in refused(capsys, "certify", "--check", "none.json")
+
+
+def test_what_cannot_be_proved_is_exit_code_1(capsys, elsewhere):
+    (elsewhere / "gains.toml").write_text(gains_of(cap=1e4).to_toml())
+    assert (
+        main(["certify", "gains.toml", "--held-only", "--stiffness", "1e4:2e5", "--out", "proof.json"]) == 1
+    )
+    assert not (elsewhere / "proof.json").exists()
+
+
+def test_from_what_identify_printed(capsys, elsewhere):
+    (elsewhere / "found.json").write_text(json.dumps(found()))
+    code, told = ask(capsys, "found.json", "--arm", "ur5e", "--force", "20")
+    assert code == 0
+    assert told["estimate"]["stiffness"] == 5000.0
+    assert told["gains"]["stiffness_cap"] == pytest.approx(5200.0 + 25.0 / told["theta_s"])
+    low, high = told["proved"]["stiffness"]
+    assert low < 4800.0
+    assert high > 5200.0
+
+
+def test_the_working_point_goes_first(capsys, elsewhere):
+    point = {
+        "stiffness": {
+            "value": 7000.0,
+            "ci95": [6900.0, 7100.0],
+            "prediction95": [6500.0, 7500.0],
+            "unit": "N/m",
+        }
+    }
+    (elsewhere / "found.json").write_text(json.dumps(found(working_point=point)))
+    told = ask(capsys, "found.json", "--arm", "ur5e", "--force", "20")[1]
+    assert told["estimate"]["stiffness_interval"] == [6500.0, 7500.0]
+
+
+def test_an_estimate_as_wide_as_the_margin_is_said(capsys, elsewhere):
+    (elsewhere / "found.json").write_text(json.dumps(found(half=4000.0)))
+    told = ask(capsys, "found.json", "--arm", "ur5e", "--force", "20")[1]
+    assert [w["code"] for w in told["warnings"]] == ["wide-estimate"]
+
+
+def test_straight_from_a_log(capsys, root):
+    log = root / "examples" / "data" / "press.csv"
+    code, told = ask(
+        capsys, log, "--time", "time_s", "--position", "position_mm:mm", "--force", "20", "--arm", "ur5e",
+        "--log-force", "force_N:N",
+    )  # fmt: skip
+    assert code == 0
+    low, high = told["estimate"]["stiffness_interval"]
+    assert 0.0 < low < told["estimate"]["stiffness"] < high
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--arm", "ur5e", "--force", "20"), "for what"),
+        (("--stiffness", "1e4:1e2", "--arm", "ur5e", "--force", "20"), "interval"),
+        (("--stiffness", "0:1e4", "--arm", "ur5e", "--force", "20"), "above 0"),
+        (("--stiffness", "-5:1e4", "--arm", "ur5e", "--force", "20"), "above 0"),
+        (("--stiffness", "1e2:nan", "--arm", "ur5e", "--force", "20"), "number"),
+        (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "0"), "above 0 N"),
+        (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "-20"), "above 0 N"),
+        (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "0.5"), "noise"),
+        (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "200"), "full scale"),
+        (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "20:parsec"), "unit"),
+        (("--stiffness", "1e2:1e4", "--arm", "r2d2", "--force", "20"), "unknown arm"),
+        (("--stiffness", "1e2:1e4", "--arm", "no.toml", "--force", "20"), "no.toml"),
+        (
+            ("--stiffness", "1e2:1e4", "--stiffness-cap", "1e3", "--arm", "ur5e", "--force", "20"),
+            "below what",
+        ),
+        (("--stiffness", "1e2:1e6", "--peak", "20.5", "--arm", "ur5e", "--force", "20"), "no approach speed"),
+        (("--stiffness", "1e2:1e6", "--surface-speed", "0.01", "--arm", "ur5e", "--force", "20"), "limit is"),
+        (
+            ("--stiffness", "1e2:1e6", "--surface-speed", "-1", "--arm", "ur5e", "--force", "20"),
+            "0 m/s or more",
+        ),
+        (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "20", "--out", "g.json"), "toml"),
+        (("missing.json", "--arm", "ur5e", "--force", "20"), "missing.json"),
+        (("x.json", "--stiffness", "1:2", "--arm", "ur5e", "--force", "20"), "not both"),
+    ],
+)
+def test_bad_input_is_one_line(capsys, words, says):
+    assert says in refused(capsys, "tune", *words)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[1, 2]", "identify"),
+        ("{}", "identify"),
+        ("{", "JSON"),
+        (json.dumps({"parameters": {"B": {}}}), "no interval"),
+        (
+            json.dumps({"parameters": {"K": {"value": None, "ci95": None, "reason": "too little moved"}}}),
+            "too little moved",
+        ),
+        (json.dumps(found(unit="1/m")), "1/m"),
+        (json.dumps(found(K=-500.0, half=10.0)), "press on"),
+        (json.dumps({"logs": [], "pooled": None}), "identify"),
+    ],
+)
+def test_a_bad_identification_is_one_line(capsys, elsewhere, text, says):
+    (elsewhere / "found.json").write_text(text)
+    assert says in refused(capsys, "tune", "found.json", "--arm", "ur5e", "--force", "20")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ((), "certify what"),
+        (("gains.toml", "--jitter", "-1"), "jitter"),
+        (("gains.toml", "--margin", "0.5"), "margin"),
+        (("gains.toml", "--stiffness", "5:1"), "lower end"),
+        (("gains.toml", "--damping-time", "0.1:0.2"), "0:T"),
+        (("gains.toml", "--out", "proof.txt"), "json"),
+        (("bad.toml",), "law"),
+        (("none.toml",), "none.toml"),
+    ],
+)
+def test_bad_words_to_certify(capsys, elsewhere, words, says):
+    (elsewhere / "gains.toml").write_text(gains_of("fr3").to_toml())
+    text = (elsewhere / "gains.toml").read_text()
+    (elsewhere / "bad.toml").write_text(text.replace("cautious 1", "cautious 0"))
+    assert says in refused(capsys, "certify", *words)
+
+
+def test_what_stands_there_is_not_replaced_unasked(capsys, elsewhere):
+    (elsewhere / "gains.toml").write_text("mine")
+    assert "did not write it" in refused(capsys, "tune", *RANGE, "--out", "gains.toml")
+    assert (elsewhere / "gains.toml").read_text() == "mine"

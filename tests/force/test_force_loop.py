@@ -1,0 +1,159 @@
+"""The law in a user's loop: each thing that can go wrong has its stated answer, and nothing grows."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from force.gained import gains_of
+from palpate.errors import InputError
+from palpate.force import ForceLoop
+from palpate.force.certificate import FORM, Certificate
+
+
+@pytest.fixture
+def loop():
+    return ForceLoop(gains_of())
+
+
+def press(loop, ticks=1500, K=2e4, start=-2e-4, seed=0):
+    """A tip that follows at once, on a spring, with noise: enough for the loop to learn."""
+    rng, x, speeds = np.random.default_rng(seed), start, []
+    for _ in range(ticks):
+        force = max(K * x, 0.0) + 0.1 * rng.normal()
+        speeds.append(loop.update(float(force), float(x)))
+        x += loop.gains.arm.tick * speeds[-1]
+    return speeds, K * x
+
+
+def test_it_presses_with_the_force_asked_for(loop):
+    assert loop.estimate is None
+    assert loop.phase == "air"
+    _, force = press(loop)
+    assert force == pytest.approx(20.0, rel=0.02)
+    assert loop.phase == "locked"
+    found = loop.estimate
+    assert found.stiffness == pytest.approx(2e4, abs=4.0 * found.stiffness_std + 1000.0)
+    assert found.bound >= 0.95 * 2e4
+    assert loop.trouble == ""
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_reading_that_is_none_holds_the_tip(loop, bad):
+    press(loop, 400)
+    before = loop.state
+    assert loop.update(bad, 0.0) == 0.0
+    assert "no number" in loop.trouble
+    assert loop.update(5.0, bad) == 0.0
+    assert loop.state[:50] == before[:50]  # nothing was learned from it
+    loop.update(20.1, 1e-3)
+    assert "missed" in loop.trouble
+
+
+def test_readings_gone_for_longer_than_the_lag_start_it_anew(loop):
+    press(loop, 1500)
+    noise = loop.noise
+    assert loop.phase == "locked"
+    for _ in range(100):
+        loop.update(math.nan, math.nan)
+    loop.update(0.01, 0.0)
+    assert loop.phase == "air"
+    assert loop.state[50] == loop.gains.seen_cap
+    assert loop.noise == noise
+
+
+def test_missed_ticks(loop):
+    press(loop, 400)
+    loop.update(19.9, 1e-3, 2)
+    assert "missed" in loop.trouble
+    loop.update(0.02, 1e-3, 1000)
+    assert loop.phase == "air"
+
+
+def test_a_stale_force_holds_the_tip(loop):
+    speeds = [loop.update(0.03, 1e-6 * k) for k in range(200)]
+    assert speeds[5] > 0.0
+    assert speeds[-1] == 0.0
+    assert "not changed" in loop.trouble
+
+
+def test_saturation_and_the_force_limit_withdraw(loop):
+    press(loop, 400)
+    assert loop.update(61.0, 1e-3) <= -loop.gains.approach
+    assert "limit" in loop.trouble
+    assert loop.update(100.0, 1e-3) == -loop.gains.approach
+    assert "scale" in loop.trouble
+    assert (
+        loop.update(-100.0, 1e-3) == 0.0
+    )  # a reading that pulls with full scale says nothing of where to go
+
+
+def test_a_lost_contact_is_approached_anew(loop):
+    press(loop, 1500)
+    rng = np.random.default_rng(5)
+    speeds = [loop.update(0.1 * float(rng.normal()), 1e-3) for _ in range(200)]
+    assert loop.phase == "air"
+    assert max(speeds[-50:]) <= loop.gains.approach
+
+
+def test_it_never_asks_for_more_than_the_limit(loop):
+    rng = np.random.default_rng(0)
+    for _ in range(3000):
+        speed = loop.update(float(30.0 * rng.normal()), float(0.1 * rng.normal()))
+        assert abs(speed) <= loop.gains.arm.limits.speed
+        assert math.isfinite(speed)
+    assert all(map(math.isfinite, loop.state))
+
+
+def test_it_goes_on_where_it_was_saved(loop):
+    press(loop, 300)
+    again, other = pickle.loads(pickle.dumps(loop)), ForceLoop(loop.gains)
+    other.state = loop.state
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        force, position = 10.0 + float(rng.normal()), 1e-3 * float(rng.normal())
+        speed = loop.update(force, position)
+        assert again.update(force, position) == speed == other.update(force, position)
+
+
+@pytest.mark.parametrize("bad", [(), (1.0, 2.0), [math.nan] * 61, [9.0] * 61])
+def test_a_state_of_something_else_is_refused(loop, bad):
+    before = loop.state
+    with pytest.raises(InputError, match="state"):
+        loop.state = bad
+    assert loop.state == before
+
+
+@pytest.mark.parametrize("bad", [0.0, -5.0, 0.7, 60.0, math.nan, math.inf])
+def test_a_force_that_cannot_be_kept_is_refused(loop, bad):
+    with pytest.raises(InputError, match="desired force"):
+        loop.desired = bad
+    assert loop.desired == 20.0
+    loop.desired = 25.0
+
+
+def test_many_ticks_leave_no_memory_behind(loop):
+    forces = (5.0 + 0.1 * np.random.default_rng(0).normal(size=20_000)).tolist()
+    for f in forces:
+        loop.update(f, 1e-3)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    for f in forces:
+        loop.update(f, 1e-3)
+    grown = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    assert grown < 2000  # the last speed and the iterator
+
+
+def test_files(loop, tmp_path):
+    loop.save(tmp_path / "gains.toml")
+    assert ForceLoop.load(tmp_path / "gains.toml").gains == loop.gains
+    Certificate(form=FORM, gains=gains_of("fr3"), claims=()).save(tmp_path / "other.json")
+    with pytest.raises(InputError, match="another rate"):
+        ForceLoop.load(tmp_path / "gains.toml", tmp_path / "other.json")
+    with pytest.raises(InputError, match="folder"):
+        loop.save(tmp_path / "nowhere" / "gains.toml")

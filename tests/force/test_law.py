@@ -1,0 +1,151 @@
+"""The cautious law: one text compiled and plain, and what it does on surfaces that it was not told of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from force.gained import gains_of
+from palpate._vector import Vec3
+from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
+from palpate.force.law import LOCKED
+from palpate.force.regression import AXIS_K, PRIOR, Fit, fit_from, without_offset
+from palpate.force.touching import touch
+from palpate.force.worlds import pressed, surface, world_of
+
+
+def run(name, K, B=0.0, force=20.0, noise=0.1, seconds=2.0, seed=0, desired=None, **others):
+    gains = gains_of(name, force, noise=noise)
+    world = world_of(gains.arm, noise=noise)
+    wanted = np.full(round(seconds * gains.arm.rate), force) if desired is None else desired
+    return pressed(world, surface(K, B, **others), gains.cautious(), 0.1 * gains.approach, wanted, seed)
+
+
+@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+@pytest.mark.parametrize("K", [300.0, 3e3, 3e4, 1e6])
+def test_it_settles_on_what_it_meets_without_retuning(name, K):
+    force = run(name, K, 2.0 * 0.1 * np.sqrt(K))[:, 0]
+    assert abs(force[-50:].mean() - 20.0) < 0.2  # 1 %: noise of 0.1 N, averaged
+    assert force.max() < 1.1 * 20.0
+    firm = int(np.argmax(force > 10.0))
+    assert (force[firm:] > 0.0).all()
+
+
+def test_compiled_and_plain_are_one_law():
+    gains = gains_of("ur5e")
+    world, desired = world_of(gains.arm, noise=0.1), np.full(150, 20.0)
+    noise = np.random.default_rng(3).standard_normal(8 * 151)
+    outs = []
+    compiled = pressed(world, surface(5e3, 20.0), gains.cautious(), 1e-4, desired, 3)
+    plain = np.zeros((150, 4))
+    touch(
+        world, surface(5e3, 20.0), gains.cautious(), -1e-4, desired, noise, np.zeros(world.delay + 1), plain
+    )
+    outs += [compiled, plain]
+    # Sums may be taken in another order: the last digits, through a loop that forgets.
+    np.testing.assert_allclose(compiled, plain, rtol=1e-8, atol=1e-10)
+    assert plain[-1, 1] < gains.seen_cap  # it has learned, so that all of the law was run
+
+
+def test_the_bound_stays_above_the_stiffness():
+    for seed in range(6):
+        rows = run("ur5e", 5e3, 30.0, seed=seed)
+        seen = gains_of("ur5e").arm.seen(5e3)
+        assert (
+            rows[rows[:, 0] > 5.0, 1].min() > 0.9 * seen
+        )  # two standard deviations: 2 % of estimates are below
+
+
+def test_in_the_air_it_approaches_and_learns_nothing():
+    gains = gains_of("ur5e")
+    rows = pressed(
+        world_of(gains.arm, noise=0.1), surface(1e5), gains.cautious(), 1.0, np.full(3000, 20.0), 1
+    )
+    assert (rows[:, 1] == gains.seen_cap).all()
+    assert rows[:, 3].max() <= gains.approach
+    assert rows[500:, 3].mean() == pytest.approx(gains.approach, rel=0.02)
+
+
+def test_a_tip_that_lies_on_the_surface_at_the_start_does_not_jump():
+    gains = gains_of("ur5e")
+    rows = pressed(
+        world_of(gains.arm, noise=0.1), surface(1e5), gains.cautious(), -1e-4, np.full(800, 20.0), 1
+    )
+    assert rows[:, 0].max() < 1.15 * 20.0
+
+
+def test_without_the_bound_it_is_worse():
+    gains = gains_of("ur5e", 10.0, noise=0.3)
+    world = world_of(gains.arm, noise=0.3)
+    peaks = {}
+    for bounding in (1.0, 0.0):
+        control = gains.cautious()._replace(bounding=bounding)
+        runs = [
+            pressed(world, surface(4e4), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(5)
+        ]
+        peaks[bounding] = max(runs)
+    assert peaks[1.0] < 11.5 < peaks[0.0]
+
+
+def test_a_stiffer_surface_in_mid_press_is_found_at_once():
+    rows = run("ur5e", 7e3, 8.0, seconds=4.0, later=62e3, change=2.0, depth=20.0 / 7e3)
+    force = rows[1000:, 0]
+    assert force.max() < 1.05 * 20.0
+    assert abs(force[-100:].mean() - 20.0) < 0.3
+
+
+def test_a_step_after_it_was_locked_is_followed():
+    desired = np.concatenate([np.full(1000, 20.0), np.full(1000, 30.0)])
+    force = run("ur5e", 2e3, 10.0, desired=desired)[:, 0]
+    assert abs(force[900:1000].mean() - 20.0) < 0.3
+    assert abs(force[-100:].mean() - 30.0) < 0.3
+    assert force.max() < 1.1 * 30.0
+
+
+def test_the_flat_state_is_the_state():
+    gains = gains_of()
+    law = gains.cautious()
+    numbers = flattened(law)
+    assert flattened(law_in(numbers)).tolist() == numbers.tolist()
+    state, rng = law.start(), np.random.default_rng(0)
+    for k in range(300):
+        _, state = law.step(state, 20.0, 0.02 * k + 0.1 * rng.normal(), 1e-5 * k)
+    flat = flattened(state)
+    assert len(flat) == STATE
+    again = np.zeros(STATE)
+    put_state(again, state_in(flat))
+    assert again.tolist() == flat.tolist()
+    assert state.stage.phase != LOCKED
+
+
+def test_the_fit_is_least_squares_with_its_prior():
+    rng = np.random.default_rng(0)
+    phi = rng.normal(size=(200, 3))
+    force = phi @ [0.4, 0.1, 2.0] + 0.01 * rng.normal(size=200)
+    fit = fit_from(1.0, 10.0)
+    for row, f in zip(phi, force, strict=True):
+        fit = fit.taking(Vec3(*row), f, 1e4, 1.0)
+    N = 1e4 * phi.T @ phi + np.array(PRIOR) + np.diag([0.0, 0.0, 0.01])
+    r = 1e4 * phi.T @ force + np.array([0.0, 0.0, 0.01])
+    np.testing.assert_allclose(fit.solved(), np.linalg.solve(N, r), rtol=1e-9)
+    assert fit.std(AXIS_K) == pytest.approx(np.sqrt(np.linalg.inv(N)[0, 0]))
+
+
+def test_dropping_the_offset_keeps_what_is_known_of_the_slopes():
+    rng = np.random.default_rng(1)
+    fit = fit_from(0.0, 100.0)
+    for _ in range(50):
+        phi = rng.normal(size=3)
+        fit = fit.taking(Vec3(*phi), float(phi @ [0.5, 0.2, 3.0]), 1e6, 1.0)
+    kept = without_offset(fit, 1.0)
+    assert kept.std(AXIS_K) == pytest.approx(fit.std(AXIS_K), rel=1e-3)  # the prior is added once more
+    assert kept.solved().x == pytest.approx(0.5, rel=1e-4)
+    assert without_offset(fit, 0.25).std(AXIS_K) == pytest.approx(2.0 * fit.std(AXIS_K), rel=1e-3)
+
+
+def test_no_information_is_no_certainty():
+    even = Fit(PRIOR, Vec3(0.0, 0.0, 0.0))
+    for _ in range(20_000):
+        even = even.taking(Vec3(0.0, 8.0, 1.0), 0.3, 100.0, 0.999)  # the tip moves evenly in the air
+    assert even.std(Vec3(1.0, 0.0, 0.0)) > 0.9
+    assert np.isfinite(list(even.solved())).all()
