@@ -74,11 +74,12 @@ class Answer:
         return float(self.half[self.names.index(name)])
 
     def parts(self, name: str) -> dict[str, float]:
-        """Half-width of one parameter by cause, largest first."""
+        """Half-width of one parameter by cause, largest first; their squares add up to that of the whole."""
         i = self.names.index(name)
+        total = sum(float(part.variance[i]) for part in self.budget.values()) or 1.0
+        whole = float(self.half[i])
         found = {
-            cause: float(causes.half_widths({cause: Spread(part.variance[i : i + 1], part.freedom)})[0])
-            for cause, part in self.budget.items()
+            cause: whole * float(np.sqrt(part.variance[i] / total)) for cause, part in self.budget.items()
         }
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 

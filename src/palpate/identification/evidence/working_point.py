@@ -56,8 +56,13 @@ def working_point(
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     force, depth = problem.force[inside], problem.motion.moved(0, lag)[inside]
     rest = 0.0 if problem.counted else problem.contacts.resting
+    contacts = problem.contacts
+    stiffness = _judged(value, half, tolerance, unit)
+    if not contacts.signed or (contacts.bonded and value < 0):
+        reason = f"{stiffness.reason}; which way force and position count is not known (--force-sign)"
+        stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
     return WorkingPoint(
-        _judged(value, half, tolerance, unit),
+        stiffness,
         float(force.mean() - rest),
         float(depth.mean()),
         float(frequency),
