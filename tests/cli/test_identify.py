@@ -62,21 +62,17 @@ COLUMNS = {"time": "time_s", "position": "position_mm:mm", "force": "force_N:N"}
 OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
 
 
-@pytest.mark.parametrize(("load", "stiffness"), [(400, 195), (600, 258), (800, 290)])
-def test_a_plain_fit_of_skin(measured, capsys, load, stiffness):
-    path = measured / f"skin_indentation/press_{load}mN.csv"
-    code, found = ask(capsys, path, *SKIN, "--model", "kelvin-voigt")
+@pytest.mark.parametrize(("load", "softest", "stiffest"), [(400, 80, 330), (600, 120, 400), (800, 120, 450)])
+def test_skin_has_a_stiffness_at_its_working_point_and_no_model(measured, capsys, load, softest, stiffest):
+    """The tangents of these presses lie between the two; the tissue stiffens and relaxes, so K, B, M hold nothing."""
+    code, found = ask(capsys, measured / f"skin_indentation/press_{load}mN.csv", *SKIN)
     assert code == 0
-    assert found["model"] == "kelvin-voigt"
-    assert found["parameters"]["K"]["value"] == pytest.approx(stiffness, rel=0.05)
-    assert found["parameters"]["B"]["verdict"] != "identified"
-    assert found["parameters"]["B"]["value"] is None
-    assert "loading alone" in found["parameters"]["B"]["reason"]
-    assert "model-rejected" in codes(found)
-    assert found["fit"]["r2"] == pytest.approx(0.945, abs=0.01)
+    assert found["working_point"]["source"] == "press"
+    assert softest < found["working_point"]["stiffness"]["value"] < stiffest
+    assert all(p["verdict"] != "identified" for p in found["parameters"].values())
     (contact,) = found["contacts"]
-    assert contact["start_s"] == pytest.approx(0.905, abs=0.01)
-    assert contact["end_s"] == pytest.approx(1.2, abs=0.01)
+    assert contact["start_s"] == pytest.approx(0.905, abs=0.02)
+    assert contact["end_s"] == pytest.approx(1.2, abs=0.02)
 
 
 @pytest.mark.parametrize("load", [20, 40])
@@ -90,26 +86,21 @@ def test_silverbox(measured, capsys):
     code, found = ask(capsys, measured / "silverbox/schroeder_80mV.csv", *columns)
     assert code == 0
     own = found["parameters"]
-    assert {own[name]["verdict"] for name in "KBM"} == {"identified"}
+    assert {own[name]["verdict"] for name in "KM"} == {"identified"}  # nobody told the lag, so B is not
     assert {own[name]["unit"] for name in "KBM"} == {"1"}
-    k, b, m = (own[name]["value"] for name in "KBM")
+    k, m = (own[name]["value"] for name in "KM")
     assert np.sqrt(k / m) / (2 * np.pi) == pytest.approx(68.6, rel=0.02)
-    assert b / (2 * np.sqrt(k * m)) == pytest.approx(0.049, rel=0.1)
 
 
 def test_lattice(measured, capsys):
     columns = ("--time", "0", "--position", "3:mm", "--force", "4:g")
     code, found = ask(capsys, measured / "lattice_probe/probe_states.csv", *columns)
     assert code == 0
-    assert {"force-lags-position", "missing-samples", "irregular-time", "position-sign-reversed"} <= set(
-        codes(found)
-    )
+    assert {"missing-samples", "irregular-time", "position-sign-reversed"} <= set(codes(found))
     assert "-1" in next(w["text"] for w in found["warnings"] if w["code"] == "missing-samples")
-    assert found["parameters"]["B"]["verdict"] == "rejected"
-    assert found["parameters"]["B"]["value"] is None
-    assert found["parameters"]["K"]["value"] == pytest.approx(3300, rel=0.1)
-    assert found["lag_s"]["value"] == pytest.approx(0.5, abs=0.15)
-    assert found["lag_s"]["std"] > 0.02
+    assert found["parameters"]["B"]["verdict"] != "identified"
+    assert found["parameters"]["K"]["value"] == pytest.approx(3500, rel=0.15)
+    assert found["lag_s"]["kind"] == "prior"
     assert len(found["contacts"]) == 10
 
 
@@ -268,7 +259,7 @@ WRONG = {
         [*OWN, "--method", "output-error", "--model", "kelvin-voigt-mass", "--lag", "0"],
         "this log shows none .*; take least-squares",
     ),
-    "no mass at all": ([*OWN, "--method", "output-error"], "has no mass: ask for --model kelvin-voigt-mass"),
+    "no mass at all": ([*OWN, "--method", "output-error"], "use least squares"),
     "tolerance": ([*OWN, "--tolerance", "2"], r"tolerance must be in \(0, 1\]"),
     "lag": ([*OWN, "--lag", "late"], "--lag needs VALUE or VALUE:STD"),
     "lag in ms": (

@@ -11,7 +11,7 @@ from identification.problems import problem
 from identification.synthetic_contacts import pressed, record
 from palpate.identification import Verdict, identify
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import pooled, press_of
+from palpate.identification.evidence.press import press_of
 from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness
 from palpate.identification.evidence.working_point import working_point
 from palpate.identification.options import Options
@@ -207,43 +207,6 @@ def test_a_hold_of_a_spring_does_not_relax():
     time, x = press_path(0.3, hold=2.0)
     found = press(time, x, 5000 * np.maximum(x, 0)).relaxation
     assert found is None or abs(found.share) < 1e-3
-
-
-def test_pooled_alike_is_the_weighted_mean():
-    values, variances = np.array([5.0, 5.2, 4.9, 5.1]), np.array([1.0, 2.0, 1.0, 4.0])
-    mean, std, freedom = pooled(values, variances)
-    weight = 1 / variances
-    assert mean == pytest.approx(weight @ values / weight.sum())
-    assert std == pytest.approx(1 / np.sqrt(weight.sum()))
-    assert freedom == 3
-
-
-def test_pooled_different_is_the_plain_mean_and_its_scatter():
-    values = np.array([3.0, 7.0, 5.5, 4.0, 6.0])
-    mean, std, _ = pooled(values, np.full(5, 1e-6))
-    assert mean == pytest.approx(values.mean(), rel=1e-4)
-    assert std == pytest.approx(values.std(ddof=1) / np.sqrt(5), rel=1e-2)
-
-
-@given(st.lists(st.floats(-100, 100), min_size=1, max_size=8), st.floats(1e-6, 10), st.floats(-50, 50))
-def test_pooling_moves_with_its_values(values, variance, by):
-    own = np.array(values)
-    one, other = (pooled(v, np.full(len(own), variance)) for v in (own, own + by))
-    assert other[0] == pytest.approx(one[0] + by, abs=1e-6)
-    assert other[1] == pytest.approx(one[1], rel=1e-4, abs=1e-9)
-
-
-def test_intervals_of_pooled_presses_hold_the_mean_they_scatter_about():
-    """t(n - 1) of five presses whose stiffnesses differ by 10 %; 190 of 200 expected, four deviations less 178."""
-    from scipy.stats import t
-
-    inside = 0
-    for seed in range(200):
-        rng = np.random.default_rng(seed)
-        true = rng.normal(100, 10, 5)
-        mean, std, freedom = pooled(true + rng.normal(0, 3, 5), np.full(5, 9.0))
-        inside += abs(mean - 100) < t.ppf(0.975, freedom) * std
-    assert 178 <= inside <= 199, inside
 
 
 def octave(frequency, storage, half, share, loss=0.0):

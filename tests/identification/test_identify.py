@@ -31,11 +31,12 @@ def test_a_lag_that_is_calibrated_does_not_bias():
     assert (found.lag.value, found.lag.std, found.lag.kind) == (0.005, 1e-4, "told")
 
 
-def test_a_lag_that_the_log_can_tell_is_found():
+def test_a_lag_nobody_told_stays_a_prior_and_b_knows_no_more_of_it():
     found = identify(shaken(lag=0.005, noise=0.05))
-    assert found.lag.kind == "measured"
-    assert abs(found.lag.value - 0.005) < found.lag.bound < 1e-3
-    assert found.parameters["B"].value == pytest.approx(40, rel=0.1)
+    assert found.lag.kind == "prior"
+    damping = found.parameters["B"]
+    assert damping.verdict is not Verdict.IDENTIFIED
+    assert damping.budget["lag"] > 1.9 * 5000 * 0.0075
 
 
 def test_the_lags_own_uncertainty_is_in_the_interval():
@@ -139,7 +140,8 @@ def test_one_sine_cannot_tell_a_lag_from_damping_unless_it_is_calibrated():
     assert found.parameters["B"].verdict is Verdict.NOT_IDENTIFIABLE
     assert "lag-damping-confounded" in found.codes
     known = identify(log, lag=0.0, lag_std=1e-4)
-    assert known.parameters["B"].value == pytest.approx(40, rel=0.1)
+    near = min(known.dynamic_stiffness, key=lambda octave: abs(octave.frequency - 1))
+    assert abs(near.loss - omega * 40) < near.loss_half  # one frequency tells the loss, and no more
 
 
 @pytest.mark.parametrize("lag", [0.02, 0.04])

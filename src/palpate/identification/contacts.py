@@ -31,6 +31,8 @@ _ROUNDS = 3
 _FREE = 0.25
 """Share of the position's range that must be travelled at one end of the force for contact to be sure to begin there:
 the power law of the softest toe (n = 2) goes 0.22 of its depth below ONSET of its force."""
+_TWICE = 2.0
+"""How much farther the position must travel at one end of the force than at the other, if at both without the force."""
 _DWELL = 8
 """Samples that a force stays near an end of its range before it may rest there: an oscillation only turns."""
 _FLAT = 0.4
@@ -244,9 +246,11 @@ def _free_end(force: Array, position: Array, dt: float) -> tuple[float, float] |
     free = [t > _FREE or _flat(force, position, own, slope) for t, own in zip(travel, stays, strict=True)]
     if not any(free):
         return None
-    if all(free):
+    if all(free):  # a damped oscillation turns at both ends alike: its force leads its position
         ratio = travel[0] / max(travel[1], 1e-300)
-        from_low = ratio > 1 if max(ratio, 1 / max(ratio, 1e-300)) > 2 else abs(low) <= abs(high)
+        if 1 / _TWICE < ratio < _TWICE:
+            return None
+        from_low = ratio > 1
     else:
         from_low = free[0]
     return (low, high) if from_low else (high, low)

@@ -85,7 +85,7 @@ def identify(
     terms = replace(terms, band=highest_motion(problem.motion))
     choice = choose(problem, options)
     holds = estimated_by(method, choice.answer.fit.model, choice.problem, channels)
-    follows = max(choice.answer.explained, holds.r2) > _FOLLOWS
+    follows = max(choice.answer.fit.r2, holds.r2) > _FOLLOWS
     if not (contacts.clear or bonded or follows):
         text = f"the force (rms {choice.answer.unexplained:.3g} N) does not follow the position: nothing seems touched"
         return nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))

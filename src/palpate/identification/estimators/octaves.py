@@ -170,14 +170,9 @@ def _phase(
 ) -> tuple[NDArray[np.complex128], tuple[Array, NDArray[np.complex128]]]:
     """The transform of a block, and that of its mean and slope; the power of white noise stays what it is."""
     time = np.arange(length)
-    if numbers == _WHOLE_LINES:  # half cosines, two to a line: a step where a contact begins is kept
-        half = np.cos(np.pi * np.outer(time + 0.5, np.arange(1, 2 * len(numbers) + 1)) / length)
-        phase = np.sqrt(2 / length) * (half[:, ::2] + 1j * half[:, 1::2])
-        window = np.ones(length)
-    else:
-        window = np.hanning(length + 2)[1:-1]
-        window /= np.sqrt(window @ window / 2)
-        phase = np.exp(-2j * np.pi * np.outer(time, numbers) / length) * window[:, None]
+    window = np.hanning(length + 2)[1:-1]
+    window /= np.sqrt(window @ window / 2)
+    phase = np.exp(-2j * np.pi * np.outer(time, numbers) / length) * window[:, None]
     plain = np.column_stack([np.ones(length), 2 * time / (length - 1) - 1])
     weighted = window[:, None] * plain
     fitted = np.linalg.solve(weighted.T @ plain, weighted.T)  # (2, length)
