@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.identification.estimators.robust import Answer, answer
+from palpate.identification.estimators.robust import Answer, answer, lag_open
 from palpate.identification.models import (
     KELVIN_VOIGT,
     KELVIN_VOIGT_MASS,
@@ -76,9 +76,8 @@ def choose(problem: Problem, options: Options) -> Choice:
         best, at = plain, problem
         tried = [_compared(plain, "")]
         if name is None and options.series_stiffness is None and plain.unexplained > _sensor_rms(plain):
-            one_sided = (
-                problem.with_touches is not None
-            )  # a power of the depth needs the place of the surface
+            # A power of the depth needs the place of the surface, and looks like a lag that nobody has told.
+            one_sided = problem.with_touches is not None and not lag_open(problem)
             for make in (standard_linear_solid, *([hunt_crossley] if one_sided else [])):
                 rich, own = _one_sided(make, problem)
                 why = _against(rich, best, tolerance)
