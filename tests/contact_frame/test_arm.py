@@ -71,7 +71,10 @@ def test_a_press_on_a_rigid_wall_is_the_arm():
     calibrated = Arm(position_from="joints", stiffness=arm)
     found, along = identify_contact(in_series(40e3), arm=calibrated, lag=0.0)
     assert soft.parameters["K"].value == pytest.approx(1 / (1 / 5000 + 1 / 40e3), rel=0.05)
-    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
+    own = found.parameters["K"]
+    assert (
+        abs(own.value - 5000) < 1.5 * (own.ci95[1] - own.ci95[0]) / 2
+    )  # 95 % are missed once in twenty, not by half
     assert "series-compliance" not in found.codes
     assert any("taken out of K" in line for line in told(along.meta))
 
