@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.octaves import Segment
+from palpate.identification.pooling import student
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness
 
@@ -123,7 +124,7 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
     power = float((np.abs(blocks.position) ** 2).sum())
     line = _fitted(blocks)
     omega, parts = line.omega, line.parts
-    halves = _student(line.freedom) * np.sqrt(line.variance)
+    halves = student(line.freedom) * np.sqrt(line.variance)
     by_lag = 1.96 * omega * lag_std
     halves = np.hypot(
         halves, [abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag]
@@ -163,9 +164,3 @@ def _fitted(blocks: _Blocks) -> _Line:
     change = theta[2:] * np.sqrt(spread) if slope else np.zeros(2)
     variance = np.maximum((moved**2).sum(axis=0) * grown, within)
     return _Line(omega, theta[:2], change, variance, freedom)
-
-
-def _student(freedom: float) -> float:
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(freedom, 1.0), 0.975))
