@@ -25,6 +25,8 @@ class Motion:
         rows: the samples that are fitted, shape (m,): of the position behind a filter, of the force behind a sensor.
         bonded: whether the probe is fixed to the surface.
         noise: of the position; it makes every column of the regression uncertain.
+        free: what the position does before it meets the surface, zero in contact, shape (n,); None in rows of contact.
+        touched: 1 from the touch on, 0 before, shape (n,); None likewise.
     """
 
     chain: Chain | SensorPath
@@ -32,6 +34,8 @@ class Motion:
     rows: NDArray[np.intp]
     bonded: bool
     noise: PositionNoise = NOISELESS
+    free: Array | None = None
+    touched: Array | None = None
     _kept: dict[tuple[int, float], Array] = field(default_factory=dict)
     _powers: dict[int, Array] = field(default_factory=dict)
 
@@ -55,6 +59,13 @@ class Motion:
         return self.filtered(self._powers[n], 0, lag)
 
     @property
+    def instants(self) -> Array:
+        """Sample of the position that each row belongs to, shape (m,)."""
+        if isinstance(self.chain, SensorPath):
+            return self.chain.instants[self.rows]
+        return self.rows.astype(np.float64)
+
+    @property
     def matched(self) -> bool:
         """Whether the force sensor's own way is known, so that its readings are as white as their noise."""
         return isinstance(self.chain, SensorPath)
@@ -73,6 +84,20 @@ class Motion:
 def on_rows(motion: Motion, rows: NDArray[np.intp]) -> Motion:
     """The same motion at other rows, shape (m,)."""
     return replace(motion, rows=rows, _kept={})
+
+
+def from_surface(motion: Motion, inside: NDArray[np.bool_], surface: float) -> Motion:
+    """The same motion counted from a surface: nothing is pressed before it is met.
+
+    Args:
+        motion: whose position is that of the probe.
+        inside: samples that are in contact for sure, shape (n,).
+        surface: its position [m].
+    """
+    depth = motion.position - surface
+    pressed = np.where(inside, depth, np.maximum(depth, 0.0))
+    touched = (inside | (depth > 0)).astype(np.float64)
+    return replace(motion, position=pressed, free=depth - pressed, touched=touched, _kept={}, _powers={})
 
 
 def without_noise(motion: Motion) -> Motion:
@@ -234,6 +259,17 @@ def at_rest_before(model: Model) -> Model:
         return model.columns(motion, knobs, lag)[:-1]
 
     return replace(model, linear=model.linear[:-1], columns=columns)
+
+
+def begun_before(model: Model) -> Model:
+    """The same in a log that begins in contact: what the Maxwell branch was stretched by then dies out with tau."""
+
+    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+        own = model.columns(motion, knobs, lag)
+        since = np.arange(len(motion.position)) * motion.chain.dt
+        return [*own[:-1], motion.filtered(np.exp(-since / knobs["tau"]), 0, lag), own[-1]]
+
+    return replace(model, linear=(*model.linear[:-1], "y0", model.linear[-1]), columns=columns)
 
 
 def with_friction(model: Model, way: Array) -> Model:

@@ -169,7 +169,7 @@ def _untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
 
 
 def _traces(channels: Channels, chain: Chain, choice: Choice, terms: Terms) -> Traces:
-    problem, fitted = choice.problem, choice.answer.fit
+    problem, fitted = choice.answer.problem, choice.answer.fit
     step = max(len(channels.position) // _SHOWN, 1)
     size = max(len(problem.force) // _SHOWN, 1)
     linear = fitted.model.linear
@@ -182,7 +182,7 @@ def _traces(channels: Channels, chain: Chain, choice: Choice, terms: Terms) -> T
         fitted_time=block_means(channels.start + problem.time, size),
         fitted_position=block_means(problem.motion.moved(0, fitted.lag), size),
         fitted_force=block_means(problem.force, size),
-        predicted=block_means(fitted.predicted, size),
+        predicted=block_means(fitted.force, size),
         columns={name: block_means(c, size) for name, c in zip(linear, columns, strict=True)},
         theta={name: fitted[name] for name in linear},
         prior={"M": lag.mass[1]} if lag.mass and "M" in linear else {},

@@ -74,7 +74,8 @@ class Problem:
         spans: number of the contact that each belongs to, shape (m,).
         lag: prior.
         free: the force out of contact behind the same front end, in stretches of rows.
-        touch: the rows with those before each touch; None if no touch is in the log.
+        touch: the rows with those shortly before each touch; None if no touch is in the log.
+        approach: the same with as many rows before a touch as the contact has, where there are so many.
         origin: position of the surface on the log's own scale [m].
         contacts: as found.
         counted: the force is counted from where it rests out of contact, and the rows begin before the touches.
@@ -86,6 +87,7 @@ class Problem:
     lag: Lag
     free: tuple[Array, ...]
     touch: Touch | None
+    approach: Touch | None
     origin: float
     contacts: Contacts
     counted: bool = False
@@ -110,12 +112,30 @@ class Problem:
     @property
     def with_touches(self) -> Problem | None:
         """The same over the rows from before each touch, the force counted from where it rests; None if unknown."""
-        if self.touch is None:
+        return self._at(self.touch)
+
+    @property
+    def with_approach(self) -> Problem | None:
+        """The same over the rows from as long before each touch as the contact lasts; None without a touch."""
+        return self._at(self.approach)
+
+    def _at(self, touch: Touch | None) -> Problem | None:
+        if touch is None:
             return None
-        motion = replace(self.motion, rows=self.touch.rows, _kept={})
+        motion = replace(self.motion, rows=touch.rows, _kept={})
         return replace(
-            self, motion=motion, force=self.touch.force, spans=self.touch.spans, touch=None, counted=True
+            self, motion=motion, force=touch.force, spans=touch.spans, touch=None, approach=None, counted=True
         )
+
+    @property
+    def in_contact(self) -> NDArray[np.bool_]:
+        """Samples of the position between the first and the last row of a contact, shape (n,)."""
+        found = np.zeros(len(self.motion.position), bool)
+        instants = self.motion.instants
+        for number in np.unique(self.spans):
+            own = instants[self.spans == number]
+            found[int(own[0]) : int(np.ceil(own[-1])) + 1] = True
+        return found
 
 
 def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Options) -> Problem:
@@ -146,14 +166,15 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     motion = Motion(chain, position, rows, contacts.bonded, _noise(position, rows, spans))
     period = 1 / channels.rate
     lag = lag_prior(options.lag, options.lag_std, period, 0.0, options.mass)
-    touch = None
+    touch = approach = None
     if not contacts.bonded:
         margin = int(np.ceil(chain.settling / chain.dt))
         begins = [begin for begin, _ in contacts.spans]
         usable = _settled(channels.valid, margin)
         touch = touching(force, contacts.resting, rows, spans, begins, margin, usable)
+        approach = touching(force, contacts.resting, rows, spans, begins, margin, usable, reach=1)
     free = _free(force, channels, chain, contacts)
-    return Problem(motion, force[rows], spans, lag, free, touch, origin, contacts)
+    return Problem(motion, force[rows], spans, lag, free, touch, approach, origin, contacts)
 
 
 MOST_ROWS = 1 << 17
@@ -166,11 +187,24 @@ def reduced(problem: Problem) -> Problem:
     rows = problem.motion.rows
     if len(rows) <= MOST_ROWS:
         return problem
-    pieces = -(-len(rows) // _PIECE)
-    every = -(-pieces // (MOST_ROWS // _PIECE))
-    kept = (np.arange(len(rows)) // _PIECE) % every == 0
+    kept = _pieces(len(rows))
     motion = replace(problem.motion, rows=rows[kept], _kept={})
-    return replace(problem, motion=motion, force=problem.force[kept], spans=problem.spans[kept])
+    fewer = replace(problem, motion=motion, force=problem.force[kept], spans=problem.spans[kept])
+    return replace(fewer, touch=_fewer(problem.touch), approach=_fewer(problem.approach))
+
+
+def _fewer(touch: Touch | None) -> Touch | None:
+    if touch is None or len(touch.rows) <= MOST_ROWS:
+        return touch
+    kept = _pieces(len(touch.rows))
+    return Touch(touch.rows[kept], touch.spans[kept], touch.force[kept])
+
+
+def _pieces(count: int) -> NDArray[np.bool_]:
+    pieces = -(-count // _PIECE)
+    every = -(-pieces // (MOST_ROWS // _PIECE))
+    kept: NDArray[np.bool_] = (np.arange(count) // _PIECE) % every == 0
+    return kept
 
 
 def _free(force: Array, channels: Channels, chain: Chain, contacts: Contacts) -> tuple[Array, ...]:
@@ -294,13 +328,14 @@ def _of_sensor_path(channels: Channels, chain: Chain, contacts: Contacts, option
         low_pass.lag,
         options.mass,
     )
-    touch = None
+    touch = approach = None
     if not contacts.bonded:
         begins = np.searchsorted(time, [begin for begin, _ in between]).tolist()
         margin = int(np.ceil(path.settling / path.period))
         touch = touching(force, contacts.resting, rows, spans, begins, margin, usable)
+        approach = touching(force, contacts.resting, rows, spans, begins, margin, usable, reach=1)
     free = _path_free(force, time, contacts, chain, channels)
-    return Problem(motion, force[rows], spans, lag, free, touch, origin, contacts)
+    return Problem(motion, force[rows], spans, lag, free, touch, approach, origin, contacts)
 
 
 def _path_usable(

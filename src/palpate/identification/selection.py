@@ -14,6 +14,7 @@ from palpate.identification.models import (
     KELVIN_VOIGT_MASS,
     Model,
     at_rest_before,
+    begun_before,
     hunt_crossley,
     standard_linear_solid,
 )
@@ -51,12 +52,13 @@ class Choice:
 
         The octaves do not see a force that sinks over a whole contact, as of a relaxing surface.
         """
-        fitted, spans = self.answer.fit, self.problem.spans
+        fitted, problem = self.answer.fit, self.answer.problem
+        spans = problem.spans
         left, whole = 0.0, 0.0
         for number in np.unique(spans):
             own = spans == number
             u = np.linspace(-1.0, 1.0, int(own.sum()))
-            residuals, force = fitted.residuals[own], self.problem.force[own]
+            residuals, force = fitted.residuals[own], problem.force[own]
             slope = float(u @ residuals) / max(float(u @ u), 1e-300)
             left += float(np.sum((residuals - residuals.mean() - slope * u) ** 2))
             whole += float(np.sum((force - force.mean()) ** 2))
@@ -96,7 +98,8 @@ def _one_sided(make: Callable[..., Model], problem: Problem) -> tuple[Answer, Pr
     """A model with the place of the surface in it, fitted to the touches too where the log has them."""
     wider = problem.with_touches
     if wider is None:
-        return answer(problem, make(problem.motion)), problem
+        model = make(problem.motion)
+        return answer(problem, begun_before(model) if "K1" in model.linear else model), problem
     return answer(wider, at_rest_before(make(wider.motion))), wider
 
 

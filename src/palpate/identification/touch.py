@@ -24,16 +24,12 @@ class Touch:
     Args:
         rows: shape (m,).
         spans: number of the contact that each belongs to, shape (m,).
-        inside: which of them are those of the contacts proper, shape (m,).
         force: filtered, less what it rests at out of contact, shape (m,).
-        resting: what it rests at [N].
     """
 
     rows: Rows
     spans: Rows
-    inside: NDArray[np.bool_]
     force: Array
-    resting: float
 
 
 def touching(
@@ -44,8 +40,9 @@ def touching(
     begins: Sequence[int],
     margin: int,
     usable: NDArray[np.bool_],
+    reach: int = 0,
 ) -> Touch | None:
-    """The rows in contact and those from `margin` before each touch; None if no touch is in the log.
+    """The rows in contact and those before each touch; None if no touch is in the log.
 
     Args:
         force: filtered, shape (n,).
@@ -53,13 +50,16 @@ def touching(
         rows: in contact, settled, shape (m,).
         spans: number of the contact that each belongs to, shape (m,).
         begins: first row behind the touch of each contact.
-        margin: rows before the touch; fewer where the contact before is nearer, none where it is too near.
+        margin: of the filter's memory: samples before the touch; fewer where the contact before is nearer, none where
+            it is too near.
         usable: rows whose filter remembers only valid readings, shape (n,).
+        reach: samples before the touch for each of the contact, if there are so many; those of `margin` at least.
     """
     before, left = [], 0
     edges = np.flatnonzero(np.diff(spans, prepend=-1))
     for number, own in zip(spans[edges], np.split(rows, edges[1:]), strict=True):
-        first = max(begins[number] - margin, left + margin)
+        wanted = max(margin, reach * int(own[-1] - own[0]))
+        first = max(begins[number] - wanted, left + margin, margin)
         if first < begins[number]:
             step = int(own[1] - own[0]) if len(own) > 1 else 1
             fresh = np.arange(own[0] - step, first - 1, -step)
@@ -70,7 +70,4 @@ def touching(
     fresh, numbers = np.array(before, dtype=np.intp).T
     every = np.r_[rows, fresh]
     order = np.argsort(every)
-    inside = np.r_[np.ones(len(rows), bool), np.zeros(len(fresh), bool)]
-    return Touch(
-        every[order], np.r_[spans, numbers][order], inside[order], force[every[order]] - resting, resting
-    )
+    return Touch(every[order], np.r_[spans, numbers][order], force[every[order]] - resting)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.identification.estimators.fit import Fit
+from palpate.identification.estimators.fit import Fit, Prediction
 from palpate.identification.estimators.robust import Answer
 from palpate.identification.prior import LAG, Lag
 from palpate.identification.result import Parameter, Verdict, WorkingPoint
@@ -19,6 +19,8 @@ _FAR = 2.0
 _NOTHING = 1e4
 """Half-widths over the value beyond which no bounds are worth printing."""
 _SHAPE = ("n", "tau", "x0")
+_NUISANCE = ("x0", "y0")
+"""Where the surface is, and how a branch was stretched when the log began: found, not asked for."""
 """Parameters without force in their unit: no calibration of force or position scales them."""
 
 
@@ -58,7 +60,7 @@ def verdicts(
     """
     found = choice.answer
     lag = choice.problem.lag
-    names = [n for n in found.names if n not in (LAG, "x0")]
+    names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
     parameters = {name: _parameter(name, choice, holds, terms) for name in names}
     if point is not None and {"K", "M"} <= set(found.names):
         parameters = _agreeing(parameters, found, point)
@@ -215,7 +217,7 @@ def _remedy(name: str, terms: Terms) -> str:
     return "press deeper, longer or more often; try palpate excite"
 
 
-def unit_of(name: str, fitted: Fit, terms: Terms) -> str:
+def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:
     """The unit of one parameter of a model."""
     units = impedance_units(terms.force_unit, terms.position_unit)
     plain = units["K"] == "1"

@@ -103,6 +103,37 @@ def of_unexplained(system: System, solution: Solution, sensor: Array) -> Spread:
     return Spread(HIDDEN_SHARE**2 * np.maximum(weight @ gain, 0.0))
 
 
+def white_level(level: Array, lines: Array) -> tuple[float, float]:
+    """Level of white noise, and the lines that it rests on: as many of the quietest octaves as differ by chance alone.
+
+    Args:
+        level: variance of a line in each octave, over that of white noise of variance 1.
+        lines: that each level rests on, shape (octaves,); one is not 0 at least.
+
+    Source: Bartlett's test of equal variances, at 95 %.
+    """
+    from scipy.special import chdtri
+
+    order = np.argsort(level)
+    order = order[lines[order] > 0]
+    for last in range(len(order), 0, -1):
+        own, count = np.maximum(level[order[:last]], 1e-300), lines[order[:last]]
+        pooled = float(own @ count / count.sum())
+        apart = float(count.sum() * np.log(pooled) - count @ np.log(own))
+        scale = 1 + float((1 / count).sum() - 1 / count.sum()) / (3 * max(last - 1, 1))
+        if last == 1 or apart / scale <= float(chdtri(last - 1, 0.05)):
+            break
+    return pooled, float(count.sum())
+
+
+def by_chance(lines: Array, count: float) -> Array:
+    """How far a level of some lines, shape (octaves,), may exceed the same level of `count` lines: F at 95 %."""
+    from scipy.special import fdtri
+
+    chance: Array = fdtri(np.maximum(lines, 1.0), max(count, 1.0), 0.95)
+    return np.where(lines > 0, chance, 1.0)
+
+
 def half_widths(budget: Budget) -> Array:
     """95 % half-widths of all causes together, shape (p,).
 

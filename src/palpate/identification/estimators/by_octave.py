@@ -52,7 +52,13 @@ class System:
 
 @dataclass(frozen=True)
 class Solution:
-    """Parameters, their covariance for the noise levels given, and these: shapes (p,), (p, p), (octaves,)."""
+    """Parameters and their covariance for given noise levels.
+
+    Args:
+        theta: shape (p,).
+        cov: shape (p, p).
+        noise: variance of a line in each octave, shape (octaves,).
+    """
 
     theta: Array
     cov: Array
@@ -113,11 +119,10 @@ def _levels(system: System, solution: Solution) -> Array:
     full = np.append(-solution.theta, 1.0)
     products, lines = system.stretches
     left = np.maximum(np.einsum("i,goij,j->go", full, products, full), 0.0) / np.maximum(lines, 1.0)
-    power = products[:, :, -1, -1]
-    share = np.where(lines > 0, power, 0.0) / np.maximum(power.sum(axis=0), 1e-300)
+    share, count = _shares(system)
     used = np.einsum("oij,ij->o", system.products[:, :-1, :-1], solution.cov) / solution.noise
-    free = np.maximum(system.lines - used, 0.0)
-    whole = (share * left).sum(axis=0) * system.lines
+    free = np.maximum(count - used, 0.0)
+    whole = (share * left).sum(axis=0) * count
     floor = 1e-12 * float(system.products[:, -1, -1].sum()) / max(float(system.lines.sum()), 1.0) + 1e-280
     noise = np.full(len(whole), floor)
     above = 0.0
@@ -127,3 +132,17 @@ def _levels(system: System, solution: Solution) -> Array:
             own = (whole[o] + borrowed * above) / max(free[o] + borrowed, 1.0)
             above = noise[o] = max(own, floor)
     return noise
+
+
+def _shares(system: System) -> tuple[Array, Array]:
+    """Weight of each stretch in an octave's level, (groups, octaves), and the lines that such a mean rests on."""
+    products, lines = system.stretches
+    power = np.where(lines > 0, products[:, :, -1, -1], 0.0)
+    share = power / np.maximum(power.sum(axis=0), 1e-300)
+    spread = np.sum(share**2 / np.maximum(lines, 1.0), axis=0)
+    return share, np.where(spread > 0, 1 / np.maximum(spread, 1e-300), 0.0)
+
+
+def worth(system: System) -> Array:
+    """Lines that the noise level of each octave rests on, shape (octaves,)."""
+    return np.where(system.lines > 0, _shares(system)[1], 0.0)

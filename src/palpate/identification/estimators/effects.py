@@ -1,4 +1,8 @@
-"""Columns of force that no contact model has, but many a log: friction, hysteresis, stiffness that goes with depth."""
+"""Columns of force that no contact model has, but many a log.
+
+Friction, hysteresis, a stiffness that goes with depth; where the log holds the approach, a force that is there at once
+with the touch (adhesion, or a surface that is met elsewhere), and the inertia of what moves before it.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,7 @@ from palpate.identification.models import Model, Motion, direction
 Array = NDArray[np.float64]
 
 FRICTION = "Fc"
+TOUCH = "touch"
 
 
 def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segment]) -> dict[str, Array]:
@@ -25,6 +30,9 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
     found = {FRICTION: motion.filtered(direction(motion), 0, lag)}
     if model.knobs:
         return found
+    if motion.free is not None and motion.touched is not None:
+        found[TOUCH] = motion.filtered(motion.touched, 0, lag)
+        found["free inertia"] = motion.filtered(motion.free, 2, lag)
     x = motion.moved(0, lag)
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     depth = (x - float(x[inside].mean())) / (float(np.ptp(x[inside])) or 1.0)

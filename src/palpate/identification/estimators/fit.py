@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -109,23 +109,62 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag) -> Fit:
     return _finish(model, motion, force, best, lag, known)
 
 
-def relinearised(fitted: Fit, motion: Motion, force: Array, theta: dict[str, float]) -> Fit:
-    """The same about other values of the parameters, for a model without nonlinear ones."""
-    values = np.array([theta.get(name, fitted[name]) for name in fitted.names])
-    lag = theta[LAG]
-    columns = np.column_stack(fitted.model.columns(motion, {}, lag))
-    count = columns.shape[1]
-    values[:count] += np.eye(count)[-1] * float(np.mean(force - columns @ values[:count]))  # of the offset
-    predicted = columns @ values[:count]
-    point = _Point({}, lag, columns, values[:count], force - predicted, 0.0, 0.0)
-    slope = _slopes(fitted.model, motion, point, [_lag_knob(motion, Lag(lag))])
-    jacobian = np.column_stack([columns, slope])
-    rmse = float(np.sqrt(np.mean((force - predicted) ** 2)))
-    spread = float(np.mean((force - force.mean()) ** 2))
-    return replace(
-        fitted, theta=values, jacobian=jacobian, residuals=force - predicted, predicted=predicted, lag=lag,
-        rmse=rmse, r2=1 - rmse**2 / spread if spread else 0.0,
-    )  # fmt: skip
+@dataclass(frozen=True)
+class Prediction:
+    """The force that a model predicts for a log.
+
+    Args:
+        model: which.
+        theta: its parameters by name.
+        lag: of the force behind the position [s].
+        force, residuals: predicted, and what it leaves of the measured one, shape (n,).
+        r2, rmse: share of the variance that it explains, and rms of what it leaves.
+    """
+
+    model: Model
+    theta: dict[str, float]
+    lag: float
+    force: Array
+    residuals: Array
+    r2: float
+    rmse: float
+
+    @classmethod
+    def of(
+        cls, model: Model, motion: Motion, force: Array, theta: dict[str, float], lag: float
+    ) -> Prediction:
+        """By a model; an offset that is not among the parameters is that of the mean.
+
+        Args:
+            model: which.
+            motion: the position.
+            force: measured, shape (n,).
+            theta: its parameters.
+            lag: of the force [s].
+        """
+        columns = model.columns(motion, theta, lag)
+        predicted = sum(
+            (theta.get(n, 0.0) * c for n, c in zip(model.linear, columns, strict=True)), np.zeros(len(force))
+        )
+        if "offset" in model.linear and "offset" not in theta:
+            offset = float(np.mean(force - predicted))
+            theta, predicted = {**theta, "offset": offset}, predicted + offset
+        residuals = force - predicted
+        rmse = float(np.sqrt(np.mean(residuals**2)))
+        spread = float(np.mean((force - force.mean()) ** 2))
+        return cls(model, theta, lag, predicted, residuals, 1 - rmse**2 / spread if spread else 0.0, rmse)
+
+    def __getitem__(self, name: str) -> float:
+        return self.theta[name]
+
+
+def slope_of_lag(model: Model, motion: Motion, theta: dict[str, float], lag: float) -> Array:
+    """Derivative of the predicted force by the lag [N/s], shape (n,), of a model without nonlinear parameters."""
+    knob = _lag_knob(motion, Lag(lag))
+    up, down = (model.columns(motion, {}, lag + step) for step in (knob.step, -knob.step))
+    pairs = zip(model.linear, up, down, strict=True)
+    change = sum((theta.get(n, 0.0) * (u - d) for n, u, d in pairs), np.zeros(len(motion.rows)))
+    return change / (2 * knob.step)
 
 
 def _evaluate(

@@ -9,7 +9,7 @@ products of all columns are summed over the lines of each octave and over stretc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -32,6 +32,8 @@ OVERLAP = 0.75
 TIED = 35 / 18
 """Power of white noise along a sine's own lines, over that of a line: Hann's window ties neighbouring lines, so that
 three of them are worth about one and a half (n sum w^4 / (sum w^2)^2)."""
+_MEMORY = 1 << 13
+"""Rows in which filtered noise has forgotten itself, with room."""
 _AT_ONCE = 1 << 22
 """Numbers of one channel's blocks that are in memory at a time."""
 
@@ -141,6 +143,33 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
     return (
         Octaves(products[seen], lines[seen], frequency) if seen.any() else Octaves(products, lines, frequency)
     )
+
+
+def white_lines(gain: Callable[[Array], Array], dt: float, longest: int, octaves: Octaves) -> Array:
+    """Variance of a line of filtered white noise of variance 1 in each octave, shape (octaves,).
+
+    What a block's window leaks from the filter's pass band is in it: beyond the cut-off there is little else.
+
+    Args:
+        gain: of the filter's amplitude at frequencies [Hz].
+        dt: from row to row [s].
+        longest: rows of the block of the first octave.
+        octaves: for their number.
+    """
+    from scipy.linalg import matmul_toeplitz
+
+    correlation = np.zeros(longest)
+    frequency = np.asarray(np.fft.rfftfreq(2 * _MEMORY, dt), np.float64)
+    short = np.fft.irfft(gain(frequency) ** 2)[: min(_MEMORY, longest)]
+    correlation[: len(short)] = short
+    found = np.empty(len(octaves.frequency))
+    for o in range(len(found)):
+        length = longest if o == 0 else longest >> (o - 1)
+        phase, level = _phase(length, _WHOLE_LINES if o == 0 else _LINES)
+        seen = phase - level[0] @ level[1]
+        tied = matmul_toeplitz(correlation[:length], seen)
+        found[o] = np.mean(np.sum(seen.conj() * tied, axis=0).real) / 2
+    return np.maximum(found, np.finfo(float).eps)
 
 
 def _sums(

@@ -16,12 +16,19 @@ from numpy.typing import NDArray
 from palpate.errors import InputError
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget, Spread
-from palpate.identification.estimators.by_octave import Solution, System, estimate, system_of
-from palpate.identification.estimators.effects import FRICTION, effect_columns
-from palpate.identification.estimators.fit import Fit, fit, relinearised
-from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of, segments_of
-from palpate.identification.models import Model, Motion
-from palpate.identification.prior import LAG, mass_std
+from palpate.identification.estimators.by_octave import Solution, System, estimate, system_of, worth
+from palpate.identification.estimators.effects import FRICTION, TOUCH, effect_columns
+from palpate.identification.estimators.fit import Prediction, fit, slope_of_lag
+from palpate.identification.estimators.octaves import (
+    Octaves,
+    Segment,
+    longest_of,
+    octaves_of,
+    segments_of,
+    white_lines,
+)
+from palpate.identification.models import Model, Motion, from_surface
+from palpate.identification.prior import LAG, Lag, mass_std
 from palpate.identification.problem import Problem
 
 Array = NDArray[np.float64]
@@ -29,12 +36,12 @@ Array = NDArray[np.float64]
 _ROUNDS = 6
 _RESTS = 0.02
 """Share of its deviation by which a lag may still move."""
+_FOUND = 0.1
+"""Share of its deviation by which a surface may still move: it adds a hundredth to the variance."""
 _SEEN = 10.0
 """Power of the position over that of its noise below which an octave is left out: it would be off by a tenth."""
 _ROUNDED = 100.0
 """Last digits of a position that its way through the filters may round."""
-_QUIETEST = 16
-"""Lines of an octave that may stand for the sensor's noise."""
 
 
 @dataclass(frozen=True)
@@ -46,20 +53,22 @@ class Answer:
         theta: shape (p,).
         cov: of the mixed model, shape (p, p).
         budget: by cause.
-        fit: least squares at the same lag.
+        fit: what the model predicts with them.
         explained: share of the force's variance in contact that the model alone accounts for.
         unexplained: rms of what is left beyond the sensor's noise [N].
         sensor: mean square of the sensor's own noise [N^2].
+        problem: the rows that it was fitted to.
     """
 
     names: tuple[str, ...]
     theta: Array
     cov: Array
     budget: Budget
-    fit: Fit
+    fit: Prediction
     explained: float
     unexplained: float
     sensor: float
+    problem: Problem
 
     def __getitem__(self, name: str) -> float:
         return float(self.theta[self.names.index(name)])
@@ -90,25 +99,66 @@ def answer(problem: Problem, model: Model) -> Answer:
     Raises:
         InputError: the stretches in contact are too short.
     """
+    wider = None if model.knobs else problem.with_approach
+    found = None if wider is None else _over_approach(wider, problem.in_contact, model)
+    return found or _in_contact(problem, model)
+
+
+def _over_approach(problem: Problem, inside: NDArray[np.bool_], model: Model) -> Answer | None:
+    """Over the approach too: how the force rises from nothing tells most of a press that then rests.
+
+    The surface is looked for with the lag: what a wrong place of it does is a force that is there at once with the
+    touch. None if it is not found.
+    """
+    segments = segments_of(problem.motion.rows, problem.spans)
+    exact = replace(problem, lag=replace(problem.lag, std=0.0))
+    at = problem.motion.instants.astype(np.intp)
+    way = problem.motion.position[at[~inside[at]]]  # in which it lies
+    if not len(way):
+        return None
+    surface, lag, theta = 0.0, problem.lag.value, None
+    for _ in range(2 * _ROUNDS):
+        motion = from_surface(problem.motion, inside, surface)
+        asked = replace(exact if theta is None else problem, motion=motion)
+        question = _Question.of(asked, model, lag, segments, theta)
+        solution = estimate(question.system)
+        first = theta is None
+        theta = dict(zip(question.names, solution.theta, strict=True))
+        if theta["K"] <= 0:
+            return None
+        i = question.names.index(TOUCH)
+        found = theta[TOUCH] ** 2 < _FOUND**2 * solution.cov[i, i]
+        moved = _within(theta.get(LAG, lag), problem.lag)
+        if found and abs(moved - lag) <= _RESTS * problem.lag.std and not (first and problem.lag.std > 0):
+            return question.answered(solution)
+        step = -theta[TOUCH] / theta["K"]
+        surface += float(np.clip(step, (way.min() - surface) / 2, (way.max() - surface) / 2))
+        lag = moved
+    return None
+
+
+def _within(lag: float, prior: Lag) -> float:
+    """Not farther from the prior's mean than three of its deviations [s]."""
+    return float(np.clip(lag, prior.value - 3 * prior.std, prior.value + 3 * prior.std))
+
+
+def _in_contact(problem: Problem, model: Model) -> Answer:
+    """Over the rows in contact; the lag looked for within its prior, the columns formed again at each."""
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
         raise InputError("every stretch in contact is too short; log longer or faster")
-    lag = problem.lag.value
-    theta = None
+    lag, theta = problem.lag.value, None
     if problem.lag.std > 0 and not model.knobs:  # the lag's column needs parameters that are roughly right
         exact = replace(problem, lag=replace(problem.lag, std=0.0))
         first = _Question.of(exact, model, lag, segments, None)
-        solution = estimate(first.system)
-        theta = dict(zip(first.names, solution.theta, strict=False))
+        theta = dict(zip(first.names, estimate(first.system).theta, strict=False))
     for _ in range(_ROUNDS):
         question = _Question.of(problem, model, lag, segments, theta)
         solution = estimate(question.system)
         if problem.lag.std == 0:
             break
         theta = dict(zip(question.names, solution.theta, strict=False))
-        moved = theta[LAG]
-        limit = 3 * problem.lag.std
-        moved = float(np.clip(moved, problem.lag.value - limit, problem.lag.value + limit))
+        moved = _within(theta[LAG], problem.lag)
         if abs(moved - lag) < _RESTS * problem.lag.std:
             break
         lag = moved
@@ -123,7 +173,9 @@ def lag_open(problem: Problem) -> bool:
 @dataclass(frozen=True)
 class _Question:
     problem: Problem
-    fit: Fit
+    model: Model
+    lag: float
+    at: dict[str, float]
     names: tuple[str, ...]
     own: int
     prior: dict[str, tuple[float, float]]
@@ -143,30 +195,28 @@ class _Question:
     ) -> _Question:
         """Linearise the model at a lag, and sum its columns by octave.
 
-        A model without nonlinear parameters is linearised about what was found for it before, if anything was: least
-        squares may be far off in a log with other forces, and with them the column of the lag.
+        Args:
+            problem: of the log.
+            model: which.
+            lag: of the force [s].
+            segments: rows without a gap.
+            theta: parameters about which a model that is linear in them is linearised in the lag.
         """
         motion = problem.motion
-        fitted = fit(model, motion, problem.force, replace(problem.lag, value=lag, std=0.0))
-        if theta is not None and not model.knobs:
-            fitted = relinearised(fitted, motion, problem.force, {**theta, LAG: lag})
-        free = [n for n in fitted.names if n != "offset" and (n != LAG or problem.lag.std > 0)]
-        at = [fitted.names.index(n) for n in free]
-        jacobian, values = fitted.jacobian[:, at], fitted.theta[at]
+        at, own, target = _linearised(problem, model, lag, theta or {})
+        free = list(own)
         effects = effect_columns(motion, model, lag, segments)
-        target = fitted.residuals + jacobian @ values
-        position = motion.moved(0, lag)
-        columns = np.column_stack([jacobian, *effects.values(), target, position])
+        columns = [*own.values(), *effects.values(), target, motion.moved(0, lag)]
         prior = {LAG: (problem.lag.value, problem.lag.std)} if LAG in free else {}
         if problem.lag.mass is not None and "M" in free:
             prior["M"] = (problem.lag.mass[0], mass_std(problem.lag.mass))
         dt = float(np.median(np.diff(problem.time)))
-        whole = octaves_of(columns, segments, dt, longest_of(segments))
+        whole = octaves_of(np.column_stack(columns), segments, dt, longest_of(segments))
         octaves = Octaves(whole.products[:, :, :-1, :-1], whole.lines, whole.frequency)
         use = _seen(motion, dt, whole)
         names = (*free, *effects)
         system = system_of(octaves.only(use), names, prior)
-        return cls(problem, fitted, names, len(free), prior, segments, octaves, use, system)
+        return cls(problem, model, lag, at, names, len(free), prior, segments, octaves, use, system)
 
     @property
     def dt(self) -> float:
@@ -186,15 +236,13 @@ class _Question:
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: Spread(part.variance[kept], part.freedom) for cause, part in budget.items()}
-        fitted = self.fit
-        if not fitted.model.knobs:
-            values = {n: v for n, v in zip(self.names, solution.theta, strict=True) if n in fitted.names}
-            fitted = relinearised(
-                fitted, self.problem.motion, self.problem.force, {LAG: fitted.lag, **values}
-            )
+        values = self.at or dict(zip(self.names, solution.theta.tolist(), strict=True))
+        predicted = Prediction.of(self.model, self.problem.motion, self.problem.force, values, self.lag)
         noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
-        return Answer(names, solution.theta[kept], cov, budget, fitted, explained, left, noise)
+        return Answer(
+            names, solution.theta[kept], cov, budget, predicted, explained, left, noise, self.problem
+        )
 
     def _lag_of_damping(self, solution: Solution, found: Spread) -> Spread:
         """A lag T counts as a damping of -K T: B knows of a lag nobody has calibrated what the prior says, no more.
@@ -208,26 +256,34 @@ class _Question:
         return Spread(variance, found.freedom)
 
     def _sensor(self, solution: Solution) -> Array:
-        """Variance of a line by the sensor's own noise in each octave: out of contact, else the quietest octave's."""
-        gain = self.problem.motion.chain.force_gain(self.octaves.frequency) ** 2
-        lines = self.octaves.all_lines
-        enough = lines >= _QUIETEST
-        unseen = self.octaves.total[:, -1, -1] / np.maximum(lines, 1.0)
-        ratio = np.where(self.use, solution.noise, unseen) / np.maximum(gain, 1e-12)
-        floor = float(ratio[enough].min()) if enough.any() else float(ratio.min())
-        sensor = floor * gain
-        free, longest = self.problem.free, longest_of(self.segments)
-        if free:
-            edges = np.cumsum([0, *(len(f) for f in free)])
-            rest = octaves_of(
-                np.concatenate(free)[:, None],
-                [Segment(int(a), int(b)) for a, b in pairwise(edges)],
-                self.dt,
-                longest,
-            )
-            seen = rest.all_lines >= 2
-            sensor[seen] = np.maximum(rest.total[seen, 0, 0] / rest.all_lines[seen], sensor[seen])
+        """Variance of a line by the sensor's own noise in each octave, shape (octaves,).
+
+        Out of contact it is seen; where the log has no such stretch, it is what the quietest octaves have in common.
+        """
+        longest = longest_of(self.segments)
+        gain = white_lines(self.problem.motion.chain.force_gain, self.dt, longest, self.octaves)
+        rest = self._rest(longest)
+        if rest is None:
+            own = self.octaves.total[:, -1, -1] / np.maximum(self.octaves.all_lines, 1.0)
+            level = np.where(self.use, solution.noise, own)
+            lines = np.where(self.use, worth(self.system), self.octaves.all_lines)
+        else:
+            lines = rest.all_lines
+            level = rest.total[:, 0, 0] / np.maximum(lines, 1.0)
+        white, count = causes.white_level(level / gain, lines)
+        sensor = white * gain * causes.by_chance(worth(self.system), count)
+        if rest is not None:
+            sensor = np.maximum(sensor, np.where(lines > 0, level, 0.0))
         return np.minimum(sensor, solution.noise)
+
+    def _rest(self, longest: int) -> Octaves | None:
+        """The force out of contact by the octaves of the contacts; None if there is too little of it."""
+        if not self.problem.free:
+            return None
+        edges = np.cumsum([0, *(len(f) for f in self.problem.free)])
+        stretches = [Segment(int(a), int(b)) for a, b in pairwise(edges)]
+        found = octaves_of(np.concatenate(self.problem.free)[:, None], stretches, self.dt, longest)
+        return found if found.lines.any() else None
 
     def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float]:
         """Share of the force's variance in contact that the model's own columns account for, noise left aside."""
@@ -238,12 +294,35 @@ class _Question:
         offset[-1] = 1.0
         if LAG in self.names:  # the target counts the lag from zero
             at = self.names.index(LAG)
-            offset[at] = -self.fit.lag
+            offset[at] = -self.lag
         noise = float(sensor @ self.system.lines)
         left = max(float(full @ total @ full) - noise, 0.0)
         whole = max(float(offset @ total @ offset) - noise, 1e-300)
         count = max(float(self.system.lines.sum()), 1.0)
         return 1 - left / whole, float(np.sqrt(left / count))
+
+
+def _linearised(
+    problem: Problem, model: Model, lag: float, theta: dict[str, float]
+) -> tuple[dict[str, float], dict[str, Array], Array]:
+    """Where a nonlinear model is linearised, the columns of the parameters, and the force that they add up to.
+
+    The lag is among the parameters unless it is exact.
+    """
+    motion, asks = problem.motion, problem.lag.std > 0
+    if not model.knobs:
+        named = zip(model.linear, model.columns(motion, {}, lag), strict=True)
+        own = {name: column for name, column in named if name != "offset"}
+        if not asks:
+            return {}, own, problem.force
+        slope = slope_of_lag(model, motion, theta, lag)
+        return {}, {**own, LAG: slope}, problem.force + slope * lag
+    fitted = fit(model, motion, problem.force, replace(problem.lag, value=lag, std=0.0))
+    free = [n for n in fitted.names if n != "offset" and (n != LAG or asks)]
+    jacobian = fitted.jacobian[:, [fitted.names.index(n) for n in free]]
+    target = fitted.residuals + jacobian @ np.array([fitted[n] for n in free])
+    at = dict(zip(fitted.names, fitted.theta.tolist(), strict=True))
+    return at, dict(zip(free, jacobian.T, strict=True)), target
 
 
 def _seen(motion: Motion, dt: float, octaves: Octaves) -> NDArray[np.bool_]:

@@ -8,6 +8,7 @@ filtered channels exactly as for the raw ones, because F is the same on all of t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import factorial, pi
 
 import numpy as np
@@ -96,7 +97,15 @@ class Chain:
 
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
         """The same at the samples `rows` only, shape (len(rows),)."""
-        return self(signal, derivative, lag)[rows]
+        memory = _memory(self, lag)
+        cuts = np.flatnonzero(np.diff(rows) > 2 * memory) + 1
+        found = np.empty(len(rows))
+        for first, last in pairwise([0, *cuts.tolist(), len(rows)]):
+            if last > first:
+                own = rows[first:last]
+                begin, end = max(int(own[0]) - memory, 0), int(own[-1]) + memory
+                found[first:last] = self(signal[begin:end], derivative, lag)[own - begin]
+        return found
 
     def noise_spread(self, noise: PositionNoise) -> Array:
         """Covariance of what noise of the position leaves in the derivatives 0 to 3, shape (4, 4)."""
@@ -130,6 +139,11 @@ class Chain:
         raise ValueError(f"the chain gives derivatives 0 to 4, not {derivative}")
 
 
+def _memory(chain: Chain, lag: float) -> int:
+    """Samples around a row that a reading of it rests on."""
+    return int(np.ceil(_LENGTH / (chain.rate * chain.dt) + abs(lag) / chain.dt)) + 5
+
+
 def _erlang(order: int, tau: Array) -> Array:
     """Impulse response of `order` unit lags in a row."""
     return tau ** (order - 1) * np.exp(-tau) / factorial(order - 1)
@@ -147,23 +161,23 @@ def _erlang_cdf(order: int, tau: Array) -> Array:
 
 
 def _convolve(signal: Array, taps: Array) -> Array:
+    from scipy.signal import oaconvolve
+
     if len(taps) <= 256:
         return np.convolve(signal, taps)
-    size = 1 << (len(signal) + len(taps) - 2).bit_length()
-    product = np.fft.rfft(signal, size) * np.fft.rfft(taps, size)
-    return np.fft.irfft(product, size)[: len(signal) + len(taps) - 1]
+    found: Array = oaconvolve(signal, taps)
+    return found
 
 
 def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
     """One lag 1/(1 + s T), exact for straight lines between the samples, starting from rest at 0. Shape (n,)."""
+    from scipy.signal import lfilter
+
     decay = np.exp(-dt / time_constant)
     b1 = 1 - time_constant / dt * (1 - decay)
     b0 = time_constant / dt * (1 - decay) - decay
-    count = min(len(signal), int(np.ceil(36 * time_constant / dt)) + 1)
-    powers = decay ** np.arange(count)
-    taps = b1 * powers
-    taps[1:] += b0 * powers[:-1]
-    return _convolve(signal, taps)[: len(signal)]
+    found: Array = lfilter([b1, b0], [1.0, -decay], signal)
+    return found
 
 
 def white_noise(signal: Array) -> float:
