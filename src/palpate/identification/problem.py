@@ -177,7 +177,7 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     return Problem(motion, force[rows], spans, lag, free, touch, approach, origin, contacts)
 
 
-MOST_ROWS = 1 << 17
+MOST_ROWS = 1 << 16
 """Rows that are fitted at most, in pieces spread over the log: more average noise alone, which limits nothing then."""
 _PIECE = 1 << 14
 

@@ -115,6 +115,7 @@ _REMEDY = {
     "other forces": "let the log begin and end in the air, and press more often",
     "octaves": "the answer differs from octave to octave; excite a wider band (palpate excite)",
     "repetition": "two parts of the log differ; press more often",
+    "touch": "the touch and the contact give two answers; approach slower, and more often",
     "strokes": "the ways in and out differ; press slower, or more often",
     "unexplained": "the model leaves force that is no noise; keep the motion near one working point",
     "position noise": "measure the position finer, or move further",
@@ -124,7 +125,7 @@ _REMEDY = {
 
 
 def _agreeing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoint) -> dict[str, Parameter]:
-    """K and M that foretell another stiffness at the working point than the log shows are not identified."""
+    """Nothing of a model that foretells another stiffness at the working point than the log shows is identified."""
     own = point.stiffness
     if own.ci95 is None or own.value is None or point.source != "octave":
         return parameters
@@ -140,9 +141,7 @@ def _agreeing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoi
         f" stiffness there {_digits(own.value)}"
     )
     return {
-        name: replace(p, verdict=Verdict.REJECTED, reason=reason)
-        if p.verdict is Verdict.IDENTIFIED and name in ("K", "M")
-        else p
+        name: replace(p, verdict=Verdict.REJECTED, reason=reason) if p.verdict is Verdict.IDENTIFIED else p
         for name, p in parameters.items()
     }
 

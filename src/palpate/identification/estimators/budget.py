@@ -22,6 +22,8 @@ HIDDEN_SHARE = 0.5
 """Share of the unexplained amplitude of an octave that may lie along a parameter's own column: of a force in an
 unknown phase, in phase and in quadrature, half of the power is along either. `make trust` measures the coverage that
 follows."""
+_NORMAL = 1.96
+"""Deviations of a 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,20 @@ def of_stretches(system: System, solution: Solution) -> Spread:
     pull = np.einsum("o,goij,j->gi", weight, products[:, :, :-1, :], full) @ solution.cov
     variance = count / (count - 1) * (pull**2).sum(axis=0)
     return Spread(np.maximum(variance - np.diag(solution.cov), 0.0), count - 1.0)
+
+
+def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Spread:
+    """By how much an answer contradicts one that rests on fewer rows: beyond their difference's 95 % interval.
+
+    Args:
+        theta: of the answer, shape (p,).
+        budget: of the answer.
+        other: parameters of the other, shape (p,).
+        others: its budget.
+    """
+    own, less = (sum((part.variance for part in b.values()), np.zeros(len(theta))) for b in (budget, others))
+    apart = np.abs(other - theta) - _NORMAL * np.sqrt(np.maximum(less - own, 0.0))
+    return Spread(np.maximum(apart, 0.0) ** 2)
 
 
 def of_unexplained(system: System, solution: Solution, sensor: Array) -> Spread:

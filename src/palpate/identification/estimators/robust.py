@@ -28,16 +28,16 @@ from palpate.identification.estimators.octaves import (
     white_lines,
 )
 from palpate.identification.models import Model, Motion, from_surface
-from palpate.identification.prior import LAG, Lag, mass_std
+from palpate.identification.prior import LAG, mass_std
 from palpate.identification.problem import Problem
 
 Array = NDArray[np.float64]
 
 _ROUNDS = 6
 _RESTS = 0.02
-"""Share of its deviation by which a lag may still move."""
-_FOUND = 0.1
-"""Share of its deviation by which a surface may still move: it adds a hundredth to the variance."""
+"""Share of its prior's deviation by which a lag may still move."""
+_FOUND = 0.25
+"""Share of its deviation by which a surface may still move: it adds a sixteenth to the variance."""
 _SEEN = 10.0
 """Power of the position over that of its noise below which an octave is left out: it would be off by a tenth."""
 _ROUNDED = 100.0
@@ -99,50 +99,23 @@ def answer(problem: Problem, model: Model) -> Answer:
     Raises:
         InputError: the stretches in contact are too short.
     """
+    question, solution = _in_contact(problem, model)
+    plain = question.answered(solution)
     wider = None if model.knobs else problem.with_approach
-    found = None if wider is None else _over_approach(wider, problem.in_contact, model)
-    return found or _in_contact(problem, model)
+    found = None if wider is None else _over_approach(wider, problem.in_contact, question, solution)
+    if found is None:
+        return plain
+    found = replace(
+        found,
+        budget={
+            **found.budget,
+            "touch": causes.of_another(found.theta, found.budget, plain.theta, plain.budget),
+        },
+    )
+    return found if found.half_of("K") < plain.half_of("K") else plain
 
 
-def _over_approach(problem: Problem, inside: NDArray[np.bool_], model: Model) -> Answer | None:
-    """Over the approach too: how the force rises from nothing tells most of a press that then rests.
-
-    The surface is looked for with the lag: what a wrong place of it does is a force that is there at once with the
-    touch. None if it is not found.
-    """
-    segments = segments_of(problem.motion.rows, problem.spans)
-    exact = replace(problem, lag=replace(problem.lag, std=0.0))
-    at = problem.motion.instants.astype(np.intp)
-    way = problem.motion.position[at[~inside[at]]]  # in which it lies
-    if not len(way):
-        return None
-    surface, lag, theta = 0.0, problem.lag.value, None
-    for _ in range(2 * _ROUNDS):
-        motion = from_surface(problem.motion, inside, surface)
-        asked = replace(exact if theta is None else problem, motion=motion)
-        question = _Question.of(asked, model, lag, segments, theta)
-        solution = estimate(question.system)
-        first = theta is None
-        theta = dict(zip(question.names, solution.theta, strict=True))
-        if theta["K"] <= 0:
-            return None
-        i = question.names.index(TOUCH)
-        found = theta[TOUCH] ** 2 < _FOUND**2 * solution.cov[i, i]
-        moved = _within(theta.get(LAG, lag), problem.lag)
-        if found and abs(moved - lag) <= _RESTS * problem.lag.std and not (first and problem.lag.std > 0):
-            return question.answered(solution)
-        step = -theta[TOUCH] / theta["K"]
-        surface += float(np.clip(step, (way.min() - surface) / 2, (way.max() - surface) / 2))
-        lag = moved
-    return None
-
-
-def _within(lag: float, prior: Lag) -> float:
-    """Not farther from the prior's mean than three of its deviations [s]."""
-    return float(np.clip(lag, prior.value - 3 * prior.std, prior.value + 3 * prior.std))
-
-
-def _in_contact(problem: Problem, model: Model) -> Answer:
+def _in_contact(problem: Problem, model: Model) -> tuple[_Question, Solution]:
     """Over the rows in contact; the lag looked for within its prior, the columns formed again at each."""
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
@@ -151,18 +124,55 @@ def _in_contact(problem: Problem, model: Model) -> Answer:
     if problem.lag.std > 0 and not model.knobs:  # the lag's column needs parameters that are roughly right
         exact = replace(problem, lag=replace(problem.lag, std=0.0))
         first = _Question.of(exact, model, lag, segments, None)
-        theta = dict(zip(first.names, estimate(first.system).theta, strict=False))
+        theta = dict(zip(first.names, estimate(first.system).theta, strict=True))
     for _ in range(_ROUNDS):
         question = _Question.of(problem, model, lag, segments, theta)
         solution = estimate(question.system)
         if problem.lag.std == 0:
             break
-        theta = dict(zip(question.names, solution.theta, strict=False))
-        moved = _within(theta[LAG], problem.lag)
+        theta = dict(zip(question.names, solution.theta, strict=True))
+        reach = 3 * problem.lag.std
+        moved = float(np.clip(theta[LAG], problem.lag.value - reach, problem.lag.value + reach))
         if abs(moved - lag) < _RESTS * problem.lag.std:
             break
         lag = moved
-    return question.answered(solution)
+    return question, solution
+
+
+def _over_approach(
+    problem: Problem, inside: NDArray[np.bool_], known: _Question, found: Solution
+) -> Answer | None:
+    """Over the approach too: how the force rises from nothing tells most of a press that then rests.
+
+    The surface is looked for: what a wrong place of it does is a force that is there at once with the touch.
+
+    Args:
+        problem: with the rows of the approach.
+        inside: samples of the position that are in contact.
+        known: the question of the rows in contact.
+        found: its answer.
+
+    Returns:
+        None if the surface is not found.
+    """
+    segments = segments_of(problem.motion.rows, problem.spans)
+    at = problem.motion.instants.astype(np.intp)
+    way = problem.motion.position[at[~inside[at]]]  # in which the surface lies
+    theta = dict(zip(known.names, found.theta, strict=True))
+    surface = 0.0
+    for _ in range(_ROUNDS if len(way) else 0):
+        motion = from_surface(problem.motion, inside, surface)
+        question = _Question.of(replace(problem, motion=motion), known.model, known.lag, segments, theta)
+        solution = estimate(question.system)
+        theta = dict(zip(question.names, solution.theta, strict=True))
+        i = question.names.index(TOUCH)
+        if theta["K"] <= 0:
+            return None
+        if theta[TOUCH] ** 2 < _FOUND**2 * solution.cov[i, i]:
+            return question.answered(solution)
+        step = -theta[TOUCH] / theta["K"]
+        surface += float(np.clip(step, (way.min() - surface) / 2, (way.max() - surface) / 2))
+    return None
 
 
 def lag_open(problem: Problem) -> bool:
@@ -271,9 +281,11 @@ class _Question:
             lines = rest.all_lines
             level = rest.total[:, 0, 0] / np.maximum(lines, 1.0)
         white, count = causes.white_level(level / gain, lines)
-        sensor = white * gain * causes.by_chance(worth(self.system), count)
-        if rest is not None:
-            sensor = np.maximum(sensor, np.where(lines > 0, level, 0.0))
+        sensor = white * gain
+        if rest is not None:  # it is the sensor's for sure, and a level above it may be chance
+            sensor = np.maximum(
+                sensor * causes.by_chance(worth(self.system), count), np.where(lines > 0, level, 0.0)
+            )
         return np.minimum(sensor, solution.noise)
 
     def _rest(self, longest: int) -> Octaves | None:

@@ -9,6 +9,7 @@ _CAUSES = {
         "drift, friction or relaxation beside the model",
         "let the log begin and end in the air, and press more often",
     ),
+    "touch": ("that the touch and the contact give two answers", "approach slower, and more often"),
     "octaves": ("that the answer differs by frequency", "excite a wider band (palpate excite)"),
     "blocks": ("that stretches of the log differ", "press longer, or more often, about one depth"),
     "repetition": ("that two parts of the log differ", "press more often"),
