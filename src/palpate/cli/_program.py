@@ -14,6 +14,7 @@ TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
 # and returns its exit code. The line is repeated here so that the help imports none of them.
 COMMANDS = {
     "identify": "Find what a robot touched, from a log: stiffness, damping, mass.",
+    "payload": "Weigh a tool by a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List what a log holds: topics, variables, columns.",
     "excite": "Design a force that shows what a surface is, and say how well beforehand.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
