@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from palpate.cli._arm_options import FrameOptions
 from palpate.cli._log_options import LogOptions, read
+from palpate.cli._options_file import CellOptions
 from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
 from palpate.errors import InputError
 from palpate.files import check_place
@@ -25,6 +26,7 @@ def payload(
     *,
     source: LogOptions | None = None,
     frame: FrameOptions | None = None,
+    cell: CellOptions | None = None,
     tolerance: float = 0.25,
     out: Path | None = None,
     replace: Annotated[bool, _FLAG] = False,
@@ -58,6 +60,8 @@ def payload(
     json
         Print one JSON object and nothing else.
     """
+    cell = cell or CellOptions()
+    cell.check()
     if out is not None:
         check_place(out, "--out", ending=".toml")
         if out.exists() and not replace:
@@ -68,6 +72,7 @@ def payload(
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
     from palpate.contact_frame import ContactFrame, weigh
 
+    cell.save((source or LogOptions(), frame or FrameOptions()))
     record = read(log, source or LogOptions(), samples=False)
     if "force_x" not in record.columns:
         raise InputError(
