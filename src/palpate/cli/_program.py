@@ -19,6 +19,7 @@ COMMANDS = {
     "excite": "Design a force that shows what a surface is, and say how well beforehand.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
+    "press-wire": "Press with a real arm, over its wire.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "thesis": "Measure every figure and every claim of the thesis again.",
@@ -50,5 +51,6 @@ def program() -> App:
         suppress_keyboard_interrupt=False,
     )
     for order, (name, line) in enumerate(COMMANDS.items()):
-        app.command(f"palpate.cli.{name}:{name}", name=name, help=line, sort_key=order)
+        own = name.replace("-", "_")
+        app.command(f"palpate.cli.{own}:{own}", name=name, help=line, sort_key=order)
     return app
