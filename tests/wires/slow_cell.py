@@ -16,7 +16,10 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from palpate.force import load_arm, tune
+from palpate.wires.recording import UNITS
 
 ARM = """
 title = "a slow arm"
@@ -69,6 +72,17 @@ def arm(folder: Path, *words: str):
             yield process, process.stdout.readline().strip()
         finally:
             process.kill()
+
+
+def wait_for_rows(path, rows=40):
+    """Until a press in another process has kept so many."""
+    for _ in range(2000):
+        if path.exists():
+            numbers = np.fromfile(path)
+            if np.count_nonzero(numbers[1 :: len(UNITS)]) >= rows:
+                return
+        time.sleep(0.02)
+    raise AssertionError("the press keeps no rows")
 
 
 class Relay(threading.Thread):

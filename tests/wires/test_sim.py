@@ -18,8 +18,7 @@ from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
 from palpate.wires import LostError, open_wire
-from palpate.wires.recording import UNITS
-from wires.slow_cell import WORDS, arm, cell, relayed
+from wires.slow_cell import WORDS, arm, cell, relayed, wait_for_rows
 
 
 @pytest.fixture(scope="module")
@@ -91,17 +90,6 @@ def test_nothing_moves_where_nobody_can_be_asked(folder, here, capsys, monkeypat
 
 def words_of(folder, address):
     return ["press-wire", "--wire", address, "--gains", str(folder / "gains.toml"), *WORDS, "--json"]
-
-
-def wait_for_rows(path, rows=40):
-    """Until a press in another process has kept so many."""
-    for _ in range(2000):
-        if path.exists():
-            numbers = np.fromfile(path)
-            if np.count_nonzero(numbers[1 :: len(UNITS)]) >= rows:
-                return
-        time.sleep(0.02)
-    raise AssertionError("the press keeps no rows")
 
 
 def refused_after_plan(capsys, *words):

@@ -58,7 +58,7 @@ def press_wire(
     Parameters
     ----------
     wire
-        The arm: sim:HOST:PORT. There is no default.
+        The arm: rtde:ADDRESS of a UR, sim:HOST:PORT of a simulated one. There is no default.
     gains
         What palpate tune wrote for this arm.
     force

@@ -5,7 +5,7 @@ from __future__ import annotations
 from palpate.errors import InputError, unknown
 from palpate.wires.protocol import Wire
 
-KINDS = {"sim": "sim:HOST:PORT"}
+KINDS = {"sim": "sim:HOST:PORT", "rtde": "rtde:ADDRESS"}
 
 
 def open_wire(address: str) -> Wire:
@@ -33,4 +33,10 @@ def _sim(where: str) -> Wire:
     return SimWire(host, int(port))
 
 
-_OPENERS = {"sim": _sim}
+def _rtde(where: str) -> Wire:
+    from palpate.wires.ur import UrWire
+
+    return UrWire(where)
+
+
+_OPENERS = {"sim": _sim, "rtde": _rtde}
