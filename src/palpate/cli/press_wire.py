@@ -58,7 +58,8 @@ def press_wire(
     Parameters
     ----------
     wire
-        The arm: rtde:ADDRESS of a UR, sim:HOST:PORT of a simulated one. There is no default.
+        The arm: rtde:ADDRESS of a UR, sim:HOST:PORT of a simulated one, or ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&
+        command=TOPIC&as=twist&wrench-frame=tool&force-sign=action, as one word. There is no default.
     gains
         What palpate tune wrote for this arm.
     force

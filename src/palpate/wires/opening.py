@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from palpate.errors import InputError, unknown
 from palpate.wires.protocol import Wire
+from palpate.wires.ros2 import FORM
 
-KINDS = {"sim": "sim:HOST:PORT", "rtde": "rtde:ADDRESS"}
+KINDS = {"sim": "sim:HOST:PORT", "rtde": "rtde:ADDRESS", "ros2": FORM}
 
 
 def open_wire(address: str) -> Wire:
@@ -39,4 +40,10 @@ def _rtde(where: str) -> Wire:
     return UrWire(where)
 
 
-_OPENERS = {"sim": _sim, "rtde": _rtde}
+def _ros2(where: str) -> Wire:
+    from palpate.wires.ros2 import Ros2Wire, topics_of
+
+    return Ros2Wire(*topics_of(where))
+
+
+_OPENERS = {"ros2": _ros2, "sim": _sim, "rtde": _rtde}
