@@ -36,7 +36,7 @@ def palpate(command: str, into: str | None = None) -> int:
 
 
 controller = [sys.executable, "-m", "palpate.wires.rtde_arm", "--address", ADDRESS, "--arm", "cell.toml"]
-with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PIPE, text=True) as arm:
+with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
     assert arm.stdout is not None
     wire = arm.stdout.readline().strip()
     press = f"press-wire --wire {wire} --gains gains.toml --force 20:N --direction 0,0,-1 {LIMITS}"
