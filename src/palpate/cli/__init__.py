@@ -23,7 +23,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     import sys
 
     from palpate.cli._edge import guarded
+    from palpate.cli._options_file import expanded
     from palpate.cli._program import TYPED, program
 
     TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
-    return guarded(lambda: program()(argv))
+
+    def run() -> int:
+        app = program()
+        words = list(TYPED.get())
+        return app(
+            expanded(words, app)
+            if any(word.startswith(("--options", "--preset")) for word in words)
+            else words
+        )
+
+    return guarded(run)

@@ -12,7 +12,7 @@ from palpate.cli._values import span, vector, with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
-    from palpate.contact_frame import Arm, ContactFrame
+    from palpate.contact_frame import Arm, ContactFrame, Payload
 
 _SIGNED = Parameter(allow_leading_hyphen=True)
 
@@ -64,11 +64,11 @@ class FrameOptions:
         """Whether anything was said that only a wrench and a pose have."""
         return replace(self, force_sign=None) != FrameOptions()
 
-    def frame(self) -> ContactFrame | None:
+    def frame(self, hung: Payload | None = None) -> ContactFrame | None:
         """The contact frame; None if nothing was said."""
         from palpate.contact_frame import ContactFrame
 
-        if self == FrameOptions():
+        if self == FrameOptions() and hung is None:
             return None
         sides: dict[int | None, Literal["action", "reaction"] | None] = {
             None: None,
@@ -88,6 +88,7 @@ class FrameOptions:
             normal_frame="tool" if axes == "tool" else "base",
             gravity_compensated=self.gravity_compensated,
             free=span("free", self.free),
+            payload=hung,
         )
 
 
@@ -104,14 +105,23 @@ class ArmOptions:
         What gives way between the position sensor and the surface, N/m or N/m:STD; it is taken out of K.
     robot_stiffness_from
         A log of a press on a rigid wall, with the same columns or topics: all that gives way in it is the arm.
+    payload
+        What palpate payload wrote of the tool on the sensor: its weight, and the mass to take out of M.
     position_from
         joints: the position is made from encoders in the joints, and does not show the arm give way; tip: it is not.
     """
 
     tool_mass: str | None = None
+    payload: Path | None = None
     robot_stiffness: Annotated[str | None, Parameter(name=["--robot-stiffness", "--series-stiffness"])] = None
     robot_stiffness_from: Path | None = None
     position_from: Literal["joints", "tip"] | None = None
+
+    def weighed(self) -> Payload | None:
+        """What hangs on the sensor, if it was weighed."""
+        from palpate.contact_frame import load_payload
+
+        return None if self.payload is None else load_payload(self.payload)
 
     def arm(self) -> Arm:
         """The arm as far as it was said; a press on a wall is another log."""
@@ -119,8 +129,9 @@ class ArmOptions:
 
         if self.robot_stiffness is not None and self.robot_stiffness_from is not None:
             raise InputError("give --robot-stiffness or --robot-stiffness-from, not both")
+        hung = self.weighed()
         return Arm(
-            tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02"),
+            tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02") or (hung.beyond if hung else None),
             stiffness=with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),
             position_from=self.position_from,
         )

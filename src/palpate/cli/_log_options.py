@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from palpate.records import Record
 
 _SHOWN = 40
+Rotation = Literal["quaternion", "quaternion-wxyz", "rotation-vector", "rpy", "matrix", "matrix-by-columns"]
 GB = 2.0
 """What a log may unpack to [GB]; the default of `palpate.logs.limits`."""
 
@@ -39,6 +40,9 @@ class LogOptions:
         Topic of the wrench in a bag, if it is not the only one; or columns fx,fy,fz or fx,fy,fz,tx,ty,tz.
     pose
         Topic of the pose in a bag, if it is not the only one; or columns x,y,z or x,y,z,qx,qy,qz,qw.
+    rotation
+        How the pose's columns write the orientation: quaternion (qx,qy,qz,qw), quaternion-wxyz, rotation-vector
+        (rx,ry,rz as UR does), rpy (roll,pitch,yaw about fixed axes), matrix (by rows) or matrix-by-columns.
     start
         Leave out what is before, in seconds from the first row.
     end
@@ -59,6 +63,7 @@ class LogOptions:
     force: str | None = None
     wrench: str | None = None
     pose: str | None = None
+    rotation: Rotation = "quaternion"
     start: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
     end: float | None = None
     missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = ()
@@ -116,7 +121,7 @@ def _of_bag(log: Path, options: LogOptions, cut: dict[str, Any], samples: bool) 
         raise InputError(f"the messages of {log} carry their own time; leave --time and --rate out")
     if one is None:
         return read_wrench_and_pose(
-            log, options.wrench, options.pose, held="force_x" if samples else None, **cut
+            log, options.wrench, options.pose, options.rotation, held="force_x" if samples else None, **cut
         )
     return read_log(log, held="force" if samples else None, **cut, **one)
 
@@ -135,7 +140,14 @@ def _of_table(log: Path, options: LogOptions, cut: dict[str, Any]) -> Record:
     if options.wrench or options.pose or saved:
         _one_axis(options)
         own = [_saved(names, there) if saved else None for names in (WRENCH, POSE)]
-        return read_wrench_and_pose(log, options.wrench or own[0], options.pose or own[1], **cut, **columns)
+        return read_wrench_and_pose(
+            log,
+            options.wrench or own[0],
+            options.pose or own[1],
+            "quaternion" if saved and options.pose is None else options.rotation,
+            **cut,
+            **columns,
+        )
     names: dict[str, Any] = {
         role: getattr(options, role) or (role if role in there else None) for role in ("position", "force")
     }

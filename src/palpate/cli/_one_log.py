@@ -60,7 +60,7 @@ class OneLog:
         known = self.fitted.known(log, self.source)
         samples = known.get("force_filter") is not None
         record = read(log, self.source, samples=samples)
-        frame = self.frame.frame()
+        frame = self.frame.frame(self.arm.weighed() if "force_x" in record.columns else None)
         if "force_x" not in record.columns:
             if self.frame.of_space:
                 raise InputError(
@@ -82,8 +82,10 @@ class OneLog:
         between, wall = self.arm.arm(), self.arm.robot_stiffness_from
         if wall is None:
             return between
-        frame = self.frame.frame() if self.frame.of_space else None
+        hung = self.arm.weighed()
         whole = read(wall, replace(self.source, start=None, end=None), samples=samples)
+        in_space = self.frame.of_space or "force_x" in whole.columns
+        frame = self.frame.frame(hung) if in_space else None
         rigid = replace(between, position_from="tip")
         pressed, _ = identify_contact(whole, replace(frame, free=None) if frame else None, rigid, **known)
         return replace(between, stiffness=robot_stiffness(pressed, wall.name))

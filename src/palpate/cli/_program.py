@@ -14,10 +14,12 @@ TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
 # and returns its exit code. The line is repeated here so that the help imports none of them.
 COMMANDS = {
     "identify": "Find what a robot touched, from a log: stiffness, damping, mass.",
+    "payload": "Weigh a tool by a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List what a log holds: topics, variables, columns.",
     "excite": "Design a force that shows what a surface is, and say how well beforehand.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
+    "press-wire": "Press with a real arm, over its wire.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "thesis": "Measure every figure and every claim of the thesis again.",
@@ -49,5 +51,6 @@ def program() -> App:
         suppress_keyboard_interrupt=False,
     )
     for order, (name, line) in enumerate(COMMANDS.items()):
-        app.command(f"palpate.cli.{name}:{name}", name=name, help=line, sort_key=order)
+        own = name.replace("-", "_")
+        app.command(f"palpate.cli.{own}:{own}", name=name, help=line, sort_key=order)
     return app

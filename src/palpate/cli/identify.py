@@ -12,6 +12,7 @@ from palpate.cli._arm_options import ArmOptions, FrameOptions
 from palpate.cli._indenter_options import IndenterOptions
 from palpate.cli._log_options import LogOptions
 from palpate.cli._one_log import OneLog, answered
+from palpate.cli._options_file import CellOptions
 from palpate.cli._terminal import console, place, print_json
 from palpate.cli._values import with_std
 from palpate.errors import InputError
@@ -125,6 +126,7 @@ def identify(
     fitted: ModelOptions | None = None,
     pressed_by: IndenterOptions | None = None,
     output: OutputOptions | None = None,
+    cell: CellOptions | None = None,
 ) -> int:
     """Find what a robot touched, from a log: stiffness, damping, mass.
 
@@ -140,6 +142,12 @@ def identify(
 
     palpate identify presses/ --time time_s --position position_mm:mm --force force_mN:mN
 
+    What is said of a cell can be kept, and said again by one word:
+
+    palpate identify press.csv --preset ur-rtde --tcp 0,0,120:mm --save-options my-cell.toml
+
+    palpate identify other.csv --options my-cell.toml
+
     Parameters
     ----------
     logs
@@ -148,8 +156,13 @@ def identify(
     """
     from palpate.logs.gathered import gathered, is_folder_of_logs
 
-    pressed_by, output = pressed_by or IndenterOptions(), output or OutputOptions()
+    pressed_by, output, cell = (
+        pressed_by or IndenterOptions(),
+        output or OutputOptions(),
+        cell or CellOptions(),
+    )
     pressed_by.check()
+    cell.check()
     asked = OneLog(
         source or LogOptions(),
         frame or FrameOptions(),
@@ -157,6 +170,7 @@ def identify(
         fitted or ModelOptions(),
         pressed_by,
     )
+    cell.save((asked.source, asked.frame, asked.arm, fitted or ModelOptions(), asked.pressed_by))
     if not logs:
         raise InputError(
             "identify what? Name a log, several, or a folder of them (see: palpate identify --help)"

@@ -39,6 +39,7 @@ def tune(
     rate: float | None = None,
     position: str | None = None,
     log_force: str | None = None,
+    payload: Path | None = None,
 ) -> int:
     """Tune a force loop for an arm, and prove where it is stable.
 
@@ -85,6 +86,8 @@ def tune(
         Of a log: its column of the position, as position_mm:mm.
     log_force
         Of a log: its column of the force, as force_mN:mN.
+    payload
+        Of a log: what palpate payload wrote of the tool on the sensor, whose mass is taken out of M.
     """
     _one_thread()
     if report is not None:
@@ -99,7 +102,9 @@ def tune(
     told = tuned(
         one,
         quantity("--force", force, "force"),
-        _known(found, stiffness, LogOptions(time=time, rate=rate, position=position, force=log_force)),
+        _known(
+            found, stiffness, LogOptions(time=time, rate=rate, position=position, force=log_force), payload
+        ),
         cap=None if stiffness_cap is None else quantity("--stiffness-cap", stiffness_cap, "stiffness"),
         peak=None if peak is None else quantity("--peak", peak, "force"),
         surface_speed=surface_speed,
@@ -121,7 +126,9 @@ def _check_out(out: Path, replace: bool) -> None:
         raise InputError(f"{out} exists; choose another place, or add --replace")
 
 
-def _known(found: Path | None, stiffness: str | None, source: LogOptions) -> Known | None:
+def _known(
+    found: Path | None, stiffness: str | None, source: LogOptions, payload: Path | None
+) -> Known | None:
     from palpate.excitation.quantities import spread
     from palpate.force import Known, known_from
 
@@ -136,7 +143,7 @@ def _known(found: Path | None, stiffness: str | None, source: LogOptions) -> Kno
         return Known((low, high))
     if found.suffix.lower() == ".json":
         return known_from(_object(found), str(found))
-    return known_from(_identified(found, source), str(found))
+    return known_from(_identified(found, source, payload), str(found))
 
 
 def _object(path: Path) -> dict[str, Any]:
@@ -157,9 +164,10 @@ def _object(path: Path) -> dict[str, Any]:
     return value
 
 
-def _identified(log: Path, source: LogOptions) -> dict[str, Any]:
-    from palpate import identify
+def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str, Any]:
+    from palpate.cli._arm_options import ArmOptions
     from palpate.cli._log_options import read
+    from palpate.contact_frame import identify_contact
     from palpate.logs.own_runs import is_run, measured_by
 
     record = read(log, source, samples=False)
@@ -168,7 +176,8 @@ def _identified(log: Path, source: LogOptions) -> dict[str, Any]:
             f"{log}: tune takes a log of one axis; run palpate identify --json on it and give that"
         )
     known: dict[str, Any] = measured_by(log) if source.plain and is_run(log) else {}
-    return identify(record, **known).to_json()
+    found, _ = identify_contact(record, None, ArmOptions(payload=payload).arm(), **known)
+    return found.to_json()
 
 
 def _write(told: Tuning, out: Path | None, page: Path | None) -> None:

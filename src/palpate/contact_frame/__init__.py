@@ -10,7 +10,21 @@ from __future__ import annotations
 from palpate.contact_frame.arm import robot_stiffness, with_arm
 from palpate.contact_frame.declared import Arm, ContactFrame
 from palpate.contact_frame.identifying import identify_contact
+from palpate.contact_frame.payload import Payload, load_payload
 from palpate.contact_frame.projecting import project
 from palpate.contact_frame.telling import told
+from palpate.contact_frame.weighed import Weighed, weigh
 
-__all__ = ["Arm", "ContactFrame", "identify_contact", "project", "robot_stiffness", "told", "with_arm"]
+__all__ = [
+    "Arm",
+    "ContactFrame",
+    "Payload",
+    "Weighed",
+    "identify_contact",
+    "load_payload",
+    "project",
+    "robot_stiffness",
+    "told",
+    "weigh",
+    "with_arm",
+]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from palpate.contact_frame.payload import Payload
 
 Vector = tuple[float, float, float]
 
@@ -28,6 +31,7 @@ class ContactFrame:
         normal_frame: axes of the normal: the base's, or the tool's.
         gravity_compensated: the tool's weight is already taken off the wrench.
         free: begin and end of a stretch in which nothing is touched [s]; None to find such stretches.
+        payload: what hangs on the sensor, if it was weighed; its wrench must be in the same axes.
 
     Raises:
         InputError: they contradict each other.
@@ -42,6 +46,7 @@ class ContactFrame:
     normal_frame: Literal["base", "tool"] = "base"
     gravity_compensated: bool = False
     free: tuple[float, float] | None = None
+    payload: Payload | None = None
 
     def __post_init__(self) -> None:
         if (self.wrench_frame == "sensor") != (self.sensor_rpy is not None):
@@ -55,6 +60,16 @@ class ContactFrame:
         if self.free is not None and not self.free[0] < self.free[1]:
             raise InputError(
                 f"the free stretch must end after it begins, got {self.free[0]:g} to {self.free[1]:g} s"
+            )
+        if self.payload is not None:
+            self._check_axes(self.payload)
+
+    def _check_axes(self, payload: Payload) -> None:
+        said = (self.wrench_frame, self.sensor_rpy)
+        if self.wrench_frame is not None and said != (payload.wrench_frame, payload.sensor_rpy):
+            raise InputError(
+                f"the payload was weighed with a wrench in the {payload.wrench_frame}'s axes, and this wrench is said"
+                f" to be in the {self.wrench_frame}'s: give the same --wrench-frame and --sensor-rpy, or weigh again"
             )
 
 

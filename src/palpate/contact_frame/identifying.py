@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.contact_frame.air_inertia import wrong_sign
 from palpate.contact_frame.arm import with_arm
 from palpate.contact_frame.declared import Arm, ContactFrame
 from palpate.contact_frame.projecting import project
@@ -60,6 +61,8 @@ def identify_contact(
         found = _untouched(found)
     if in_space and Code.NO_CONTACT.word in found.codes:
         found, record = _all_free(found, record)
+    if in_space and wrong_sign(record.meta["contact_frame"]["air_inertia_kg"]):
+        found = _mistaken(found)
     about = _about(arm) | {"force_filter": str(options.get("force_filter") or "none")}
     about["method"] = options.get("method", LEAST_SQUARES)
     record = replace(record, meta={**record.meta, "arm": about})
@@ -75,6 +78,17 @@ def _untouched(found: Identification) -> Identification:
     }
     warnings = [warn for warn in found.warnings if warn.code is not Code.NO_CONTACT]
     return replace(found, parameters=refused, warnings=(*warnings, Warn(Code.NO_CONTACT, reason)))
+
+
+def _mistaken(found: Identification) -> Identification:
+    """A mass taken off with the wrong sign is told from a lag and a damping by nothing that a contact shows."""
+    reason = "the tool's inertia is in the force with the wrong sign (tool-inertia), which a damping and a lag hide"
+    refused = {
+        name: replace(p, verdict=Verdict.REJECTED, value=None, std=None, ci95=None, reason=reason)
+        for name, p in found.parameters.items()
+        if name in {"B", "M"}
+    }
+    return replace(found, parameters={**found.parameters, **refused})
 
 
 def _all_free(found: Identification, record: Record) -> tuple[Identification, Record]:

@@ -12,9 +12,13 @@ one that it leaves as it is. What of w cannot be told is left to b: their sum is
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from palpate.contact_frame.payload import Payload
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -58,6 +62,16 @@ def turns(rotations: Array) -> bool:
     """Whether rotations, shape (n, 3, 3), differ by enough to tell a weight from a bias, at least in part."""
     mean = rotations.mean(axis=0)
     return bool(np.linalg.eigvalsh(np.eye(3) - mean @ mean.T)[-1] > _TOLD)
+
+
+def known_load(force: Array, rotations: Array, payload: Payload) -> Load:
+    """The bias by least squares over free rows, shape (n, 3), with the weight known; the payload's where n is 0."""
+    weight = np.array(payload.weight)
+    if not len(force):
+        return Load(weight, np.array(payload.bias), payload.bias_std, True, payload.weight_std)
+    left = force - np.einsum("nji,j->ni", rotations, weight)
+    bias = left.mean(axis=0)
+    return Load(weight, bias, _std_of_mean(left - bias), True, payload.weight_std)
 
 
 def load_of(force: Array, rotations: Array, *, weighs: bool, weights: Array | None = None) -> Load:

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.contact_frame.air_inertia import air_inertia, wrong_sign
 from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.lever import line_misses_tcp
+from palpate.contact_frame.load import load_of, turns
 from palpate.contact_frame.normal import Normal, direction_of, scale_std
 from palpate.contact_frame.signals_in_base import Signals, signals_of
 from palpate.contact_frame.unloading import Unloaded, in_range
@@ -20,6 +22,8 @@ Array = NDArray[np.float64]
 
 _FOLLOWS = 0.5
 _MATTERS = 0.02
+_FAR_OFF = 4.0
+"""Standard deviations in three dimensions that chance passes by as rarely (chi with three degrees of freedom)."""
 
 
 def project(record: Record, frame: ContactFrame) -> Record:
@@ -47,8 +51,9 @@ def project(record: Record, frame: ContactFrame) -> Record:
     sign, normal, turned = _oriented(signals, freed, normal, frame)
     position = (signals.place - signals.place[read_rows(signals.place)][0]) @ normal.direction
     spread = scale_std(normal, *_in_contact(signals, freed))
-    notes += turned + _warnings(signals, freed, normal, spread)
-    about = _about(signals, freed, normal, sign, frame) | {"scale_std": spread}
+    inertia = _inertia_in_air(signals, freed, sign, frame)
+    notes += turned + _warnings(signals, freed, normal, spread) + _doubts(freed, signals, frame, inertia)
+    about = _about(signals, freed, normal, sign, frame) | {"scale_std": spread, "air_inertia_kg": inertia}
     meta = {**record.meta, "contact_frame": about, "notes": [*record.meta.get("notes", ()), *notes]}
     columns = {"time": signals.time, "position": position, "force": sign * freed.force @ normal.direction}
     return Record(columns, {"time": "s", "position": "m", "force": "N"}, meta)
@@ -136,6 +141,42 @@ def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) 
     return notes
 
 
+def _inertia_in_air(
+    signals: Signals, freed: Unloaded, sign: float, frame: ContactFrame
+) -> tuple[float, float] | None:
+    """The mass by which the force follows the acceleration before the touch, and its std [kg]."""
+    payload = frame.payload
+    centre = payload.centre if payload is not None and payload.centre is not None else (0.0, 0.0, 0.0)
+    off = np.array(frame.wrench_at) + np.array(centre) - np.array(frame.tcp)
+    return air_inertia(signals.time, sign * freed.force, signals.place + signals.rotations @ off, freed.free)
+
+
+def _doubts(
+    freed: Unloaded, signals: Signals, frame: ContactFrame, inertia: tuple[float, float] | None
+) -> list[dict[str, Any]]:
+    """What the free rows say against the tool as it is compensated, or was weighed."""
+    notes = []
+    if wrong_sign(inertia):
+        assert inertia is not None
+        text = (
+            f"in the air the force follows the acceleration as a mass of {inertia[0]:.3g} kg (std {inertia[1]:.2g})"
+            " would: the tool's inertia is compensated with the wrong sign, or twice"
+        )
+        notes.append({"code": "tool-inertia", "text": text})
+    free = freed.free
+    if frame.payload is None or not free.any() or not turns(signals.rotations[free]):
+        return notes
+    own = load_of(signals.force[free], signals.rotations[free], weighs=True)
+    off = float(np.linalg.norm(own.weight - np.array(frame.payload.weight)))
+    if own.separable and off > _FAR_OFF * float(np.hypot(own.weight_std, frame.payload.weight_std)):
+        text = (
+            f"the free rows weigh {off:.2g} N otherwise than the payload file says: is it of another tool, of a pose of"
+            " another frame, or is the sensor saturated?"
+        )
+        notes.append({"code": "payload-doubtful", "text": text})
+    return notes
+
+
 def _about(
     signals: Signals, freed: Unloaded, normal: Normal, sign: float, frame: ContactFrame
 ) -> dict[str, Any]:
@@ -155,6 +196,7 @@ def _about(
         "normal_std_rad": normal.std,
         "normal_shown": normal.shown,
         "free_said_s": list(frame.free) if frame.free else None,
+        "payload_said": frame.payload is not None,
         "free_rows": int(freed.free.sum()),
         "bias_N": load.bias.tolist(),
         "weight_N": load.weight.tolist() if load.separable else None,

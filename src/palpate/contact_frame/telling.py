@@ -51,12 +51,17 @@ def _normal(about: Mapping[str, Any]) -> str:
 
 
 def _load(about: Mapping[str, Any]) -> str:
-    if not about["free_rows"]:
+    if not about["free_rows"] and not about.get("payload_said"):
         return "no free motion: bias and weight are not known"
     if about["weight_N"] is None:
         what = "bias" if about["gravity_compensated"] else "bias and weight together"
         return f"{what} {_listed(about['bias_N'])} N in the tool's axes (std {about['load_std_N']:.2g} N)"
     weight, std = float(np.linalg.norm(about["weight_N"])), about["weight_std_N"]
+    if about.get("payload_said"):
+        return (
+            f"tool's weight {weight:.3g} N (std {std:.2g} N) by the payload file; bias {_listed(about['bias_N'])} N"
+            f"{'' if about['free_rows'] else ' by the same, as the log has no free motion'}"
+        )
     mass = f"--tool-mass {weight / _GRAVITY:.3g}:{std / _GRAVITY:.1g} would take its inertia out of M"
     return f"tool's weight {weight:.3g} N (std {std:.2g} N; {mass}); bias {_listed(about['bias_N'])} N"
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.free_motion import contact_rows, rows_between
-from palpate.contact_frame.load import Load, load_of, no_load, robust_load, turns
+from palpate.contact_frame.load import Load, known_load, load_of, no_load, robust_load, turns
 from palpate.contact_frame.saturation import saturated_rows
 from palpate.contact_frame.signals_in_base import Signals
 from palpate.contact_frame.vectors import read_rows
@@ -56,27 +56,43 @@ def in_range(signals: Signals, frame: ContactFrame) -> tuple[Signals, Unloaded, 
 
 
 def _unloaded(signals: Signals, frame: ContactFrame) -> Unloaded:
-    weighs = not frame.gravity_compensated
     there = read_rows(signals.force)
     if frame.free is None:
-        load, inside, free = _found(signals, there, weighs)
+        load, inside, free = _found(signals, there, frame)
     else:
         free = rows_between(signals.time, frame.free) & there
-        load = load_of(signals.force[free], signals.rotations[free], weighs=weighs)
+        load = _load(signals, free, frame)
         inside, _ = _contact(signals, load)
     return Unloaded(load.taken_off(signals.force, signals.rotations), there, inside, free, load)
 
 
-def _found(signals: Signals, there: Rows, weighs: bool) -> tuple[Load, Rows, Rows]:
+def _load(signals: Signals, free: Rows, frame: ContactFrame) -> Load:
+    """Weight and bias by the free rows; the weight is the payload's where there is one."""
+    force, rotations = signals.force[free], signals.rotations[free]
+    if frame.payload is not None:
+        return known_load(force, rotations, frame.payload)
+    return load_of(force, rotations, weighs=not frame.gravity_compensated)
+
+
+def _found(signals: Signals, there: Rows, frame: ContactFrame) -> tuple[Load, Rows, Rows]:
     """Weight and bias by the free rows; which rows these are, depends on the weight where the tool turns."""
     turned = signals.turned and turns(signals.rotations[there])
-    load = robust_load(signals.force[there], signals.rotations[there], weighs=weighs) if turned else no_load()
+    none = there & False
+    weighs = not frame.gravity_compensated
+    if frame.payload is not None:
+        load = _load(signals, none, frame)
+    else:
+        load = (
+            robust_load(signals.force[there], signals.rotations[there], weighs=weighs)
+            if turned
+            else no_load()
+        )
     for _ in range(_ROUNDS if turned else 1):
         inside, free = _contact(signals, load)
         free &= there
         if not free.any():
-            return no_load(), inside, free
-        load = load_of(signals.force[free], signals.rotations[free], weighs=weighs)
+            return _load(signals, none, frame) if frame.payload else no_load(), inside, free
+        load = _load(signals, free, frame)
     return load, inside, free
 
 

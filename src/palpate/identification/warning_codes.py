@@ -61,6 +61,11 @@ class Code(Enum):
     NORMAL_UNCERTAIN = (
         "The contact's normal was found from the force, and so badly that it matters for the parameters."
     )
+    TOOL_INERTIA = (
+        "In the air the force follows the acceleration against the sense in which a tool's mass makes it: its"
+        " inertia is compensated with the wrong sign, or twice. In contact a damping and a lag hide that: B is refused."
+    )
+    PAYLOAD_DOUBTFUL = "What the sensor shows in the air is not what the payload file foretells."
     NEGATIVE_STIFFNESS = "The force falls as the penetration grows: no passive surface does that."
 
     @property

@@ -11,6 +11,7 @@ from palpate.logs.bags import Bag
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.read import read_log
 from palpate.logs.roles import POSE, WRENCH
+from palpate.logs.rotations import roles_of, with_quaternions
 from palpate.logs.tables import open_table
 from palpate.records import Record
 
@@ -61,7 +62,11 @@ def is_pose(kind: str) -> bool:
 
 
 def read_wrench_and_pose(
-    path: str | Path, wrench: str | None = None, pose: str | None = None, **options: Any
+    path: str | Path,
+    wrench: str | None = None,
+    pose: str | None = None,
+    rotation: str = "quaternion",
+    **options: Any,
 ) -> Record:
     """Read wrench and pose of a log into a record of three dimensions.
 
@@ -69,7 +74,9 @@ def read_wrench_and_pose(
         path: of the log.
         wrench: a topic of a bag, or columns of any log, `fx,fy,fz` or `fx,fy,fz,tx,ty,tz`, each `NAME` or `NAME:UNIT`;
             of a bag the only topic that is one, when None.
-        pose: likewise, `x,y,z` or `x,y,z,qx,qy,qz,qw`.
+        pose: likewise, `x,y,z` or `x,y,z,qx,qy,qz,qw`, or as `rotation` says.
+        rotation: how the orientation is written: `quaternion`, `quaternion-wxyz`, `rotation-vector`, `rpy` (about fixed
+            axes), `matrix` (by rows) or `matrix-by-columns`.
         options: of `read_log`: `time` of a log that is no bag, `start`, `end`, `missing`, ...
 
     Returns:
@@ -83,8 +90,12 @@ def read_wrench_and_pose(
     with Bag(path, kind, options.get("limits")) if kind.is_bag else nullcontext() as bag:
         wrench = wrench or _only("wrench", bag, path)
         pose = pose or _only("pose", bag, path)
-        columns = _columns("wrench", wrench, path, kind, bag) | _columns("pose", pose, path, kind, bag)
+        columns = _columns("wrench", wrench, path, kind, bag) | _columns(
+            "pose", pose, path, kind, bag, rotation
+        )
     record = read_log(path, **(options | columns))
+    turned = with_quaternions(record.columns)
+    record = Record(turned, {name: record.units.get(name, "1") for name in turned}, record.meta)
     facts = [f"wrench of {wrench}, pose of {pose}", *record.meta.get("facts", ())]
     return Record(record.columns, record.units, {**record.meta, "facts": facts})
 
@@ -106,12 +117,18 @@ def _only(what: str, bag: Bag | None, path: Path) -> str:
     )
 
 
-def _columns(what: str, spec: str, path: Path, kind: Kind, bag: Bag | None) -> dict[str, str]:
+def _columns(
+    what: str, spec: str, path: Path, kind: Kind, bag: Bag | None, rotation: str = "quaternion"
+) -> dict[str, str]:
     """Columns by role."""
     roles, counts = _COUNTS[what]
     names = spec.split(",")
     if len(names) == 1:
-        names = _of_topic(what, spec, bag) if bag else _of_matrix(what, spec, path, kind)
+        names = _of_topic(what, spec, bag) if bag else _of_matrix(what, spec, path, kind, rotation)
+        if bag:
+            rotation = "quaternion"  # a message that is known says its order itself
+    if what == "pose":
+        return roles_of(rotation, names)
     if len(names) not in counts:
         raise InputError(f"--{what} needs {_ORDERS[what]}, got {len(names)} columns: {','.join(names)}")
     return dict(zip(roles, names, strict=False))
@@ -128,12 +145,13 @@ def _of_topic(what: str, name: str, bag: Bag) -> list[str]:
     )
 
 
-def _of_matrix(what: str, name: str, path: Path, kind: Kind) -> list[str]:
+def _of_matrix(what: str, name: str, path: Path, kind: Kind, rotation: str) -> list[str]:
     """The columns of a matrix of a MATLAB file; quaternions have two orders there, so they are not guessed at."""
     columns = [own for own in open_table(path, kind).names if own.rpartition(".")[0] == name]
-    if what == "pose" and len(columns) > 3:
+    if what == "pose" and len(columns) > 3 and rotation == "quaternion":
         raise InputError(
-            f"name the columns of {name} one by one, --pose {name}.0,{name}.1,...: x,y,z,qx,qy,qz,qw, the scalar last"
+            f"name the columns of {name} one by one, --pose {name}.0,{name}.1,...: x,y,z,qx,qy,qz,qw, the scalar last;"
+            " or say how it is written with --rotation"
         )
     if not columns:
         raise InputError(f"--{what} needs {_ORDERS[what]} of {path}, got {name!r}")

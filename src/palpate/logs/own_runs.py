@@ -29,6 +29,11 @@ def is_run(path: Path) -> bool:
 def read_run(path: Path, **options: Any) -> Record:
     """Time, position and force of a run's record; `options` are those of `read_log`."""
     record = read_log(path, **(options | RUN))
+    about = stored_about(path)
+    if about is not None and "wire" in about.meta:
+        fact = "a press over a wire: force and position along its direction, the force less what it was in the air"
+        meta = {**record.meta, "facts": [fact], "position_from": "joints"}
+        return Record(record.columns, record.units, meta)
     fact = f"a run's record: {RUN['position']} and {RUN['force']}, measured as the record itself says"
     no_tool = {"tool_mass_kg": (0.0, 0.0)}  # the bench's force is that on the surface itself
     return Record(record.columns, record.units, {**record.meta, **no_tool, "facts": [fact]})

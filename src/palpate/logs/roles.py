@@ -31,14 +31,29 @@ _QUANTITY = {
     "force": "force",
     "torque": "torque",
     "quaternion": "number",
+    "rotvec": "angle",
+    "rpy": "angle",
+    "matrix": "number",
 }
-_SI = {"time": "s", "position": "m", "force": "N", "torque": "N m", "quaternion": "1"}
+_SI = {
+    "time": "s",
+    "position": "m",
+    "force": "N",
+    "torque": "N m",
+    "quaternion": "1",
+    "rotvec": "rad",
+    "rpy": "rad",
+    "matrix": "1",
+}
 _ALLOWED = {
     "time": {"time"},
     "position": {"length", "angle", "number"},
     "force": {"force", "torque", "number"},
     "torque": {"torque"},
     "quaternion": {"number"},
+    "rotvec": {"angle"},
+    "rpy": {"angle"},
+    "matrix": {"number"},
 }
 
 

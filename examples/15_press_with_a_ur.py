@@ -1,0 +1,52 @@
+"""A UR cell from nothing to a press of 20 N: gains, a look, a press, the surface, better gains.
+
+The arm is a simulated one that speaks as a UR's controller does, so that ur-rtde itself moves it; with a real one only
+the address is another, and `--yes` is left out, so that it asks. Each line is a command as it can be typed.
+"""
+
+import contextlib
+import io
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+from palpate.cli import main
+
+ADDRESS = "127.0.0.15"
+LIMITS = "--force-limit 40:N --speed-limit 50:mm/s --travel-limit 15:mm --time-limit 20:s"
+
+# A UR whose RTDE runs at 125 Hz: the file of the shipped arm with its own numbers.
+Path("cell.toml").write_text(
+    'title = "our UR, 125 Hz"\nrate = 125\n[inner]\nkind = "position"\nbandwidth = 10\ndamping = 0.9\ndelay = 0.016\n'
+    'stiffness = 5e4\n[sensor]\nlow_pass = "butterworth3:120"\nsampling = 125\nnoise = 0.1\nfull_scale = 100\n'
+    "[limits]\nspeed = 0.25\nstiffness = 1e6\n"
+)
+
+
+def palpate(command: str, into: str | None = None) -> int:
+    """Run a command in this process, as a shell would."""
+    print(f"$ palpate {command}" + (f" > {into}" if into else ""), flush=True)
+    if into is None:
+        return main(shlex.split(command))
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        code = main(shlex.split(command))
+    Path(into).write_text(printed.getvalue())
+    return code
+
+
+controller = [sys.executable, "-m", "palpate.wires.rtde_arm", "--address", ADDRESS, "--arm", "cell.toml"]
+with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
+    assert arm.stdout is not None
+    wire = arm.stdout.readline().strip()
+    press = f"press-wire --wire {wire} --gains gains.toml --force 20:N --direction 0,0,-1 {LIMITS}"
+    try:
+        palpate("tune --arm cell.toml --stiffness 1e3:1e5 --force 20 --out gains.toml --json", "tuned.json")
+        palpate(f"{press} --dry-run")
+        code = palpate(f"{press} --yes --ordinary-priority --record first")
+        if code:  # a machine that is busy is late, and then the arm is stopped: that is as it should be
+            print("the press ended before it was done, as said above")
+        palpate("identify first/record.parquet --robot-stiffness 50000:2000 --json", "found.json")
+        print(Path("found.json").read_text()[:200], "...")
+    finally:
+        arm.kill()

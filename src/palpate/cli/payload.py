@@ -1,0 +1,104 @@
+"""`palpate payload`: what hangs on the force sensor, and what does the sensor show of itself?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from palpate.cli._arm_options import FrameOptions
+from palpate.cli._log_options import LogOptions, read
+from palpate.cli._options_file import CellOptions
+from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
+from palpate.errors import InputError
+from palpate.files import check_place
+
+if TYPE_CHECKING:
+    from palpate.contact_frame import Weighed
+
+_FLAG = Parameter(negative=())
+
+
+def payload(
+    log: Path,
+    /,
+    *,
+    source: LogOptions | None = None,
+    frame: FrameOptions | None = None,
+    cell: CellOptions | None = None,
+    tolerance: float = 0.25,
+    out: Path | None = None,
+    replace: Annotated[bool, _FLAG] = False,
+    report: Path | None = None,
+    json: Annotated[bool, _FLAG] = False,
+) -> int:
+    """Weigh a tool by a log of free motion: mass, centre, the sensor's bias and drift.
+
+    Rest in six orientations or more, a second each, 30 degrees and more from each other, and come back to the first;
+    log wrench and pose:
+
+    palpate payload turning.mcap --wrench-frame tool --out tool.toml
+
+    palpate identify press.mcap --wrench-frame tool --payload tool.toml
+
+    Shake the tool at the end of the log, and it is told too whether the driver takes off the tool's inertia. Exit
+    code 1 says that the poses do not tell the mass, and how to move.
+
+    Parameters
+    ----------
+    log
+        A log of wrench and pose, as palpate identify takes it.
+    tolerance
+        Largest half-width of the mass' 95 % interval, as a share of its value.
+    out
+        Where to write the payload, a TOML file for --payload.
+    replace
+        Replace what stands at --out.
+    report
+        Where to write a page with everything, an HTML file.
+    json
+        Print one JSON object and nothing else.
+    """
+    cell = cell or CellOptions()
+    cell.check()
+    if out is not None:
+        check_place(out, "--out", ending=".toml")
+        if out.exists() and not replace:
+            raise InputError(f"{out} exists; choose another place, or add --replace")
+    if report is not None:
+        check_place(report, "--report", ending=".html")
+    if not 0.0 < tolerance <= 1.0:
+        raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
+    from palpate.contact_frame import ContactFrame, weigh
+
+    cell.save((source or LogOptions(), frame or FrameOptions()))
+    record = read(log, source or LogOptions(), samples=False)
+    if "force_x" not in record.columns:
+        raise InputError(
+            f"{log}: a tool is weighed by a wrench and a pose in three dimensions; name them with --wrench and --pose"
+        )
+    found = weigh(record, (frame or FrameOptions()).frame() or ContactFrame(), tolerance)
+    if out is not None and found.payload is not None:
+        found.payload.save(out)
+    if report is not None:
+        from palpate.report.payload import write_page
+
+        write_page(found, log.name, report)
+    _print(found, log, [p for p in (out if found.payload else None, report) if p is not None], json)
+    return 0 if found.payload is not None else 1
+
+
+def _print(found: Weighed, log: Path, written: list[Path], json: bool) -> None:
+    if json:
+        print_json(found.to_json())
+        return
+    from palpate.report.payload import sentence, table
+
+    screen = console()
+    head(screen, log.name, f": {sentence(found)}")
+    show_table(screen, table(found))
+    for note in found.notes:
+        screen.print(f"{note['code']}: {note['text']}", style=STYLE, soft_wrap=True)
+    for path in written:
+        place(screen, "written:", path)

@@ -1,0 +1,95 @@
+"""What hangs on a force sensor, as one value and one TOML file: the tool's mass and centre, the sensor's bias."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from palpate.contact_frame.declared import Vector
+from palpate.errors import InputError
+from palpate.files import write_text
+from palpate.force.arm import NotNegative, Table, from_toml, read_small
+
+GRAVITY = 9.80665
+"""Standard gravity [m/s^2]."""
+
+
+class Payload(Table):
+    """A tool beyond a force sensor, and the sensor's bias when it was weighed.
+
+    Raises:
+        InputError: numbers that do not fit together.
+    """
+
+    mass: NotNegative
+    """[kg]."""
+    mass_std: NotNegative
+    weight: Vector
+    """As the sensor shows it, in the base's axes [N]; it points up where the sensor shows the reaction."""
+    weight_std: NotNegative
+    """Of an axis [N]."""
+    bias: Vector
+    """Of the force, in the tool's axes [N]."""
+    bias_std: NotNegative
+    """Of an axis [N]."""
+    noise: NotNegative
+    """Standard deviation of a reading of an axis [N]."""
+    wrench_frame: Annotated[str, Meta(pattern="^(base|tool|sensor)$")]
+    """Axes of the wrench in the log that it was weighed by."""
+    sensor_rpy: Vector | None = None
+    """How the sensor is turned against the tool [rad]."""
+    drift: Vector | None = None
+    """Of the bias [N/s]; None where the log does not tell it."""
+    centre: Vector | None = None
+    """Of mass, in the tool's axes from the point that the torque is about [m]; None without a torque."""
+    centre_std: NotNegative | None = None
+    inertia: float | None = None
+    """Mass by which the force follows the acceleration in the air, against gravity's sense [kg]: the tool's own where
+    nothing takes it off, 0 where a driver does, below 0 where one does so with the wrong sign; None if not told."""
+    inertia_std: NotNegative | None = None
+
+    def __post_init__(self) -> None:
+        if (self.wrench_frame == "sensor") != (self.sensor_rpy is not None):
+            raise InputError("sensor_rpy belongs to wrench_frame = 'sensor', and only to that")
+
+    @property
+    def beyond(self) -> tuple[float, float] | None:
+        """The mass that is in the force beside the surface's, and its std [kg]; None if it is not told.
+
+        The one that follows the acceleration, where it was shaken; else the one that hangs, unless that is nothing: a
+        driver that takes off the weight may leave the inertia in.
+        """
+        if self.inertia is not None and self.inertia_std is not None:
+            return max(self.inertia, 0.0), self.inertia_std
+        return (self.mass, self.mass_std) if self.mass > 2.0 * self.mass_std else None
+
+    def to_toml(self) -> str:
+        """The file's text."""
+        plain = {name: value for name, value in msgspec.to_builtins(self).items() if value is not None}
+        lines = [f"{name} = {_written(value)}" for name, value in plain.items()]
+        head = "# Made by palpate payload; palpate identify and palpate tune take it by --payload. SI units."
+        return "\n".join([head, *lines]) + "\n"
+
+    def save(self, path: Path) -> None:
+        """Writes the file, whole or not at all."""
+        write_text(path, self.to_toml())
+
+
+def load_payload(path: Path) -> Payload:
+    """A payload from the file that `palpate payload` wrote.
+
+    Raises:
+        InputError: no such file, an unknown or missing key, a value out of range.
+    """
+    return from_toml(read_small(path, "a payload"), str(path), Payload)
+
+
+def _written(value: object) -> str:
+    if isinstance(value, str):
+        return msgspec.json.encode(value).decode()
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(repr(float(v)) for v in value) + "]"
+    return repr(float(value))  # type: ignore[arg-type]

@@ -1,0 +1,49 @@
+"""From an address to a wire: KIND:WHERE, without any default."""
+
+from __future__ import annotations
+
+from palpate.errors import InputError, unknown
+from palpate.wires.protocol import Wire
+from palpate.wires.ros2 import FORM
+
+KINDS = {"sim": "sim:HOST:PORT", "rtde": "rtde:ADDRESS", "ros2": FORM}
+
+
+def open_wire(address: str) -> Wire:
+    """The wire at an address such as `sim:127.0.0.1:4000`.
+
+    Raises:
+        InputError: an address that is none, a library that is missing, an arm that does not answer.
+    """
+    kind, colon, where = address.partition(":")
+    if kind not in KINDS:
+        raise unknown("wire", kind, KINDS)
+    if not colon or not where.strip():
+        raise InputError(
+            f"--wire needs the arm's address, as {KINDS[kind]}, got {address!r}; there is no default"
+        )
+    return _OPENERS[kind](where.strip())
+
+
+def _sim(where: str) -> Wire:
+    from palpate.wires.sim import SimWire
+
+    host, colon, port = where.rpartition(":")
+    if not colon or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise InputError(f"--wire needs {KINDS['sim']}, as sim:127.0.0.1:4000, got 'sim:{where}'")
+    return SimWire(host, int(port))
+
+
+def _rtde(where: str) -> Wire:
+    from palpate.wires.ur import UrWire
+
+    return UrWire(where)
+
+
+def _ros2(where: str) -> Wire:
+    from palpate.wires.ros2 import Ros2Wire, topics_of
+
+    return Ros2Wire(*topics_of(where))
+
+
+_OPENERS = {"ros2": _ros2, "sim": _sim, "rtde": _rtde}

@@ -1,0 +1,223 @@
+"""The wire to an arm under ROS 2, by cyclonedds alone: wrench and pose in, a twist, a pose or an array out."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any, Literal
+from urllib.parse import parse_qsl
+
+import msgspec
+
+from palpate.errors import InputError
+from palpate.wires.protocol import Command, LostError, Sense, Triple
+from palpate.wires.turns import turned
+
+FORM = "ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=reaction"
+_KEPT = 32
+_PATIENCE = 2.0
+"""For which topics may take to be found [s]."""
+
+
+class Topics(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What a wire to ROS 2 has to be told; nothing of it has a default.
+
+    Args:
+        wrench: topic of a WrenchStamped.
+        pose: topic of a PoseStamped, of the tool in the arm's base.
+        command: topic that a controller listens at.
+        kind: `twist` (TwistStamped), `pose` (PoseStamped) or `array` (Float64MultiArray of a twist's six numbers).
+        wrench_frame: axes of the wrench: the arm's `base` or the `tool`.
+        force_sign: `action` for what the tool exerts on the surface, `reaction` for the opposite.
+    """
+
+    wrench: str
+    pose: str
+    command: str
+    kind: Literal["twist", "pose", "array"] = msgspec.field(name="as")
+    wrench_frame: Literal["base", "tool"] = msgspec.field(name="wrench-frame")
+    force_sign: Literal["action", "reaction"] = msgspec.field(name="force-sign")
+
+
+def topics_of(where: str) -> tuple[int, Topics]:
+    """Domain and topics of an address behind `ros2:`.
+
+    Raises:
+        InputError: one of them is missing or none.
+    """
+    domain, _, query = where.partition("?")
+    if not domain.isdecimal() or not 0 <= int(domain) <= 232:
+        raise InputError(f"--wire needs {FORM}, with a domain from 0 to 232, got 'ros2:{where}'")
+    try:
+        return int(domain), msgspec.convert(dict(parse_qsl(query, keep_blank_values=True)), Topics)
+    except msgspec.ValidationError as error:
+        raise InputError(f"--wire {FORM}: {error}") from None
+
+
+@dataclass
+class _Ends:
+    """What a participant reads and writes."""
+
+    wrench: Any
+    pose: Any
+    command: Any
+    writers: Any
+    waiting: Any
+
+
+class Ros2Wire:
+    """An arm under ROS 2, whose controller runs.
+
+    Args:
+        domain: ROS_DOMAIN_ID.
+        topics: by name.
+
+    Raises:
+        InputError: cyclonedds is missing, or nothing publishes there.
+    """
+
+    def __init__(self, domain: int, topics: Topics):
+        try:
+            from palpate.wires import ros2_messages
+        except ImportError:
+            raise InputError("this wire needs cyclonedds: pip install 'palpate[ros2]'") from None
+        self._messages: Any = ros2_messages
+        self._topics, self._domain = topics, domain
+        self._ends = _opened(domain, topics, ros2_messages)
+        self._last, self._begun = -1.0, False
+        self._pose: Any = None
+        try:
+            self.read(_PATIENCE)
+        except LostError as error:
+            raise InputError(f"nothing to read in ROS domain {domain}: {error}") from None
+
+    @property
+    def title(self) -> str:
+        """What it leads to."""
+        t = self._topics
+        return f"an arm in ROS domain {self._domain}, {t.wrench} and {t.pose} in, {t.kind} to {t.command}"
+
+    @property
+    def watchdog(self) -> str:
+        """What stops it if this process dies."""
+        return (
+            f"only what the controller at {self._topics.command} does when commands stop: look up its timeout"
+        )
+
+    def read(self, timeout: float) -> Sense:
+        """The next wrench, with the newest pose."""
+        end = time.monotonic() + timeout
+        while (left := end - time.monotonic()) > 0:
+            self._ends.waiting.wait(max(int(1e9 * left), 1))
+            wrenches = self._ends.wrench.take(_KEPT)
+            for sample in self._ends.pose.take(_KEPT):
+                if hasattr(sample, "pose"):
+                    self._pose = sample
+            fresh = [sample for sample in wrenches if hasattr(sample, "wrench")]
+            if fresh and self._pose is not None:
+                sense = self._sense(fresh[-1], timeout)
+                if sense is not None:
+                    return sense
+        lacking = self._topics.wrench if self._pose is not None else self._topics.pose
+        raise LostError(f"no reading at {lacking} for {1e3 * timeout:.3g} ms")
+
+    def _sense(self, sample: Any, timeout: float) -> Sense | None:
+        received, stamp = time.monotonic(), _seconds(sample.header.stamp)
+        pose = self._pose
+        if not stamp > self._last:
+            return None
+        if stamp - _seconds(pose.header.stamp) > timeout:
+            raise LostError(f"the pose at {self._topics.pose} is older than {1e3 * timeout:.3g} ms")
+        self._last = stamp
+        p, o = pose.pose.position, pose.pose.orientation
+        quaternion = (o.x, o.y, o.z, o.w)
+        sign = 1.0 if self._topics.force_sign == "action" else -1.0
+        f, m = ((sign * v.x, sign * v.y, sign * v.z) for v in (sample.wrench.force, sample.wrench.torque))
+        if self._topics.wrench_frame == "tool":
+            f, m = turned(quaternion, f), turned(quaternion, m)
+        return Sense(received, stamp, f, m, (p.x, p.y, p.z), quaternion)
+
+    def tare(self) -> None:
+        """ROS 2 has no one way to zero a sensor."""
+
+    def begin(self) -> None:
+        """Refuse another master, and a topic that nobody listens at."""
+        name, own = f"rt{self._topics.command}", self._ends.command
+        end = time.monotonic() + _PATIENCE
+        while not own.get_matched_subscriptions():
+            if time.monotonic() > end:
+                raise InputError(f"nothing listens at {self._topics.command}; is the controller active?")
+            time.sleep(0.02)
+        others = [
+            one for one in self._ends.writers.take(1000)
+            if getattr(one, "topic_name", "") == name and one.key != own.guid
+        ]  # fmt: skip
+        if others:
+            raise InputError(f"{self._topics.command} has another master; end that one first")
+        self._begun = True
+
+    def write(self, command: Command) -> None:
+        """A message of the kind that was told."""
+        try:
+            self._ends.command.write(self._message(command.velocity, command.position))
+        except Exception as error:  # noqa: BLE001 - cyclonedds has many, of no common base
+            raise LostError(f"a command could not be sent: {error}") from None
+
+    def _message(self, velocity: Triple, position: Triple) -> Any:
+        m = self._messages
+        now = time.time_ns()
+        frame = self._pose.header.frame_id if self._pose is not None else ""
+        header = m.Header(m.Time(now // 10**9, now % 10**9), frame)
+        if self._topics.kind == "pose":
+            turn = self._pose.pose.orientation
+            return m.PoseStamped(header, m.Pose(m.Point(*position), turn))
+        if self._topics.kind == "array":
+            return m.Float64MultiArray(m.Layout([], 0), [*velocity, 0.0, 0.0, 0.0])
+        return m.TwistStamped(header, m.Twist(m.Vector3(*velocity), m.Vector3(0.0, 0.0, 0.0)))
+
+    def stop(self) -> None:
+        """Speed 0, or the place where the tool is; said three times."""
+        if not self._begun:
+            return
+        self._begun = False
+        p = self._pose.pose.position
+        for _ in range(3):
+            try:
+                self.write(Command((0.0, 0.0, 0.0), (p.x, p.y, p.z)))
+            except LostError:
+                return
+            time.sleep(0.002)
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self.stop()
+        self._ends = None  # type: ignore[assignment]
+
+
+def _seconds(stamp: Any) -> float:
+    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+
+
+def _opened(domain: int, topics: Topics, messages: Any) -> _Ends:
+    from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
+    from cyclonedds.core import InstanceState, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
+    from cyclonedds.domain import DomainParticipant
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+
+    participant = DomainParticipant(domain)
+    into = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(_KEPT))
+    out = Qos(Policy.Reliability.Reliable(10**8), Policy.History.KeepLast(1))
+    kinds = {"twist": "TwistStamped", "pose": "PoseStamped", "array": "Float64MultiArray"}
+
+    def topic(name: str, kind: str) -> Any:
+        return Topic(participant, f"rt{name}", getattr(messages, kind))
+
+    wrench = DataReader(participant, topic(topics.wrench, "WrenchStamped"), qos=into)
+    pose = DataReader(participant, topic(topics.pose, "PoseStamped"), qos=into)
+    command = DataWriter(participant, topic(topics.command, kinds[topics.kind]), qos=out)
+    waiting = WaitSet(participant)
+    waiting.attach(ReadCondition(wrench, ViewState.Any | InstanceState.Alive | SampleState.NotRead))
+    writers = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
+    return _Ends(wrench, pose, command, writers, waiting)

@@ -1,0 +1,287 @@
+"""A simulated arm that speaks as a UR does, to rehearse with: RTDE, dashboard and script port, on a loopback address.
+
+`python -m palpate.wires.rtde_arm --address 127.0.0.9`. It knows of ur-rtde's control script what a press needs: speedL
+and its stop, zeroFtSensor, the watchdog, the end; to all else it answers as a script that has done it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import selectors
+import socket
+import struct
+import sys
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from palpate.force.arm import load_arm
+from palpate.force.worlds import surface
+from palpate.wires.sim_arm import OneDirection
+
+RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
+_VERSION = (5, 15, 0, 0)
+_RUNNING, _STOPPED = 2, 1
+READY, DONE = 1, 2
+# Numbers of ur-rtde's commands.
+NOTHING, ZERO, SPEEDL, SPEED_STOP, WATCHDOG, STOP = 0, 8, 10, 15, 35, 255
+_SIX = {"actual_TCP_pose", "actual_TCP_force", "actual_TCP_speed", "actual_q", "actual_qd"}
+_DASHBOARD = {
+    "PolyscopeVersion": "URSoftware 5.15.0.1202319 (Aug 22 2023)",
+    "is in remote control": "true",
+    "running": "Program running: true",
+    "robotmode": "Robotmode: RUNNING",
+    "stop": "Stopped",
+    "get serial number": "20235500001",
+    "get robot model": "UR5",
+}
+
+
+def kind_of(name: str) -> str:
+    """The type of a variable of RTDE."""
+    if name in _SIX:
+        return "VECTOR6D"
+    if name.startswith(("input_int", "output_int", "robot_mode", "safety_mode")):
+        return "INT32"
+    if name.endswith(("_bits", "runtime_state")):
+        return "UINT32"
+    return "DOUBLE"
+
+
+_CODES = {"VECTOR6D": "6d", "INT32": "i", "UINT32": "I", "DOUBLE": "d"}
+
+
+@dataclass
+class Client:
+    """One connection to RTDE.
+
+    Args:
+        socket: of it.
+        buffer: what has come and is no whole packet yet.
+        outputs: variables that it asked for.
+        inputs: recipes that it sends, by number.
+        started: whether it wants packets.
+    """
+
+    socket: socket.socket
+    buffer: bytes = b""
+    outputs: list[str] = field(default_factory=list)
+    inputs: dict[int, list[str]] = field(default_factory=dict)
+    started: bool = False
+
+
+class Controller:
+    """The arm, and what a control script would do with it.
+
+    Args:
+        arm: the simulated arm.
+    """
+
+    def __init__(self, arm: OneDirection):
+        self.arm = arm
+        self.running, self.state = False, READY
+        self.speed, self.zero = 0.0, 0.0
+        self.least, self.heard = 0.0, 0.0
+        self.commands: list[int] = []
+        self.master: Client | None = None
+
+    def obey(self, numbers: dict[str, Any]) -> None:
+        """A packet of registers."""
+        command = int(numbers.get("input_int_register_0", 0))
+        self.heard = self.arm.time
+        if command == NOTHING:
+            self.state = READY
+            return
+        if not self.running:
+            return
+        self.commands.append(command)
+        value = [float(numbers.get(f"input_double_register_{i}", 0.0)) for i in range(8)]
+        if command == SPEEDL:
+            self.speed = -value[2]
+            return
+        if command in {SPEED_STOP, STOP}:
+            self.speed = 0.0
+        if command == ZERO:
+            self.zero = self.arm.reading()[2]
+        if command == WATCHDOG:
+            self.least = value[0]
+        if command == STOP:
+            self.running = False
+        self.state = DONE
+
+    def tick(self) -> None:
+        """Go on by one tick."""
+        if self.least and self.arm.time - self.heard > 1.0 / self.least:
+            self.speed, self.running = 0.0, False
+        self.arm.tick(self.speed)
+
+    def value(self, name: str) -> Any:
+        """Of a variable."""
+        x, y, z = self.arm.reading()[6:9]
+        # The controller shows what the surface exerts on the tool.
+        up = -(self.arm.reading()[2] - self.zero)
+        known = {
+            "timestamp": self.arm.time,
+            "actual_TCP_pose": (x, y, z, 3.14159, 0.0, 0.0),
+            "actual_TCP_force": (0.0, 0.0, up, 0.0, 0.0, 0.0),
+            "robot_status_bits": 1 | (2 if self.running else 0),
+            "safety_status_bits": 1,
+            "runtime_state": _RUNNING if self.running else _STOPPED,
+            "output_int_register_0": self.state,
+        }
+        return known.get(name, (0.0,) * 6 if name in _SIX else 0)
+
+
+class Server:
+    """The three ports.
+
+    Args:
+        address: of the loopback.
+        controller: of the arm.
+    """
+
+    def __init__(self, address: str, controller: Controller):
+        self.controller = controller
+        self.clients: dict[socket.socket, Client] = {}
+        self.selector = selectors.DefaultSelector()
+        for port in (RTDE, SCRIPT, DASHBOARD):
+            listening = socket.socket()
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.bind((address, port))
+            listening.listen()
+            listening.setblocking(False)
+            self.selector.register(listening, selectors.EVENT_READ, ("accept", port))
+
+    def serve(self, seconds: float) -> None:
+        """Run at real time until the seconds of the arm are over."""
+        controller, begun = self.controller, time.monotonic()
+        while controller.arm.time < seconds:
+            due = begun + controller.arm.time
+            while True:
+                left = max(due - time.monotonic(), 0.0)
+                for key, _ in self.selector.select(left):
+                    self._handle(key.fileobj, *key.data)
+                if time.monotonic() >= due:
+                    break
+            if time.monotonic() - due > 1.0:
+                begun += time.monotonic() - due
+            controller.tick()
+            for client in list(self.clients.values()):
+                if client.started:
+                    self._send(client, "U", self._packet(client))
+
+    def _handle(self, one: Any, what: str, port: int) -> None:
+        if what == "accept":
+            made, _ = one.accept()
+            made.setblocking(False)
+            made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self.selector.register(made, selectors.EVENT_READ, ("data", port))
+            if port == RTDE:
+                self.clients[made] = Client(made)
+            if port == DASHBOARD:
+                made.send(b"Connected: Universal Robots Dashboard Server\n")
+            return
+        try:
+            data = one.recv(65536)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._gone(one)
+        elif port == RTDE:
+            self._rtde(self.clients[one], data)
+        elif port == DASHBOARD:
+            self._dashboard(one, data)
+        else:
+            self.controller.running, self.controller.state = True, READY  # a script is uploaded and runs
+
+    def _gone(self, one: socket.socket) -> None:
+        self.selector.unregister(one)
+        client = self.clients.pop(one, None)
+        if client is not None and client is self.controller.master:
+            self.controller.master, self.controller.speed = None, 0.0
+        one.close()
+
+    def _dashboard(self, one: socket.socket, data: bytes) -> None:
+        for line in data.decode(errors="replace").splitlines():
+            one.send((_DASHBOARD.get(line.strip(), "could not understand") + "\n").encode())
+
+    def _rtde(self, client: Client, data: bytes) -> None:
+        client.buffer += data
+        while len(client.buffer) >= 3:
+            size = struct.unpack_from(">H", client.buffer)[0]
+            if size < 3 or len(client.buffer) < size:
+                return
+            kind, body = chr(client.buffer[2]), client.buffer[3:size]
+            client.buffer = client.buffer[size:]
+            self._answer(client, kind, body)
+
+    def _answer(self, client: Client, kind: str, body: bytes) -> None:
+        if kind == "V":
+            self._send(client, "V", b"\x01")
+        elif kind == "v":
+            self._send(client, "v", struct.pack(">4I", *_VERSION))
+        elif kind == "O":
+            client.outputs = [name for name in body[8:].decode().split(",") if name]
+            kinds = ",".join(kind_of(name) for name in client.outputs)
+            self._send(client, "O", b"\x01" + kinds.encode())
+        elif kind == "I":
+            self._inputs(client, [name for name in body.decode().split(",") if name])
+        elif kind in "SP":
+            client.started = kind == "S"
+            self._send(client, kind, b"\x01")
+        elif kind == "U":
+            names = client.inputs.get(body[0], [])
+            code = ">" + "".join(_CODES[kind_of(name)] for name in names)
+            if names and len(body) == 1 + struct.calcsize(code):
+                self.controller.obey(dict(zip(names, struct.unpack(code, body[1:]), strict=True)))
+
+    def _inputs(self, client: Client, names: list[str]) -> None:
+        """Registers belong to one client at a time, as on the real controller."""
+        master = self.controller.master
+        if master is not None and master is not client:
+            self._send(client, "I", b"\x00" + ",".join("IN_USE" for _ in names).encode())
+            return
+        self.controller.master = client
+        number = len(client.inputs) + 1
+        client.inputs[number] = names
+        self._send(client, "I", bytes([number]) + ",".join(kind_of(name) for name in names).encode())
+
+    def _packet(self, client: Client) -> bytes:
+        parts = [b"\x01"]
+        for name in client.outputs:
+            value, code = self.controller.value(name), ">" + _CODES[kind_of(name)]
+            parts.append(struct.pack(code, *value) if isinstance(value, tuple) else struct.pack(code, value))
+        return b"".join(parts)
+
+    def _send(self, client: Client, kind: str, body: bytes) -> None:
+        try:
+            client.socket.send(struct.pack(">HB", 3 + len(body), ord(kind)) + body)
+        except OSError:
+            return
+
+
+def main() -> None:
+    """Read the words, bind, say where, and serve."""
+    words = argparse.ArgumentParser(prog="python -m palpate.wires.rtde_arm", description=__doc__)
+    words.add_argument("--address", default="127.0.0.9", help="of the loopback")
+    words.add_argument("--arm", default="ur5e", help="ur5e or a TOML file")
+    words.add_argument("--stiffness", type=float, default=5000.0, help="of the surface, N/m")
+    words.add_argument("--damping", type=float, default=20.0, help="of the surface, N s/m")
+    words.add_argument("--gap", type=float, default=0.002, help="between tool and surface, m")
+    words.add_argument("--seconds", type=float, default=600.0, help="after which it ends")
+    told = words.parse_args()
+    if not told.address.startswith("127."):
+        words.error(f"--address must be one of the loopback, 127.*, got {told.address}")
+    arm = OneDirection(
+        load_arm(told.arm), surface(told.stiffness, told.damping), told.gap, (0.0, 0.0, 3.0), 0
+    )
+    server = Server(told.address, Controller(arm))
+    sys.stdout.write(f"rtde:{told.address}\n")
+    sys.stdout.flush()
+    server.serve(told.seconds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,143 @@
+"""The wire to an arm of ours in another process, over loopback: `python -m palpate.wires.sim_arm` is that arm."""
+
+from __future__ import annotations
+
+import math
+import secrets
+import socket
+import time
+
+from palpate.errors import InputError
+from palpate.wires import sim_protocol as protocol
+from palpate.wires.protocol import Command, LostError, Sense
+
+_ANSWER = 1.0
+"""Within which an arm answers a greeting [s]."""
+
+
+class SimWire:
+    """A simulated arm at HOST:PORT.
+
+    Args:
+        host: a loopback address.
+        port: UDP.
+
+    Raises:
+        InputError: nothing answers there, or something else does, or it has another master.
+    """
+
+    def __init__(self, host: str, port: int):
+        self._where = f"{host}:{port}"
+        self._session = secrets.randbits(32)
+        self._sent, self._last = 0, -1
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.connect((host, port))
+            self.rate = self._greeted()
+        except OSError as error:
+            self._socket.close()
+            raise InputError(
+                f"no simulated arm answers at {self._where} ({error.strerror or error}); start one with"
+                f" python -m palpate.wires.sim_arm --port {port}"
+            ) from None
+        except InputError:
+            self._socket.close()
+            raise
+
+    @property
+    def title(self) -> str:
+        """What it leads to."""
+        return f"a simulated arm at {self._where}, {self.rate:g} readings a second"
+
+    @property
+    def watchdog(self) -> str:
+        """What stops it if this process dies."""
+        return "the simulated arm rests after 10 ticks without a command"
+
+    def _greeted(self) -> float:
+        end = time.monotonic() + _ANSWER
+        while (left := end - time.monotonic()) > 0:
+            self._socket.send(protocol.packed(protocol.HELLO, self._session))
+            self._socket.settimeout(min(left, 0.2))
+            try:
+                data = self._socket.recv(512)
+            except TimeoutError:
+                continue
+            found = protocol.unpacked(data)
+            if found is None:
+                raise InputError(f"{self._where} speaks another protocol; is it the port of a simulated arm?")
+            kind, session, body = found
+            if kind == protocol.BUSY:
+                raise InputError(f"the arm at {self._where} has another master; end that one first")
+            rate = protocol.read_welcome(body)
+            if kind == protocol.WELCOME and session == self._session and rate:
+                return rate
+        raise TimeoutError(0, f"no answer within {_ANSWER:g} s")
+
+    def read(self, timeout: float) -> Sense:
+        """The next reading; what is no reading of this session is passed over."""
+        end = time.monotonic() + timeout
+        strange = 0
+        while (left := end - time.monotonic()) > 0:
+            self._socket.settimeout(left)
+            try:
+                data = self._socket.recv(512)
+            except TimeoutError:
+                break
+            except OSError as error:
+                raise LostError(f"the wire broke: {error.strerror or error}") from None
+            sense = self._latest(self._sense(data))
+            if sense is not None:
+                return sense
+            strange += 1
+        what = f", only {strange} datagrams that are none" if strange else ""
+        raise LostError(f"no reading for {1e3 * timeout:.3g} ms{what}")
+
+    def _latest(self, sense: Sense | None) -> Sense | None:
+        """The newest of what has come: a late loop does not answer what is past."""
+        self._socket.settimeout(0.0)
+        while True:
+            try:
+                sense = self._sense(self._socket.recv(512)) or sense
+            except OSError:  # nothing more, or broken: the next read says so
+                return sense
+
+    def _sense(self, data: bytes) -> Sense | None:
+        received = time.monotonic()
+        found = protocol.unpacked(data)
+        if found is None or found[0] != protocol.STATE or found[1] != self._session:
+            return None
+        state = protocol.read_state(found[2])
+        if state is None or state.number <= self._last or not math.isfinite(state.time):
+            return None
+        self._last = state.number
+        v = state.values
+        return Sense(received, state.time, v[0:3], v[3:6], v[6:9], v[9:13])  # type: ignore[arg-type]
+
+    def tare(self) -> None:
+        """The simulated sensor has no zero of its own."""
+
+    def begin(self) -> None:
+        """The greeting has taken it over."""
+
+    def write(self, command: Command) -> None:
+        """Send the speed."""
+        self._sent += 1
+        try:
+            self._socket.send(
+                protocol.packed(protocol.MOVE, self._session, protocol.move(self._sent, command.velocity))
+            )
+        except OSError as error:
+            raise LostError(f"a command could not be sent: {error.strerror or error}") from None
+
+    def stop(self) -> None:
+        """Rest; said three times, as a datagram may be lost."""
+        for _ in range(3):
+            try:
+                self._socket.send(protocol.packed(protocol.STOP, self._session))
+            except OSError:
+                return
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()

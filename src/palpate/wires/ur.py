@@ -1,0 +1,189 @@
+"""The wire to a Universal Robots arm, by ur-rtde: it reads over RTDE, and moves the tool by speedL."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from palpate.errors import InputError
+from palpate.wires.protocol import Command, LostError, Sense
+from palpate.wires.turns import from_rotation_vector
+
+_READ = ["timestamp", "actual_TCP_pose", "actual_TCP_force", "robot_status_bits", "safety_status_bits"]
+_POLL = 2e-4
+_PORT = 30004
+_KNOCK = 2.0
+"""For which the first answer may take [s]."""
+_ACCELERATION = 1.0
+"""Of the tool towards a commanded speed, and of the stop [m/s^2]."""
+_WATCHDOG = 10.0
+"""Commands a second below which the controller stops the arm by itself [Hz]."""
+_PATIENCE = 2.0
+"""For which a call to stop may take [s]."""
+_ANSWER = 8.0
+"""For which opening may take [s]."""
+
+
+class UrWire:
+    """A UR at an address, switched on and in remote control.
+
+    Wrench and pose are the controller's: at the tool centre point, in the base's axes, less the payload that it was
+    told of. `begin` and `tare` upload ur-rtde's control script, which ends whatever program ran.
+
+    Args:
+        address: of the controller.
+
+    Raises:
+        InputError: ur-rtde is missing, or nothing at the address speaks RTDE.
+    """
+
+    def __init__(self, address: str):
+        try:
+            from rtde_receive import RTDEReceiveInterface
+        except ImportError:
+            raise InputError(
+                "this wire needs ur-rtde: pip install 'palpate[ur]' (it has no wheel for some systems)"
+            ) from None
+        self._address = address
+        self._control: Any = None
+        self._last = -1.0
+        _check_protocol(address)
+        self._receive: Any = _in_time(
+            lambda: RTDEReceiveInterface(address, -1.0, _READ),
+            f"no UR answers at {address}, port 30004",
+            _ANSWER,
+        )
+
+    @property
+    def title(self) -> str:
+        """What it leads to."""
+        return f"a UR at {self._address}, over RTDE"
+
+    @property
+    def watchdog(self) -> str:
+        """What stops it if this process dies."""
+        return f"the controller stops it when no command came for {1e3 / _WATCHDOG:g} ms (ur-rtde's watchdog)"
+
+    def read(self, timeout: float) -> Sense:
+        """The next packet of the controller."""
+        end = time.monotonic() + timeout
+        receive = self._receive
+        while True:
+            stamp = receive.getTimestamp()
+            if stamp != self._last:
+                force, pose = receive.getActualTCPForce(), receive.getActualTCPPose()
+                if (
+                    receive.getTimestamp() == stamp
+                ):  # otherwise a packet came between, and this would be of two
+                    break
+                continue
+            if time.monotonic() > end:
+                state = "" if receive.isConnected() else "; the controller has closed the connection"
+                raise LostError(f"no reading for {1e3 * timeout:.3g} ms{state}")
+            time.sleep(_POLL)
+        received = time.monotonic()
+        if receive.isProtectiveStopped() or receive.isEmergencyStopped():
+            raise LostError("the controller has stopped the arm (protective or emergency stop)")
+        self._last = stamp
+        x, y, z = pose[:3]
+        # The controller gives what the surface exerts on the tool.
+        a, b, c, d, e, f = (-value for value in force)
+        return Sense(received, stamp, (a, b, c), (d, e, f), (x, y, z), from_rotation_vector(pose[3:]))
+
+    def tare(self) -> None:
+        """zero_ftsensor of the controller."""
+        self._taken().zeroFtSensor()
+        time.sleep(0.05)
+
+    def begin(self) -> None:
+        """Upload the control script, and let the controller watch over this process."""
+        self._taken().setWatchdog(_WATCHDOG)
+
+    def _taken(self) -> Any:
+        if self._control is None:
+            from rtde_control import RTDEControlInterface
+
+            self._control = _in_time(
+                lambda: RTDEControlInterface(self._address),
+                f"the UR at {self._address} takes no control script (is it in remote control, with no other master?)",
+                _ANSWER,
+            )
+        return self._control
+
+    def write(self, command: Command) -> None:
+        """speedL."""
+        try:
+            sent = self._control.speedL([*command.velocity, 0.0, 0.0, 0.0], _ACCELERATION, 0.0)
+        except RuntimeError as error:
+            raise LostError(f"a command could not be sent: {error}") from None
+        if not sent:
+            raise LostError("the controller takes no command: is the arm stopped, or its script ended?")
+
+    def stop(self) -> None:
+        """Speed 0, then the script's end."""
+        control, self._control = self._control, None
+        if control is None:
+            return
+
+        def rest() -> None:
+            control.speedStop(_ACCELERATION)
+            control.stopScript()
+            control.disconnect()
+
+        _quietly(rest)
+
+    def close(self) -> None:
+        """Disconnect."""
+        self.stop()
+        _quietly(self._receive.disconnect)
+
+
+def _check_protocol(address: str) -> None:
+    """Ask for RTDE's second protocol, before a library that would wait for ever for another one's answer."""
+    try:
+        with socket.create_connection((address, _PORT), _KNOCK) as knock:
+            knock.settimeout(_KNOCK)
+            knock.sendall(b"\x00\x05V\x00\x02")
+            answer = knock.recv(4)
+    except OSError as error:
+        why = error.strerror or str(error) or type(error).__name__
+        raise InputError(f"no UR answers at {address}, port {_PORT} ({why}); check the address") from None
+    if answer[:3] != b"\x00\x04V":
+        raise InputError(f"no UR answers at {address}, port {_PORT}: what is there speaks another protocol")
+
+
+def _in_time(made: Callable[[], Any], what: str, seconds: float) -> Any:
+    """What a library makes, which may wait for ever for another protocol; an InputError where it does not."""
+    found: list[Any] = []
+
+    def run() -> None:
+        try:
+            found.append(made())
+        except Exception as error:  # noqa: BLE001 - whatever the library throws is the wire's fault
+            found.append(error)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    if not found:
+        raise InputError(f"{what}: nothing came within {seconds:g} s; check address, port and protocol")
+    if isinstance(found[0], Exception):
+        raise InputError(f"{what}: {found[0]}")
+    return found[0]
+
+
+def _quietly(act: Callable[[], Any]) -> None:
+    """Do what may fail or hang on a wire that is broken."""
+
+    def run() -> None:
+        try:
+            act()
+        except Exception:  # noqa: BLE001 - the wire is gone, and the arm's own watchdog has it
+            return
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    thread.join(_PATIENCE)

@@ -1,0 +1,142 @@
+"""A slow simulated arm in a process of its own, gains for it, and a wire that is spoiled on the way.
+
+Slow, so that a machine that runs many tests at once is in time: 100 Hz, and a lag of some 200 ms.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import select
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from palpate.force import load_arm, tune
+from palpate.wires.recording import UNITS
+
+ARM = """
+title = "a slow arm"
+rate = 100
+
+[inner]
+kind = "position"
+bandwidth = 3
+damping = 1.0
+delay = 0.02
+stiffness = 5e4
+
+[sensor]
+sampling = 100
+noise = 0.1
+full_scale = 100
+
+[limits]
+speed = 0.25
+stiffness = 1e4
+"""
+WORDS = ("--force", "10:N", "--direction", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",
+         "--travel-limit", "30:mm", "--time-limit", "20:s", "--ordinary-priority")  # fmt: skip
+
+
+def cell(folder: Path) -> Path:
+    """Arm and gains as files; returns the gains' path."""
+    (folder / "arm.toml").write_text(ARM)
+    told = tune(load_arm(str(folder / "arm.toml")), force=10.0, cap=1e4, prove_adapting=False)
+    (folder / "gains.toml").write_text(told.gains.to_toml())
+    return folder / "gains.toml"
+
+
+@contextmanager
+def arm(folder: Path, *words: str):
+    """The arm's process; yields it and its address."""
+    command = [
+        sys.executable,
+        "-m",
+        "palpate.wires.sim_arm",
+        "--arm",
+        str(folder / "arm.toml"),
+        "--seconds",
+        "60",
+        *words,
+    ]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            yield process, process.stdout.readline().strip()
+        finally:
+            process.kill()
+
+
+def wait_for_rows(path, rows=40):
+    """Until a press in another process has kept so many."""
+    for _ in range(2000):
+        if path.exists():
+            numbers = np.fromfile(path)
+            if np.count_nonzero(numbers[1 :: len(UNITS)]) >= rows:
+                return
+        time.sleep(0.02)
+    raise AssertionError("the press keeps no rows")
+
+
+class Relay(threading.Thread):
+    """Hands datagrams on between a master and an arm, and spoils those that come from the arm.
+
+    Args:
+        address: of the arm, `sim:HOST:PORT`.
+        fault: given the seconds since the first command, what to do with a datagram: `None` as it is, a number to hold
+            it back for so many seconds, `lose`, or `garble`.
+    """
+
+    def __init__(self, address: str, fault):
+        super().__init__(daemon=True)
+        self._to = ("127.0.0.1", int(address.rpartition(":")[2]))
+        self._fault, self._rng = fault, random.Random(0)
+        self._near, self._far = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        self._near.bind(("127.0.0.1", 0))
+        self._far.bind(("127.0.0.1", 0))
+        self.address = f"sim:127.0.0.1:{self._near.getsockname()[1]}"
+        self.commands, self.done = [], threading.Event()
+
+    def run(self):
+        master, begun, held = None, None, []
+        while not self.done.is_set():
+            ready, _, _ = select.select([self._near, self._far], [], [], 0.002)
+            now = time.monotonic()
+            if self._near in ready:
+                data, master = self._near.recvfrom(512)
+                if data[8] == 4:
+                    begun = begun or now
+                    self.commands.append((now, data))
+                self._far.sendto(data, self._to)
+            if self._far in ready:
+                data = self._far.recv(512)
+                fault = None if begun is None or data[8] != 3 else self._fault(now - begun, self._rng)
+                if fault == "garble":
+                    data = bytes(self._rng.randrange(256) for _ in range(len(data)))
+                if fault != "lose":
+                    held.append((now + (fault if isinstance(fault, float) else 0.0), data))
+            for due in [one for one in held if one[0] <= now]:
+                held.remove(due)
+                if master is not None:
+                    self._near.sendto(due[1], master)
+        self._near.close()
+        self._far.close()
+
+
+@contextmanager
+def relayed(address: str, fault):
+    """A relay in front of an arm."""
+    relay = Relay(address, fault)
+    relay.start()
+    try:
+        yield relay
+    finally:
+        relay.done.set()
+        relay.join()

@@ -1,0 +1,162 @@
+"""A press with a UR by ur-rtde itself, against a simulated controller in another process."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from palpate.cli import main
+from palpate.logs import read_record
+from palpate.wires import open_wire
+from palpate.wires.turns import from_rotation_vector, turned
+from wires.slow_cell import WORDS, cell, wait_for_rows
+
+pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("ur")
+    cell(made)
+    return made
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def address():
+    """Of the loopback, of its own for each process that tests."""
+    return f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.9"
+
+
+@contextmanager
+def controller(folder, address, *words):
+    command = [sys.executable, "-m", "palpate.wires.rtde_arm", "--address", address, "--arm", str(folder / "arm.toml"),
+               "--seconds", "60", *words]  # fmt: skip
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            assert process.stdout.readline().strip() == f"rtde:{address}"
+            yield process
+        finally:
+            process.kill()
+
+
+def words_of(folder, address, *more):
+    return [
+        "press-wire",
+        "--wire",
+        f"rtde:{address}",
+        "--gains",
+        str(folder / "gains.toml"),
+        *WORDS,
+        "--json",
+        *more,
+    ]
+
+
+def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
+    with controller(folder, address, "--stiffness", "4000"):
+        code = main(words_of(folder, address, "--yes", "--record", "rec", "--hold", "2.5:s"))
+        told = json.loads(capsys.readouterr().out)
+    assert code == 0, told["ended"]
+    assert told["force_N"] == pytest.approx(10.0, rel=0.05)
+    assert abs(told["bias_N"][2]) < 0.2  # the controller zeroed 3 N
+    record = read_record(here / "rec" / "record.parquet")
+    assert len(record) == told["lateness"]["ticks"]
+    assert main(["identify", "rec/record.parquet", "--json"]) in {0, 1}
+    assert json.loads(capsys.readouterr().out)["parameters"]["K"]["value"] is not None
+    # The arm's own 50 kN/m are in series. A late reading here and there moves the loop's estimate by some per cent.
+    assert told["stiffness_N_per_m"][0] == pytest.approx(4000 / (1 + 4000 / 5e4), rel=0.1)
+
+
+def test_a_controller_that_falls_silent_ends_the_press_and_stops_the_arm(folder, here, capsys, address):
+    with controller(folder, address, "--gap", "0.05") as process:
+
+        def die():
+            wait_for_rows(here / "rec" / "rows.f64")
+            process.kill()
+
+        threading.Thread(target=die, daemon=True).start()
+        code = main(words_of(folder, address, "--yes", "--record", "rec", "--hold", "10:s"))
+        told = json.loads(capsys.readouterr().out)
+    assert code == 1
+    assert "no reading for" in told["ended"] or "could not be sent" in told["ended"]
+    assert len(read_record(here / "rec" / "record.parquet")) > 20
+
+
+def test_the_controller_stops_the_arm_where_its_master_dies(folder, here, address):
+    with controller(folder, address, "--gap", "0.05"):
+        words = [
+            w
+            for w in words_of(folder, address, "--yes", "--record", "rec", "--hold", "10:s")
+            if w != "--json"
+        ]
+        with subprocess.Popen([sys.executable, "-m", "palpate", *words], stdout=subprocess.DEVNULL) as master:
+            wait_for_rows(here / "rec" / "rows.f64")
+            master.kill()
+        time.sleep(0.3)
+        wire = open_wire(f"rtde:{address}")
+        depth = [wire.read(1.0).position[2] for _ in range(40)]
+        wire.close()
+    assert np.ptp(depth[10:]) < 1e-5
+
+
+def test_a_second_master_is_refused(folder, here, capsys, address):
+    with controller(folder, address):
+        first = open_wire(f"rtde:{address}")
+        first.begin()
+        assert main(words_of(folder, address, "--yes")) == 2
+        assert "with no other master" in capsys.readouterr().err
+        first.close()
+
+
+def test_nothing_at_the_address_and_another_protocol_are_named(folder, here, capsys, address):
+    assert main(words_of(folder, address, "--dry-run")) == 2
+    assert "no UR answers" in capsys.readouterr().err
+    with socket.socket() as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        other.bind((address, 30004))
+        other.listen()
+
+        def answer():
+            one, _ = other.accept()
+            one.recv(100)
+            one.send(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+            one.close()
+
+        threading.Thread(target=answer, daemon=True).start()
+        assert main(words_of(folder, address, "--dry-run")) == 2
+        err = capsys.readouterr().err
+    assert "no UR answers" in err
+    assert "Traceback" not in err
+
+
+def test_turns_are_those_of_a_library():
+    from scipy.spatial.transform import Rotation
+
+    rng = np.random.default_rng(0)
+    turns = Rotation.random(50, rng=rng)
+    for turn in [
+        *turns,
+        Rotation.identity(),
+        Rotation.from_rotvec([np.pi, 0, 0]),
+        Rotation.from_rotvec([0, 0, np.pi]),
+    ]:
+        v = rng.normal(size=3)
+        q = from_rotation_vector(turn.as_rotvec())
+        assert (Rotation.from_quat(q) * turn.inv()).magnitude() < 1e-7
+        np.testing.assert_allclose(turned(q, v), turn.apply(v), atol=1e-12)
