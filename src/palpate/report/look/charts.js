@@ -158,6 +158,7 @@ const palpate = (() => {
         ctx.beginPath(); ctx.moveTo(at, bbox.top); ctx.lineTo(at, bbox.top + bbox.height); ctx.stroke();
         if (!mark.text || spec.wordless) continue;
         ctx.font = `${failed ? 600 : 400} ${12 * dense}px sans-serif`;
+        ctx.textAlign = "left"; ctx.textBaseline = "alphabetic";
         const wide = ctx.measureText(mark.text).width, beyond = at + wide + 10 * dense > bbox.left + bbox.width;
         const from = beyond ? at - wide - 5 * dense : at + 5 * dense;
         if (from < Math.max(free, bbox.left)) continue;
