@@ -64,7 +64,7 @@ def test_what_has_no_truth_and_no_settling_has_a_dash(summary):
 
 
 NOTED = {
-    "no contact": ({"end": "no contact", "why": "no surface was felt"}, "move the wall"),
+    "no contact": ({"end": "no contact", "why": "no surface was felt"}, "Move the wall"),
     "diverged": ({"end": "diverged", "why": "torque2 is not a finite number"}, "torque2"),
     "interrupted": ({"end": "interrupted", "why": "interrupted at 3.0 s"}, "3.0 s"),
     "losses": ({"contacts_lost": 2}, "lost 2 times"),

@@ -77,7 +77,8 @@ class Replay:
 
     def reset(self, seed: int | None = None) -> None:
         """To the beginning; a log has no noise to draw again."""
-        self.seek(max(self._first, float(self._times[0])))
+        assert self.view.span is not None
+        self.seek(max(self._first, self.view.span[0]))
 
     def advance(self, seconds: float) -> Array:
         """The rows of the time to come."""
@@ -107,7 +108,8 @@ class Replay:
         Raises:
             InputError: it is no time of the log.
         """
-        first, last = float(self._times[0]), float(self._times[-1])
+        assert self.view.span is not None
+        first, last = self.view.span
         if not first <= time <= last:
             raise InputError(f"the log spans {first:.6g} to {last:.6g} s, got {time:.6g}")
         self._now = time
