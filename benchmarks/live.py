@@ -16,7 +16,16 @@ from pathlib import Path
 
 FRAMES, DELAY = 60.0, 0.050
 """What is aimed at: frames a second, and seconds from slider to picture."""
-QUIET = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"]  # fmt: skip
+QUIET = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 GAPS = """seconds => new Promise(done => {
   const gaps = [], drawn = palpate.live.frames, start = performance.now();
   let last = start;
