@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from palpate.errors import InputError
 from palpate.report import style
 from palpate.report.look.assets import CHARTS, data, policy, scripts, styles, text_of
 from palpate.report.look.columns import GAP, packed, thinned
@@ -152,3 +153,35 @@ def test_a_plain_page_has_the_frame():
 def test_pairs_differ_by_light_and_dark():
     assert all(a != b for a, b in PAIRS.values())
     assert all(len(c) == 7 for c in itertools.chain(DATA.values(), *PAIRS.values()))
+
+
+@pytest.mark.parametrize(
+    ("name", "head"), [("a.png", b"\x89PNG"), ("a.SVG", b"<!-- Made by palpate"), ("a.pdf", b"%PDF-")]
+)
+def test_a_figure_is_what_its_ending_says_and_known_again(tmp_path, name, head):
+    from palpate.files.ownership import ours
+
+    figure, (axis,) = style.figure()
+    axis.plot([0, 1], [0, 1], color=style.K)
+    for _ in range(2):  # the second takes the place of the first, which is palpate's own
+        style.save(figure, tmp_path / name)
+    written = (tmp_path / name).read_bytes()
+    assert written.startswith(head)
+    assert ours(tmp_path / name)
+    (tmp_path / name).write_bytes(written[:40] + b"somebody else's")
+    if not name.endswith("SVG"):
+        assert not ours(tmp_path / name)
+
+
+def test_a_finer_picture_has_more_pixels(tmp_path):
+    from matplotlib.image import imread
+
+    figure, _ = style.figure()
+    coarse, fine = (imread(style.save(figure, tmp_path / f"{dpi}.png", dpi)) for dpi in (50, 100))
+    assert fine.shape[0] == 2 * coarse.shape[0]
+    for wrong in (0, -5, 100_000):
+        with pytest.raises(InputError, match="--dpi must be from 30 to 1200"):
+            style.save(figure, tmp_path / "wrong.png", wrong)
+    with pytest.raises(InputError, match="a figure ends in"):
+        style.save(figure, tmp_path / "wrong.tiff")
+    assert not list(tmp_path.glob("wrong*"))
