@@ -38,3 +38,23 @@ def test_a_process_of_its_own_answers_and_ends():
     process = own._process
     own.close()
     assert process.poll() is not None
+
+
+def test_a_proof_is_not_claimed_of_a_surface_that_it_does_not_cover(monkeypatch):
+    import palpate.force
+
+    class Proof:
+        def __init__(self):
+            self.claims = [type("Claim", (), {"kind": "held", "low": 400.0, "high": 4e5})()]
+
+        def check(self):
+            return type("Verdict", (), {"holds": True})()
+
+    # The proof itself takes ten seconds, and is `tests/force`'s.
+    monkeypatch.setattr(palpate.force, "certify", lambda gains, adapting: Proof())
+    (bare,) = answers(near("foam-cautious", **{"surface.damping": 0.0}))
+    (damped,) = answers(near("foam-cautious"))
+    assert bare["stiffness"] == damped["stiffness"] == [400.0, 4e5]
+    assert bare["proved"]
+    assert not damped["proved"]
+    assert "of which nothing is proved" in damped["text"]

@@ -152,7 +152,7 @@
     parts.stable.classList.toggle("proved", !!(told && told.proved));
     lay(parts.band, K == null ? 0 : Math.max(K - half, window_[0]), K + half);
     lay(parts.own, K ?? 0); lay(parts.truth, truth ?? 0);
-    const kinds = [["estimate", "estimate"], ["interval", "95 %"], ...(stable ? [["stable", told.proved ? "proved stable" : "stable, linear model"]] : []), ...(truth ? [["truth", "truth"]] : [])];
+    const kinds = [["estimate", "estimate"], ["interval", "95 %"], ...(stable ? [["stable", told.label]] : []), ...(truth ? [["truth", "truth"]] : [])];
     const key = JSON.stringify(kinds);
     if (key !== legendOf) { legendOf = key; legend.replaceChildren(...kinds.map(([kind, text]) => entry(kind, text))); }
     byId("stiffness-what").textContent = stable ? "estimated, and where the loop is stable" : "estimated";

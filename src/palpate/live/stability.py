@@ -89,7 +89,8 @@ class Stability:
 def answers(experiment: Experiment) -> Iterator[Answer]:
     """What can be said of the loop, sooner and then better.
 
-    Each has `stiffness`, the interval of surfaces [N/m] or None; `proved`, whether it is a proof; and `text`.
+    Each has `stiffness`, the interval of surfaces [N/m] or None, and its `label`; `proved`, whether this surface is one
+    of which a proof holds; and `text`.
     """
     try:
         if isinstance(experiment.controller, CautiousController):
@@ -114,18 +115,26 @@ def _proved(experiment: Experiment, table: CautiousController) -> Answer:
     said = f"On the stiffest surface {_margins(own.gain, own.phase, own.delay)}."
     if held is None or not certificate.check().holds:
         return {"stiffness": None, "proved": False, "text": f"Nothing could be proved. {said}"}
+    bare = experiment.surface.damping == 0.0
     text = (
         f"Proved stable with its gain held: every surface without damping from {quantity(held.low, 'N/m')} to "
         f"{quantity(held.high, 'N/m')}. {said}"
     )
-    return {"stiffness": [held.low, held.high], "proved": True, "text": text}
+    if not bare:
+        text += " This surface has damping, of which nothing is proved."
+    return {
+        "stiffness": [held.low, held.high],
+        "proved": bare,
+        "label": "proved stable" if bare else "proved stable, were there no damping",
+        "text": text,
+    }
 
 
 def _linear(experiment: Experiment) -> Iterator[Answer]:
     """By the loop's linear model, friction of the joints left out."""
     from palpate.analysis import linearise, margins, stable_stiffness
 
-    known: Answer = {"stiffness": None, "proved": False}
+    known: Answer = {"stiffness": None, "proved": False, "label": "stable, linear model"}
     loop = linearise(experiment)
     stable = loop.stable
     said = (
