@@ -44,6 +44,7 @@ def run(
     json: Annotated[bool, Parameter(negative="")] = False,
     figures: Annotated[tuple[str, ...], Parameter(negative=())] = ("png",),
     dpi: int | None = None,
+    movie: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Run an experiment: the arm approaches, touches, presses.
 
@@ -57,6 +58,7 @@ def run(
         json: print the summary as JSON and nothing else.
         figures: as what they are written: png, svg, pdf; may be given again.
         dpi: of a PNG; 110 if not given.
+        movie: write a film of the arm too, arm.gif; it takes some ten seconds.
     """
     from palpate.bench import experiment as experiments
 
@@ -78,7 +80,7 @@ def run(
                 f"--figures must be of {', '.join(kind[1:] for kind in FORMATS)}, got {ending[1:]!r}"
             )
     with noticed() as interrupted:
-        ran = _run(name, source, seed, folder, force, json, interrupted, _Drawn(endings, dpi))
+        ran = _run(name, source, seed, folder, force, json, interrupted, _Drawn(endings, dpi, movie))
     # All is in its place, so that a reader of the output who has gone loses nothing.
     _tell(ran, folder, json)
     if ran.undrawn:
@@ -94,6 +96,7 @@ class _Drawn:
 
     endings: tuple[str, ...]
     dpi: int | None
+    movie: bool
 
 
 @dataclass(frozen=True)
@@ -142,6 +145,10 @@ def _run(
                 sha256 = sha256_of(fresh / "record.parquet")
                 told = Told(experiment.title, experiment.about, source, summary, found, why, sha256)
                 write_text(fresh / "report.html", run_page(record, told))
+                if drawn.movie:
+                    from palpate.report.run.movie import write_movie
+
+                    write_movie(record, fresh / "arm.gif")
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
             undrawn = f"there was not enough room to draw it ({shown(str(error)) or type(error).__name__})"
     return _Ran(experiment.title, summary, found, undrawn)
