@@ -1,6 +1,5 @@
 """`palpate live`: its first line is its address, and what is wrong is a line and exit code 2."""
 
-import asyncio
 import json
 import re
 import signal
@@ -72,28 +71,22 @@ def test_a_log_without_joints_says_so_and_is_played(root):
 
 def test_viewers_are_served_beside_the_page(record):
     """Foxglove's protocol, by a client of its own: what is offered, and that messages come."""
-    from websockets.asyncio.client import connect
-
-    async def heard(url):
-        async with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE) as client:
-            offered = {}
-            while "/palpate/contact" not in offered:
-                told = json.loads(await asyncio.wait_for(client.recv(), PATIENCE))
-                offered |= {c["topic"]: c for c in told.get("channels", [])}
-            number = offered["/palpate/contact"]["id"]
-            await client.send(
-                json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": number}]})
-            )
-            while True:
-                message = await asyncio.wait_for(client.recv(), PATIENCE)
-                if isinstance(message, bytes) and message[0] == 1:
-                    # op code 1, the subscription's number, nanoseconds, then the message
-                    return offered, int.from_bytes(message[1:5], "little"), json.loads(message[13:])
+    from websockets.sync.client import connect
 
     with running("--record", record, "--foxglove", "--foxglove-port", 0, lines=2) as (_, viewers):
         assert re.fullmatch(r"viewers: ws://127\.0\.0\.1:\d+", viewers)
-        offered, subscription, message = asyncio.run(heard(viewers.removeprefix("viewers: ")))
-    assert "/palpate/arm" in offered
+        url = viewers.removeprefix("viewers: ")
+        with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE) as client:
+            offered = {}
+            while not {"/palpate/contact", "/palpate/arm"} <= set(offered):
+                told = json.loads(client.recv(PATIENCE))
+                offered |= {c["topic"]: c for c in told.get("channels", [])}
+            number = offered["/palpate/contact"]["id"]
+            client.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": number}]}))
+            # op code 1, the subscription's number, nanoseconds, then the message
+            while not isinstance(data := client.recv(PATIENCE), bytes) or data[0] != 1:
+                pass
+            subscription, message = int.from_bytes(data[1:5], "little"), json.loads(data[13:])
     assert offered["/palpate/contact"]["encoding"] == "json"
     assert subscription == 7
     assert message["t"] >= 0.0
