@@ -6,7 +6,7 @@ from dataclasses import replace
 from importlib import resources
 
 from palpate.live.view import View
-from palpate.report.look.assets import ARM, CHARTS, data, policy, scripts, styles
+from palpate.report.look.assets import ARM, CHARTS, data, policy, scripts
 from palpate.report.page import render
 from palpate.text import shown
 
@@ -36,7 +36,8 @@ def page(view: View) -> str:
         "palpate.live",
         view=shown_view,
         data=data(shown_view.to_json()),
-        styles=styles(),
+        title=f"{shown_view.title} – palpate live",
+        command="",
         own_styles=_own("live.css"),
         scripts=codes,
         policy=policy(codes, "connect-src 'self' ws://127.0.0.1:* ws://localhost:*"),
