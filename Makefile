@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench attack trust leaderboard docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench live attack trust leaderboard docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -45,6 +45,9 @@ bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold s
 	$(BIN)/python benchmarks/many_runs.py
 	$(BIN)/python benchmarks/least_squares.py
 	$(BIN)/python benchmarks/cold_start.py
+
+live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a second, and slider to picture
+	$(BIN)/python benchmarks/live.py
 
 attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hour of each experiment; into docs/reliability.md
 	$(BIN)/python benchmarks/attack/run.py --write

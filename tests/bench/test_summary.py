@@ -83,13 +83,10 @@ def test_losses_and_saturation_are_counted():
     assert summary["saturated"] == {"joint1": 0.0, "joint2": 0.25, "joint3": 0.0}
 
 
-def test_the_quotient_and_the_verdict():
+def test_the_quotient():
     found = summarise(record())["identified"]
     assert found["force_over_displacement"]["K"] == pytest.approx(5000.0, rel=1e-3)
     assert found["matched"]["K"] == 5000.0
-    assert found["matched_verdict"]["K"] == "identified"
-    loose = summarise(record(K_matched_std=np.full(TICKS, 4000.0)))["identified"]
-    assert loose["matched_verdict"]["K"] != "identified"
 
 
 def test_without_contact_there_is_no_force_to_tell():

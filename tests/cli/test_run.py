@@ -117,9 +117,10 @@ def test_the_report_opens_without_a_network(mine):
     page = (mine.parent / "results" / "report.html").read_text(encoding="utf-8")
     references = References()
     references.feed(page)
-    assert len(references.found) == 4
-    assert all(r.startswith("data:image/png;base64,") for r in references.found)
-    assert "://" not in page
+    assert len(references.found) == 2, "still pictures for a browser that runs no scripts"
+    assert all(r.startswith("data:image/svg+xml;base64,") for r in references.found)
+    assert "default-src &#39;none&#39;" in page
+    assert "unsafe-eval" not in page
     assert "stiffness = 5200.0" in page, "the experiment's file"
     assert "palpate run mine.toml --seed 0" in page
 
@@ -130,7 +131,7 @@ def test_what_is_in_the_file_cannot_break_the_page(tmp_path, monkeypatch):
     (tmp_path / "evil name.toml").write_text(evil, encoding="utf-8")
     assert main(["run", "evil name.toml", "--out", "results"]) == 0
     page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
-    assert "<script" not in page
+    assert "<script>alert" not in page
     assert "&lt;script&gt;" in page
     assert "palpate run &#39;evil name.toml&#39; --seed 0" in page
 
@@ -333,3 +334,28 @@ def test_a_warm_run_compiles_nothing():
     for _ in range(2):
         ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "True"
+
+
+def test_figures_of_other_kinds(mine, capsys):
+    assert main(["run", "mine.toml", "--out", "results", "--figures", "svg", "--figures", "pdf"]) == 0
+    names = {path.name for path in (mine.parent / "results").iterdir()}
+    assert {"force.svg", "force.pdf", "torque.svg"} <= names
+    assert not any(name.endswith(".png") for name in names)
+    assert main(["run", "mine.toml", "--out", "results", "--force"]) == 0, "palpate knows its own again"
+    capsys.readouterr()
+    assert "--figures must be of png, svg, pdf, got 'gif'" in refused(capsys, "mine.toml", "--figures", "gif")
+    assert "--dpi must be from" in refused(capsys, "mine.toml", "--dpi", "5")
+
+
+def test_the_verdict_is_that_of_identify(mine, capsys):
+    """On whatever was run: the page, the summary and `palpate identify` of the record say one thing."""
+    mine.write_text(text_of(press=2.0), encoding="utf-8")
+    assert main(["run", "mine.toml", "--out", "results"]) == 0
+    capsys.readouterr()
+    assert main(["identify", "results/record.parquet", "--json"]) in {0, 1}
+    found = json.loads(capsys.readouterr().out)
+    summary = json.loads((mine.parent / "results" / "summary.json").read_text())
+    assert summary["identification"]["parameters"] == found["parameters"]
+    page = (mine.parent / "results" / "report.html").read_text(encoding="utf-8")
+    for own in found["parameters"].values():
+        assert f">{own['verdict']}</span>" in page

@@ -6,7 +6,7 @@ import pytest
 from bench.quick import quick
 from palpate.bench import build
 from palpate.records import Record
-from palpate.report import run_figures
+from palpate.report.run import figures as run_figures
 
 
 @pytest.fixture(scope="module")

@@ -97,7 +97,7 @@ def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
     page = (folder / "index.html").read_text("utf-8")
     assert "&lt;it&gt; holds &amp; is told" in page
     assert page.count("data:image/png;base64,") == 2
-    assert "http" not in re.sub(r"http://www\.w3\.org\S*", "", page), "the page opens without a network"
+    assert "://" not in re.sub(r"http://www\.w3\.org\S*", "", page), "the page opens without a network"
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])

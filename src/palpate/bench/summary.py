@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
-from palpate.signals import passive_verdict
 
 BAND = 0.05
 """Settled: within this share of the desired force."""
@@ -87,15 +86,15 @@ def _first_change(values: NDArray[np.float64]) -> int:
 
 
 def _identified(record: Record, last: NDArray[np.bool_]) -> dict[str, Any]:
-    """The estimates at the end, the quotient f/x, and the standard deviations that the matched one states."""
+    """The estimates at the end, the quotient f/x, and the standard deviations that the matched one states.
+
+    They take the surface for a spring, a damper and a mass; whether it is one, `palpate.identify` says of the record.
+    """
     end = int(np.nonzero(last)[0][-1])
     found: dict[str, Any] = {
         front: {p: float(record[f"{p}_{front}"][end]) for p in PARAMETERS} for front in FRONT_ENDS
     }
     found["matched_std"] = {p: float(record[f"{p}_matched_std"][end]) for p in PARAMETERS}
-    found["matched_verdict"] = {
-        p: passive_verdict(found["matched"][p], found["matched_std"][p]) for p in PARAMETERS
-    }
     displacement = float(np.mean(record["displacement"][last]))
     force = float(np.mean(record["force_measured"][last]))
     found["force_over_displacement"] = {"K": force / displacement if displacement else None}

@@ -21,7 +21,15 @@ if TYPE_CHECKING:
     from palpate.report.many.rows import LogRow
 
 
-def many(logs: Sequence[Path], asked: OneLog, figure: Path | None, page: Path | None, *, json: bool) -> int:
+def many(
+    logs: Sequence[Path],
+    asked: OneLog,
+    figure: Path | None,
+    page: Path | None,
+    *,
+    json: bool,
+    dpi: int | None = None,
+) -> int:
     """Identify many logs, print a row each and what they say together.
 
     A log that fails is a row that says why, and the others go on. An interruption keeps what was done.
@@ -51,7 +59,7 @@ def many(logs: Sequence[Path], asked: OneLog, figure: Path | None, page: Path | 
         )
     pooled = pool([row.found for row in rows], asked.fitted.tolerance)
     if rows:
-        _print(rows, pooled, _write(rows, pooled, figure, page), json=json)
+        _print(rows, pooled, _write(rows, pooled, figure, page, dpi), json=json)
     if interrupted:
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
         return INTERRUPTED
@@ -84,11 +92,13 @@ def _light(found: Identification) -> Identification:
     return replace(found, traces=traces, estimate=None)
 
 
-def _write(rows: Sequence[LogRow], pooled: Pooled, figure: Path | None, page: Path | None) -> list[Path]:
+def _write(
+    rows: Sequence[LogRow], pooled: Pooled, figure: Path | None, page: Path | None, dpi: int | None
+) -> list[Path]:
     if figure is not None:
         from palpate.report.many.forest import write_figure
 
-        write_figure(rows, pooled, figure)
+        write_figure(rows, pooled, figure, dpi)
     if page is not None:
         from palpate.report.many.page import write_page
 
@@ -107,7 +117,7 @@ def _print(rows: Sequence[LogRow], pooled: Pooled, written: Sequence[Path], *, j
     screen = console()
     show(rows, pooled, screen)
     for path in written:
-        place(screen, "figure:" if path.suffix.lower() == ".png" else "report:", path)
+        place(screen, "report:" if path.suffix.lower() == ".html" else "figure:", path)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from palpate.errors import InputError
 if TYPE_CHECKING:
     from palpate.contact_frame import Arm
     from palpate.identification import Identification
+    from palpate.records import Record
     from palpate.report.identification.source import Source
 
 
@@ -54,6 +55,11 @@ class OneLog:
         Raises:
             InputError: the log or an option is wrong, in one line.
         """
+        found, _, source = self.identified_along(log)
+        return found, source
+
+    def identified_along(self, log: Path) -> tuple[Identification, Record, Source]:
+        """The same, with the force and the position along the normal that it is of."""
         from palpate.contact_frame import identify_contact, told
         from palpate.report.identification.source import Source, sha256_of
 
@@ -71,8 +77,10 @@ class OneLog:
         found, along = identify_contact(record, frame, between, **known)
         found = self.pressed_by.modulus(found, self.fitted.tolerance)
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        return found, Source(
-            str(log), self.told, sha256_of(log), command(), made=now, notes=tuple(told(along.meta))
+        return (
+            found,
+            along,
+            Source(str(log), self.told, sha256_of(log), command(), made=now, notes=tuple(told(along.meta))),
         )
 
     def _between(self, known: dict[str, Any], samples: bool) -> Arm:

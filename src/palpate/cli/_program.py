@@ -21,6 +21,7 @@ COMMANDS = {
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "press-wire": "Press with a real arm, over its wire.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
+    "live": "Show an arm that presses, or a log, in a page of the browser.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "thesis": "Measure every figure and every claim of the thesis again.",
     "speed": "Measure what one tick of the closed loop costs here.",

@@ -88,8 +88,10 @@ class OutputOptions:
     Parameters
     ----------
     figure
-        Where to write the figure, a PNG; LOG.identify.png in the current folder if not given (of many logs,
-        pooled.identify.png).
+        Where to write the figure, a PNG, SVG or PDF by its ending; LOG.identify.png in the current folder if not given
+        (of many logs, pooled.identify.png).
+    dpi
+        Of a PNG; 110 if not given.
     no_figure
         Write no figure.
     report
@@ -99,6 +101,7 @@ class OutputOptions:
     """
 
     figure: Path | None = None
+    dpi: int | None = None
     no_figure: Annotated[bool, _FLAG] = False
     report: Path | None = None
     json: Annotated[bool, _FLAG] = False
@@ -107,8 +110,12 @@ class OutputOptions:
         """Where the figure goes; found wrong before any work is done."""
         if self.no_figure or (self.figure is None and self.json):
             return None
+        from palpate.report.style import FORMATS, check_dpi
+
+        check_dpi(self.dpi)
         path = self.figure or Path(f"{name}.identify.png")
-        check_place(path, "--figure", ending=".png")
+        ending = path.suffix.lower()
+        check_place(path, "--figure", ending=ending if ending in FORMATS else ".png")
         return path
 
     def page(self) -> Path | None:
@@ -179,7 +186,7 @@ def identify(
         return _one(logs[0], asked, output)
     from palpate.cli._many_logs import many
 
-    return many(gathered(logs), asked, output.png("pooled"), output.page(), json=output.json)
+    return many(gathered(logs), asked, output.png("pooled"), output.page(), json=output.json, dpi=output.dpi)
 
 
 def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
@@ -190,7 +197,7 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
     if figure is not None:
         from palpate.report.identification.figure import write_figure
 
-        write_figure(found, figure, title=log.name)
+        write_figure(found, figure, title=log.name, dpi=output.dpi)
     if page is not None:
         from palpate.report.identification.page import write_page
 
@@ -212,4 +219,4 @@ def _print(found: Identification, origin: Source, written: list[Path], json: boo
     for line in origin.notes:
         screen.print(line, soft_wrap=True)
     for path in written:
-        place(screen, "figure:" if path.suffix.lower() == ".png" else "report:", path)
+        place(screen, "report:" if path.suffix.lower() == ".html" else "figure:", path)

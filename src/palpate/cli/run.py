@@ -20,6 +20,7 @@ from palpate.text import shown
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from palpate.identification import Identification
     from palpate.records import Record
 
 
@@ -41,6 +42,9 @@ def run(
     list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
     print_: Annotated[bool, Parameter(name="--print", negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
+    figures: Annotated[tuple[str, ...], Parameter(negative=())] = ("png",),
+    dpi: int | None = None,
+    movie: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Run an experiment: the arm approaches, touches, presses.
 
@@ -52,6 +56,9 @@ def run(
         list_: list the experiments and stop.
         print_: print the experiment's file, to copy and edit, and stop.
         json: print the summary as JSON and nothing else.
+        figures: as what they are written: png, svg, pdf; may be given again.
+        dpi: of a PNG; 110 if not given.
+        movie: write a film of the arm too, arm.gif; it takes some ten seconds.
     """
     from palpate.bench import experiment as experiments
 
@@ -63,9 +70,17 @@ def run(
         return 0
     folder = out if out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
     from palpate.bench.ending import DONE, INTERRUPTED
+    from palpate.report.style import FORMATS, check_dpi
 
+    check_dpi(dpi)
+    endings = tuple(f".{kind.lower().lstrip('.')}" for kind in figures)
+    for ending in endings:
+        if ending not in FORMATS:
+            raise InputError(
+                f"--figures must be of {', '.join(kind[1:] for kind in FORMATS)}, got {ending[1:]!r}"
+            )
     with noticed() as interrupted:
-        ran = _run(name, source, seed, folder, force, json, interrupted)
+        ran = _run(name, source, seed, folder, force, json, interrupted, _Drawn(endings, dpi, movie))
     # All is in its place, so that a reader of the output who has gone loses nothing.
     _tell(ran, folder, json)
     if ran.undrawn:
@@ -76,11 +91,21 @@ def run(
 
 
 @dataclass(frozen=True)
+class _Drawn:
+    """How figures are written."""
+
+    endings: tuple[str, ...]
+    dpi: int | None
+    movie: bool
+
+
+@dataclass(frozen=True)
 class _Ran:
-    """What a run came to, and why it could not be drawn, if it could not."""
+    """What a run came to, what was identified of it, and why it could not be drawn, if it could not."""
 
     title: str
     summary: dict[str, Any]
+    found: Identification | None
     undrawn: str
 
 
@@ -92,27 +117,56 @@ def _run(
     force: bool,
     as_json: bool,
     interrupted: Callable[[], bool],
+    drawn: _Drawn,
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise
     from palpate.bench.experiment import parse
     from palpate.logs import write_record
+    from palpate.report.identification.source import sha256_of
+    from palpate.report.run.figures import draw
+    from palpate.report.run.page import Told, run_page
 
     with fresh_folder(folder, force=force) as fresh:
         experiment = parse(source, name)
         command = shown(f"palpate run {shlex.quote(name)} --seed {seed}")
         record = _record(console(stderr=as_json), name, experiment, seed, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
-        summary = signed({"experiment": shown(Path(name).stem), "command": command, **summarise(record)})
         write_record(record, fresh / "record.parquet")
+        found, why = _identified(fresh / "record.parquet")
+        said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
+        about = {"experiment": shown(Path(name).stem), "command": command}
+        summary = signed({**about, **summarise(record), **said})
         write_json(fresh / "summary.json", summary)
         undrawn = ""
         try:
             if len(record):
-                _report(record, experiment.title, experiment.about, source, summary, fresh)
+                draw(record, fresh, drawn.endings, drawn.dpi)
+                sha256 = sha256_of(fresh / "record.parquet")
+                told = Told(experiment.title, experiment.about, source, summary, found, why, sha256)
+                write_text(fresh / "report.html", run_page(record, told))
+                if drawn.movie:
+                    from palpate.report.run.movie import write_movie
+
+                    write_movie(record, fresh / "arm.gif")
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
             undrawn = f"there was not enough room to draw it ({shown(str(error)) or type(error).__name__})"
-    return _Ran(experiment.title, summary, undrawn)
+    return _Ran(experiment.title, summary, found, undrawn)
+
+
+def _identified(record: Path) -> tuple[Identification | None, str]:
+    """What `palpate identify` says of the record, or why it says nothing."""
+    from palpate.cli._arm_options import ArmOptions, FrameOptions
+    from palpate.cli._indenter_options import IndenterOptions
+    from palpate.cli._log_options import LogOptions
+    from palpate.cli._one_log import OneLog
+    from palpate.cli.identify import ModelOptions
+
+    asked = OneLog(LogOptions(), FrameOptions(), ArmOptions(), ModelOptions(), IndenterOptions())
+    try:
+        return asked.identified(record)[0], ""
+    except InputError as error:
+        return None, shown(str(error).replace(str(record), record.name))
 
 
 def _record(
@@ -146,28 +200,8 @@ def _record(
         )
 
 
-def _report(
-    record: Record, title: str, about: str, source: str, summary: dict[str, Any], folder: Path
-) -> None:
-    from palpate.report.page import page
-    from palpate.report.run_figures import draw
-    from palpate.report.run_tables import notes, tables
-
-    captions = draw(record, folder)
-    text = page(
-        title=title,
-        about=about,
-        tables=tables(summary),
-        figures={folder / file: caption for file, caption in captions.items()},
-        command=summary["command"],
-        source=source,
-        notes=notes(summary),
-    )
-    write_text(folder / "report.html", text)
-
-
 def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
-    from palpate.report.run_tables import notes, tables
+    from palpate.report.run.table import notes, tables
 
     summary = ran.summary
     if as_json:
@@ -175,7 +209,7 @@ def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
         return
     screen = console()
     head(screen, ran.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
-    for content in tables(summary):
+    for content in tables(summary, ran.found):
         show_table(screen, content)
     for note in notes(summary):
         screen.print(note, style=STYLE)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from palpate.cli._log_options import LogOptions
+from palpate.cli._program import command
 from palpate.cli._terminal import console, place, print_json
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
@@ -186,7 +187,7 @@ def _write(told: Tuning, out: Path | None, page: Path | None) -> None:
     if page is not None:
         from palpate.report.force_page import write_page
 
-        write_page(told, page)
+        write_page(told, page, command())
 
 
 def _print(told: Tuning, written: list[Path], json: bool) -> None:

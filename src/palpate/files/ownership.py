@@ -20,6 +20,11 @@ FORCE = ("time_s", "force_desired_N")
 
 _KINDS = {".png": "PNG", ".html": "HTML file", ".toml": "TOML file"}
 _HEAD, _FOOT = 4096, 1 << 20
+_FEET = {
+    b"PAR1": b"\x18\x07palpate\x18",  # a key and its value, as Thrift writes them
+    b"%PDF-": b"/Creator (palpate)",
+}
+"""What begins so bears its mark at its end."""
 _MARKS = re.compile(
     rb"|".join(
         (
@@ -43,10 +48,11 @@ def ours(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         head = file.read(_HEAD)
-        if not head.startswith(b"PAR1"):
+        foot = next((mark for kind, mark in _FEET.items() if head.startswith(kind)), None)
+        if foot is None:
             return _MARKS.search(head) is not None
         file.seek(max(0, path.stat().st_size - _FOOT))
-        return b"\x18\x07palpate\x18" in file.read()  # a key and its value, as Thrift writes them
+        return foot in file.read()
 
 
 def check_place(path: Path, option: str = "", *, ending: str = "") -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import UTC, datetime
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -18,6 +19,7 @@ from palpate.report import style
 from palpate.report.force_table import rows
 from palpate.report.page import Table, embedded, render
 from palpate.report.svg import svg
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,14 +29,14 @@ _SHOWN = (1.0, 1e7)
 """Stiffnesses that the figure shows [N/m]."""
 
 
-def write_page(told: Tuning, path: Path) -> Path:
+def write_page(told: Tuning, path: Path, command: str = "palpate tune") -> Path:
     """Writes the page, whole or not at all; it opens without a network."""
-    write_text(path, page(told))
+    write_text(path, page(told, command))
     return path
 
 
-def page(told: Tuning) -> str:
-    """The page as HTML."""
+def page(told: Tuning, command: str = "palpate tune") -> str:
+    """The page as HTML; `command` is what made it."""
     return render(
         "page.html",
         title=f"A force loop for {told.gains.arm.title}",
@@ -50,7 +52,10 @@ def page(told: Tuning) -> str:
             _figure("Nyquist's curve on the stiffest surface", partial(one, _nyquist, told, 4.0)),
         ],
         source=told.gains.to_toml(),
-        command="palpate tune",
+        source_title="The gains",
+        room="tune",
+        command=shown(command),
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
 

@@ -54,13 +54,17 @@ def render(template: str, *packages: str, **values: Any) -> str:
     Args:
         template: its file's name.
         packages: where it and those that it extends lie, besides this one.
-        values: what it shows; `base.html` itself wants a `title` and the `command` that made the page, and takes
-            the `seconds` it took.
+        values: what it shows; `base.html` itself wants a `title` and the `command` that made the page, and takes the
+            `seconds` it took, what the page is of (`room`), the date it was `made`, further lines of its foot
+            (`origin`, pairs of name and text), and `scripts`, which alone may run.
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader
 
     from palpate import __version__
+    from palpate.report.look.assets import TABLES, policy, scripts, styles
 
+    codes = tuple(values.pop("scripts", scripts(*TABLES)))
+    values = {"styles": styles(), "scripts": codes, "policy": policy(codes), **values}
     folders = dict.fromkeys((*packages, "palpate.report"))
     loader = ChoiceLoader([PackageLoader(folder, "") for folder in folders])
     environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)

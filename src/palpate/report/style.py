@@ -7,7 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
+from palpate.report.look.tokens import DATA, PAIRS
 from palpate.text import shown
 
 if TYPE_CHECKING:
@@ -15,15 +17,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
-INK, QUIET = "#1a1d21", "#59616c"
-K, B, M, F = "#2f8bf2", "#d07a05", "#9457b8", "#268c5e"
-"""One colour a quantity, the same by light and by dark: stiffness, damping, mass; force and contact."""
-MEASURED, FAIL, DOUBT = "#858d99", "#d23b47", "#9a7400"
+INK, QUIET, GRID = (PAIRS[name][0] for name in ("ink", "quiet", "grid"))
+K, B, M, F = (DATA[name] for name in ("K", "B", "M", "F"))
+"""One colour a quantity, the same by light and by dark: stiffness, damping, mass; true force and contact."""
+MEASURED, FAIL, DOUBT = (DATA[name] for name in ("measured", "fail", "warn"))
+KNOWN: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": (0, (5, 4))}
+"""The line of what is asked for, or known to be true."""
+FORMATS = (".png", ".svg", ".pdf")
 BLUE, ORANGE, GREEN, RED, VIOLET, GREY = "#1f6fb4", "#e07b16", "#2a9254", "#c4342d", "#7b53a6", "#8a8a8a"
 SAND = "#ddaa33"
-GRID = "#e9ecf0"
 VEIL = "#d0d0d0"
 DPI = 110
+_COARSEST, _FINEST = 30, 1200
 _NARROW = 5.6
 """Inches under which a legend does not fit on one line."""
 _LONG = 15
@@ -137,12 +142,41 @@ def literal(text: str) -> str:
     return shown(text).replace("$", r"\$")
 
 
-def save(drawing: Figure, path: Path) -> Path:
-    """Writes the figure as PNG, the file there whole or not at all."""
+def save(drawing: Figure, path: Path, dpi: int | None = None) -> Path:
+    """Writes the figure, the file there whole or not at all.
+
+    Args:
+        drawing: the figure.
+        path: it ends in one of `FORMATS`.
+        dpi: of a PNG; `DPI` if none is given.
+
+    Raises:
+        InputError: another ending, or a resolution that makes no picture.
+    """
+    kind = path.suffix.lower()
+    if kind not in FORMATS:
+        raise InputError(f"{path}: a figure ends in {', '.join(FORMATS)}; name it so")
+    check_dpi(dpi)
     _spell_out(drawing)
     with whole(path) as draft:
-        drawing.savefig(draft, format="png", metadata={"Software": SIGNATURE})
+        if kind == ".svg":
+            from palpate.report.svg import svg
+
+            draft.write_bytes(svg(drawing, signed=True))
+            return path
+        about = {"Software": SIGNATURE} if kind == ".png" else {"Creator": SIGNATURE, "CreationDate": None}
+        drawing.savefig(draft, format=kind[1:], metadata=about, dpi=dpi or DPI)
     return path
+
+
+def check_dpi(dpi: int | None) -> None:
+    """Refuses a resolution of which no picture can be made, or none that fits into memory.
+
+    Raises:
+        InputError: it is one.
+    """
+    if dpi is not None and not _COARSEST <= dpi <= _FINEST:
+        raise InputError(f"--dpi must be from {_COARSEST} to {_FINEST}, got {dpi}")
 
 
 def _spell_out(drawing: Figure) -> None:

@@ -6,15 +6,15 @@ import io
 import re
 from typing import TYPE_CHECKING
 
+from palpate.files import SIGNATURE
 from palpate.report import style
+from palpate.report.look.tokens import PAIRS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BY_DARK = {
-    style.INK: "#e8eaed",
-    style.QUIET: "#a3abb6",
-    style.GRID: "#272d34",
+    **{PAIRS[name][0]: PAIRS[name][1] for name in ("ink", "quiet", "grid")},
     style.VEIL: "#4a4d52",
     style.BLUE: "#5ea6e6",
     style.ORANGE: "#f0a35b",
@@ -25,10 +25,10 @@ _BY_DARK = {
 }
 
 
-def svg(drawing: Figure) -> bytes:
+def svg(drawing: Figure, *, signed: bool = False) -> bytes:
     """The figure without a background, its colours turned where the reader's page is dark; needs no other file.
 
-    The same figure gives the same bytes.
+    The same figure gives the same bytes. A file of its own is `signed`; what lies in a page need not be.
     """
     import matplotlib
 
@@ -42,7 +42,8 @@ def svg(drawing: Figure) -> bytes:
     for colour, name in names.items():
         text = text.replace(colour, f"var({name})")
     end = text.index(">") + 1
-    return f"{text[:end]}\n{_sheet(names)}{text[end:]}".encode()
+    mark = f"<!-- Made by {SIGNATURE} -->\n" if signed else ""
+    return f"{mark}{text[:end]}\n{_sheet(names)}{text[end:]}".encode()
 
 
 def _sheet(names: dict[str, str]) -> str:

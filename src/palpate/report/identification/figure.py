@@ -31,16 +31,17 @@ _LETTERS = 12
 """Size of letters on a page [px]."""
 
 
-def write_figure(found: Identification, path: Path, title: str) -> Path:
-    """Draw an identification and write it as a PNG, whole or not at all.
+def write_figure(found: Identification, path: Path, title: str, dpi: int | None = None) -> Path:
+    """Draw an identification and write it, whole or not at all.
 
     Args:
         found: with its traces.
-        path: of the PNG.
+        path: of the PNG, SVG or PDF.
         title: what to call the log.
+        dpi: of a PNG; `style.DPI` if none is given.
     """
     figure = draw(found, title)
-    return style.save(figure, path)
+    return style.save(figure, path, dpi)
 
 
 def draw(found: Identification, title: str) -> Figure:

@@ -69,6 +69,9 @@ def page(found: Identification, source: Source) -> str:
     return render(
         "identification.html",
         "palpate.report.identification",
+        room="identify",
+        made=source.made,
+        scripts=(),
         title=source.title,
         sentence=sentence(found),
         model_line=model_line(found),

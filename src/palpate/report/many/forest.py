@@ -27,10 +27,10 @@ _LETTERS = 12
 _WIDE = 13.0
 
 
-def write_figure(rows: Sequence[LogRow], pooled: Pooled, path: Path) -> Path:
-    """Draw the forest plots and write them as a PNG, whole or not at all."""
+def write_figure(rows: Sequence[LogRow], pooled: Pooled, path: Path, dpi: int | None = None) -> Path:
+    """Draw the forest plots and write them, whole or not at all."""
     figure = draw(rows, pooled)
-    return style.save(figure, path)
+    return style.save(figure, path, dpi)
 
 
 def draw(rows: Sequence[LogRow], pooled: Pooled) -> Figure:

@@ -12,6 +12,7 @@ from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.source import Source
 from palpate.report.identification.words import CALLED, facts_of, interval, said
+from palpate.report.look.assets import TABLES, scripts
 from palpate.report.many import forest
 from palpate.report.many.rows import POINT, LogRow, drawn, json_of, quantities
 from palpate.report.many.words import failures, place, sentence
@@ -25,7 +26,7 @@ _HALF, _NARROW = 560, 360
 
 
 def write_page(rows: Sequence[LogRow], pooled: Pooled, path: Path) -> Path:
-    """Write the page of many identifications, whole or not at all; it opens without a network and runs nothing."""
+    """Write the page of many identifications, whole or not at all; it opens without a network."""
     text = page(rows, pooled)
     write_text(path, text)
     return path
@@ -39,6 +40,9 @@ def page(rows: Sequence[LogRow], pooled: Pooled) -> str:
         "many.html",
         "palpate.report.many",
         "palpate.report.identification",
+        room="identify",
+        made=source.made,
+        scripts=scripts(*TABLES),
         title=f"{len(rows)} logs",
         sentence=sentence(rows, pooled),
         failures=failures(rows),

@@ -1,0 +1,254 @@
+/* The live page: rows come in by a socket, and are drawn when the screen is. */
+"use strict";
+(() => {
+  const { Group, chart, figure, make, token, repaints } = palpate;
+  const view = JSON.parse(document.getElementById("view").textContent);
+  const at = Object.fromEntries(view.columns.map((name, i) => [name, i]));
+  const there = new Set(view.shown);
+  const SPAN = 10, MOST = Math.ceil(1.1 * SPAN / view.stride);
+  const byId = (id) => document.getElementById(id);
+  const live = { frames: 0, rows: 0, latest: {}, state: null };
+  palpate.live = live;
+
+  /* Rows of the last seconds, by column; what is no number is a gap. */
+  const columns = Object.fromEntries(view.columns.map((name) => [name, []]));
+  const forget = () => { for (const list of Object.values(columns)) list.length = 0; };
+  const take = (numbers) => {
+    const width = view.columns.length, count = numbers.length / width;
+    view.columns.forEach((name, i) => {
+      const list = columns[name];
+      for (let row = 0; row < count; row++) { const value = numbers[row * width + i]; list.push(Number.isNaN(value) ? null : value); }
+      if (list.length > 1.2 * MOST) list.splice(0, list.length - MOST);
+    });
+    live.rows += count;
+  };
+  const last = (name) => { const list = columns[name]; return list.length ? list[list.length - 1] : null; };
+
+  /* Charts */
+  const group = new Group();
+  const interval = (name) => {
+    const value = columns[name], half = columns[`${name}_half`];
+    return [value.map((v, i) => (v == null || half[i] == null ? null : v + half[i])), value.map((v, i) => (v == null || half[i] == null ? null : v - half[i]))];
+  };
+  const about = (name, share) => (_, low, high) => {
+    const value = last(`${name}_true`) ?? last(name), half = last(`${name}_half`) ?? 0;
+    if (value == null) return low == null ? [0, 1] : [low, high];
+    const room = Math.max(share * value, 2.2 * half, 1.3 * Math.abs((last(name) ?? value) - value));
+    return [value - room, value + room];
+  };
+  const measured = { label: "measured", kind: "measured", colour: "measured", of: "measured" };
+  const force = { label: "true", kind: "own", colour: "F", of: "force" };
+  const desired = { label: "desired", kind: "known", colour: "ink", of: "desired" };
+  const estimated = (name) => [
+    { label: "95 %", kind: "band", colour: name, high: `${name}_high`, low: `${name}_low` },
+    { label: "estimate", kind: "own", colour: name, of: name },
+    { label: "truth", kind: "known", colour: "ink", of: `${name}_true` },
+  ];
+  const offered = [
+    { title: "Force", y: `force [${view.units.measured}]`, needs: "measured", series: [measured, force, desired], digits: 4 },
+    { title: "Position", y: `${view.position} [${view.units.depth}]`, needs: "depth", series: [{ label: view.position, kind: "own", colour: "F", of: "depth" }] },
+    { title: "Stiffness K", y: "K [N/m]", needs: "K", series: estimated("K"), range: about("K", 0.06) },
+    { title: "Damping B", y: "B [N s/m]", needs: "B", series: estimated("B"), range: about("B", 0.3) },
+  ].filter((one) => there.has(one.needs));
+  offered.forEach((one) => { one.series = one.series.filter((s) => there.has((s.of || s.high).replace("_high", "_half"))); });
+  const fed = () => {
+    const more = {};
+    for (const name of ["K", "B"]) if (there.has(`${name}_half`)) [more[`${name}_high`], more[`${name}_low`]] = interval(name);
+    return { ...columns, ...more };
+  };
+  const tall = () => (innerWidth > 900 ? Math.max(120, (innerHeight - 150) / offered.length - 44) : 170);
+  const charts = offered.map((one, i) => {
+    const host = make("figure");
+    byId("charts").append(host);
+    return chart(host, { ...one, moving: true, height: tall(), alt: one.title, wordless: i > 0, x: i === offered.length - 1 ? "time [s]" : "" }, fed(), group);
+  });
+  addEventListener("resize", () => charts.forEach((one) => one.tall(tall())));
+
+  /* The picture: an arm, or force over position where no joints are known */
+  const canvas = byId("picture");
+  const arm = view.links.length ? palpate.arm(canvas, view.links) : null;
+  const press = () => {
+    const dense = devicePixelRatio || 1, wide = canvas.clientWidth, high = canvas.clientHeight, draw = canvas.getContext("2d");
+    canvas.width = Math.round(wide * dense); canvas.height = Math.round(high * dense);
+    draw.setTransform(dense, 0, 0, dense, 0, 0);
+    const x = columns.depth, y = columns.measured, known = x.map((v, i) => v != null && y[i] != null);
+    const xs = x.filter((_, i) => known[i]), ys = y.filter((_, i) => known[i]);
+    draw.font = "12px sans-serif"; draw.fillStyle = token("quiet");
+    draw.textAlign = "left"; draw.fillText(`force [${view.units.measured}]`, 14, 20);
+    draw.textAlign = "right"; draw.fillText(`${view.position} [${view.units.depth}]`, wide - 14, high - 8);
+    if (!xs.length) return;
+    const ends = (list) => { const low = list.reduce((a, b) => Math.min(a, b)), top = list.reduce((a, b) => Math.max(a, b)), room = 0.08 * (top - low) || 1; return [low - room, top + room]; };
+    const [x0, x1] = ends(xs), [y0, y1] = ends(ys);
+    const px = (v) => 52 + (v - x0) / (x1 - x0) * (wide - 72), py = (v) => high - 46 - (v - y0) / (y1 - y0) * (high - 84);
+    for (const share of [0.1, 0.5, 0.9]) {
+      const u = x0 + share * (x1 - x0), v = y0 + share * (y1 - y0);
+      draw.textAlign = "center"; draw.fillText(figure(u, 3), px(u), high - 26);
+      draw.textAlign = "right"; draw.fillText(figure(v, 3), 46, py(v) + 4);
+    }
+    draw.strokeStyle = token("measured"); draw.lineWidth = 1.25; draw.beginPath();
+    let up = true;
+    x.forEach((v, i) => { if (!known[i]) { up = true; return; } if (up) draw.moveTo(px(v), py(y[i])); else draw.lineTo(px(v), py(y[i])); up = false; });
+    draw.stroke();
+    draw.fillStyle = token("F"); draw.beginPath(); draw.arc(px(xs[xs.length - 1]), py(ys[ys.length - 1]), 6, 0, 7); draw.fill();
+  };
+  const picture = () => {
+    if (!arm) { press(); return; }
+    const q = ["q1", "q2", "q3"].map(last), force = last("force") ?? last("measured") ?? 0;
+    if (q.some((v) => v == null)) return;
+    arm({ q, rest: view.rest.length ? view.rest : null, wall: last("wall"), depth: last("depth") / 1000, force });
+  };
+
+  /* Sliders */
+  const sliders = {};
+  const send = (request) => { if (socket && socket.readyState === 1) socket.send(JSON.stringify(request)); };
+  const spelled = (slider, value) => `${figure(value, 3)} ${slider.unit}`.trim();
+  for (const one of view.sliders) {
+    const to = (share) => (one.logarithmic ? one.low * (one.high / one.low) ** share : one.low + share * (one.high - one.low));
+    const from = (value) => (one.logarithmic ? Math.log(value / one.low) / Math.log(one.high / one.low) : (value - one.low) / (one.high - one.low));
+    const field = make("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": one.name, class: one.colour });
+    const output = make("span", { class: "value", "aria-hidden": "true" });
+    byId("sliders").append(make("label", {}, make("span", {}, one.name), output, field));
+    const show = (value) => { output.textContent = spelled(one, value); field.setAttribute("aria-valuetext", output.textContent); };
+    const clipped = (value) => Math.min(one.high, Math.max(one.low, value));
+    let held = false;
+    const ask = (value) => { show(value); send({ do: "set", key: one.key, value: clipped(value) }); };
+    field.addEventListener("input", () => { held = true; ask(to(+field.value)); });
+    field.addEventListener("change", () => { held = false; });
+    sliders[one.key] = {
+      put: (value) => { if (!held) { field.value = from(value); show(value); } },
+      by: (change) => { const value = clipped(change(to(+field.value))); field.value = from(value); ask(value); },
+    };
+    sliders[one.key].put(one.value);
+  }
+
+  /* The card of the stiffness: where the estimate lies within what is stable, on an axis of equal factors */
+  const place = byId("place");
+  const parts = Object.fromEntries(["rail", "stable", "band", "truth", "own"].map((name) => { const part = make("span", { class: name }); place.append(part); return [name, part]; }));
+  let window_ = null, ticks = [];
+  const scale = (low, high) => {
+    if (window_ && low >= window_[0] && high <= window_[1] && high / low > (window_[1] / window_[0]) ** 0.2) return;
+    const middle = Math.sqrt(low * high), factor = [1.3, 1.7, 3, 10, 30, 100, 1000, 1e4, 1e5].find((f) => f >= (high / low) ** 1.4) || 1e6;
+    window_ = [middle / Math.sqrt(factor), middle * Math.sqrt(factor)];
+    ticks.forEach((one) => one.remove());
+    const step = 10 ** Math.floor(Math.log10(window_[1] - window_[0])), list = [];
+    if (factor > 8) { for (let e = Math.floor(Math.log10(window_[0])); e < 9; e++) for (const m of factor > 300 ? [1] : factor > 50 ? [1, 3] : [1, 2, 5]) list.push(m * 10 ** e); }
+    else { const own = (window_[1] - window_[0]) / step > 4 ? 2 * step : (window_[1] - window_[0]) / step > 2 ? step : step / 2; for (let v = Math.ceil(window_[0] / own) * own; v < window_[1]; v += own) list.push(v); }
+    ticks = list.filter((v) => v > window_[0] * 1.01 && v < window_[1] / 1.01).map((v) => { const one = make("span", { class: "at" }, v >= 1000 ? `${+(v / 1000).toPrecision(3)} k` : String(+v.toPrecision(3))); one.style.left = `${share(v)}%`; place.append(one); return one; });
+  };
+  const share = (value) => Math.max(0, Math.min(100, 100 * Math.log(value / window_[0]) / Math.log(window_[1] / window_[0])));
+  const lay = (part, low, high) => { part.hidden = !(low > 0); part.style.display = low > 0 ? "" : "none"; if (!(low > 0)) return; part.style.left = `${share(low)}%`; if (high != null) part.style.width = `${share(high) - share(low)}%`; };
+  const legend = byId("place-legend");
+  const entry = (kind, text) => make("li", { class: kind }, make("i"), text);
+  let legendOf = "";
+  const card = () => {
+    if (!there.has("K")) { byId("stiffness").style.display = "none"; return; }
+    const K = last("K"), half = last("K_half"), truth = last("K_true"), told = live.state && live.state.stability;
+    const number = byId("number");
+    number.replaceChildren(...(K == null ? [make("span", { class: "quiet" }, "not known yet")] : [figure(K, 4), make("i", {}, ` ± ${figure(half, 2)}`), make("small", {}, " N/m")]));
+    const stable = told && told.stiffness, values = [K, K && K - half > 0 ? K - half : null, K && K + half, truth, ...(stable || [])].filter((v) => v > 0);
+    if (!values.length) return;
+    scale(Math.min(...values), Math.max(...values));
+    lay(parts.stable, stable ? stable[0] : 0, stable ? stable[1] : 0);
+    parts.stable.classList.toggle("proved", !!(told && told.proved));
+    lay(parts.band, K == null ? 0 : Math.max(K - half, window_[0]), K + half);
+    lay(parts.own, K ?? 0); lay(parts.truth, truth ?? 0);
+    const kinds = [["estimate", "estimate"], ["interval", "95 %"], ...(stable ? [["stable", told.label]] : []), ...(truth ? [["truth", "truth"]] : [])];
+    const key = JSON.stringify(kinds);
+    if (key !== legendOf) { legendOf = key; legend.replaceChildren(...kinds.map(([kind, text]) => entry(kind, text))); }
+    byId("stiffness-what").textContent = stable ? "estimated, and where the loop is stable" : "estimated";
+    byId("why").textContent = told ? told.text : "";
+  };
+
+  /* How it stands */
+  const alerts = byId("alerts");
+  const alert = (tone, title, text) => make("div", { class: `alert ${tone}`, role: "alert" }, make("p", {}, make("b", {}, title), ` ${text}`));
+  let away = "";
+  const stand = () => {
+    const state = live.state;
+    if (!state) return;
+    byId("pause").setAttribute("aria-pressed", String(!state.playing));
+    byId("pause").replaceChildren(make("span", { "aria-hidden": "true" }, state.playing ? "❚❚" : "▶"), " ", make("span", { class: "word" }, state.playing ? "pause" : "go on"));
+    for (const [key, value] of Object.entries(state.values)) if (sliders[key]) sliders[key].put(value);
+    const seed = byId("seed");
+    if (seed && document.activeElement !== seed) seed.value = state.seed;
+    const pace = byId("pace");
+    if (pace) pace.value = String(state.pace);
+    charts.forEach((one) => { one.marks = state.happened; });
+    const over = state.ended.startsWith("done");
+    alerts.replaceChildren(
+      ...(away ? [alert("", "The program is gone.", away)] : []),
+      ...(state.ended ? [alert(over ? "" : "fail", over ? "The end." : "✕ Stopped.", `${state.ended.replace(/^done: /, "")}. Reset, or go on, to begin again.`)] : []),
+      ...(state.warning ? [alert("", "At its limit:", state.warning)] : []),
+      ...(state.said ? [alert("", "Not done:", state.said)] : []));
+    fresh = true;
+  };
+  const phase = () => {
+    const kind = last("phase"), node = byId("phase");
+    const [word, tone] = away ? ["gone", "fail"] : live.state && !live.state.playing && !live.state.ended ? ["paused", "none"]
+      : live.state && live.state.ended && !live.state.ended.startsWith("done") ? ["stopped", "fail"] : live.state && live.state.ended ? ["ended", "none"]
+      : view.kind === "replay" ? ["playing", "ok"] : kind === 1 ? ["pressing", "ok"] : kind === 2 ? ["contact lost", "fail"] : ["approaching", "go"];
+    if (node.textContent !== word) { node.textContent = word; node.className = `v ${tone}`; }
+  };
+
+  /* The socket: it comes back by itself */
+  let socket = null, fresh = false, wait = 250;
+  const connect = () => {
+    socket = new WebSocket(new URL("stream", location.href.replace(/^http/, "ws")));
+    socket.binaryType = "arraybuffer";
+    socket.addEventListener("open", () => { away = ""; wait = 250; forget(); stand(); });
+    socket.addEventListener("message", ({ data }) => {
+      if (typeof data !== "string") { take(new Float64Array(data)); fresh = true; return; }
+      const told = JSON.parse(data);
+      if (told.kind === "clear") { forget(); fresh = true; }
+      else if (told.kind === "state") { live.state = told; stand(); }
+      else if (told.kind === "refused" && live.state) { live.state.said = told.why; stand(); }
+    });
+    socket.addEventListener("close", () => {
+      away = "The page looks for it again, and goes on when it is back."; stand(); fresh = true;
+      setTimeout(connect, wait); wait = Math.min(5000, 2 * wait);
+    });
+  };
+
+  /* Drawn once a frame, and only if there is something new */
+  const draw = () => {
+    requestAnimationFrame(draw);
+    if (!fresh) return;
+    fresh = false;
+    live.frames++;
+    for (const name of view.columns) live.latest[name] = last(name);
+    const now = last("t");
+    phase();
+    if (now != null) {
+      const first = columns.t[0], from = now - SPAN > first ? now - SPAN : first, rows = fed();
+      for (const one of charts) one.put(rows, from, from + SPAN);
+      byId("clock").textContent = `${now.toFixed(2)} s`;
+      const moment = byId("moment");
+      if (moment && document.activeElement !== moment) moment.value = now;
+      if (moment) byId("of").textContent = `${now.toFixed(1)} of ${view.span[1].toFixed(1)} s`;
+    }
+    picture(); card();
+  };
+  const again = () => { fresh = true; };
+  repaints.add(again);
+  new ResizeObserver(again).observe(canvas);
+
+  /* Buttons and keys */
+  const paused = () => live.state && !live.state.playing;
+  const acts = {
+    " ": () => send({ do: "pause", on: !paused() }), ".": () => send({ do: "step" }), 0: () => send({ do: "reset" }),
+    ArrowUp: () => sliders["force.first"]?.by((v) => v + 1), ArrowDown: () => sliders["force.first"]?.by((v) => v - 1),
+    "[": () => sliders["surface.stiffness"]?.by((v) => v / 1.1), "]": () => sliders["surface.stiffness"]?.by((v) => v * 1.1),
+  };
+  byId("pause").addEventListener("click", acts[" "]);
+  byId("step").addEventListener("click", acts["."]);
+  byId("reset").addEventListener("click", acts[0]);
+  byId("seed")?.addEventListener("change", (event) => { if (/^\d{1,15}$/.test(event.target.value)) send({ do: "reset", seed: +event.target.value }); });
+  byId("pace")?.addEventListener("change", (event) => send({ do: "pace", value: +event.target.value }));
+  byId("moment")?.addEventListener("input", (event) => send({ do: "seek", time: +event.target.value }));
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input, select, .plot") || (event.key === " " && event.target.matches("button"))) return;
+    if (acts[event.key]) { event.preventDefault(); acts[event.key](); }
+  });
+  connect();
+  requestAnimationFrame(draw);
+})();

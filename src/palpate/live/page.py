@@ -1,0 +1,48 @@
+"""The live page's text: everything it needs lies in it, and its policy lets nothing else run or be asked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib import resources
+
+from palpate.live.view import View
+from palpate.report.look.assets import ARM, CHARTS, data, policy, scripts
+from palpate.report.page import render
+from palpate.text import shown
+
+PAGE_HEADERS = {
+    "Content-Type": "text/html; charset=utf-8",
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+def page(view: View) -> str:
+    """The page of a source as HTML."""
+    codes = (*scripts(*CHARTS, *ARM), _own("live.js"))
+    shown_view = replace(
+        view,
+        title=shown(view.title),
+        about=shown(view.about),
+        notes=tuple(map(shown, view.notes)),
+        units={name: shown(unit) for name, unit in view.units.items()},
+    )
+    return render(
+        "live.html",
+        "palpate.live",
+        view=shown_view,
+        data=data(shown_view.to_json()),
+        title=f"{shown_view.title} – palpate live",
+        command="",
+        own_styles=_own("live.css"),
+        scripts=codes,
+        policy=policy(codes, "connect-src 'self' ws://127.0.0.1:* ws://localhost:*"),
+    )
+
+
+def _own(name: str) -> str:
+    return (resources.files("palpate.live") / name).read_text(encoding="utf-8")

@@ -1,0 +1,223 @@
+"""A source at real time, in a thread of its own; readers ask it to pause, to step, to go back."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import msgspec
+
+from palpate.errors import InputError
+from palpate.live.feed import Feed
+from palpate.live.view import STRIDE, Source
+
+PERIOD = 0.01
+"""Between two looks at the clock [s]."""
+BEHIND = 0.1
+"""What is made up for after a stall; a longer one is lost [s]."""
+STEP = 0.01
+"""Of the step button [s]."""
+WAITING = 64
+"""Requests that may wait; further ones are dropped."""
+PACES = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""Times real time."""
+
+
+class Pause(msgspec.Struct, tag="pause", tag_field="do", forbid_unknown_fields=True):
+    """Stand still, or go on."""
+
+    on: bool
+
+
+class Step(msgspec.Struct, tag="step", tag_field="do", forbid_unknown_fields=True):
+    """Stand still a moment later."""
+
+
+class Reset(msgspec.Struct, tag="reset", tag_field="do", forbid_unknown_fields=True):
+    """Begin again, with another seed if one is given."""
+
+    seed: int | None = None
+
+
+class Set(msgspec.Struct, tag="set", tag_field="do", forbid_unknown_fields=True):
+    """Move a slider."""
+
+    key: str
+    value: float
+
+
+class Seek(msgspec.Struct, tag="seek", tag_field="do", forbid_unknown_fields=True):
+    """Go to a moment [s]."""
+
+    time: float
+
+
+class Pace(msgspec.Struct, tag="pace", tag_field="do", forbid_unknown_fields=True):
+    """So many times real time."""
+
+    value: float
+
+
+Request = Pause | Step | Reset | Set | Seek | Pace
+
+
+class Player:
+    """Plays a source into a feed; started by `with`.
+
+    It stands still until somebody watches.
+
+    Args:
+        source: what runs.
+        feed: where its rows go.
+        changed: called after something was changed that its loop's stability depends on.
+        stability: what is known of that, as plain values; None while nothing is.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        feed: Feed,
+        changed: Callable[[], None] = lambda: None,
+        stability: Callable[[], dict[str, Any] | None] = lambda: None,
+    ):
+        self.source, self.feed = source, feed
+        self._set, self._stability = changed, stability
+        self.failure: BaseException | None = None
+        self.version = 0
+        self._playing, self._pace, self._said = True, 1.0, ""
+        self._watched = threading.Event()
+        self._stop = threading.Event()
+        self._requests: queue.Queue[Request] = queue.Queue(WAITING)
+        self._thread = threading.Thread(target=self._guarded, name="live", daemon=True)
+
+    def __enter__(self) -> Player:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+
+    def watch(self) -> None:
+        """Somebody watches: from now on it runs."""
+        self._watched.set()
+
+    def ask(self, request: Request) -> bool:
+        """Has something done at the next look at the clock; False where too much waits already."""
+        try:
+            self._requests.put_nowait(request)
+        except queue.Full:
+            return False
+        return True
+
+    def wait(self) -> None:
+        """Until the thread ends, which it does by a failure alone.
+
+        Raises:
+            BaseException: that failure.
+        """
+        while self._thread.is_alive():
+            self._thread.join(0.2)
+        if self.failure is not None:
+            raise self.failure
+
+    def news(self) -> None:
+        """How it stands has changed: readers are told."""
+        self.version += 1
+        self.feed.tell()
+
+    def told(self) -> dict[str, Any]:
+        """How it stands, as the page takes it."""
+        state = self.source.state
+        return {
+            "version": self.version,
+            "playing": self._playing,
+            "pace": self._pace,
+            "values": dict(state.values),
+            "seed": state.seed,
+            "ended": state.ended,
+            "warning": state.warning,
+            "happened": [asdict(one) for one in state.happened],
+            "said": self._said,
+            "stability": self._stability(),
+        }
+
+    def _guarded(self) -> None:
+        try:
+            self._run()
+        except BaseException as error:  # noqa: BLE001 - raised again by whoever started it
+            self.failure = error
+            self.feed.tell()
+
+    def _run(self) -> None:
+        due, last = 0.0, time.monotonic()
+        while not self._stop.wait(PERIOD):
+            self._obey()
+            now = time.monotonic()
+            if self._playing and self._watched.is_set():
+                due = min(due + self._pace * (now - last), self._pace * BEHIND)
+            last = now
+            strides = int(due / STRIDE)
+            if strides:
+                due -= strides * STRIDE
+                self._advance(strides * STRIDE)
+
+    def _advance(self, seconds: float) -> None:
+        state = self.source.state
+        before = state.ended, state.happened, state.warning
+        self.feed.put(self.source.advance(seconds))
+        if (state.ended, state.happened, state.warning) != before:
+            if state.ended:
+                self._playing = False
+            self.news()
+
+    def _obey(self) -> None:
+        """Does what was asked, of each slider only the last."""
+        waiting: list[Request] = []
+        while True:
+            try:
+                waiting.append(self._requests.get_nowait())
+            except queue.Empty:
+                break
+        last = {one.key: one for one in waiting if isinstance(one, Set)}
+        for request in waiting:
+            if isinstance(request, Set) and last[request.key] is not request:
+                continue
+            try:
+                self._said = ""
+                self._do(request)
+            except InputError as error:
+                self._said = str(error)
+            self.news()
+
+    def _do(self, request: Request) -> None:
+        match request:
+            case Pause(on):
+                self._playing = not on
+                if not on and self.source.state.ended:
+                    self._begin(None)
+            case Step():
+                self._playing = False
+                self._advance(STEP)
+            case Reset(seed):
+                self._begin(seed)
+            case Set(key, value):
+                self.source.set(key, value)
+                self._set()
+            case Seek(moment):
+                self.feed.clear()
+                self.source.seek(moment)
+                self._advance(STEP)
+            case Pace(value):
+                if value not in PACES:
+                    raise InputError(f"the pace must be one of {', '.join(map(str, PACES))}, got {value:g}")
+                self._pace = value
+
+    def _begin(self, seed: int | None) -> None:
+        self.source.reset(seed)
+        self.feed.clear()
+        self._playing = True

@@ -1,0 +1,168 @@
+"""What a page is shown: rows of these columns, and a description of what they are of."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+COLUMNS = (
+    "t",
+    "measured",
+    "force",
+    "desired",
+    "depth",
+    "K",
+    "K_half",
+    "B",
+    "B_half",
+    "K_true",
+    "B_true",
+    "q1",
+    "q2",
+    "q3",
+    "wall",
+    "phase",
+)
+"""Time [s]; measured, true and desired force [N]; depth in the surface [mm]; K [N/m] and B [N s/m], half-widths of
+their 95 % intervals, and the truth; joint angles [rad]; the undeformed surface [m]; phase (`bench.sequence`)."""
+AT = {name: i for i, name in enumerate(COLUMNS)}
+STRIDE = 0.005
+"""Time between two rows that are shown [s]."""
+
+LEAD = 1.5
+"""Before the first touch, from where it begins [s]: the long search for the surface is passed over."""
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A number that can be changed while it runs.
+
+    Args:
+        key: of the experiment, as `force.first`.
+        name: what stands at it.
+        unit: of the number.
+        low, high: ends.
+        value: at the start.
+        logarithmic: equal factors are equally far apart.
+        colour: of the quantity, a token.
+    """
+
+    key: str
+    name: str
+    unit: str
+    low: float
+    high: float
+    value: float
+    logarithmic: bool = False
+    colour: str = "F"
+
+
+@dataclass(frozen=True)
+class View:
+    """What is shown.
+
+    Args:
+        title: in a few words.
+        about: in a sentence.
+        kind: `simulation` or `replay`.
+        rate: rows a second of the data itself [Hz].
+        shown: which of `COLUMNS` there are.
+        sliders: what can be changed.
+        links: lengths of the arm [m]; empty if there is none to draw.
+        rest: joint angles at the start [rad].
+        span: of a replay's time, first and last [s].
+        notes: what a reader should know, such as what the log lacks.
+        identified: what `palpate identify` says of a log, by parameter: text, verdict.
+        position: what the depth is called.
+        units: of what the charts show.
+    """
+
+    title: str
+    about: str
+    kind: str
+    rate: float
+    shown: tuple[str, ...] = COLUMNS
+    sliders: tuple[Slider, ...] = ()
+    links: tuple[float, ...] = ()
+    rest: tuple[float, ...] = ()
+    span: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
+    identified: tuple[dict[str, str], ...] = ()
+    position: str = "depth in the surface"
+    units: dict[str, str] = field(default_factory=lambda: {"depth": "mm", "measured": "N"})
+
+    def to_json(self) -> dict[str, Any]:
+        """As the page takes it."""
+        return {"columns": COLUMNS, "stride": STRIDE, **asdict(self)}
+
+
+@dataclass(frozen=True)
+class Happened:
+    """Something at a moment, to be marked in the charts.
+
+    Args:
+        x: when [s].
+        text: what.
+        tone: `fail` where it went wrong.
+    """
+
+    x: float
+    text: str
+    tone: str = ""
+
+
+@dataclass
+class State:
+    """How a source stands, beside its rows.
+
+    Args:
+        values: of the sliders, by key.
+        seed: of the noise; None for a replay.
+        ended: why it goes no further; empty while it does.
+        happened: the last few moments worth a mark.
+        warning: what is amiss while it goes on; empty if nothing is.
+    """
+
+    values: dict[str, float] = field(default_factory=dict)
+    seed: int | None = None
+    ended: str = ""
+    happened: list[Happened] = field(default_factory=list)
+    warning: str = ""
+
+    _MOST = 12
+
+    def note(self, happened: Happened) -> None:
+        """Keeps a moment, and forgets those long ago."""
+        self.happened = [*self.happened, happened][-self._MOST :]
+
+
+class Source(Protocol):
+    """What runs: a simulation, or a log that is played again."""
+
+    view: View
+    state: State
+
+    def advance(self, seconds: float) -> Array:
+        """The rows of the time to come, shape (n, len(COLUMNS)); none once it has ended."""
+        ...
+
+    def reset(self, seed: int | None = None) -> None:
+        """To the beginning, with another seed if one is given."""
+        ...
+
+    def set(self, key: str, value: float) -> None:
+        """Moves a slider.
+
+        Raises:
+            InputError: none of that key, or a value out of range.
+        """
+        ...
+
+    def seek(self, time: float) -> None:
+        """To a moment of a replay [s]; a simulation runs on to it."""
+        ...

@@ -1,0 +1,232 @@
+/* Charts that can be zoomed and read: one cursor and one zoom for all charts of a group. */
+"use strict";
+const palpate = (() => {
+  const token = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  const faded = (name, alpha) => {
+    const code = parseInt(token(name).slice(1), 16);
+    return `rgba(${code >> 16},${(code >> 8) & 255},${code & 255},${alpha})`;
+  };
+  const make = (tag, attributes = {}, ...inside) => {
+    const node = document.createElement(tag);
+    for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+    node.append(...inside);
+    return node;
+  };
+  const repaints = new Set();
+  const repaint = () => repaints.forEach((again) => again());
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  addEventListener("beforeprint", () => { document.documentElement.dataset.print = ""; repaint(); });
+  addEventListener("afterprint", () => { delete document.documentElement.dataset.print; repaint(); });
+
+  /* A number with so many digits that mean something, with a minus that is one. */
+  const figure = (value, digits = 4) => {
+    if (value == null || !isFinite(value)) return "–";
+    if (value === 0) return "0";
+    const behind = digits - 1 - Math.floor(Math.log10(Math.abs(value)));
+    return value.toFixed(Math.max(0, Math.min(6, behind))).replace("-", "−");
+  };
+  const tick = (value) => String(+value.toPrecision(6)).replace("-", "−");
+
+  /* A column as `look/columns.py` packs it; gaps are null. */
+  const unpacked = (column) => {
+    if (Array.isArray(column)) return column;
+    const bytes = Uint8Array.from(atob(column.b), (letter) => letter.charCodeAt(0));
+    const codes = new DataView(bytes.buffer);
+    return Array.from({ length: bytes.length / 2 }, (_, i) => {
+      const code = codes.getInt16(2 * i, true);
+      return code === -32768 ? null : (code + 32500) * column.s + column.o;
+    });
+  };
+
+  /* What a line means decides how it is drawn, everywhere. */
+  const KINDS = {
+    measured: { width: 1, dash: [] },
+    own: { width: 2, dash: [] },
+    known: { width: 1.25, dash: [5, 4] },
+    other: { width: 1.5, dash: [8, 3] },
+  };
+  const sample = (one) => {
+    const ns = "http://www.w3.org/2000/svg";
+    const svg = document.createElementNS(ns, "svg");
+    svg.setAttribute("width", 18); svg.setAttribute("height", 10); svg.setAttribute("aria-hidden", "true");
+    const put = (tag, attributes) => {
+      const node = document.createElementNS(ns, tag);
+      for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+      svg.append(node);
+    };
+    const colour = `var(--${one.colour})`;
+    if (one.kind === "band") put("rect", { width: 18, height: 10, rx: 2, fill: colour, "fill-opacity": 0.3 });
+    else put("line", { x1: 0, x2: 18, y1: 5, y2: 5, stroke: colour, "stroke-width": KINDS[one.kind].width,
+      "stroke-dasharray": KINDS[one.kind].dash.join(" ") });
+    return svg;
+  };
+
+  class Group {
+    constructor() { this.charts = []; this.watchers = []; this.busy = false; }
+    /* Tells all charts but one where the reader points: a value of x, or null. */
+    point(x, from) {
+      if (this.busy) return;
+      this.busy = true;
+      for (const chart of this.charts) if (chart !== from) chart.point(x);
+      for (const watcher of this.watchers) watcher(x);
+      this.busy = false;
+    }
+    zoom(low, high, from) {
+      if (this.busy) return;
+      this.busy = true;
+      for (const chart of this.charts) if (chart !== from) chart.plot.setScale("x", { min: low, max: high });
+      this.busy = false;
+    }
+  }
+
+  const axis = (more) => ({ stroke: () => token("quiet"), font: "12px sans-serif", gap: 6, ticks: { show: false },
+    grid: { stroke: () => token("grid"), width: 1 }, values: (_, list) => list.map(tick), ...more });
+
+  /* A chart in `host`.
+     spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, text,
+     tone}], shades [[from, to]], moving (fed, not zoomed), series [{label, kind, colour, of}] or [{..., kind: "band",
+     low, high}], where `of`, `low` and `high` name columns; `x_of` names that of x. */
+  const chart = (host, spec, columns, group = new Group()) => {
+    const self = { marks: spec.marks || [] };
+    const legend = make("ul", { class: "legend" });
+    for (const one of spec.series) legend.append(make("li", {}, sample(one), one.label));
+    const head = make("header", {}, make("h3", {}, spec.title), legend);
+    const whole = make("button", { type: "button", class: "screen" }, "whole range");
+    if (!spec.moving) head.append(whole);
+    const read = make("span", { class: "read" });
+    const box = make("div", { class: "plot", tabindex: 0, role: "img", "aria-label": spec.alt || spec.title });
+    host.classList.add("chart");
+    host.replaceChildren(head, make("div", { class: "axis" }, make("span", {}, spec.y), read), box);
+    if (spec.x) host.append(make("div", { class: "axis below" }, make("span", {}, spec.x)));
+    if (spec.caption) host.append(make("figcaption", {}, spec.caption));
+
+    const series = [{}], bands = [], rows = [];
+    for (const one of spec.series) {
+      if (one.kind === "band") {
+        rows.push(one.high, one.low);
+        bands.push({ series: [series.length, series.length + 1], fill: () => faded(one.colour, 0.22) });
+        series.push({ width: 0, points: { show: false } }, { width: 0, points: { show: false } });
+      } else {
+        rows.push(one.of);
+        series.push({ stroke: () => token(one.colour), ...KINDS[one.kind], points: { show: false } });
+      }
+    }
+    const taken = (from) => [from[spec.x_of || "t"], ...rows.map((name) => from[name])];
+    let data = taken(columns);
+    const height = () => (innerWidth < 560 ? Math.round(0.85 * spec.height) : spec.height);
+    const ends = () => [data[0][0], data[0][data[0].length - 1]];
+    const padded = (_, low, high) => {
+      if (low == null) return [0, 1];
+      const room = 0.07 * (high - low) || Math.abs(high) * 0.1 || 1;
+      return [low - room, high + room];
+    };
+    const nearest = (x) => {
+      let low = 0, high = data[0].length - 1;
+      while (high - low > 1) { const middle = (low + high) >> 1; if (data[0][middle] < x) low = middle; else high = middle; }
+      return x - data[0][low] < data[0][high] - x ? low : high;
+    };
+    const tell = (x) => {
+      if (x == null || !data[0].length) { read.textContent = ""; return; }
+      const i = nearest(x), parts = [`${figure(data[0][i], 5)} ${spec.unit || "s"}`];
+      let k = 1;
+      for (const one of spec.series) {
+        const digits = spec.digits || 4;
+        if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i], digits)} to ${figure(data[k][i], digits)}`); k += 2; }
+        else parts.push(`${one.label} ${figure(data[k++][i], digits)}`);
+      }
+      read.textContent = parts.join("  ·  ");
+    };
+    const behind = (plot) => {
+      const { ctx, bbox } = plot;
+      for (const [from, to] of spec.shades || []) {
+        const left = Math.max(bbox.left, plot.valToPos(from, "x", true));
+        const right = Math.min(bbox.left + bbox.width, plot.valToPos(to, "x", true));
+        ctx.fillStyle = faded("F", 0.09);
+        if (right > left) ctx.fillRect(left, bbox.top, right - left, bbox.height);
+      }
+    };
+    const before = (plot) => {
+      const { ctx, bbox } = plot, dense = devicePixelRatio || 1;
+      ctx.save();
+      ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
+      let free = -Infinity;
+      for (const mark of self.marks) {
+        const at = plot.valToPos(mark.x, "x", true), failed = mark.tone === "fail";
+        if (at < bbox.left - 1) continue;
+        ctx.strokeStyle = token(failed ? "fail" : "quiet");
+        ctx.lineWidth = 1.25 * dense; ctx.setLineDash([3 * dense, 3 * dense]);
+        ctx.beginPath(); ctx.moveTo(at, bbox.top); ctx.lineTo(at, bbox.top + bbox.height); ctx.stroke();
+        if (!mark.text || spec.wordless) continue;
+        ctx.font = `${failed ? 600 : 400} ${12 * dense}px sans-serif`;
+        ctx.textAlign = "left"; ctx.textBaseline = "alphabetic";
+        const wide = ctx.measureText(mark.text).width, beyond = at + wide + 10 * dense > bbox.left + bbox.width;
+        const from = beyond ? at - wide - 5 * dense : at + 5 * dense;
+        if (from < Math.max(free, bbox.left)) continue;
+        free = from + wide + 6 * dense;
+        ctx.setLineDash([]); ctx.lineJoin = "round"; ctx.lineWidth = 4 * dense; ctx.strokeStyle = token("paper");
+        ctx.fillStyle = token(failed ? "bad" : "quiet");
+        const y = bbox.top + bbox.height - 8 * dense;
+        ctx.strokeText(mark.text, from, y); ctx.fillText(mark.text, from, y);
+      }
+      ctx.restore();
+    };
+    let ready = false;
+    const plot = new uPlot({
+      width: Math.max(160, box.clientWidth), height: height(), padding: [8, 8, 0, 0], legend: { show: false },
+      cursor: { y: false, drag: { x: !spec.moving, y: false, setScale: !spec.moving }, points: { show: false },
+        bind: { dblclick: () => () => full() } },
+      scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: { range: spec.range || padded } },
+      axes: [axis({ size: 26 }), axis({ size: spec.left || 52, space: 22 })],
+      series, bands,
+      hooks: {
+        setCursor: [(own) => {
+          if (group.busy) return;
+          const x = own.cursor.left < 0 ? null : own.posToVal(own.cursor.left, "x");
+          tell(x); group.point(x, self);
+        }],
+        setScale: [(own, key) => {
+          if (key !== "x" || spec.moving) return;
+          const { min, max } = own.scales.x, [low, high] = ends();
+          host.classList.toggle("zoomed", max - min < 0.995 * (high - low));
+          if (ready) group.zoom(min, max, self);
+        }],
+        drawClear: [behind], draw: [before],
+      },
+    }, data, box);
+    const full = () => { const [low, high] = ends(); plot.setScale("x", { min: low, max: high }); };
+    self.plot = plot;
+    self.point = (x) => {
+      plot.setCursor({ left: x == null ? -10 : plot.valToPos(x, "x"), top: 10 }, false, false);
+      tell(x);
+    };
+    self.put = (from, low, high) => {
+      data = taken(from);
+      plot.batch(() => { plot.setData(data, false); plot.setScale("x", { min: low, max: high }); });
+    };
+    self.tall = (pixels) => { spec.height = pixels; plot.setSize({ width: plot.width, height: height() }); };
+    whole.addEventListener("click", full);
+    let at = null;
+    box.addEventListener("keydown", (event) => {
+      const { min, max } = plot.scales.x, wide = max - min, middle = at == null ? (min + max) / 2 : at;
+      const [low, high] = ends();
+      const moves = {
+        ArrowLeft: () => { at = Math.max(min, middle - 0.01 * wide); }, ArrowRight: () => { at = Math.min(max, middle + 0.01 * wide); },
+        "+": () => plot.setScale("x", { min: Math.max(low, middle - 0.3 * wide), max: Math.min(high, middle + 0.3 * wide) }),
+        "-": () => plot.setScale("x", { min: Math.max(low, middle - wide), max: Math.min(high, middle + wide) }),
+        0: () => { at = null; full(); }, Escape: () => { at = null; full(); },
+      };
+      if (spec.moving || !moves[event.key]) return;
+      event.preventDefault();
+      moves[event.key](); self.point(at); group.point(at, self);
+    });
+    new ResizeObserver(() => {
+      const wide = box.clientWidth;
+      if (wide && Math.abs(wide - plot.width) > 1) plot.setSize({ width: wide, height: height() });
+    }).observe(box);
+    repaints.add(() => plot.redraw(false, true));
+    group.charts.push(self);
+    setTimeout(() => { ready = true; });
+    return self;
+  };
+  return { Group, chart, unpacked, figure, token, faded, make, repaints };
+})();

@@ -1,0 +1,69 @@
+"""Colours, each with one meaning everywhere: on pages, in figures, on the live page; and the same by light and dark.
+
+A data colour draws, and has a contrast of 3:1 or more on every ground (WCAG 2.2, 1.4.11); what is written in a
+quantity's colour takes its `-text`, of 4.5:1 or more (1.4.3). `tests/report/test_tokens.py` measures both.
+"""
+
+from __future__ import annotations
+
+DATA = {
+    "K": "#2f8bf2",
+    "B": "#d07a05",
+    "M": "#9457b8",
+    "F": "#268c5e",
+    "measured": "#858d99",
+    "fail": "#d23b47",
+    "warn": "#9a7400",
+    "ok": "#2b8a57",
+}
+"""Stiffness, damping, mass, true force; what a sensor said; it failed, it is in doubt, it holds."""
+
+PAIRS = {
+    "paper": ("#ffffff", "#13161a"),
+    "card": ("#f5f6f8", "#1b1f25"),
+    "lift": ("#ffffff", "#242a31"),
+    "line": ("#dce0e6", "#343b44"),
+    "grid": ("#e9ecf0", "#272d34"),
+    "ink": ("#1a1d21", "#e8eaed"),
+    "quiet": ("#59616c", "#a3abb6"),
+    "link": ("#1665bd", "#6fb1fa"),
+    "K-text": ("#1665bd", "#6fb1fa"),
+    "B-text": ("#96560a", "#e9a24a"),
+    "M-text": ("#7a3f9f", "#c294de"),
+    "F-text": ("#1d6646", "#5cb98a"),
+    "bad": ("#b3242f", "#ff8a8f"),
+    "doubt": ("#7a5a00", "#dcb13c"),
+    "good": ("#1c6e42", "#5cc08b"),
+    "fail-ground": ("#fdeeee", "#331b1f"),
+    "warn-ground": ("#fbf5e2", "#2c2614"),
+}
+"""What is turned where the reader's page is dark: grounds, lines, letters."""
+
+GROUNDS = ("paper", "card")
+"""What data is drawn on."""
+
+
+def style_sheet() -> str:
+    """The tokens as custom properties of CSS; paper that is printed on is always light."""
+    light = "".join(f"--{name}:{value};" for name, value in DATA.items())
+    light += "".join(f"--{name}:{pair[0]};" for name, pair in PAIRS.items())
+    dark = "".join(f"--{name}:{pair[1]};" for name, pair in PAIRS.items())
+    return (
+        f":root{{color-scheme:light dark;{light}}}\n"
+        f"@media screen and (prefers-color-scheme:dark){{:root:not([data-print]){{{dark}}}}}\n"
+    )
+
+
+def contrast(one: str, other: str) -> float:
+    """Of two colours, 1 to 21 (WCAG 2.2, contrast ratio)."""
+    high, low = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    def linear(byte: int) -> float:
+        share = byte / 255
+        return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
+
+    red, green, blue = (linear(int(colour[i : i + 2], 16)) for i in (1, 3, 5))
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

@@ -1,0 +1,1 @@
+"""The results of one run: tables, figures, and the page of both."""

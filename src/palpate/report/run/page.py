@@ -1,0 +1,295 @@
+"""The page of a run: the answer and what failed first, charts to touch, and the thesis' own columns below."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.identification.result import Identification
+from palpate.records import Record
+from palpate.report import style
+from palpate.report.identification.page import TONES, split
+from palpate.report.identification.words import CALLED, said
+from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts
+from palpate.report.look.columns import packed, thinned
+from palpate.report.numbers import plain, quantity
+from palpate.report.page import embedded, render
+from palpate.report.run.figures import drawings
+from palpate.report.run.table import force_rows, thesis_table
+from palpate.report.run.words import alerts, motors, sentence
+from palpate.report.svg import svg
+from palpate.robots.arm3 import Arm3
+from palpate.text import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Array = NDArray[np.float64]
+
+ROWS = 4000
+"""Of the record that lie in the page, the peaks of the measured force among them."""
+_FEWER = 1500
+"""Of it in the pictures for a browser that runs no scripts."""
+_PARAMETERS = ("K", "B", "M")
+_STILL = ("force", "identification")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the page is of.
+
+    Args:
+        title, about: of the experiment.
+        source: its file.
+        summary: as `summary.json` has it.
+        found: what `palpate identify` says of the record; None where it says nothing.
+        why: why not.
+        sha256: of `record.parquet`.
+    """
+
+    title: str
+    about: str
+    source: str
+    summary: dict[str, Any]
+    found: Identification | None
+    why: str
+    sha256: str
+
+
+def run_page(record: Record, told: Told) -> str:
+    """The page as HTML."""
+    summary = told.summary
+    contact = summary["force"] is not None
+    worth = len(record) > 2
+    codes = "palpate.report.run"
+    return render(
+        "run.html",
+        codes,
+        room="run",
+        title=shown(told.title),
+        about=shown(told.about),
+        sentence=sentence(summary),
+        alerts=alerts(summary),
+        cards=_cards(told),
+        surface=_surface(told),
+        identified_by=_identified_by(told),
+        thesis=thesis_table(summary) if contact else None,
+        motors=motors(summary),
+        facts=force_rows(summary) if contact else [],
+        source=told.source,
+        charts=data(_charts(record, summary)) if worth else "",
+        pictures=list(_pictures(record)) if worth else [],
+        scripts=(*scripts(*CHARTS, *ARM, *TABLES), _script()) if worth else scripts(*TABLES),
+        command=summary["command"],
+        origin=[("seed", str(summary["seed"])), ("record.parquet", f"sha256 {told.sha256}")],
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+
+
+def _script() -> str:
+    from importlib import resources
+
+    return (resources.files("palpate.report.run") / "run.js").read_text(encoding="utf-8")
+
+
+def _cards(told: Told) -> list[dict[str, str]]:
+    summary, f = told.summary, told.summary["force"]
+    if f is None:
+        return []
+    lost, end = summary["contacts_lost"], summary["end"]
+    kept = not lost and end not in {"lost contact", "diverged"}
+    why = f"from {summary['contact_at_s']:.2f} s on" if kept else shown(summary["why"])
+    cards = [_card("Contact", "kept" if kept else "lost", why=why, tone="ok" if kept else "fail", verdict="")]
+    never = "of a changing force there is none" if f["overshoot_N"] is None else "not within the run"
+    settled = None if f["settling_s"] is None else plain(f["settling_s"], 3)
+    cards.append(
+        _card(
+            "Settled in",
+            settled or "",
+            "s" if settled else "",
+            why="within 5 % of the first force" if settled else never,
+        )
+    )
+    if f["overshoot_N"] is not None:
+        share = 100 * f["overshoot_N"] / abs(f["desired_N"]) if f["desired_N"] else 0.0
+        cards.append(_card("Overshoot", plain(f["overshoot_N"], 2), "N", why=f"{share:.0f} % of the step"))
+    error = f"{f['error_N']:+.2f}".replace("-", "−")
+    cards.append(
+        _card("Error, last second", error, "N", why=f"RMS since contact {plain(f['rms_error_N'], 2)} N")
+    )
+    return [*cards, _stiffness(told)]
+
+
+def _card(name: str, number: str, unit: str = "", **more: str) -> dict[str, str]:
+    return {"name": name, "number": number, "unit": unit, **more}
+
+
+def _stiffness(told: Told) -> dict[str, str]:
+    """By `palpate identify`: at the working point, or else of the model."""
+    if told.found is None:
+        return _card("Stiffness", "", why=told.why, colour="K", tone="none", verdict="not identified")
+    point = told.found.working_point
+    own = told.found.parameters.get("K") or (point.stiffness if point else None)
+    if own is None:
+        return _card("Stiffness", "", why="nothing is touched", colour="K", tone="none", verdict="")
+    number = split(own)
+    known = own.value is not None
+    return _card(
+        "Stiffness",
+        number["text"] if known else "",
+        number["unit"],
+        half=number["half"],
+        why=shown(own.reason),
+        colour="K wide",
+        tone=TONES[own.verdict],
+        verdict=str(own.verdict),
+    )
+
+
+def _identified_by(told: Told) -> str:
+    if told.found is None:
+        return f"palpate identify says nothing of this record: {shown(told.why)}."
+    return (
+        f"By palpate identify of record.parquet, as the model {told.found.model}; on the bench the truth is known. The "
+        "charts are of an estimator on line, which assumes a spring, a damper and a mass."
+    )
+
+
+def _surface(told: Told) -> list[dict[str, str]]:
+    """What was identified beside the truth."""
+    if told.found is None:
+        return []
+    truth = told.summary["truth"]
+    rows = []
+    for name, p in told.found.parameters.items():
+        known = truth.get(name, {}).get("value")
+        off = "–"
+        if known is not None and p.value is not None and p.ci95 is not None:
+            off = "inside the interval" if p.ci95[0] <= known <= p.ci95[1] else "outside the interval"
+        rows.append(
+            {
+                "name": shown(name),
+                "called": CALLED.get(name, ""),
+                "colour": name if name in _PARAMETERS else "other",
+                "tone": TONES[p.verdict],
+                "verdict": str(p.verdict),
+                "value": said(p) if p.value is not None else "no number",
+                "truth": quantity(known, truth[name]["unit"], digits=4) if known is not None else "–",
+                "off": off,
+            }
+        )
+    return rows
+
+
+def _pictures(record: Record) -> Iterator[dict[str, str]]:
+    """Still pictures, for a browser that runs no scripts."""
+    rows = thinned(record["force_measured"], _FEWER, record["phase"] == CONTACT)
+    few = Record({name: column[rows] for name, column in record.columns.items()}, record.units, record.meta)
+    for one in drawings(few):
+        if one.name in _STILL:
+            with style.inked():
+                picture = svg(one.draw(few))
+            yield {"source": embedded(picture, "image/svg+xml"), "caption": one.caption}
+
+
+def _charts(record: Record, summary: dict[str, Any]) -> dict[str, Any]:
+    """What the charts and the arm are drawn from, in plain values."""
+    t, phase = record["t"], record["phase"]
+    touched = summary["contact_at_s"]
+    near = np.zeros(len(t), dtype=bool) if touched is None else (t > touched - 1.0) & (t < touched + 2.0)
+    rows = thinned(record["force_measured"], ROWS, near)
+    columns = {name: values[rows] for name, values in _columns(record).items()}
+    length = Arm3().length
+    end = float(t[-1])
+    shown_from = float(t[0]) if touched is None else max(float(t[0]), touched - 1.0)
+    truth = {name: value["value"] for name, value in record.meta["truth"].items() if name in _PARAMETERS}
+    return {
+        "columns": {name: packed(values) for name, values in columns.items()},
+        "truth": truth,
+        "ranges": _ranges(record, truth),
+        "marks": _marks(t, phase),
+        "shades": _stretches(t, phase == CONTACT),
+        "links": [length.x, length.y, length.z],
+        "window": [shown_from, end],
+        "shown": end if touched is None else min(touched + 1.2, end),
+    }
+
+
+def _columns(record: Record) -> dict[str, Array]:
+    plain_ones = {
+        "t": "t",
+        "measured": "force_measured",
+        "force": "force",
+        "desired": "force_desired",
+        "K_thesis": "K_thesis",
+        "K_raw": "K_raw",
+    }
+    plain_ones |= {name: name for name in ("q1", "q2", "q3", "torque1", "torque2", "torque3")}
+    columns = {name: record[own] for name, own in plain_ones.items()}
+    contact = np.maximum.accumulate(record["phase"]) > 0.0
+    for name in ("K_thesis", "K_raw"):
+        columns[name] = np.where(contact, columns[name], np.nan)
+    for name in _PARAMETERS:
+        value, half = record[f"{name}_matched"], 1.96 * record[f"{name}_matched_std"]
+        columns[name] = np.where(contact, value, np.nan)
+        columns[f"{name}_low"], columns[f"{name}_high"] = columns[name] - half, columns[name] + half
+    columns["depth"] = 1e3 * record["penetration"]
+    columns["wall"] = record["x"] - record["penetration"]
+    return {name: _bounded(values) for name, values in columns.items()}
+
+
+def _bounded(values: Array) -> Array:
+    """Without the few values from far away that would leave no steps for the others: gaps in their place."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return values
+    low, high = np.quantile(known, (0.02, 0.98))
+    room = 50.0 * (high - low) or np.inf
+    return np.where((values < low - room) | (values > high + room), np.nan, values)
+
+
+def _ranges(record: Record, truth: dict[str, float]) -> dict[str, list[float]]:
+    """Of the charts: where the estimates come to rest, their interval and the truth, not where they come from."""
+    pressed = np.flatnonzero(record["phase"] == CONTACT)
+    if not len(pressed):
+        return {}
+    late = pressed[len(pressed) // 4 :]
+    found = {}
+    for name in _PARAMETERS:
+        value, half = record[f"{name}_matched"][late], 1.96 * record[f"{name}_matched_std"][late]
+        found[name] = _range([value - half, value + half], truth.get(name))
+    found["thesis"] = _range(
+        [record[f"K_{front}"][late] for front in ("thesis", "raw", "matched")], truth.get("K")
+    )
+    return found
+
+
+def _range(parts: Sequence[Array], known: float | None) -> list[float]:
+    low = min(float(np.quantile(part, 0.02)) for part in parts)
+    high = max(float(np.quantile(part, 0.98)) for part in parts)
+    if known is not None:
+        low, high = min(low, known), max(high, known)
+    room = 0.25 * (high - low) or 1.0
+    return [low - room, high + room]
+
+
+def _marks(t: Array, phase: Array) -> list[dict[str, Any]]:
+    """Touches and losses."""
+    found = []
+    for i in np.flatnonzero(np.diff(phase, prepend=0.0))[:40]:
+        if phase[i] == CONTACT:
+            found.append({"x": float(t[i]), "text": "switch to force", "tone": ""})
+        elif phase[i] == LOST:
+            found.append({"x": float(t[i]), "text": "✕ contact lost", "tone": "fail"})
+    return found
+
+
+def _stretches(t: Array, inside: NDArray[np.bool_]) -> list[list[float]]:
+    edges = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
+    return [[float(t[a]), float(t[b - 1])] for a, b in zip(edges[::2], edges[1::2], strict=True)][:40]

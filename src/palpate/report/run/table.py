@@ -1,0 +1,86 @@
+"""A run's summary as tables, for the terminal and for the page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palpate.identification.result import Identification
+from palpate.report.identification.words import CALLED, said
+from palpate.report.numbers import NONE, plain, quantity, with_half
+from palpate.report.page import Table
+from palpate.report.run.words import alerts
+
+
+def tables(summary: dict[str, Any], found: Identification | None) -> list[Table]:
+    """The tables of a run: force first, then what it touched, then the thesis' columns."""
+    if summary["force"] is None:
+        return []
+    own = [surface_table(summary, found)] if found is not None else []
+    return [Table("Force", ("", "value"), force_rows(summary)), *own, thesis_table(summary)]
+
+
+def notes(summary: dict[str, Any]) -> list[str]:
+    """What a reader must not miss."""
+    return [" ".join(part for part in (a["title"], a["text"], a["advice"]) if part) for a in alerts(summary)]
+
+
+def force_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """How the force went, a number a row."""
+    f, tip = summary["force"], summary["tip"]
+    never = NONE if f["overshoot_N"] is None else "not within the run"
+    settling = never if f["settling_s"] is None else f"{f['settling_s']:.3f} s"
+    return [
+        ("contact at", f"{summary['contact_at_s']:.3f} s"),
+        ("desired at the end", f"{f['desired_N']:.2f} N"),
+        ("error, mean of the last second", f"{f['error_N']:+.3f} N"),
+        ("standard deviation in it", f"{f['std_N']:.3f} N"),
+        ("error since contact, RMS", f"{f['rms_error_N']:.3f} N"),
+        ("settling to 5 %", settling),
+        ("overshoot", NONE if f["overshoot_N"] is None else f"{f['overshoot_N']:.2f} N"),
+        ("noise of the measured force", f"{f['measured_std_N']:.3f} N"),
+        ("tip off in y", f"{tip['y_error_mm']:+.2f} mm"),
+        ("tip off in angle", f"{tip['phi_error_deg']:+.2f}°"),
+    ]
+
+
+def surface_table(summary: dict[str, Any], found: Identification) -> Table:
+    """What `palpate identify` says of the record, beside the truth."""
+    truth = summary["truth"]
+    rows = []
+    for name, p in found.parameters.items():
+        known = truth.get(name, {}).get("value")
+        rows.append(
+            (
+                f"{name}, {CALLED[name]}" if name in CALLED else name,
+                said(p) if p.value is not None else "no number",
+                str(p.verdict),
+                quantity(known, truth[name]["unit"], digits=4) if known is not None else NONE,
+            )
+        )
+    return Table(
+        f"What it touched, by palpate identify: {found.model}", ("", "95 %", "verdict", "truth"), rows
+    )
+
+
+def thesis_table(summary: dict[str, Any]) -> Table:
+    """The estimators on line at the end, fed in three ways."""
+    found, truth = summary["identified"], summary["truth"]
+    names = {"K": "K [N/m]", "B": "B [N s/m]", "M": "M [kg]"}
+    ratio = found["force_over_displacement"]
+    rows = [
+        (
+            label,
+            plain(found["thesis"][name]),
+            plain(found["raw"][name]),
+            with_half(found["matched"][name], 1.96 * found["matched_std"][name]),
+            plain(ratio.get(name)),
+            plain(truth[name]["value"]) if name in truth else NONE,
+        )
+        for name, label in names.items()
+    ]
+    head = ("", "thesis", "raw", "matched, 95 %", "f / x", "truth")
+    return Table(
+        "On line, if it is a spring: least squares on the thesis' signals, raw, and matched in lag",
+        head,
+        rows,
+    )

@@ -1,0 +1,116 @@
+"""A page that is served, a client of its stream, and a browser where there is one."""
+
+import json
+import shutil
+from contextlib import ExitStack, contextmanager
+
+import numpy as np
+import pytest
+
+from palpate.bench.experiment import changed, load
+from palpate.live.feed import Feed
+from palpate.live.player import Player
+from palpate.live.server import served
+from palpate.live.simulation import Simulation
+from palpate.live.view import AT, COLUMNS
+
+CHROMIUM = ("/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome")
+QUIET = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+PATIENCE = 60.0
+"""Within which what has to happen does, on whatever machine [s]: a loaded one is slow, not wrong."""
+
+
+class Stream:
+    """A page's end of the stream, without the page."""
+
+    def __init__(self, address, **options):
+        from websockets.sync.client import connect
+
+        url = str(address).replace("http", "ws") + "stream"
+        self._held = ExitStack()
+        self._socket = self._held.enter_context(
+            connect(url, compression=None, open_timeout=PATIENCE, **options)
+        )
+        self.kinds, self.state, self.lost = [], None, 0
+        self.rows = np.empty((0, len(COLUMNS)))
+
+    def ask(self, do, **more):
+        self._socket.send(json.dumps({"do": do, **more}))
+
+    def send(self, text):
+        self._socket.send(text)
+
+    def until(self, wanted):
+        """Reads until `wanted(self)` is true; fails where nothing comes any more."""
+        while not wanted(self):
+            message = self._socket.recv(timeout=PATIENCE)
+            if isinstance(message, bytes):
+                self.rows = np.concatenate([self.rows, np.frombuffer(message).reshape(-1, len(COLUMNS))])
+                continue
+            told = json.loads(message)
+            self.kinds.append(told["kind"])
+            if told["kind"] == "state":
+                self.state = told
+            elif told["kind"] == "clear":
+                self.rows = self.rows[:0]
+            elif told["kind"] == "lost":
+                self.lost += told["rows"]
+            elif told["kind"] == "refused":
+                self.refused = told["why"]
+        return self
+
+    def column(self, name):
+        return self.rows[:, AT[name]]
+
+    def close(self):
+        self._held.close()
+
+
+def near(name="foam-hybrid", **more):
+    """An experiment that touches soon, so that nothing is waited for."""
+    return changed(load(name), {"approach.hold": 0.1, "approach.first": 0.463, **more})
+
+
+@pytest.fixture
+def simulation():
+    return Simulation("foam-hybrid", near(), seed=1)
+
+
+@contextmanager
+def playing(source):
+    """A source that is served: its player, its address, and what connects a client to it."""
+    clients = []
+
+    def client(**options):
+        clients.append(Stream(address, **options))
+        return clients[-1]
+
+    with Player(source, Feed()) as player, served(player) as address:
+        try:
+            yield player, address, client
+        finally:
+            for one in clients:
+                one.close()
+    assert player.failure is None
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Headless Chromium; skipped where there is none."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.skip("there is no Chromium on this machine (Debian: apt-get install chromium)")
+    with sync_api.sync_playwright() as playwright:
+        own = playwright.chromium.launch(executable_path=path, args=QUIET)
+        yield own
+        own.close()

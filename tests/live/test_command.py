@@ -1,0 +1,135 @@
+"""`palpate live`: its first line is its address, and what is wrong is a line and exit code 2."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from live.conftest import PATIENCE, Stream, near
+from palpate.bench import build
+from palpate.cli import main
+from palpate.live.view import AT
+from palpate.logs import write_record
+
+ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/[\w-]{24}/")
+
+
+@contextmanager
+def running(*words, lines=1):
+    """The program, until the block ends; its first lines."""
+    command = [sys.executable, "-m", "palpate", "live", *map(str, words)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield [process.stdout.readline().strip() for _ in range(lines)]
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.said = process.communicate(timeout=PATIENCE)
+            assert process.returncode == 130, process.said
+            assert "Traceback" not in process.said[1]
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory):
+    path = tmp_path_factory.mktemp("run") / "record.parquet"
+    write_record(build(near()).run(20.0, seed=1, press=1.0), path)
+    return path
+
+
+def refused(capsys, *words):
+    assert main(["live", *map(str, words)]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.count("\n") == 1
+    return told.err
+
+
+def test_a_run_s_record_moves_the_arm_and_knows_the_truth(record):
+    with running("--record", record) as (address,):
+        assert ADDRESS.fullmatch(address)
+        one = Stream(address).until(lambda c: len(c.rows) > 20)
+        one.ask("seek", time=3.5)
+        one.until(lambda c: len(c.rows) and np.isfinite(c.rows[-1, AT["K"]]) and c.rows[-1, 0] > 3.4)
+        assert one.rows[-1, AT["K_true"]] == 5200.0
+        assert np.isfinite(one.rows[:, AT["q1"]]).all()
+        one.close()
+
+
+def test_a_log_without_joints_says_so_and_is_played(root):
+    columns = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
+    with running("--log", root / "examples" / "data" / "press.csv", *columns) as (address,):
+        one = Stream(address).until(lambda c: len(c.rows) > 20)
+        assert np.isnan(one.rows[:, AT["q1"]]).all()
+        assert 460 < one.rows[-1, AT["depth"]] < 470  # millimetres, as they stand in the log
+        one.close()
+
+
+def test_viewers_are_served_beside_the_page(record):
+    """Foxglove's protocol, by a client of its own: what is offered, and that messages come."""
+    from websockets.sync.client import connect
+
+    with running("--record", record, "--foxglove", "--foxglove-port", 0, lines=2) as (_, viewers):
+        assert re.fullmatch(r"viewers: ws://127\.0\.0\.1:\d+", viewers)
+        url = viewers.removeprefix("viewers: ")
+        with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE) as client:
+            offered = {}
+            while not {"/palpate/contact", "/palpate/arm"} <= set(offered):
+                told = json.loads(client.recv(PATIENCE))
+                offered |= {c["topic"]: c for c in told.get("channels", [])}
+            number = offered["/palpate/contact"]["id"]
+            client.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": number}]}))
+            # op code 1, the subscription's number, nanoseconds, then the message
+            while not isinstance(data := client.recv(PATIENCE), bytes) or data[0] != 1:
+                pass
+            subscription, message = int.from_bytes(data[1:5], "little"), json.loads(data[13:])
+    assert offered["/palpate/contact"]["encoding"] == "json"
+    assert subscription == 7
+    assert message["t"] >= 0.0
+    assert message["K_true"] == 5200.0
+
+
+def test_a_port_in_use(capsys, record):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert f"port {port} is in use by another program" in refused(
+            capsys, "--record", record, "--port", port
+        )
+        told = refused(capsys, "--record", record, "--foxglove", "--foxglove-port", port)
+        assert "name another with --foxglove-port" in told
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--run", "foam-hybird"], "did you mean 'foam-hybrid'"),
+        (["--run", "foam-hybrid", "--log", "x.csv"], "--run and --log are different things"),
+        (["--log", "absent.csv"], "absent.csv"),
+        (["--record", "absent.parquet"], "absent.parquet"),
+        (["--record", "r.parquet", "--time", "t"], "a record names its own columns"),
+        (["--port", "-1"], "--port must be from 0 to 65535"),
+        (["--port", "many"], "port"),
+        (["--seed", "-1"], "seed"),
+    ],
+)
+def test_what_is_wrong_is_a_line(capsys, tmp_path, monkeypatch, words, told):
+    monkeypatch.chdir(tmp_path)
+    assert told in refused(capsys, *words)
+
+
+def test_a_log_without_a_force_names_what_there_is(capsys, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,x\n" + "".join(f"{i},{i}\n" for i in range(100)))
+    assert "--force" in refused(capsys, "--log", path)
+
+
+def test_a_record_that_was_cut_short(capsys, record, tmp_path):
+    path = tmp_path / "record.parquet"
+    path.write_bytes(record.read_bytes()[:5000])
+    assert "is it whole?" in refused(capsys, "--record", path)

@@ -1,0 +1,187 @@
+"""Tokens that stand out on every ground, columns that keep their peaks, pages in which nothing else runs."""
+
+import base64
+import hashlib
+import itertools
+import json
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from palpate.errors import InputError
+from palpate.report import style
+from palpate.report.look.assets import CHARTS, data, policy, scripts, styles, text_of
+from palpate.report.look.columns import GAP, packed, thinned
+from palpate.report.look.tokens import DATA, GROUNDS, PAIRS, contrast, style_sheet
+from palpate.report.page import render
+
+ALL_GROUNDS = [PAIRS[name][i] for name in GROUNDS for i in (0, 1)]
+
+
+@pytest.mark.parametrize("name", DATA)
+def test_what_is_drawn_stands_out_on_every_ground(name):
+    assert min(contrast(DATA[name], ground) for ground in ALL_GROUNDS) >= 3.0  # WCAG 2.2, 1.4.11
+
+
+@pytest.mark.parametrize("dark", [0, 1])
+@pytest.mark.parametrize(
+    "name", [n for n in PAIRS if n.endswith("-text")] + ["ink", "quiet", "link", "bad", "doubt", "good"]
+)
+def test_what_is_written_can_be_read(name, dark):
+    grounds = [PAIRS[ground][dark] for ground in (*GROUNDS, "fail-ground", "warn-ground", "lift")]
+    assert min(contrast(PAIRS[name][dark], ground) for ground in grounds) >= 4.5  # WCAG 2.2, 1.4.3
+
+
+def test_contrast_is_that_of_the_standard():
+    assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
+    assert contrast("#777777", "#ffffff") == pytest.approx(
+        4.48, abs=0.01
+    )  # the standard's well-known near miss
+
+
+def test_figures_and_pages_have_the_same_colours():
+    for name in ("K", "B", "M", "F"):
+        assert getattr(style, name) == DATA[name]
+    assert DATA["measured"] == style.MEASURED
+    assert f"--K:{DATA['K']}" in style_sheet()
+    assert len(set(DATA.values())) == len(DATA)
+
+
+def test_no_colour_stands_in_a_style_sheet_but_by_its_token():
+    for name in ("look.css",):
+        assert set(re.findall(r"#[0-9a-fA-F]{3,6}\b", text_of(name))) <= {"#fff"}
+
+
+columns = arrays(np.float64, st.integers(1, 60), elements=st.floats(-1e12, 1e12))
+
+
+def unpacked(column):
+    codes = np.frombuffer(base64.b64decode(column["b"]), dtype="<i2").astype(float)
+    return np.where(codes == GAP, np.nan, (codes + 32500) * column["s"] + column["o"])
+
+
+@given(columns)
+def test_a_packed_column_is_itself_but_for_its_step(values):
+    column = packed(values)
+    spread = float(values.max() - values.min())
+    np.testing.assert_allclose(unpacked(column), values, rtol=1e-9, atol=spread / 65000 + 1e-12)
+
+
+def test_gaps_stay_gaps():
+    values = np.array([1.0, np.nan, 3.0, np.inf])
+    np.testing.assert_allclose(unpacked(packed(values)), [1.0, np.nan, 3.0, np.nan])
+    assert np.isnan(unpacked(packed(np.full(3, np.nan)))).all()
+
+
+@given(st.integers(1, 400), st.integers(4, 60), st.integers(0, 2**31))
+def test_thinning_keeps_order_ends_and_peaks(n, most, seed):
+    values = np.random.default_rng(seed).standard_normal(n)
+    rows = thinned(values, most)
+    assert (np.diff(rows) > 0).all()
+    assert len(rows) <= max(most + 2, n if n <= most else 0)
+    assert {0, n - 1} <= set(rows.tolist())
+    assert values[rows].max() == values.max()
+    assert values[rows].min() == values.min()
+
+
+def test_half_of_what_is_kept_lies_where_it_is_to_be_dense():
+    dense = np.zeros(10000, dtype=bool)
+    dense[5000:5500] = True
+    rows = thinned(np.sin(np.arange(10000)), 800, dense)
+    assert abs(dense[rows].sum() - 400) <= 10
+
+
+def test_only_the_page_s_own_scripts_may_run():
+    codes = scripts(*CHARTS)
+    found = policy(codes)
+    assert found.startswith("default-src 'none'")
+    digest = base64.b64encode(hashlib.sha256(codes[1].encode()).digest()).decode()
+    assert f"'sha256-{digest}'" in found
+    assert "unsafe-eval" not in found
+    assert "script-src 'none'" in policy(())
+
+
+@pytest.mark.parametrize("text", ["</script><script>alert(1)</script>", "<!--", "\u2028", "a&b", "]]>"])
+def test_no_text_ends_the_element_that_holds_it(text):
+    held = data({"name": text})
+    assert not set("<>&\u2028") & set(held)
+    assert json.loads(held) == {"name": text}
+
+
+def test_what_stands_in_scripts_and_styles_ends_none():
+    assert "</style" not in styles().lower()
+    for name, code in zip(
+        (*CHARTS, "arm.js", "tables.js"), scripts(*CHARTS, "arm.js", "tables.js"), strict=True
+    ):
+        assert "</script" not in code.lower(), name
+        assert "eval(" not in code
+        assert "new Function" not in code
+        assert "innerHTML" not in code or "vendor" in name
+
+
+def test_the_licence_lies_beside_the_library():
+    assert "MIT" in text_of("vendor/uplot/LICENSE")
+    assert "v1.6.32" in text_of("vendor/uplot/uPlot.iife.min.js")[:100]
+
+
+def test_a_plain_page_has_the_frame():
+    html = render(
+        "page.html",
+        title="<t>",
+        about="a",
+        tables=[],
+        figures=[],
+        source="",
+        notes=["<n>"],
+        command="<c>",
+        made="2026-01-02T03:04",
+    )
+    assert "&lt;t&gt;" in html
+    assert "<c>" not in html
+    assert "2026-01-02" in html
+    scripts_of = re.findall(r"<script[^>]*>(.*?)</script>", html, re.DOTALL)
+    hashes = {base64.b64encode(hashlib.sha256(code.encode()).digest()).decode() for code in scripts_of}
+    assert hashes == set(re.findall(r"sha256-([^&]+)&#39;", html)), (
+        "each script of the page is allowed by its policy"
+    )
+
+
+def test_pairs_differ_by_light_and_dark():
+    assert all(a != b for a, b in PAIRS.values())
+    assert all(len(c) == 7 for c in itertools.chain(DATA.values(), *PAIRS.values()))
+
+
+@pytest.mark.parametrize(
+    ("name", "head"), [("a.png", b"\x89PNG"), ("a.SVG", b"<!-- Made by palpate"), ("a.pdf", b"%PDF-")]
+)
+def test_a_figure_is_what_its_ending_says_and_known_again(tmp_path, name, head):
+    from palpate.files.ownership import ours
+
+    figure, (axis,) = style.figure()
+    axis.plot([0, 1], [0, 1], color=style.K)
+    for _ in range(2):  # the second takes the place of the first, which is palpate's own
+        style.save(figure, tmp_path / name)
+    written = (tmp_path / name).read_bytes()
+    assert written.startswith(head)
+    assert ours(tmp_path / name)
+    (tmp_path / name).write_bytes(written[:40] + b"somebody else's")
+    if not name.endswith("SVG"):
+        assert not ours(tmp_path / name)
+
+
+def test_a_finer_picture_has_more_pixels(tmp_path):
+    from matplotlib.image import imread
+
+    figure, _ = style.figure()
+    coarse, fine = (imread(style.save(figure, tmp_path / f"{dpi}.png", dpi)) for dpi in (50, 100))
+    assert fine.shape[0] == 2 * coarse.shape[0]
+    for wrong in (0, -5, 100_000):
+        with pytest.raises(InputError, match="--dpi must be from 30 to 1200"):
+            style.save(figure, tmp_path / "wrong.png", wrong)
+    with pytest.raises(InputError, match="a figure ends in"):
+        style.save(figure, tmp_path / "wrong.tiff")
+    assert not list(tmp_path.glob("wrong*"))
