@@ -41,6 +41,7 @@ class Air:
 
     Args:
         way: 1 if the surface lies towards higher positions, -1 if towards lower.
+        limit: position at which it may begin, at the earliest [m].
         rest: the force there [N], in the middle.
         stays: middle row of each stay in the air, shape (s,).
         levels: middle force in each [N], shape (s,).
@@ -49,6 +50,7 @@ class Air:
     """
 
     way: float
+    limit: float
     rest: float
     stays: Array
     levels: Array
@@ -59,6 +61,10 @@ class Air:
         """What the force in the air is at some rows above its middle [N]: straight lines from stay to stay."""
         found: Array = np.interp(rows, self.stays, self.levels) - self.rest
         return found
+
+    def among(self, position: Array) -> list[tuple[int, int]]:
+        """First and past-the-last row of each stay in it, of a position of shape (n,)."""
+        return stays_in(self.way * position < self.way * self.limit)
 
 
 def air_of(force: Array, position: Array, ends: tuple[float, float]) -> Air | None:
@@ -82,12 +88,15 @@ def air_of(force: Array, position: Array, ends: tuple[float, float]) -> Air | No
     way = 1.0 if found[0] >= found[1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
         return None
-    stays = stays_in(way * position < _limit(way * position, max(found)))
+    limit = _limit(way * position, max(found))
+    stays = stays_in(way * position < limit)
     middle = np.array([(a + b - 1) / 2 for a, b in stays]) * size + (size - 1) / 2
     levels = np.array([float(np.median(force[a:b])) for a, b in stays])
     rest = float(np.median(np.concatenate([force[a:b] for a, b in stays])))
     noise = _noise(force, levels, stays)
-    return Air(way, rest, middle, levels, _differ(levels, stays, noise), float(np.sqrt(noise.variance)))
+    return Air(
+        way, way * limit, rest, middle, levels, _differ(levels, stays, noise), float(np.sqrt(noise.variance))
+    )
 
 
 def _in_contact(force: Array, position: Array, ends: tuple[float, float]) -> float:

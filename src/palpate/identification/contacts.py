@@ -12,6 +12,7 @@ from palpate.identification.air import Air, air_of
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
 from palpate.identification.options import NOTHING_SAID, Options
+from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.warning_codes import Code, Warn
 
@@ -50,6 +51,7 @@ class Contacts:
             peaks, and what is left out of contact reaches up to them. Not for a bonded one: it has no such force.
         signed: whether it is known which way each channel counts: as told, as it is, or turned round by what a stretch
             out of contact shows.
+        payload: mass that the force has in the air, counted into the surface; None if it has none.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -61,6 +63,7 @@ class Contacts:
     warnings: tuple[Warn, ...]
     clear: bool = True
     signed: bool = True
+    payload: Payload | None = None
 
 
 def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
@@ -118,6 +121,9 @@ def find_contacts(
         options: whether the probe is fixed to the surface, and which way the force counts, if that is known.
     """
     force, position = chain(channels.force), chain(channels.position)
+    payload = payload_of(channels, chain, air, options.assumed_lag) if air else None
+    if payload is not None:
+        force = force - payload.mass * chain(channels.position, 2, options.assumed_lag)
     low, high = _ends(_calm(force, channels.dt))
     if air is None and options.bonded is not False:
         return _never_left(channels, force, position, options)
@@ -133,7 +139,13 @@ def find_contacts(
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     clear = _clear(sign * force, spans, threshold, int(chain.settling / chain.dt))
     way = air.way if air else 0.0
-    return replace(_oriented(force, position, spans, (sign, way, level, threshold), options), clear=clear)
+    found = replace(_oriented(force, position, spans, (sign, way, level, threshold), options), clear=clear)
+    return found if payload is None else _with_payload(found, payload)
+
+
+def _with_payload(found: Contacts, payload: Payload) -> Contacts:
+    own = replace(payload, mass=found.force_sign * found.position_sign * payload.mass)
+    return replace(found, payload=own, warnings=(*found.warnings, Warn(Code.TOOL_INERTIA, own.text)))
 
 
 def _without_drift(channels: Channels, air: Air) -> Channels:

@@ -119,6 +119,7 @@ _REMEDY = {
     "strokes": "the ways in and out differ; press slower, or more often",
     "unexplained": "the model leaves force that is no noise; keep the motion near one working point",
     "position noise": "measure the position finer, or move further",
+    "tool's inertia": "move faster in the air, or take the tool's inertia out beforehand",
     "calibration": "calibrate force and position",
     "series stiffness": "measure the position nearer to the surface",
 }

@@ -44,6 +44,9 @@ class Code(Enum):
     COLUMNS_SWAPPED = "A column was named for a role that its own name speaks against."
     LINES_SKIPPED = "Lines of the file that are no rows of its table were left out."
     FORCE_DRIFTS = "The force in the air changes in the course of the log; the change is taken out."
+    TOOL_INERTIA = (
+        "In the air the force goes with the acceleration, as what moves beyond the sensor makes it."
+    )
     FORCE_SIGN_REVERSED = "The force falls as the probe goes in; it was turned round."
     POSITION_SIGN_REVERSED = "The position falls as the probe goes in; it was turned round."
     LOW_RATE = "Rows are so rare that fast behaviour, damping and mass above all, may be missed."

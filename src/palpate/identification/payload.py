@@ -1,0 +1,70 @@
+"""The mass whose inertia the force has in the air: of what lies between the sensor and the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.air import Air
+from palpate.identification.estimators.least_squares import noise_of, quantile
+from palpate.identification.filters.position_noise import position_noise
+from palpate.identification.filters.state_variable import Chain
+from palpate.identification.sampling import Channels
+
+Array = NDArray[np.float64]
+
+_SEEN = 10.0
+"""Power of the acceleration over that of the position's noise in it, at least: the mass would be off by a tenth."""
+_FEWEST = 20
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A mass seen in the air [kg]: negative if more than the tool's inertia was taken out before.
+
+    Args:
+        mass, std: [kg].
+    """
+
+    mass: float
+    std: float
+
+    @property
+    def text(self) -> str:
+        """What it means."""
+        seen = f"in the air the force goes as a mass of {self.mass:.3g} kg (std {self.std:.2g})"
+        if self.mass > 0:
+            return f"{seen}: what moves beyond the force sensor; it is taken out"
+        return (
+            f"{seen}: a tool's inertia was taken out with the wrong sign, or too much of it; it is put back"
+        )
+
+
+def payload_of(channels: Channels, chain: Chain, air: Air, lag: float) -> Payload | None:
+    """The mass that the force in the air tells, both channels as they count in the log; None if it tells none.
+
+    Least squares of the filtered force on the filtered acceleration, in each stay on its own level.
+
+    Args:
+        channels: of the log.
+        chain: filter of both.
+        air: of the log.
+        lag: of the force behind the position [s].
+    """
+    memory = int(np.ceil((chain.settling + abs(lag)) / chain.dt))
+    stays = [(a + memory, b) for a, b in air.among(channels.position) if b - a - memory >= _FEWEST]
+    if not stays:
+        return None
+    whole = chain(channels.position, 2, lag), chain(channels.force)
+    a, f = (np.concatenate([own[i:j] - own[i:j].mean() for i, j in stays]) for own in whole)
+    size = float(a @ a)
+    spread = chain.noise_spread(position_noise([channels.position[i:j] for i, j in stays]))[2, 2]
+    if size <= _SEEN * len(a) * float(spread):
+        return None
+    mass = float(a @ f) / size
+    noise = noise_of(f - mass * a, np.arange(len(f)), len(stays) + 1)
+    std = float(np.sqrt(noise.variance * len(f) / noise.effective / size))
+    half = quantile(noise.effective, len(stays) + 1) * std
+    return Payload(mass, half / 1.96) if abs(mass) > half else None
