@@ -4,9 +4,10 @@
     python benchmarks/identification/foreign/cases.py 1 7b --data FOLDER
     python benchmarks/identification/foreign/cases.py --markdown docs/trust.md
 
-Each trial prints what is answered and OK or WRONG. WRONG is an identified number whose interval misses the truth, a lag
-beyond its own bound, a crash, or what the case says besides. With --markdown the table goes into a page. With --data the
-cases that want measured logs read `mr_damper/ensaio3.mat` and `ensaio10.mat` there. The exit code is 1 if anything is wrong.
+Each trial prints what is answered and OK or WRONG. WRONG is an identified number whose interval misses the truth, a
+lag beyond its own bound, a crash, or what the case says besides. With --markdown the table goes into a page. With
+--data the cases that want measured logs read `mr_damper/ensaio3.mat` and `ensaio10.mat` there. The exit code is 1 if
+anything is wrong.
 """
 
 from __future__ import annotations

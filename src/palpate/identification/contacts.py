@@ -92,7 +92,8 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
     chosen = cutoff or _chosen_cutoff(channels, contacts)
     if chosen > 0.9 * highest:
         return channels, chain, contacts
-    fewer = thinned(channels, int(1 / (_OVERSAMPLED * chosen * channels.dt)))
+    size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
+    fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
     again = find_contacts(fewer, narrow, air, options)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
@@ -265,9 +266,9 @@ def _resting(force: Array, rest: float, peak: float) -> float:
 
 
 def _threshold(force: Array, rest: float, peak: float) -> float:
-    """Clear of the noise at rest, which what is below it tells, and of a share of the peak."""
-    below = rest - force[force < rest]
-    noise = 1.4826 * float(np.median(below)) if len(below) else 0.0
+    """Clear of a share of the peak, and of the noise at rest, which what stays below that share tells."""
+    free = np.abs(force[force < rest + ONSET * (peak - rest)] - rest)
+    noise = 1.4826 * float(np.median(free)) if len(free) else 0.0
     return rest + max(ONSET * (peak - rest), 5 * noise)
 
 

@@ -116,6 +116,10 @@ def spectrum_without_series(
                 loss=own.imag,
                 storage_half=float(np.hypot(gain * octave.storage_half, more)),
                 loss_half=float(np.hypot(gain * octave.loss_half, more)),
+                budget={
+                    **{cause: gain * half for cause, half in octave.budget.items()},
+                    "series stiffness": more,
+                },
             )
         )
     return tuple(found)

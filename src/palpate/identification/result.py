@@ -69,6 +69,7 @@ class DynamicStiffness:
         storage_half, loss_half: 95 % half-widths [N/m], from the variance between blocks.
         blocks: how many there are.
         share: of the position's variance in contact.
+        budget: half-width of the storage by cause [N/m]; their squares add up.
     """
 
     frequency: float
@@ -78,6 +79,7 @@ class DynamicStiffness:
     loss_half: float
     blocks: int
     share: float
+    budget: dict[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, float]:
         """Plain values."""

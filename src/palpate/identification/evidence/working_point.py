@@ -39,7 +39,8 @@ def working_point(
         series = options.series_stiffness, options.series_std
         value, half = slope_without_series(slope.stiffness, slope.half, *series)
         each = tuple(slope_without_series(own, 0.0, *series)[0] for own in slope.each)
-        slope = replace(slope, stiffness=value, half=half, each=each)
+        gain = half / slope.half if slope.half else 1.0
+        slope = replace(slope, stiffness=value, half=half, each=each, budget=_scaled(slope.budget, gain))
     octave = _octave(spectrum)
     if octave is None and slope is None:
         return None
@@ -50,14 +51,16 @@ def working_point(
     )
     if use_press and slope is not None:
         value, half, frequency, again = slope.stiffness, slope.half, 0.25 / slope.rise, _again(slope)
+        budget = slope.budget
     else:
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
+        budget = octave.budget
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     force, depth = problem.force[inside], problem.motion.moved(0, lag)[inside]
     rest = 0.0 if problem.counted else problem.contacts.resting
     contacts = problem.contacts
-    stiffness = _judged(value, half, tolerance, unit)
+    stiffness = replace(_judged(value, half, tolerance, unit), budget=_largest(budget, half))
     if not contacts.signed or (contacts.bonded and value < 0):
         reason = f"{stiffness.reason}; which way force and position count is not known (--force-sign)"
         stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
@@ -69,6 +72,16 @@ def working_point(
         "press" if use_press else "octave",
         again,
     )
+
+
+def _scaled(budget: dict[str, float], gain: float) -> dict[str, float]:
+    return {cause: gain * part for cause, part in budget.items()}
+
+
+def _largest(budget: dict[str, float], half: float) -> dict[str, float]:
+    """Causes that count, largest first."""
+    kept = {cause: part for cause, part in budget.items() if part > 1e-3 * half}
+    return dict(sorted(kept.items(), key=lambda item: -item[1]))
 
 
 def _octave(spectrum: Sequence[DynamicStiffness]) -> DynamicStiffness | None:

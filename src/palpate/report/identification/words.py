@@ -37,6 +37,8 @@ ADVICE = {
     Code.IRREGULAR_TIME: "Log with the sensor's own clock if you can.",
     Code.SATURATED: "Press less, or use a sensor of a larger range.",
     Code.UNIT_GUESS: "Say the units, as in --position position_mm:mm.",
+    Code.FORCE_DRIFTS: "Let the sensor warm up and tare it; it is taken out as far as the log shows it.",
+    Code.TOOL_INERTIA: "Nothing, if the tool moves beyond the sensor; below zero: mend how its inertia is taken out.",
     Code.FORCE_SIGN_REVERSED: "Nothing, if the column is the right one.",
     Code.POSITION_SIGN_REVERSED: "Nothing, if the column is the right one.",
     Code.LOW_RATE: "Log faster: damping and mass need it first.",
