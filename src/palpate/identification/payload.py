@@ -57,14 +57,28 @@ def payload_of(channels: Channels, chain: Chain, air: Air, lag: float) -> Payloa
     stays = [(a + memory, b) for a, b in air.among(channels.position) if b - a - memory >= _FEWEST]
     if not stays:
         return None
-    whole = chain(channels.position, 2, lag), chain(channels.force)
-    a, f = (np.concatenate([own[i:j] - own[i:j].mean() for i, j in stays]) for own in whole)
-    size = float(a @ a)
+    force, speed, motion = (
+        np.concatenate([own[i:j] - own[i:j].mean() for i, j in stays])
+        for own in (chain(channels.force), *(chain(channels.position, k, lag) for k in (1, 2)))
+    )
+    size = float(motion @ motion)
     spread = chain.noise_spread(position_noise([channels.position[i:j] for i, j in stays]))[2, 2]
-    if size <= _SEEN * len(a) * float(spread):
+    if size <= _SEEN * len(motion) * float(spread) or not _of_inertia(force, speed, motion):
         return None
-    mass = float(a @ f) / size
-    noise = noise_of(f - mass * a, np.arange(len(f)), len(stays) + 1)
-    std = float(np.sqrt(noise.variance * len(f) / noise.effective / size))
+    mass = float(motion @ force) / size
+    noise = noise_of(force - mass * motion, np.arange(len(force)), len(stays) + 1)
+    std = float(np.sqrt(noise.variance * len(force) / noise.effective / size))
     half = quantile(noise.effective, len(stays) + 1) * std
     return Payload(mass, half / 1.96) if abs(mass) > half else None
+
+
+def _of_inertia(force: Array, speed: Array, motion: Array) -> bool:
+    """Whether the acceleration accounts for more of the force than all else, and for twice what the speed does.
+
+    A force that is read late, or that sinks after a contact, goes with both.
+    """
+    whole = float(force @ force)
+    by_motion, by_speed = (
+        float(own @ force) ** 2 / max(float(own @ own) * whole, 1e-300) for own in (motion, speed)
+    )
+    return by_motion > 0.5 and by_motion > 2 * by_speed

@@ -41,7 +41,7 @@ def working_point(
         each = tuple(slope_without_series(own, 0.0, *series)[0] for own in slope.each)
         gain = half / slope.half if slope.half else 1.0
         slope = replace(slope, stiffness=value, half=half, each=each, budget=_scaled(slope.budget, gain))
-    octave = _octave(spectrum)
+    octave = _octave(spectrum, tolerance)
     if octave is None and slope is None:
         return None
     use_press = octave is None or (
@@ -84,14 +84,19 @@ def _largest(budget: dict[str, float], half: float) -> dict[str, float]:
     return dict(sorted(kept.items(), key=lambda item: -item[1]))
 
 
-def _octave(spectrum: Sequence[DynamicStiffness]) -> DynamicStiffness | None:
+def _octave(spectrum: Sequence[DynamicStiffness], tolerance: float) -> DynamicStiffness | None:
+    """The most excited octave that tells its storage within the tolerance; else the most excited one.
+
+    At a resonance the motion is largest, and the storage, which goes through zero there, is told least.
+    """
     kept = []
     for i, own in enumerate(spectrum):
         lower = [o for o in spectrum[:i] if o.share >= _EXCITED]
         falls = any(own.storage + own.storage_half < o.storage - o.storage_half for o in lower)
         if own.share >= _EXCITED and not falls:
             kept.append(own)
-    return max(kept, key=lambda own: own.share, default=None)
+    told = [own for own in kept if own.storage_half <= tolerance * abs(own.storage)]
+    return max(told or kept, key=lambda own: own.share, default=None)
 
 
 def _again(slope: Slope) -> tuple[float, float] | None:
