@@ -131,6 +131,8 @@ class Press:
         loading, unloading: depth [m] and force [N] on the way in and out, shape (2, n); empty if it is not there.
         hysteresis_loss: share of the work of the way in that does not come back; None without a way out.
         relaxation: None without a hold.
+        late: by how much the force is read after the position by the work that comes back beyond what went in, and its
+            half-width [s]; None if no more comes back.
     """
 
     tangent: tuple[Tangent, ...]
@@ -138,6 +140,7 @@ class Press:
     unloading: NDArray[np.float64]
     hysteresis_loss: float | None = None
     relaxation: Relaxation | None = None
+    late: tuple[float, float] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

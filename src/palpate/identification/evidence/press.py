@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from palpate.identification.estimators.least_squares import noise_of
 from palpate.identification.estimators.octaves import Segment
+from palpate.identification.evidence.work import way_out
 from palpate.identification.filters.state_variable import ORDER, Chain
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
@@ -190,13 +191,14 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
         return None
     loading = max(strokes, key=lambda stroke: len(stroke.depth))
     tangent = [t for level in _LEVELS if (t := _tangent(strokes, level)) is not None]
-    way_out, loss = _unloading(problem, lag, segments)
+    back = way_out(problem, lag, segments)
     return Press(
         tuple(t for t in tangent if t.half < abs(t.stiffness)),
         _thin(loading.depth, loading.force),
-        way_out,
-        loss,
+        _thin(*back.curve),
+        back.loss,
         _relaxation(problem, lag, segments, slope_of(strokes)),
+        back.late,
     )
 
 
@@ -226,25 +228,6 @@ def _of_speed(stroke: Stroke) -> float:
     """What the force has of the speed over a whole way in, beside a spring that may curve [N s/m]."""
     u = stroke.depth - stroke.depth[_met(stroke)].mean()
     return _last(np.column_stack([np.ones(len(u)), u, u**2, stroke.speed]), stroke, 1e-3)
-
-
-def _unloading(problem: Problem, lag: float, segments: list[Segment]) -> tuple[Array, float | None]:
-    """The way out of the deepest contact, and the share of the work that does not come back on it."""
-    depth, force = problem.motion.moved(0, lag), problem.force
-    s = max(segments, key=lambda s: float(np.ptp(depth[s.first : s.last])))
-    x, f = depth[s.first : s.last], force[s.first : s.last]
-    top = int(np.argmax(x))
-    if top < _FEWEST or len(x) - top < _FEWEST or x[top] - x[-1] < 0.5 * (x[top] - x[0]):
-        return np.empty((2, 0)), None
-    start = max(x[0], x[top:].min())
-    into = float(np.trapezoid(f[: top + 1], x[: top + 1]))
-    first = int(np.argmax(x[: top + 1] >= start))
-    into = float(np.trapezoid(f[first : top + 1], x[first : top + 1]))
-    out = x[top:]
-    last = top + (int(np.argmax(out <= start)) if (out <= start).any() else len(out) - 1)
-    back = -float(np.trapezoid(f[top : last + 1], x[top : last + 1]))
-    loss = 1 - back / into if into > 0 else None
-    return _thin(x[top:], f[top:]), loss
 
 
 def _relaxation(

@@ -111,6 +111,13 @@ def units_of(found: Identification) -> tuple[str, str]:
     return ("1", "1") if any(p.unit == "1" for n, p in found.parameters.items() if n == "K") else ("N", "m")
 
 
+def lost(share: float) -> str:
+    """What becomes of the work of a press, by the share of it that does not come back."""
+    if share < 0:
+        return f"{-100 * share:.2g} % more work comes back than went in, as of a force that is read late"
+    return f"{100 * share:.2g} % of the work of the way in does not come back"
+
+
 def limited_by(found: Identification) -> str | None:
     """Largest cause of the working point's interval; None if nobody has told one."""
     point = found.working_point
