@@ -67,7 +67,7 @@ class Air:
         return stays_in(self.way * position < self.way * self.limit)
 
 
-def air_of(force: Array, position: Array, ends: tuple[float, float]) -> Air | None:
+def air_of(force: Array, position: Array, ends: tuple[float, float], *, none: bool = True) -> Air | None:
     """The air of a log; None if the force goes with the position at both ends of the position's range, or at neither.
 
     The slope of force over position, with its interval under coloured noise, is not above none (that of an inertia is
@@ -77,6 +77,7 @@ def air_of(force: Array, position: Array, ends: tuple[float, float]) -> Air | No
         force: as it stands in the log, shape (n,): behind a filter a fast touch is a slow one.
         position: likewise.
         ends: of the force's range, outliers left aside [N].
+        none: whether the slope has to be that of none; if not, that of an inertia may do.
     """
     size = max(len(force) // _MOST, 1)
     force, position = block_means(force, size), block_means(position, size)
@@ -84,7 +85,7 @@ def air_of(force: Array, position: Array, ends: tuple[float, float]) -> Air | No
     found = [0.0, 0.0]
     for bound in (np.inf, _OUTLYING):
         if slope and not any(found):
-            found = [_share(force, way * position, way * slope, bound) for way in (1.0, -1.0)]
+            found = [_share(force, way * position, way * slope, bound, none) for way in (1.0, -1.0)]
     way = 1.0 if found[0] >= found[1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
         return None
@@ -131,7 +132,7 @@ def _limit(position: Array, share: float) -> float:
     return float(bottom + share * (top - bottom))
 
 
-def _share(force: Array, position: Array, slope: float, bound: float) -> float:
+def _share(force: Array, position: Array, slope: float, bound: float, none: bool) -> float:
     """The largest share of the position's range, from its lower end, over which the force stays; 0 if over none.
 
     Its slope is clearly below that of the contact there, or over the next larger share, which may hold a touch.
@@ -144,7 +145,7 @@ def _share(force: Array, position: Array, slope: float, bound: float) -> float:
             continue
         own, doubt = found[0] / slope, found[1] / abs(slope)
         before, clear = clear, own + doubt < FLAT
-        if (clear or before) and -FLAT < own - doubt <= 0:
+        if (clear or before) and (-FLAT < own - doubt <= 0 or not (none or abs(own) >= FLAT)):
             return float(share)
     return 0.0
 

@@ -79,11 +79,7 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
         )
     chain = Chain(cutoff or highest, channels.dt)
-    air = (
-        None
-        if options.bonded
-        else air_of(channels.force, channels.position, _ends(_calm(chain(channels.force), channels.dt)))
-    )
+    air = None if options.bonded else _air(channels, chain, options.assumed_lag)
     if air is not None and air.drifts:
         channels = _without_drift(channels, air)
     contacts = find_contacts(channels, chain, air, options)
@@ -147,6 +143,17 @@ def find_contacts(
 def _with_payload(found: Contacts, payload: Payload) -> Contacts:
     own = replace(payload, mass=found.force_sign * found.position_sign * payload.mass)
     return replace(found, payload=own, warnings=(*found.warnings, Warn(Code.TOOL_INERTIA, own.text)))
+
+
+def _air(channels: Channels, chain: Chain, lag: float) -> Air | None:
+    """Where the probe is in the air; by the force without an inertia, if it shows one there."""
+    force, position = chain(channels.force), chain(channels.position)
+    ends = _ends(_calm(force, channels.dt))
+    perhaps = air_of(channels.force, channels.position, ends, none=False)
+    payload = payload_of(channels, chain, perhaps, lag, alone=True) if perhaps else None
+    if payload is None:
+        return air_of(channels.force, channels.position, ends)
+    return air_of(force - payload.mass * chain(channels.position, 2, lag), position, ends)
 
 
 def _without_drift(channels: Channels, air: Air) -> Channels:

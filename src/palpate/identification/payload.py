@@ -42,7 +42,9 @@ class Payload:
         )
 
 
-def payload_of(channels: Channels, chain: Chain, air: Air, lag: float) -> Payload | None:
+def payload_of(
+    channels: Channels, chain: Chain, air: Air, lag: float, *, alone: bool = False
+) -> Payload | None:
     """The mass that the force in the air tells, both channels as they count in the log; None if it tells none.
 
     Least squares of the filtered force on the filtered acceleration, in each stay on its own level.
@@ -52,18 +54,21 @@ def payload_of(channels: Channels, chain: Chain, air: Air, lag: float) -> Payloa
         chain: filter of both.
         air: of the log.
         lag: of the force behind the position [s].
+        alone: whether it has to be told from a soft spring too, which one frequency does not do.
     """
     memory = int(np.ceil((chain.settling + abs(lag)) / chain.dt))
     stays = [(a + memory, b) for a, b in air.among(channels.position) if b - a - memory >= _FEWEST]
     if not stays:
         return None
-    force, speed, motion = (
+    force, place, speed, motion = (
         np.concatenate([own[i:j] - own[i:j].mean() for i, j in stays])
-        for own in (chain(channels.force), *(chain(channels.position, k, lag) for k in (1, 2)))
+        for own in (chain(channels.force), *(chain(channels.position, k, lag) for k in (0, 1, 2)))
     )
     size = float(motion @ motion)
     spread = chain.noise_spread(position_noise([channels.position[i:j] for i, j in stays]))[2, 2]
-    if size <= _SEEN * len(motion) * float(spread) or not _of_inertia(force, speed, motion):
+    if size <= _SEEN * len(motion) * float(spread) or not _of_inertia(
+        force, motion, [speed, place] if alone else [speed]
+    ):
         return None
     mass = float(motion @ force) / size
     noise = noise_of(force - mass * motion, np.arange(len(force)), len(stays) + 1)
@@ -72,13 +77,13 @@ def payload_of(channels: Channels, chain: Chain, air: Air, lag: float) -> Payloa
     return Payload(mass, half / 1.96) if abs(mass) > half else None
 
 
-def _of_inertia(force: Array, speed: Array, motion: Array) -> bool:
-    """Whether the acceleration accounts for more of the force than all else, and for twice what the speed does.
+def _of_inertia(force: Array, motion: Array, others: list[Array]) -> bool:
+    """Whether the acceleration accounts for more of the force than all else, and for twice what others do.
 
-    A force that is read late, or that sinks after a contact, goes with both.
+    A force that is read late, or that sinks after a contact, goes with the speed as well.
     """
     whole = float(force @ force)
-    by_motion, by_speed = (
-        float(own @ force) ** 2 / max(float(own @ own) * whole, 1e-300) for own in (motion, speed)
+    by_motion, *by_others = (
+        float(own @ force) ** 2 / max(float(own @ own) * whole, 1e-300) for own in (motion, *others)
     )
-    return by_motion > 0.5 and by_motion > 2 * by_speed
+    return by_motion > 0.5 and by_motion > 2 * max(by_others)
