@@ -30,6 +30,7 @@ from foreign.on_line import streamed
 from foreign.recording import Recording
 from foreign.scoring import judge_found, record_of
 from foreign.surfaces import Surface, touch
+from foreign.tables import between
 from palpate.contact_frame import ContactFrame, identify_contact
 from palpate.errors import InputError
 from palpate.identification import identify
@@ -502,17 +503,9 @@ def told_of(case: Case, data: Path | None) -> Iterator[tuple[str, str, list[str]
 
 
 def in_page(page: str, rows: list[str], command: str) -> str:
-    """A page with the table between its two marks.
-
-    Raises:
-        ValueError: a mark is missing.
-    """
-    head, _, rest = page.partition(BEGIN)
-    _, mark, tail = rest.partition(END)
-    if not mark:
-        raise ValueError(f"the page needs the marks {BEGIN} and {END}, in this order")
+    """A page with the table between its two marks."""
     table = ["| case | log | said | right |", "|---|---|---|---|", *rows]
-    return "\n".join([f"{head}{BEGIN}\n\n    python {command}\n", *table, f"\n{END}{tail}"])
+    return between(page, (BEGIN, END), "\n".join([f"    python {command}\n", *table]))
 
 
 def main() -> None:
