@@ -66,7 +66,9 @@ def verdicts(
         parameters = _agreeing(parameters, found, point)
     parameters = _of_lag(parameters, found, lag, terms)
     if not choice.problem.contacts.signed:
-        parameters = {name: _unsigned(p) for name, p in parameters.items()}
+        parameters = {name: _refused(p, _UNSIGNED) for name, p in parameters.items()}
+    if found.fit.model.of_power and choice.problem.contacts.bonded:
+        parameters = {name: _refused(p, _UNTOUCHED) for name, p in parameters.items()}
     return parameters, _warnings(parameters, found, lag, terms)
 
 
@@ -163,11 +165,19 @@ def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Te
     return parameters | refused
 
 
-def _unsigned(p: Parameter) -> Parameter:
-    """Nothing is identified where nobody knows which way force and position count."""
+_UNSIGNED = (
+    "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
+)
+_UNTOUCHED = (
+    "a power of the depth counts from the surface and from no force, and the log never leaves the surface:"
+    " let it begin in the air"
+)
+
+
+def _refused(p: Parameter, reason: str) -> Parameter:
+    """Not identified, whatever its interval."""
     if p.verdict is not Verdict.IDENTIFIED:
         return p
-    reason = "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
     return replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
 
 
