@@ -54,6 +54,7 @@ attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hou
 
 trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
 	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md
+	$(BIN)/python benchmarks/identification/foreign/cases.py --markdown docs/trust.md || true
 
 leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
 	$(BIN)/python benchmarks/force/leaderboard.py --touches 200 --out docs/force-leaderboard.md

@@ -170,10 +170,6 @@ def in_page(page: str, scores: list[Score], command: str) -> str:
     Raises:
         ValueError: a mark is missing.
     """
-    head, _, rest = page.partition(BEGIN)
-    _, mark, tail = rest.partition(END)
-    if not mark:
-        raise ValueError(f"the page needs the marks {BEGIN} and {END}, in this order")
     every = tables(scores)
     parts = [f"    python {command}", "```\n" + "\n".join(summary(scores)) + "\n```"]
     parts += [_markdown(name, every[name]) for name in ("nuisance", "surface", "motion")]
@@ -182,7 +178,25 @@ def in_page(page: str, scores: list[Score], command: str) -> str:
         f"Cells of surface and nuisance with {ENOUGH} answers or more of which fewer than {LEAST:.0%} hold: "
         f"{', '.join(low) or 'none'}."
     )
-    return head + BEGIN + "\n\n" + "\n\n".join(parts) + "\n\n" + END + tail
+    return between(page, (BEGIN, END), "\n\n".join(parts))
+
+
+def between(page: str, marks: tuple[str, str], text: str) -> str:
+    """A page with a text between its two marks.
+
+    Args:
+        page: with both marks in it.
+        marks: where the text begins and ends.
+        text: that goes between them.
+
+    Raises:
+        ValueError: a mark is missing.
+    """
+    head, begin, rest = page.partition(marks[0])
+    _, end, tail = rest.partition(marks[1])
+    if not end:
+        raise ValueError(f"the page needs the marks {marks[0]} and {marks[1]}, in this order")
+    return f"{head}{begin}\n\n{text}\n\n{end}{tail}"
 
 
 def _markdown(name: str, rows: list[dict[str, Any]]) -> str:

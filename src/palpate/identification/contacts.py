@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
+from palpate.identification.air import Air, air_of
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
 from palpate.identification.options import NOTHING_SAID, Options
+from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.warning_codes import Code, Warn
 
@@ -28,15 +30,6 @@ _CLEAR = 3.0
 """Deviations of the free force below the threshold: noise cut at its own height stays below two, however coloured."""
 _FEWEST = 20
 _ROUNDS = 3
-_FREE = 0.25
-"""Share of the position's range that must be travelled at one end of the force for contact to be sure to begin there:
-the power law of the softest toe (n = 2) goes 0.22 of its depth below ONSET of its force."""
-_TWICE = 2.0
-"""How much farther the position must travel at one end of the force than at the other, if at both without the force."""
-_DWELL = 8
-"""Samples that a force stays near an end of its range before it may rest there: an oscillation only turns."""
-_FLAT = 0.4
-"""Slope near the resting force over that in contact, below which it is no contact: a toe of n = 2 has 0.44 at ONSET."""
 _SIGNED = 0.6
 """Correlation of block means of force and position below which nobody can tell which way they count."""
 _OVERSAMPLED = 32.0
@@ -58,6 +51,7 @@ class Contacts:
             peaks, and what is left out of contact reaches up to them. Not for a bonded one: it has no such force.
         signed: whether it is known which way each channel counts: as told, as it is, or turned round by what a stretch
             out of contact shows.
+        payload: mass that the force has in the air, counted into the surface; None if it has none.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -69,6 +63,7 @@ class Contacts:
     warnings: tuple[Warn, ...]
     clear: bool = True
     signed: bool = True
+    payload: Payload | None = None
 
 
 def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
@@ -84,15 +79,19 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
         )
     chain = Chain(cutoff or highest, channels.dt)
-    contacts = find_contacts(channels, chain, options)
+    air = None if options.bonded else _air(channels, chain, options.assumed_lag)
+    if air is not None and air.drifts:
+        channels = _without_drift(channels, air)
+    contacts = find_contacts(channels, chain, air, options)
     if not contacts.spans:
         return channels, chain, contacts
     chosen = cutoff or _chosen_cutoff(channels, contacts)
     if chosen > 0.9 * highest:
         return channels, chain, contacts
-    fewer = thinned(channels, int(1 / (_OVERSAMPLED * chosen * channels.dt)))
+    size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
+    fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
-    again = find_contacts(fewer, narrow, options)
+    again = find_contacts(fewer, narrow, air, options)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
 
 
@@ -104,7 +103,9 @@ def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
     return choose_cutoff(channels.position[around], channels.force[around], channels.dt, channels.rate)
 
 
-def find_contacts(channels: Channels, chain: Chain, options: Options = NOTHING_SAID) -> Contacts:
+def find_contacts(
+    channels: Channels, chain: Chain, air: Air | None, options: Options = NOTHING_SAID
+) -> Contacts:
     """Find the stretches in contact.
 
     Free space is where the position travels and the force does not. A force that follows the position at both ends of
@@ -113,16 +114,18 @@ def find_contacts(channels: Channels, chain: Chain, options: Options = NOTHING_S
     Args:
         channels: evenly sampled.
         chain: the filter that the fit will use, so that the spans count its delay.
+        air: of the log, if it shows any.
         options: whether the probe is fixed to the surface, and which way the force counts, if that is known.
     """
     force, position = chain(channels.force), chain(channels.position)
-    end = None if options.bonded else _free_end(force, position, channels.dt)
-    if end is None and options.bonded is False:
-        low, high = _ends(_calm(force, position, channels.dt)[0])
-        end = (low, high) if abs(low) <= abs(high) else (high, low)
-    if end is None:
+    payload = payload_of(channels, chain, air, options.assumed_lag) if air else None
+    if payload is not None:
+        force = force - payload.mass * chain(channels.position, 2, options.assumed_lag)
+    low, high = _ends(_calm(force, channels.dt))
+    if air is None and options.bonded is not False:
         return _never_left(channels, force, position, options)
-    rest, peak = end
+    rest = air.rest if air else low if abs(low) <= abs(high) else high
+    peak = max(low, high, key=lambda end: abs(end - rest))
     sign = 1.0 if peak > rest else -1.0
     top = sign * peak
     level = _resting(sign * force, sign * rest, top)
@@ -132,7 +135,39 @@ def find_contacts(channels: Channels, chain: Chain, options: Options = NOTHING_S
         text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     clear = _clear(sign * force, spans, threshold, int(chain.settling / chain.dt))
-    return replace(_oriented(force, position, spans, (sign, level, threshold), options), clear=clear)
+    way = air.way if air else 0.0
+    found = replace(_oriented(force, position, spans, (sign, way, level, threshold), options), clear=clear)
+    return found if payload is None else _with_payload(found, payload)
+
+
+def _with_payload(found: Contacts, payload: Payload) -> Contacts:
+    own = replace(payload, mass=found.force_sign * found.position_sign * payload.mass)
+    return replace(found, payload=own, warnings=(*found.warnings, Warn(Code.TOOL_INERTIA, own.text)))
+
+
+def _air(channels: Channels, chain: Chain, lag: float) -> Air | None:
+    """Where the probe is in the air; by the force without an inertia, if it shows one there."""
+    force, position = chain(channels.force), chain(channels.position)
+    ends = _ends(_calm(force, channels.dt))
+    perhaps = air_of(channels.force, channels.position, ends, none=False)
+    payload = payload_of(channels, chain, perhaps, lag, alone=True) if perhaps else None
+    if payload is None:
+        return air_of(channels.force, channels.position, ends)
+    return air_of(force - payload.mass * chain(channels.position, 2, lag), position, ends)
+
+
+def _without_drift(channels: Channels, air: Air) -> Channels:
+    """The same with the force in the air level from one stay to the next."""
+    rows: Array = np.arange(len(channels.force), dtype=np.float64)
+    raw = channels.raw
+    first = (raw.start - channels.start) / channels.dt
+    at: Array = first + np.arange(len(raw.held_force), dtype=np.float64) * (raw.dt / channels.dt)
+    raw = replace(raw, held_force=raw.held_force - air.drift(at))
+    warnings, moved = channels.warnings, float(np.ptp(air.levels))
+    if moved > air.noise:  # less is not seen in the log
+        text = f"the force in the air differs by {moved:.3g} N from stay to stay there, which is taken out as a drift"
+        warnings = (*warnings, Warn(Code.FORCE_DRIFTS, text))
+    return replace(channels, force=channels.force - air.drift(rows), raw=raw, warnings=warnings)
 
 
 def _never_left(channels: Channels, force: Array, position: Array, options: Options) -> Contacts:
@@ -179,11 +214,11 @@ def _oriented(
     force: Array,
     position: Array,
     spans: list[tuple[int, int]],
-    levels: tuple[float, float, float],
+    levels: tuple[float, float, float, float],
     options: Options,
 ) -> Contacts:
     """Which way the channels count: into the surface is where the probe is in contact and not out of it."""
-    sign, level, threshold = levels
+    sign, way, level, threshold = levels
     warnings = []
     if sign < 0:
         text = "the force goes to negative values in contact; its sign was turned round"
@@ -196,10 +231,11 @@ def _oriented(
     out = _outside(len(position), spans, 0)
     reach = float(np.ptp(position[inside])) or 1.0
     deep = inside & (sign * force > np.median(sign * force[inside]))
-    apart = float(np.median(position[deep]) - np.median(position[out])) if out.sum() >= _FEWEST else 0.0
-    if abs(apart) < ONSET * reach:
-        apart = float(np.corrcoef(position[inside], sign * force[inside])[0, 1])
-    way = 1.0 if apart >= 0 else -1.0
+    if not way:
+        apart = float(np.median(position[deep]) - np.median(position[out])) if out.sum() >= _FEWEST else 0.0
+        if abs(apart) < ONSET * reach:
+            apart = float(np.corrcoef(position[inside], sign * force[inside])[0, 1])
+        way = 1.0 if apart >= 0 else -1.0
     if way < 0:
         text = "the position falls as the probe goes in; its sign was turned round"
         warnings.append(Warn(Code.POSITION_SIGN_REVERSED, text))
@@ -209,85 +245,21 @@ def _oriented(
     return Contacts(tuple(spans), False, sign, way, level, threshold, tuple(warnings), signed=signed)
 
 
-def _calm(force: Array, position: Array, dt: float) -> tuple[Array, Array]:
-    """Short medians of both, which a chattering probe does not reach; both as they are if they are all oscillation."""
+def _calm(force: Array, dt: float) -> Array:
+    """Short medians, which a chattering probe does not reach; the force as it is if it is all oscillation."""
     width = min(len(force) // _BLOCKS, int(_LONGEST_BLOCK / dt))
     if width < 4:
-        return force, position
-    step = max(width // 4, 1)
-    views = [np.lib.stride_tricks.sliding_window_view(own, width)[::step] for own in (force, position)]
-    calm_force = np.median(views[0], axis=1)
-    low, high = np.percentile(force, [0.1, 99.9])
-    if np.ptp(calm_force) <= _COVERED * (high - low):
-        return force, position
-    return calm_force, np.median(views[1], axis=1)
+        return force
+    views = np.lib.stride_tricks.sliding_window_view(force, width)[:: max(width // 4, 1)]
+    calm: Array = np.median(views, axis=1)
+    low, high = _ends(force)
+    return force if np.ptp(calm) <= _COVERED * (high - low) else calm
 
 
 def _ends(force: Array) -> tuple[float, float]:
     """The two ends of the force's range."""
     low, high = np.percentile(force, [0.1, 99.9])
     return float(low), float(high)
-
-
-def _free_end(force: Array, position: Array, dt: float) -> tuple[float, float] | None:
-    """Resting and peak force, if at one end of its range the position travels without it; None if it never does."""
-    force, position = _calm(force, position, dt)
-    low, high = _ends(force)
-    height = high - low
-    whole = _spread(position)
-    if height <= 0 or whole <= 0:
-        return (low, high) if abs(low) <= abs(high) else (high, low)
-    near = (force < low + ONSET * height, force > high - ONSET * height)
-    slope = height / max(_spread(position[~near[0] & ~near[1]]), 1e-300)
-    stays = [_stretches(end) for end in near]
-    travel = [
-        max((_spread(position[a:b]) for a, b in own if b - a >= _DWELL), default=0.0) / whole for own in stays
-    ]
-    free = [t > _FREE or _flat(force, position, own, slope) for t, own in zip(travel, stays, strict=True)]
-    if not any(free):
-        return None
-    if all(free):  # a damped oscillation turns at both ends alike: its force leads its position
-        ratio = travel[0] / max(travel[1], 1e-300)
-        if 1 / _TWICE < ratio < _TWICE:
-            return None
-        from_low = ratio > 1
-    else:
-        from_low = free[0]
-    return (low, high) if from_low else (high, low)
-
-
-def _stretches(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and past-the-last sample of each unbroken stretch."""
-    edges = np.diff(np.r_[0, inside.astype(np.int8), 0])
-    return list(zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True))
-
-
-def _flat(force: Array, position: Array, stays: list[tuple[int, int]], slope: float) -> bool:
-    """Whether, while the force stays near one end of its range, it follows the position much less than in contact.
-
-    Args:
-        force: shape (n,).
-        position: shape (n,).
-        stays: stretches in which the force stays there.
-        slope: of force over position in contact [N/m].
-    """
-    long = [(a, b) for a, b in stays if b - a >= _FEWEST]
-    if not long:
-        return False
-    x = np.concatenate([position[a:b] - position[a:b].mean() for a, b in long])
-    f = np.concatenate([force[a:b] - force[a:b].mean() for a, b in long])
-    size = float(x @ x)
-    if size <= 0:
-        return False
-    own = float(x @ f) / size
-    left = f - own * x
-    few = max(len(f) / 8, 3.0)  # neighbours behind a filter are not independent
-    std = float(np.sqrt((left @ left) / size / few))
-    return abs(own) + 2 * std < _FLAT * slope
-
-
-def _spread(values: Array) -> float:
-    return float(np.ptp(values)) if len(values) else 0.0
 
 
 def _resting(force: Array, rest: float, peak: float) -> float:
@@ -301,9 +273,9 @@ def _resting(force: Array, rest: float, peak: float) -> float:
 
 
 def _threshold(force: Array, rest: float, peak: float) -> float:
-    """Clear of the noise at rest, which what is below it tells, and of a share of the peak."""
-    below = rest - force[force < rest]
-    noise = 1.4826 * float(np.median(below)) if len(below) else 0.0
+    """Clear of a share of the peak, and of the noise at rest, which what stays below that share tells."""
+    free = np.abs(force[force < rest + ONSET * (peak - rest)] - rest)
+    noise = 1.4826 * float(np.median(free)) if len(free) else 0.0
     return rest + max(ONSET * (peak - rest), 5 * noise)
 
 

@@ -64,6 +64,12 @@ def fit_without_series(found: Fit, series: float, series_std: float) -> Fit:
     return replace(found, theta=new, cov=cov, fixed_cov=fixed)
 
 
+def with_payload(found: Answer, std: float) -> Answer:
+    """An answer whose mass errs by as much as that of a payload, which was taken out of the force [kg]."""
+    variance = np.where(np.array(found.names) == "M", std**2, 0.0)
+    return replace(found, budget={**found.budget, "tool's inertia": Spread(variance)})
+
+
 def _places(names: tuple[str, ...]) -> dict[str, int]:
     return {name: names.index(name) for name in ("K", "B", "M") if name in names}
 
@@ -110,6 +116,10 @@ def spectrum_without_series(
                 loss=own.imag,
                 storage_half=float(np.hypot(gain * octave.storage_half, more)),
                 loss_half=float(np.hypot(gain * octave.loss_half, more)),
+                budget={
+                    **{cause: gain * half for cause, half in octave.budget.items()},
+                    "series stiffness": more,
+                },
             )
         )
     return tuple(found)

@@ -8,6 +8,7 @@ from typing import Any
 
 from palpate.errors import InputError, unknown
 from palpate.identification.models import NAMES
+from palpate.identification.prior import USUAL_LAG
 from palpate.signals.low_pass import LowPass
 
 LEAST_SQUARES = "least-squares"
@@ -46,6 +47,12 @@ class Options:
         options = cls(**(said | {"force_filter": low_pass if low_pass and low_pass.sections else None}))
         _check(options)
         return options
+
+    @property
+    def assumed_lag(self) -> float:
+        """Of the force behind the position [s]: as told, else as sensors have it."""
+        own = self.force_filter.lag if self.force_filter else 0.0
+        return own + USUAL_LAG if self.lag is None else self.lag
 
     def check_lag(self, duration: float) -> None:
         """Refuse a lag in other units than seconds."""

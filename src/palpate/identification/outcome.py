@@ -67,7 +67,7 @@ def outcome(
         r2=found.fit.r2,
         rmse=found.fit.rmse,
         n=len(problem.force),
-        warnings=(*warnings, *_doubts(parameters, problem, options, terms)),
+        warnings=(*warnings, *_late(press, problem, warnings), *_doubts(parameters, problem, options, terms)),
         comparison=choice.tried,
         cutoff=problem.motion.chain.cutoff,
         traces=_traces(channels, chain, choice, terms),
@@ -120,6 +120,19 @@ def _lag(choice: Choice) -> LagFound | None:
     if half <= _NARROWER * 1.96 * prior.std and choice.explains and not lag_open(choice.problem):
         return LagFound(found[LAG], half / 1.96, half, "measured")
     return LagFound(prior.value, prior.std, 1.96 * prior.std, "prior")
+
+
+def _late(press: Press | None, problem: Problem, warnings: tuple[Warn, ...]) -> list[Warn]:
+    """The lag that the work of the presses tells, where it is farther than the prior's bound and nobody told one."""
+    late = press.late if press else None
+    known = problem.lag.known or any(w.code is Code.FORCE_LAGS_POSITION for w in warnings)
+    if late is None or known or late[0] <= 1.96 * problem.lag.std:
+        return []
+    text = (
+        f"the ways out give back more work than the ways in took, which no passive surface does: the force is read"
+        f" after the position by {problem.lag.value + late[0]:.2g} s or more (± {late[1]:.2g}); calibrate the lag"
+    )
+    return [Warn(Code.FORCE_LAGS_POSITION, text)]
 
 
 def _doubts(parameters: dict[str, Parameter], problem: Problem, options: Options, terms: Terms) -> list[Warn]:

@@ -93,5 +93,7 @@ def identify(
     if series_stiffness is not None:
         choice = replace(choice, answer=in_series.without_series(choice.answer, series_stiffness, series_std))
         holds = in_series.fit_without_series(holds, series_stiffness, series_std)
+    if contacts.payload is not None:
+        choice = replace(choice, answer=in_series.with_payload(choice.answer, contacts.payload.std))
     parameters, told = verdicts(choice, holds, evidence[2], terms)
     return outcome(channels, chain, choice, holds, evidence, parameters, (*warnings, *told), options, terms)

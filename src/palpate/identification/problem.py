@@ -159,13 +159,15 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
         position = contacts.position_sign * low_passed(channels.position, low_pass, channels.dt)
         if options.lag is not None:
             options = replace(options, lag=options.lag - low_pass.lag)
+    period = 1 / channels.rate
+    lag = lag_prior(options.lag, options.lag_std, period, 0.0, options.mass)
     force = chain(force_raw)
+    if contacts.payload is not None:
+        force = force - contacts.payload.mass * chain(position, 2, lag.value)
     rows, spans = _rows(channels, chain, contacts)
     origin = _origin(chain(position), rows, contacts)
     position = position - origin
     motion = Motion(chain, position, rows, contacts.bonded, _noise(position, rows, spans))
-    period = 1 / channels.rate
-    lag = lag_prior(options.lag, options.lag_std, period, 0.0, options.mass)
     touch = approach = None
     if not contacts.bonded:
         margin = int(np.ceil(chain.settling / chain.dt))
@@ -321,13 +323,10 @@ def _of_sensor_path(channels: Channels, chain: Chain, contacts: Contacts, option
     position = position - origin
     motion = Motion(path, position, rows, contacts.bonded, noise=noise_within(position, whole, spans))
     force = contacts.force_sign * raw.held_force[clock.rows]
-    lag = lag_prior(
-        options.lag,
-        float(np.hypot(options.lag_std, clock.spread * dt)),
-        path.period,
-        low_pass.lag,
-        options.mass,
-    )
+    known = float(np.hypot(options.lag_std, clock.spread * dt))
+    lag = lag_prior(options.lag, known, path.period, low_pass.lag, options.mass)
+    if contacts.payload is not None:
+        force = force - contacts.payload.mass * path.read(position, 2, lag.value, np.arange(len(time)))
     touch = approach = None
     if not contacts.bonded:
         begins = np.searchsorted(time, [begin for begin, _ in between]).tolist()

@@ -69,6 +69,7 @@ class DynamicStiffness:
         storage_half, loss_half: 95 % half-widths [N/m], from the variance between blocks.
         blocks: how many there are.
         share: of the position's variance in contact.
+        budget: half-width of the storage by cause [N/m]; their squares add up.
     """
 
     frequency: float
@@ -78,6 +79,7 @@ class DynamicStiffness:
     loss_half: float
     blocks: int
     share: float
+    budget: dict[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, float]:
         """Plain values."""
@@ -129,6 +131,8 @@ class Press:
         loading, unloading: depth [m] and force [N] on the way in and out, shape (2, n); empty if it is not there.
         hysteresis_loss: share of the work of the way in that does not come back; None without a way out.
         relaxation: None without a hold.
+        late: by how much the force is read after the position by the work that comes back beyond what went in, and its
+            half-width [s]; None if no more comes back.
     """
 
     tangent: tuple[Tangent, ...]
@@ -136,6 +140,7 @@ class Press:
     unloading: NDArray[np.float64]
     hysteresis_loss: float | None = None
     relaxation: Relaxation | None = None
+    late: tuple[float, float] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

@@ -66,7 +66,9 @@ def verdicts(
         parameters = _agreeing(parameters, found, point)
     parameters = _of_lag(parameters, found, lag, terms)
     if not choice.problem.contacts.signed:
-        parameters = {name: _unsigned(p) for name, p in parameters.items()}
+        parameters = {name: _refused(p, _UNSIGNED) for name, p in parameters.items()}
+    if found.fit.model.of_power and choice.problem.contacts.bonded:
+        parameters = {name: _refused(p, _UNTOUCHED) for name, p in parameters.items()}
     return parameters, _warnings(parameters, found, lag, terms)
 
 
@@ -119,6 +121,7 @@ _REMEDY = {
     "strokes": "the ways in and out differ; press slower, or more often",
     "unexplained": "the model leaves force that is no noise; keep the motion near one working point",
     "position noise": "measure the position finer, or move further",
+    "tool's inertia": "move faster in the air, or take the tool's inertia out beforehand",
     "calibration": "calibrate force and position",
     "series stiffness": "measure the position nearer to the surface",
 }
@@ -162,11 +165,19 @@ def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Te
     return parameters | refused
 
 
-def _unsigned(p: Parameter) -> Parameter:
-    """Nothing is identified where nobody knows which way force and position count."""
+_UNSIGNED = (
+    "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
+)
+_UNTOUCHED = (
+    "a power of the depth counts from the surface and from no force, and the log never leaves the surface:"
+    " let it begin in the air"
+)
+
+
+def _refused(p: Parameter, reason: str) -> Parameter:
+    """Not identified, whatever its interval."""
     if p.verdict is not Verdict.IDENTIFIED:
         return p
-    reason = "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
     return replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
 
 

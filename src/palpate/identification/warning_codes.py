@@ -43,6 +43,7 @@ class Code(Enum):
     )
     COLUMNS_SWAPPED = "A column was named for a role that its own name speaks against."
     LINES_SKIPPED = "Lines of the file that are no rows of its table were left out."
+    FORCE_DRIFTS = "The force in the air changes in the course of the log; the change is taken out."
     FORCE_SIGN_REVERSED = "The force falls as the probe goes in; it was turned round."
     POSITION_SIGN_REVERSED = "The position falls as the probe goes in; it was turned round."
     LOW_RATE = "Rows are so rare that fast behaviour, damping and mass above all, may be missed."
@@ -62,8 +63,8 @@ class Code(Enum):
         "The contact's normal was found from the force, and so badly that it matters for the parameters."
     )
     TOOL_INERTIA = (
-        "In the air the force follows the acceleration against the sense in which a tool's mass makes it: its"
-        " inertia is compensated with the wrong sign, or twice. In contact a damping and a lag hide that: B is refused."
+        "In the air the force follows the acceleration, as a mass beyond the sensor makes it. A negative mass is an"
+        " inertia compensated with the wrong sign, or twice. In contact a damping and a lag hide that."
     )
     PAYLOAD_DOUBTFUL = "What the sensor shows in the air is not what the payload file foretells."
     NEGATIVE_STIFFNESS = "The force falls as the penetration grows: no passive surface does that."

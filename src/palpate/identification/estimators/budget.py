@@ -61,6 +61,22 @@ def of_noise(system: System, solution: Solution, names: tuple[str, ...], own: in
     return {"noise": Spread(noise), "lag": Spread(np.minimum(by_lag, whole)), "other forces": Spread(others)}
 
 
+def of_position_noise(system: System, solution: Solution, noise: Array) -> Spread:
+    """What noise of the position pulls the answer by, to the first order: cov N theta (Fuller, 1987, ch. 1).
+
+    Where the columns tell two parameters apart by little more than their noise, as K from M at one frequency, it is
+    all that is told.
+
+    Args:
+        system: of the log.
+        solution: of it.
+        noise: N by octave, products of the columns' noise with each other, shape (octaves, p, p).
+    """
+    weight = np.where(system.lines > 0, 1 / solution.noise, 0.0)
+    pulled = solution.cov @ np.tensordot(weight, noise, axes=1) @ solution.theta
+    return Spread(pulled**2)
+
+
 def of_octaves(system: System, solution: Solution) -> Spread:
     """What the answer moves by when one octave is left out, beyond what its covariance grows by."""
     var = np.diag(solution.cov)

@@ -237,6 +237,7 @@ class _Question:
         """The answer with its budget."""
         sensor = self._sensor(solution)
         budget = causes.of_noise(self.system, solution, self.names, self.own, LAG)
+        budget["position noise"] = causes.of_position_noise(self.system, solution, self._position_noise())
         budget["octaves"] = causes.of_octaves(self.system, solution)
         budget["repetition"] = causes.of_stretches(self.system, solution)
         budget["unexplained"] = causes.of_unexplained(self.system, solution, sensor)
@@ -253,6 +254,19 @@ class _Question:
         return Answer(
             names, solution.theta[kept], cov, budget, predicted, explained, left, noise, self.problem
         )
+
+    def _position_noise(self) -> Array:
+        """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p)."""
+        chain, frequency = self.problem.motion.chain, self.octaves.frequency
+        power = _line_of_noise(self.problem.motion, frequency) * chain.dt / self.dt * self.system.lines
+        found = np.zeros((len(frequency), len(self.names), len(self.names)))
+        own = self.model.derivatives if not self.model.knobs else {}
+        for a, i in own.items():
+            for b, j in own.items():
+                if (i + j) % 2 == 0:  # the others are in quadrature
+                    at = self.names.index(a), self.names.index(b)
+                    found[:, *at] = power * (2 * np.pi * frequency) ** (i + j) * (-1) ** ((i - j) // 2)
+        return found
 
     def _lag_of_damping(self, solution: Solution, found: Spread) -> Spread:
         """A lag T counts as a damping of -K T: B knows of a lag nobody has calibrated what the prior says, no more.
@@ -337,13 +351,18 @@ def _linearised(
     return at, dict(zip(free, jacobian.T, strict=True)), target
 
 
+def _line_of_noise(motion: Motion, frequency: Array) -> Array:
+    """Power of the filtered position's noise in a line at frequencies [Hz]."""
+    line: Array = motion.noise.power(frequency, motion.chain.dt) * motion.chain.position_gain(frequency) ** 2
+    return line
+
+
 def _seen(motion: Motion, dt: float, octaves: Octaves) -> NDArray[np.bool_]:
     """Octaves up to the first in which the position is mostly its own noise, which pulls every parameter to zero.
 
     The position is the last of the columns.
     """
-    chain = motion.chain
-    line = motion.noise.power(octaves.frequency, chain.dt) * chain.position_gain(octaves.frequency) ** 2
+    line, chain = _line_of_noise(motion, octaves.frequency), motion.chain
     rounding = (_ROUNDED * np.finfo(float).eps * float(np.abs(motion.position).max())) ** 2
     noise = octaves.all_lines * np.maximum(line * chain.dt / dt, rounding)
     return np.logical_and.accumulate(octaves.total[:, -1, -1] >= _SEEN * noise)

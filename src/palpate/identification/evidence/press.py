@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.least_squares import noise_of
 from palpate.identification.estimators.octaves import Segment
+from palpate.identification.evidence.work import way_out
+from palpate.identification.filters.state_variable import ORDER, Chain
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import Press, Relaxation, Tangent
@@ -17,6 +19,8 @@ Array = NDArray[np.float64]
 
 UPPER = 0.4
 """Share of the force above which a way in counts for its stiffness: below, a surface is still being met."""
+_MET = 0.15
+"""Share of the force above which its bend over the depth is looked for: the lowest that a slope is taken of."""
 _LEVELS = (0.3, 0.5, 0.7, 0.9)
 _WIDE = 0.15
 _FULL = 0.95
@@ -45,12 +49,14 @@ class Slope:
         stiffness, half: [N/m].
         rise: mean duration of a way in [s].
         each: slope of each way in [N/m].
+        budget: half-width by cause [N/m]; their squares add up.
     """
 
     stiffness: float
     half: float
     rise: float
     each: tuple[float, ...]
+    budget: dict[str, float]
 
 
 def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[Stroke]:
@@ -73,8 +79,52 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
             continue
         begin = s.first + int(np.argmin(depth[s.first : top]))
         if top - begin >= _FEWEST:
-            found.append(Stroke(*(own[begin:top] for own in channels)))
+            begin, top = _one_way(depth, channels[1], begin, top, reach)
+            found.append(_sharpened(Stroke(*(own[begin:top] for own in channels)), motion.chain))
     return found
+
+
+def _sharpened(stroke: Stroke, chain: object) -> Stroke:
+    """The same without what the filter adds to a curve.
+
+    The mean of a square is the square of the mean and the variance: behind a filter a force of bend c over the depth is
+    larger by c times the way within the filter's memory squared, to the second order of that.
+    """
+    if not isinstance(chain, Chain):
+        return stroke
+    way = (chain.delay / ORDER**0.5 * stroke.speed) ** 2
+    u = stroke.depth - stroke.depth[_met(stroke)].mean()
+    bend = _last(np.column_stack([np.ones(len(u)), u, u**2 + way]), stroke, 1e-6)
+    return replace(stroke, force=stroke.force - bend * way)
+
+
+def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> tuple[int, int]:
+    """The advance without a rest that goes farthest; the whole, if none goes half of the range of all.
+
+    A press in steps rests between them, and what the surface does meanwhile is no slope.
+    """
+    moves = speed[begin:top] > _STILL * float(np.percentile(np.abs(speed[begin:top]), 98))
+    edges = np.diff(np.r_[0, moves.astype(np.int8), 0])
+    runs = zip(np.flatnonzero(edges > 0) + begin, np.flatnonzero(edges < 0) + begin, strict=True)
+    kept = [(int(a), int(b)) for a, b in runs if b - a >= _FEWEST]
+    first, last = max(kept, key=lambda run: depth[run[1] - 1] - depth[run[0]], default=(begin, top))
+    return (first, last) if depth[last - 1] - depth[first] >= 0.5 * reach else (begin, top)
+
+
+def _met(stroke: Stroke) -> NDArray[np.bool_]:
+    """Rows in which the surface is met."""
+    low, high = np.percentile(stroke.force, [2, 98])
+    rows: NDArray[np.bool_] = stroke.force >= low + _MET * (high - low)
+    return rows
+
+
+def _last(columns: Array, stroke: Stroke, least: float) -> float:
+    """Coefficient of the last column in the force where the surface is met; 0 for directions below a share."""
+    own = columns[_met(stroke)]
+    size = np.sqrt((own**2).sum(axis=0))
+    size[size == 0] = 1.0
+    theta, *_ = np.linalg.lstsq(own / size, stroke.force[_met(stroke)], rcond=least)
+    return float(theta[-1] / size[-1])
 
 
 def slope_of(strokes: list[Stroke]) -> Slope | None:
@@ -84,7 +134,7 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
     interval has both, the scatter of each way in, the change of the slope over the range, and the variance between
     ways in (a random effect, Student's t).
     """
-    slopes, variances, rises, changes = [], [], [], []
+    slopes, variances, rises, changes, speeds = [], [], [], [], []
     for stroke in strokes:
         low, high = np.percentile(stroke.force, [2, 98])
         upper = stroke.force > low + UPPER * (high - low)
@@ -96,13 +146,19 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
         at_rest = _at_rest(stroke, rows)
         slopes.append((slope + at_rest) / 2)
         variances.append(variance)
-        changes.append(float(np.hypot(change, (slope - at_rest) / 2)))
+        changes.append(change)
+        speeds.append(abs(slope - at_rest) / 2)
         rises.append(float(stroke.time[-1] - stroke.time[0]))
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
-    half = float(np.hypot(mean.half, float(np.mean(changes))))
-    return Slope(mean.value, half, float(np.mean(rises)), tuple(slopes))
+    causes = {
+        "repetition" if len(slopes) > 1 else "noise": mean.half,
+        "curvature": float(np.mean(changes)),
+        "speed": float(np.mean(speeds)),
+    }
+    half = float(np.sqrt(sum(part**2 for part in causes.values())))
+    return Slope(mean.value, half, float(np.mean(rises)), tuple(slopes), causes)
 
 
 def _line(x: Array, f: Array) -> tuple[float, float, float]:
@@ -135,55 +191,50 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
         return None
     loading = max(strokes, key=lambda stroke: len(stroke.depth))
     tangent = [t for level in _LEVELS if (t := _tangent(strokes, level)) is not None]
-    way_out, loss = _unloading(problem, lag, segments)
+    back = way_out(problem, lag, segments)
     return Press(
-        tuple(tangent),
+        tuple(t for t in tangent if t.half < abs(t.stiffness)),
         _thin(loading.depth, loading.force),
-        way_out,
-        loss,
-        _relaxation(problem, lag, segments),
+        _thin(*back.curve),
+        back.loss,
+        _relaxation(problem, lag, segments, slope_of(strokes)),
+        back.late,
     )
 
 
 def _tangent(strokes: list[Stroke], level: float) -> Tangent | None:
-    slopes, variances, forces = [], [], []
+    slopes, variances, forces, by_speed = [], [], [], []
     for stroke in strokes:
+        loss = _of_speed(stroke)
         low, high = np.percentile(stroke.force, [2, 98])
         share = (stroke.force - low) / (high - low or 1.0)
         rows = np.flatnonzero(np.abs(share - level) < _WIDE)
         if len(rows) < _FEWEST or np.ptp(stroke.depth[rows]) <= 0:
             continue
         slope, variance, _ = _line(stroke.depth[rows], stroke.force[rows])
-        slopes.append(slope)
+        at_rest, *_ = _line(stroke.depth[rows], stroke.force[rows] - loss * stroke.speed[rows])
+        slopes.append((slope + at_rest) / 2)
         variances.append(variance)
+        by_speed.append((slope - at_rest) / 2)
         forces.append(float(low + level * (high - low)))
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
-    return Tangent(float(np.mean(forces)), mean.value, mean.half)
+    half = float(np.hypot(mean.half, np.mean(by_speed)))
+    return Tangent(float(np.mean(forces)), mean.value, half)
 
 
-def _unloading(problem: Problem, lag: float, segments: list[Segment]) -> tuple[Array, float | None]:
-    """The way out of the deepest contact, and the share of the work that does not come back on it."""
-    depth, force = problem.motion.moved(0, lag), problem.force
-    s = max(segments, key=lambda s: float(np.ptp(depth[s.first : s.last])))
-    x, f = depth[s.first : s.last], force[s.first : s.last]
-    top = int(np.argmax(x))
-    if top < _FEWEST or len(x) - top < _FEWEST or x[top] - x[-1] < 0.5 * (x[top] - x[0]):
-        return np.empty((2, 0)), None
-    start = max(x[0], x[top:].min())
-    into = float(np.trapezoid(f[: top + 1], x[: top + 1]))
-    first = int(np.argmax(x[: top + 1] >= start))
-    into = float(np.trapezoid(f[first : top + 1], x[first : top + 1]))
-    out = x[top:]
-    last = top + (int(np.argmax(out <= start)) if (out <= start).any() else len(out) - 1)
-    back = -float(np.trapezoid(f[top : last + 1], x[top : last + 1]))
-    loss = 1 - back / into if into > 0 else None
-    return _thin(x[top:], f[top:]), loss
+def _of_speed(stroke: Stroke) -> float:
+    """What the force has of the speed over a whole way in, beside a spring that may curve [N s/m]."""
+    u = stroke.depth - stroke.depth[_met(stroke)].mean()
+    return _last(np.column_stack([np.ones(len(u)), u, u**2, stroke.speed]), stroke, 1e-3)
 
 
-def _relaxation(problem: Problem, lag: float, segments: list[Segment]) -> Relaxation | None:
-    """Of the longest hold after a way in."""
+def _relaxation(
+    problem: Problem, lag: float, segments: list[Segment], slope: Slope | None
+) -> Relaxation | None:
+    """Of the longest hold after a way in, what the position gives back by its slope left aside."""
+    depth = problem.motion.moved(0, lag)
     speed, force, time = problem.motion.moved(1, lag), problem.force, problem.time
     still = np.abs(speed) < _STILL * float(np.percentile(np.abs(speed), 98))
     best: tuple[int, int] | None = None
@@ -194,13 +245,31 @@ def _relaxation(problem: Problem, lag: float, segments: list[Segment]) -> Relaxa
                 best = (s.first + int(a), s.first + int(b))
     if best is None:
         return None
-    f, t = force[best[0] : best[1]], time[best[0] : best[1]]
-    few = max(len(f) // 20, 2)
-    begin, end = float(np.median(f[:few])), float(np.median(f[-few:]))
-    if begin <= 0 or begin <= end:
+    rows = slice(*best)
+    moved = depth[rows] - depth[best[1] - 1]
+    given, doubt = (0.0 * moved, 0.0) if slope is None else (slope.stiffness * moved, slope.half)
+    return _relaxed(force[rows] - given, doubt * float(np.ptp(moved)), time[rows])
+
+
+def _relaxed(force: Array, doubt: float, time: Array) -> Relaxation | None:
+    """What a force loses in a hold, as one that only falls; None if that is within its noise and doubt.
+
+    Args:
+        force: less what the position gives back meanwhile, shape (n,) [N].
+        doubt: what is not known of that [N].
+        time: shape (n,) [s].
+    """
+    from scipy.optimize import isotonic_regression
+
+    falls = np.asarray(isotonic_regression(force, increasing=False).x)
+    noise = noise_of(force - falls, np.arange(len(force)), 2)
+    few = max(len(force) // 20, 2)
+    begin, end = float(np.median(falls[:few])), float(np.median(falls[-few:]))
+    least = np.hypot(2 * np.sqrt(2 * noise.variance * len(force) / noise.effective / few), doubt)
+    if begin <= 0 or begin - end <= least:
         return None
-    gone = (begin - f) / (begin - end)
-    return Relaxation(1 - end / begin, float(t[int(np.argmax(gone >= 0.5))] - t[0]), float(t[-1] - t[0]))
+    half = int(np.argmax(falls <= (begin + end) / 2))
+    return Relaxation((begin - end) / begin, float(time[half] - time[0]), float(time[-1] - time[0]))
 
 
 def _thin(x: Array, f: Array) -> Array:

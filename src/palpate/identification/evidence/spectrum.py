@@ -124,19 +124,20 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
     power = float((np.abs(blocks.position) ** 2).sum())
     line = _fitted(blocks)
     omega, parts = line.omega, line.parts
-    halves = student(line.freedom) * np.sqrt(line.variance)
     by_lag = 1.96 * omega * lag_std
-    halves = np.hypot(
-        halves, [abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag]
-    )
     noise = min(3 * blocks.noise * len(blocks.position) / max(power, 1e-300), 1.0)
-    halves = np.hypot(halves, noise * np.abs(parts))
-    halves = np.hypot(halves, np.abs(line.change))
+    causes = {
+        "blocks": student(line.freedom) * np.sqrt(line.variance),
+        "lag": np.array([abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag]),
+        "position noise": noise * np.abs(parts),
+        "within the octave": np.abs(line.change),
+    }
+    halves = np.sqrt(sum(half**2 for half in causes.values()))
     window = float((np.hanning(length + 2) ** 2).sum())
     share = power / len(blocks.position) * 2 / (length * window) / variance
     return DynamicStiffness(
         omega / (2 * np.pi), float(parts[0]), float(halves[0]), float(parts[1]), float(halves[1]),
-        len(blocks.position), float(min(share, 1.0)),
+        len(blocks.position), float(min(share, 1.0)), {cause: float(half[0]) for cause, half in causes.items()},
     )  # fmt: skip
 
 

@@ -39,8 +39,9 @@ def working_point(
         series = options.series_stiffness, options.series_std
         value, half = slope_without_series(slope.stiffness, slope.half, *series)
         each = tuple(slope_without_series(own, 0.0, *series)[0] for own in slope.each)
-        slope = replace(slope, stiffness=value, half=half, each=each)
-    octave = _octave(spectrum)
+        gain = half / slope.half if slope.half else 1.0
+        slope = replace(slope, stiffness=value, half=half, each=each, budget=_scaled(slope.budget, gain))
+    octave = _octave(spectrum, tolerance)
     if octave is None and slope is None:
         return None
     use_press = octave is None or (
@@ -50,14 +51,16 @@ def working_point(
     )
     if use_press and slope is not None:
         value, half, frequency, again = slope.stiffness, slope.half, 0.25 / slope.rise, _again(slope)
+        budget = slope.budget
     else:
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
+        budget = octave.budget
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     force, depth = problem.force[inside], problem.motion.moved(0, lag)[inside]
     rest = 0.0 if problem.counted else problem.contacts.resting
     contacts = problem.contacts
-    stiffness = _judged(value, half, tolerance, unit)
+    stiffness = replace(_judged(value, half, tolerance, unit), budget=_largest(budget, half))
     if not contacts.signed or (contacts.bonded and value < 0):
         reason = f"{stiffness.reason}; which way force and position count is not known (--force-sign)"
         stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
@@ -71,14 +74,29 @@ def working_point(
     )
 
 
-def _octave(spectrum: Sequence[DynamicStiffness]) -> DynamicStiffness | None:
+def _scaled(budget: dict[str, float], gain: float) -> dict[str, float]:
+    return {cause: gain * part for cause, part in budget.items()}
+
+
+def _largest(budget: dict[str, float], half: float) -> dict[str, float]:
+    """Causes that count, largest first."""
+    kept = {cause: part for cause, part in budget.items() if part > 1e-3 * half}
+    return dict(sorted(kept.items(), key=lambda item: -item[1]))
+
+
+def _octave(spectrum: Sequence[DynamicStiffness], tolerance: float) -> DynamicStiffness | None:
+    """The most excited octave that tells its storage within the tolerance; else the most excited one.
+
+    At a resonance the motion is largest, and the storage, which goes through zero there, is told least.
+    """
     kept = []
     for i, own in enumerate(spectrum):
         lower = [o for o in spectrum[:i] if o.share >= _EXCITED]
         falls = any(own.storage + own.storage_half < o.storage - o.storage_half for o in lower)
         if own.share >= _EXCITED and not falls:
             kept.append(own)
-    return max(kept, key=lambda own: own.share, default=None)
+    told = [own for own in kept if own.storage_half <= tolerance * abs(own.storage)]
+    return max(told or kept, key=lambda own: own.share, default=None)
 
 
 def _again(slope: Slope) -> tuple[float, float] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from palpate.identification.result import Identification, Traces
 from palpate.report.identification.evidence_panels import shown_by
 from palpate.report.identification.spectra import over_noise, whiteness_of
-from palpate.report.identification.words import units_of
+from palpate.report.identification.words import lost, units_of
 from palpate.report.numbers import plain, quantity
 
 DOUBTED = 1e-3
@@ -46,7 +46,7 @@ def press(found: Identification, traces: Traces) -> str:
     force = units_of(found)[0]
     told = ["The slope is the stiffness, the width of the loop what is lost. The ring is the working point."]
     if own.hysteresis_loss is not None:
-        told.append(f"{100 * own.hysteresis_loss:.2g} % of the work of the way in does not come back.")
+        told.append(f"{lost(own.hysteresis_loss)}.")
     if own.relaxation is not None:
         r = own.relaxation
         told.append(

@@ -16,6 +16,12 @@ _CAUSES = {
     "strokes": ("that the ways in and out differ", "press more slowly, or more often"),
     "unexplained": ("force that the model leaves and that is no noise", "keep the motion near one depth"),
     "curvature": ("that the slope changes over the press", "press about the force that you need"),
+    "within the octave": (
+        "that it changes with the frequency",
+        "move at one frequency, the one that you need",
+    ),
+    "speed": ("what the force has of the speed", "press more slowly"),
+    "tool's inertia": ("the tool's own inertia", "move faster in the air, or take it out beforehand"),
     "position noise": ("noise of the position", "measure the position finer, or move further"),
     "calibration": ("the scales of force and position", "calibrate them and give --calibration"),
     "series stiffness": ("what gives way beside the surface", "measure the position nearer to the surface"),

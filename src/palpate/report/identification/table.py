@@ -13,6 +13,7 @@ from palpate.report.identification.words import (
     facts_of,
     interval,
     lag_of,
+    lost,
     number,
     said,
     sentence,
@@ -86,7 +87,7 @@ def _press(found: Identification, console: Console) -> None:
     if slopes:
         console.print(Text(f"slope of the way in: {', '.join(slopes)}"))
     if press.hysteresis_loss is not None:
-        console.print(Text(f"work that does not come back: {100 * press.hysteresis_loss:.2g} %"))
+        console.print(Text(lost(press.hysteresis_loss)))
     if press.relaxation is not None:
         own = press.relaxation
         text = f"relaxation: {100 * own.share:.2g} % of the force in {own.duration:.3g} s"

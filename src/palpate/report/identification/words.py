@@ -37,6 +37,8 @@ ADVICE = {
     Code.IRREGULAR_TIME: "Log with the sensor's own clock if you can.",
     Code.SATURATED: "Press less, or use a sensor of a larger range.",
     Code.UNIT_GUESS: "Say the units, as in --position position_mm:mm.",
+    Code.FORCE_DRIFTS: "Let the sensor warm up and tare it; it is taken out as far as the log shows it.",
+    Code.TOOL_INERTIA: "Nothing, if the tool moves beyond the sensor; below zero: mend how its inertia is taken out.",
     Code.FORCE_SIGN_REVERSED: "Nothing, if the column is the right one.",
     Code.POSITION_SIGN_REVERSED: "Nothing, if the column is the right one.",
     Code.LOW_RATE: "Log faster: damping and mass need it first.",
@@ -107,6 +109,13 @@ def units_of(found: Identification) -> tuple[str, str]:
     if found.traces is not None:
         return found.traces.force_unit, found.traces.position_unit
     return ("1", "1") if any(p.unit == "1" for n, p in found.parameters.items() if n == "K") else ("N", "m")
+
+
+def lost(share: float) -> str:
+    """What becomes of the work of a press, by the share of it that does not come back."""
+    if share < 0:
+        return f"{-100 * share:.2g} % more work comes back than went in, as of a force that is read late"
+    return f"{100 * share:.2g} % of the work of the way in does not come back"
 
 
 def limited_by(found: Identification) -> str | None:

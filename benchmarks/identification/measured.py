@@ -1,0 +1,137 @@
+"""What `palpate identify` says of measured logs, one row each: of a folder with the logs of four laboratories.
+
+    python benchmarks/identification/measured.py FOLDER
+    python benchmarks/identification/measured.py FOLDER --pages PAGES
+
+FOLDER holds lattice_probe/, mr_damper/, silverbox/ and skin_indentation/ as their authors published them; a log that is
+not there is left out, and said. With --pages the page of each is written there. There is no truth: the table shows what
+is said, and what limits it. The presses on skin are pooled last, whose scatter over their own intervals is chi2/dof.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.errors import InputError
+from palpate.identification import Identification, identify
+from palpate.logs import read_log
+from palpate.report.identification.page import write_page
+from palpate.report.identification.source import Source, sha256_of
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One log: where it lies, which columns it has, which rows are meant, and what is told."""
+
+    path: str
+    columns: dict[str, Any]
+    told: dict[str, Any] = field(default_factory=dict)
+
+
+_SKIN = {"time": "time_s", "position": "position_mm:mm", "force": "force_mN:mN"}
+_DAMPER = {"time": "Tout:s", "position": "dist:mm", "force": "forc:N"}
+LOGS = (
+    Measured("lattice_probe/probe_states.csv", {"time": "0", "position": "3:mm", "force": "4:g"}),
+    Measured("mr_damper/ensaio3.mat", _DAMPER, {"bonded": True}),
+    Measured("mr_damper/ensaio3.mat", _DAMPER),
+    Measured("mr_damper/ensaio10.mat", _DAMPER, {"bonded": True}),
+    Measured(
+        "silverbox/schroeder_80mV.csv",
+        {"time": "time_s", "position": "position_V:1", "force": "force_V:1", "start": 17.343, "end": 19.019},
+        {"bonded": True},
+    ),
+    *(Measured(f"skin_indentation/press_{size}mN.csv", _SKIN) for size in (20, 40, 400, 600, 800)),
+    Measured("skin_indentation/press_250mN.ddf", {"position": "AI0", "force": "AI1"}),
+)
+HEAD = ("log", "model", "K", "B", "M", "working point", "lag", "warnings")
+
+
+def row(log: Measured, found: Identification) -> tuple[str, ...]:
+    """The cells of one log."""
+    told = " bonded" if log.told.get("bonded") else ""
+    return (
+        Path(log.path).name + told,
+        found.model,
+        *(parameter(found, name) for name in ("K", "B", "M")),
+        point(found),
+        lag(found),
+        ", ".join(found.codes) or "none",
+    )
+
+
+def parameter(found: Identification, name: str) -> str:
+    """Value and half-width of what is identified; else the verdict."""
+    own = found.parameters.get(name)
+    if own is None:
+        return "-"
+    if own.value is None or own.ci95 is None:
+        return str(own.verdict)
+    shown = f"{own.value:.4g} ± {(own.ci95[1] - own.ci95[0]) / 2:.2g}"
+    return shown if own.verdict == "identified" else f"({shown})"
+
+
+def point(found: Identification) -> str:
+    """The working point, its force and frequency, and what limits it."""
+    if found.working_point is None:
+        return "-"
+    own, at = found.working_point.stiffness, found.working_point
+    assert own.value is not None
+    assert own.ci95 is not None
+    half = (own.ci95[1] - own.ci95[0]) / 2
+    limit = next(iter(own.budget), "noise")
+    said = f"{own.value:.4g} ± {half:.2g} at {at.force_N:.3g}, {at.frequency_Hz:.3g} Hz, {at.source}; {limit}"
+    return said if own.verdict == "identified" else f"({said})"
+
+
+def lag(found: Identification) -> str:
+    """Value, bound and where it is from."""
+    if found.lag is None:
+        return "-"
+    return f"{1e3 * found.lag.value:.3g} ± {1e3 * found.lag.bound:.2g} ms, {found.lag.kind}"
+
+
+def chi2(found: Sequence[Identification]) -> str:
+    """Scatter of the working points of presses over what their own intervals make of it, over n - 1."""
+    points = [own.working_point.stiffness for own in found if own.working_point is not None]
+    value = np.array([p.value for p in points])
+    std = np.array([p.std for p in points])
+    mean = float((value / std**2).sum() / (1 / std**2).sum())
+    return f"{float(((value - mean) ** 2 / std**2).sum()) / max(len(value) - 1, 1):.2g} of {len(value)}"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--pages", type=Path, help="folder for the pages")
+    asked = parser.parse_args()
+    print("| " + " | ".join(HEAD) + " |", "|---" * len(HEAD) + "|", sep="\n")
+    skin = []
+    for log in LOGS:
+        path = asked.folder / log.path
+        if not path.is_file():
+            print(f"| {log.path} | not there" + " |" * (len(HEAD) - 1))
+            continue
+        try:
+            found = identify(read_log(path, **log.columns), **log.told)
+        except InputError as error:
+            print(f"| {log.path} | refused: {error}" + " |" * (len(HEAD) - 1), flush=True)
+            continue
+        print("| " + " | ".join(row(log, found)) + " |", flush=True)
+        if path.parent.name == "skin_indentation":
+            skin.append(found)
+        if asked.pages:
+            asked.pages.mkdir(exist_ok=True)
+            write_page(found, asked.pages / f"{path.stem}.html", Source(str(path), sha256=sha256_of(path)))
+    if skin:
+        print(f"\nskin, chi2/dof of the working point over all presses, which differ in force: {chi2(skin)}")
+
+
+if __name__ == "__main__":
+    main()

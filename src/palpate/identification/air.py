@@ -1,0 +1,183 @@
+"""Where the probe is in the air: at one end of its range the position travels, and the force does not go with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.estimators.least_squares import Noise, noise_of, quantile
+from palpate.identification.filters.state_variable import block_means, white_noise
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+FLAT = 0.4
+"""Slope in the air over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 % of
+its force has 0.44 there."""
+_SHARES = 0.5 ** (np.arange(2, 13) / 2)
+"""Of the position's range that may lie in the air, from a half to a sixty-fourth."""
+_TWICE = 2.0
+"""How much farther the position must travel at one end than at the other, if the force goes with it at neither: all of
+a log in which nothing is touched is such an end, and so is a damped oscillation's turn."""
+_FEWEST = 8
+"""Rows of a stay in the air: fewer have no slope."""
+_MOST = 1 << 16
+"""Rows that are looked at; more are averaged."""
+_SEEN = 10.0
+"""Power of the motion in a stay over that of the position's noise, at least: the slope would be off by a tenth."""
+_OUTLYING = 5.0
+"""Deviations from the middle of a stay that no noise reaches."""
+_OF_MEDIAN = 2 / np.pi
+"""Variance of a mean over that of a median, of normal noise."""
+_MIDDLE = (0.05, 0.95)
+"""Of the force's range, between which it is the surface's for sure."""
+
+
+@dataclass(frozen=True)
+class Air:
+    """A stretch of positions without a surface.
+
+    Args:
+        way: 1 if the surface lies towards higher positions, -1 if towards lower.
+        limit: position at which it may begin, at the earliest [m].
+        rest: the force there [N], in the middle.
+        stays: middle row of each stay in the air, shape (s,).
+        levels: middle force in each [N], shape (s,).
+        drifts: they differ by more than their noise.
+        noise: deviation of the force in a stay [N].
+    """
+
+    way: float
+    limit: float
+    rest: float
+    stays: Array
+    levels: Array
+    drifts: bool
+    noise: float
+
+    def drift(self, rows: Array) -> Array:
+        """What the force in the air is at some rows above its middle [N]: straight lines from stay to stay."""
+        found: Array = np.interp(rows, self.stays, self.levels) - self.rest
+        return found
+
+    def among(self, position: Array) -> list[tuple[int, int]]:
+        """First and past-the-last row of each stay in it, of a position of shape (n,)."""
+        return stays_in(self.way * position < self.way * self.limit)
+
+
+def air_of(force: Array, position: Array, ends: tuple[float, float], *, none: bool = True) -> Air | None:
+    """The air of a log; None if the force goes with the position at both ends of the position's range, or at neither.
+
+    The slope of force over position, with its interval under coloured noise, is not above none (that of an inertia is
+    below) and far below that of the contact. Rows are chosen by position: chosen by force, they would follow its noise.
+
+    Args:
+        force: as it stands in the log, shape (n,): behind a filter a fast touch is a slow one.
+        position: likewise.
+        ends: of the force's range, outliers left aside [N].
+        none: whether the slope has to be that of none; if not, that of an inertia may do.
+    """
+    size = max(len(force) // _MOST, 1)
+    force, position = block_means(force, size), block_means(position, size)
+    slope = _in_contact(force, position, ends)
+    found = [0.0, 0.0]
+    for bound in (np.inf, _OUTLYING):
+        if slope and not any(found):
+            found = [_share(force, way * position, way * slope, bound, none) for way in (1.0, -1.0)]
+    way = 1.0 if found[0] >= found[1] else -1.0
+    if max(found) == 0 or max(found) < _TWICE * min(found):
+        return None
+    limit = _limit(way * position, max(found))
+    stays = stays_in(way * position < limit)
+    middle = np.array([(a + b - 1) / 2 for a, b in stays]) * size + (size - 1) / 2
+    levels = np.array([float(np.median(force[a:b])) for a, b in stays])
+    rest = float(np.median(np.concatenate([force[a:b] for a, b in stays])))
+    noise = _noise(force, levels, stays)
+    return Air(
+        way, way * limit, rest, middle, levels, _differ(levels, stays, noise), float(np.sqrt(noise.variance))
+    )
+
+
+def _in_contact(force: Array, position: Array, ends: tuple[float, float]) -> float:
+    """Slope of force over position between the ends of the force's range [N/m]; 0 if there is none."""
+    low, high = ends
+    inner = (force > low + _MIDDLE[0] * (high - low)) & (force < low + _MIDDLE[1] * (high - low))
+    reach = float(np.ptp(position[inner])) if inner.any() else 0.0
+    rises = float((force - force.mean()) @ (position - position.mean())) >= 0
+    return (1.0 if rises else -1.0) * (high - low) / reach if reach > 0 else 0.0
+
+
+def _noise(force: Array, levels: Array, stays: list[tuple[int, int]]) -> Noise:
+    """Of the force in the air."""
+    own = np.concatenate([force[a:b] - level for (a, b), level in zip(stays, levels, strict=True)])
+    return noise_of(own, np.arange(len(own)), len(stays))
+
+
+def _differ(levels: Array, stays: list[tuple[int, int]], noise: Noise) -> bool:
+    """Whether the medians of the stays differ by more than chance would have them in one of twenty logs."""
+    from scipy.special import chdtri
+
+    if len(stays) < 2:
+        return False
+    length = np.array([b - a for a, b in stays], dtype=float)
+    weight = _OF_MEDIAN * length * noise.effective / max(noise.variance * length.sum(), 1e-300)
+    mean = float(weight @ levels) / float(weight.sum())
+    return float(weight @ (levels - mean) ** 2) > chdtri(len(stays) - 1, 0.05)
+
+
+def _limit(position: Array, share: float) -> float:
+    bottom, top = np.percentile(position, [0.1, 99.9])
+    return float(bottom + share * (top - bottom))
+
+
+def _share(force: Array, position: Array, slope: float, bound: float, none: bool) -> float:
+    """The largest share of the position's range, from its lower end, over which the force stays; 0 if over none.
+
+    Its slope is clearly below that of the contact there, or over the next larger share, which may hold a touch.
+    """
+    clear, white = False, white_noise(position)
+    for share in _SHARES:
+        stays = stays_in(position < _limit(position, share))
+        found = _slope(force, position, stays, white, bound) if stays else None
+        if found is None:
+            continue
+        own, doubt = found[0] / slope, found[1] / abs(slope)
+        before, clear = clear, own + doubt < FLAT
+        if (clear or before) and (-FLAT < own - doubt <= 0 or not (none or abs(own) >= FLAT)):
+            return float(share)
+    return 0.0
+
+
+def stays_in(inside: Rows) -> list[tuple[int, int]]:
+    """First and past-the-last row of each unbroken stretch that is long enough."""
+    edges = np.diff(np.r_[0, inside.astype(np.int8), 0])
+    pairs = zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True)
+    return [(a, b) for a, b in pairs if b - a >= _FEWEST]
+
+
+def _slope(
+    force: Array, position: Array, stays: list[tuple[int, int]], white: float, bound: float
+) -> tuple[float, float] | None:
+    """Slope of force over position within stays, and its half-width [N/m]; None if the position hardly moves.
+
+    What is more than a bound of deviations from the middle of its stay may be left out: a force that is read late has
+    a touch in it that the position no longer shows.
+    """
+    x = np.concatenate([position[a:b] - position[a:b].mean() for a, b in stays])
+    f = np.concatenate([force[a:b] - np.median(force[a:b]) for a, b in stays])
+    far = (
+        np.abs(f) > bound * 1.4826 * float(np.median(np.abs(f)))
+        if np.isfinite(bound)
+        else np.zeros(len(f), bool)
+    )
+    rows = np.flatnonzero(~far)
+    x, f = x[rows] - x[rows].mean(), f[rows] - f[rows].mean()
+    size = float(x @ x)
+    if len(rows) < _FEWEST or size <= _SEEN * len(x) * white**2:
+        return None
+    own = float(x @ f) / size
+    noise = noise_of(f - own * x, rows, len(stays) + 1)
+    std = float(np.sqrt(noise.variance * len(f) / noise.effective / size))
+    return own, quantile(noise.effective, 2) * std

@@ -1,0 +1,89 @@
+"""The mass whose inertia the force has in the air: of what lies between the sensor and the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.air import Air
+from palpate.identification.estimators.least_squares import noise_of, quantile
+from palpate.identification.filters.position_noise import position_noise
+from palpate.identification.filters.state_variable import Chain
+from palpate.identification.sampling import Channels
+
+Array = NDArray[np.float64]
+
+_SEEN = 10.0
+"""Power of the acceleration over that of the position's noise in it, at least: the mass would be off by a tenth."""
+_FEWEST = 20
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A mass seen in the air [kg]: negative if more than the tool's inertia was taken out before.
+
+    Args:
+        mass, std: [kg].
+    """
+
+    mass: float
+    std: float
+
+    @property
+    def text(self) -> str:
+        """What it means."""
+        seen = f"in the air the force goes as a mass of {self.mass:.3g} kg (std {self.std:.2g})"
+        if self.mass > 0:
+            return f"{seen}: what moves beyond the force sensor; it is taken out"
+        return (
+            f"{seen}: a tool's inertia was taken out with the wrong sign, or too much of it; it is put back"
+        )
+
+
+def payload_of(
+    channels: Channels, chain: Chain, air: Air, lag: float, *, alone: bool = False
+) -> Payload | None:
+    """The mass that the force in the air tells, both channels as they count in the log; None if it tells none.
+
+    Least squares of the filtered force on the filtered acceleration, in each stay on its own level.
+
+    Args:
+        channels: of the log.
+        chain: filter of both.
+        air: of the log.
+        lag: of the force behind the position [s].
+        alone: whether it has to be told from a soft spring too, which one frequency does not do.
+    """
+    memory = int(np.ceil((chain.settling + abs(lag)) / chain.dt))
+    stays = [(a + memory, b) for a, b in air.among(channels.position) if b - a - memory >= _FEWEST]
+    if not stays:
+        return None
+    force, place, speed, motion = (
+        np.concatenate([own[i:j] - own[i:j].mean() for i, j in stays])
+        for own in (chain(channels.force), *(chain(channels.position, k, lag) for k in (0, 1, 2)))
+    )
+    size = float(motion @ motion)
+    spread = chain.noise_spread(position_noise([channels.position[i:j] for i, j in stays]))[2, 2]
+    if size <= _SEEN * len(motion) * float(spread) or not _of_inertia(
+        force, motion, [speed, place] if alone else [speed]
+    ):
+        return None
+    mass = float(motion @ force) / size
+    noise = noise_of(force - mass * motion, np.arange(len(force)), len(stays) + 1)
+    std = float(np.sqrt(noise.variance * len(force) / noise.effective / size))
+    half = quantile(noise.effective, len(stays) + 1) * std
+    return Payload(mass, half / 1.96) if abs(mass) > half else None
+
+
+def _of_inertia(force: Array, motion: Array, others: list[Array]) -> bool:
+    """Whether the acceleration accounts for more of the force than all else, and for twice what others do.
+
+    A force that is read late, or that sinks after a contact, goes with the speed as well.
+    """
+    whole = float(force @ force)
+    by_motion, *by_others = (
+        float(own @ force) ** 2 / max(float(own @ own) * whole, 1e-300) for own in (motion, *others)
+    )
+    return by_motion > 0.5 and by_motion > 2 * max(by_others)

@@ -1,0 +1,86 @@
+"""Where the probe is in the air is found by position; a force that moves there is taken out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.synthetic_contacts import coloured, force_of, pressed, record
+from palpate.identification import identify
+from palpate.identification.air import air_of
+from palpate.logs import read_log
+
+PRESS = Path(__file__).parents[2] / "examples" / "data" / "press.csv"
+TIME = np.arange(8000) / 1000
+
+
+def hinge(depth: float, noise: float, n: float = 1.0, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """A slow sine over 4 mm whose lowest `depth` is air: force and position."""
+    x = 2e-3 - 2e-3 * np.cos(2 * np.pi * 0.5 * TIME)
+    force = 20 * (np.maximum(x - depth, 0) / (4e-3 - depth)) ** n
+    return force + coloured(len(TIME), noise, 0.9, np.random.default_rng(seed)), x
+
+
+def ends(force: np.ndarray) -> tuple[float, float]:
+    return float(force.min()), float(force.max())
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_air_lies_where_the_force_stays(way, sign):
+    force, x = hinge(1e-3, 0.05)
+    air = air_of(sign * force + 3.0, way * x, ends(sign * force + 3.0))
+    assert air is not None
+    assert air.way == way
+    assert air.rest == pytest.approx(3.0, abs=0.05)
+    assert not air.drifts
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_surface_that_is_never_left_has_no_air(n, seed):
+    """The probe turns where a quarter of the depth is still pressed: 6 % of the force for n = 2."""
+    x = 2.5e-3 - 1.5e-3 * np.cos(2 * np.pi * 0.5 * TIME)
+    force = 20 * (x / 4e-3) ** n + coloured(len(TIME), 0.05, 0.9, np.random.default_rng(seed))
+    assert air_of(force, x, ends(force)) is None
+
+
+def test_a_short_stretch_of_air_at_the_begin_is_seen():
+    """A tenth of a second of eight, and a tenth of the way: the touch itself is within 5 % of the force."""
+    log = read_log(PRESS, time="time_s", position="position_mm:mm", force="force_N:N")
+    found = identify(log)
+    assert "contact-at-start" not in found.codes
+    assert found.working_point is not None
+    assert found.working_point.depth_m == pytest.approx(2.2e-3, rel=0.1)
+
+
+@pytest.mark.parametrize("every", [2, 4, 8])
+@pytest.mark.parametrize("ramp", [0.06, 0.3])
+def test_a_held_position_leaves_the_surface_all_the_same(every, ramp):
+    log = pressed(ramp=ramp)
+    held = np.repeat(log["position"][::every], every)[: len(log)]
+    found = identify(record(log["time"], held, log["force"]))
+    assert "contact-at-start" not in found.codes
+    low, high = found.parameters["K"].ci95
+    assert low < 5000 < high
+
+
+def test_a_force_that_drifts_in_the_air_is_level_again():
+    log = pressed()
+    drift = 2.0 * log["time"] / log["time"][-1]
+    found = identify(record(log["time"], log["position"], log["force"] + drift))
+    assert "force-drifts" in found.codes
+    start, end = found.contacts[0]
+    assert (start, end) == (pytest.approx(0.52, abs=0.02), pytest.approx(2.03, abs=0.05))
+    assert "force-drifts" not in identify(log).codes
+
+
+def test_many_presses_are_as_many_contacts():
+    """In contact for more than half of the time, and in the air for half a second at a time."""
+    t = np.arange(int(60 * 1.6 * 125)) / 125
+    x = np.interp(t % 1.6, [0, 0.2, 0.45, 1.15, 1.4, 1.6], [-1e-3, -1e-3, 3e-3, 3e-3, -1e-3, -1e-3])
+    force = force_of(x, lambda d, v: 2000 * d + 8 * v, 1 / 125)
+    force += np.random.default_rng(0).normal(0, 0.03, len(t))
+    assert len(identify(record(t, x, force)).contacts) == 60
