@@ -124,7 +124,9 @@ def _built(file: ArmFile) -> SerialArm:
     for j in joints:
         _check_finite(f"joint {j.name}", (*j.at, *j.turn, j.rotor, *j.com))
         if not j.range[0] < j.range[1]:
-            raise InputError(f"joint {j.name}: its range must be two numbers, the lower first, got {list(j.range)}")
+            raise InputError(
+                f"joint {j.name}: its range must be two numbers, the lower first, got {list(j.range)}"
+            )
         notes.append(check_inertia(j.name, j.mass, symmetric(j.inertia)))
     _check_finite("home, flange and gravity", (*file.home, *file.flange, *file.flange_turn, *file.gravity))
     return SerialArm(

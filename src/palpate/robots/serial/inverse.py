@@ -14,10 +14,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_STARTS = 12
+_STARTS = 24
 """Points from which the search begins; the first is where the arm is."""
 _REACHED = 1e-9
 """Distance [m], and angle [rad], under which a pose is reached: a nanometre is below any encoder."""
+_STEPS, _LONGEST = 100, 0.3
+"""Of one search, and the most that a joint moves in one of them [rad, m]."""
 _TURN = 2.0 * np.pi
 
 
@@ -78,26 +80,31 @@ def _starts(arm: SerialArm, near: Array) -> list[Array]:
 def _box(arm: SerialArm) -> tuple[Array, Array]:
     """The range of each joint; a turn either way, or a metre, where it has no limit."""
     free = np.where(arm.chain.slide > 0.0, 1.0, 0.5 * _TURN)
-    return np.where(np.isfinite(arm.lower), arm.lower, -free), np.where(np.isfinite(arm.upper), arm.upper, free)
-
-
-def _searched(arm: SerialArm, goal: Array, start: Array) -> Array:
-    """Least squares of the pose's error within the joints' limits."""
-    from scipy.optimize import least_squares
-
-    lower, upper = arm.lower, arm.upper
-    inside = np.nextafter(start, 0.5 * (np.clip(lower, -9.0, 9.0) + np.clip(upper, -9.0, 9.0)))
-    found = least_squares(
-        lambda q: -pose_error(arm.forward_kinematics(q), goal),
-        np.clip(inside, lower, upper),
-        jac=lambda q: arm.jacobian(q),
-        bounds=(lower, upper),
-        xtol=1e-15,
-        ftol=1e-15,
-        gtol=1e-15,
-        max_nfev=200,
+    return np.where(np.isfinite(arm.lower), arm.lower, -free), np.where(
+        np.isfinite(arm.upper), arm.upper, free
     )
-    return np.asarray(found.x)
+
+
+def _searched(arm: SerialArm, goal: Array, q: Array) -> Array:
+    """Damped least squares (Wampler, 1986) in short steps within the joints' limits, so that it stays near.
+
+    The damping falls with the error, so that it converges as Newton's method does where the pose can be reached.
+    """
+    for _ in range(_STEPS):
+        error = pose_error(arm.forward_kinematics(q), goal)
+        if np.abs(error).max() < 1e-3 * _REACHED:
+            break
+        J, damping = arm.jacobian(q), 1e-3 * min(float(error @ error), 1.0)
+        step = _step(J, error, damping)
+        held = ((q <= arm.lower) & (step < 0.0)) | ((q >= arm.upper) & (step > 0.0))
+        if held.any():
+            step = _step(np.where(held, 0.0, J), error, damping)
+        q = np.clip(q + step / max(1.0, float(np.abs(step).max()) / _LONGEST), arm.lower, arm.upper)
+    return q
+
+
+def _step(J: Array, error: Array, damping: float) -> Array:
+    return np.asarray(J.T @ np.linalg.lstsq(J @ J.T + damping * np.eye(6), error, rcond=None)[0])
 
 
 def _out_of_reach(arm: SerialArm, goal: Array, off: Array) -> str:

@@ -223,11 +223,11 @@ class SerialArm:
         push = self._checked(torque, "torque") - found.room.h
         if tip_wrench is not None:
             push = push - found.room.J.T @ _wrench(tip_wrench)
-        return np.linalg.solve(found.room.M, push)
+        return np.asarray(np.linalg.solve(found.room.M, push))
 
     def singular_values(self, q: ArrayLike) -> Array:
         """Of J, largest first, shape (min(6, n),): the last is 0 in a singular pose."""
-        return np.linalg.svd(self.jacobian(q), compute_uv=False)
+        return np.asarray(np.linalg.svd(self.jacobian(q), compute_uv=False))
 
     def _checked(self, values: ArrayLike, name: str) -> Array:
         array = np.array(values, dtype=np.float64)

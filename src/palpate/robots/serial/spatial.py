@@ -92,4 +92,4 @@ def inertia_at(mass, centre, moment):
 
 
 for _cls in (Twist, Wrench, Inertia):
-    _cls.__array_ufunc__ = None  # type: ignore[attr-defined]  # NumPy leaves the operators to these classes
+    _cls.__array_ufunc__ = None  # type: ignore[union-attr]  # NumPy leaves the operators to these classes

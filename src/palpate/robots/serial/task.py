@@ -11,61 +11,8 @@ of which the second part moves joints to spare and not the tip.
 from typing import NamedTuple
 
 from palpate._jit import law, part
-from palpate._vector import Mat3, Vec3, clip, exp, sign, solve, sqrt
+from palpate._vector import Mat3, Vec3, Vec6, solve
 from palpate.robots.serial.linear import backward, forward
-
-
-@part
-class Vec6(NamedTuple):
-    """Two vectors, of translation and of rotation; operators as those of `Vec3`."""
-
-    lin: Vec3
-    ang: Vec3
-
-    def __add__(a, b):
-        return Vec6(a.lin + b.lin, a.ang + b.ang)
-
-    def __radd__(a, k):
-        return Vec6(k + a.lin, k + a.ang)
-
-    def __sub__(a, b):
-        return Vec6(a.lin - b.lin, a.ang - b.ang)
-
-    def __rsub__(a, k):
-        return Vec6(k - a.lin, k - a.ang)
-
-    def __mul__(a, b):
-        return Vec6(a.lin * b.lin, a.ang * b.ang)
-
-    def __rmul__(a, k):
-        return Vec6(k * a.lin, k * a.ang)
-
-    def __truediv__(a, b):
-        return Vec6(a.lin / b.lin, a.ang / b.ang)
-
-    def __neg__(a):
-        return Vec6(-a.lin, -a.ang)
-
-    def __abs__(a):
-        return Vec6(abs(a.lin), abs(a.ang))
-
-    def __matmul__(a, b):
-        return a.lin @ b.lin + a.ang @ b.ang
-
-    def map_left(b, A):
-        return A.on(b)
-
-    def map_exp(a):
-        return Vec6(exp(a.lin), exp(a.ang))
-
-    def map_sqrt(a):
-        return Vec6(sqrt(a.lin), sqrt(a.ang))
-
-    def map_sign(a):
-        return Vec6(sign(a.lin), sign(a.ang))
-
-    def map_clip(a, limit):
-        return Vec6(clip(a.lin, limit.lin), clip(a.ang, limit.ang))
 
 
 @part
@@ -118,8 +65,8 @@ class TaskModel(NamedTuple):
     h: Vec6
 
 
-for _cls in (Vec6, Identity, ApparentInertia):
-    _cls.__array_ufunc__ = None  # type: ignore[attr-defined]  # NumPy leaves the operators to these classes
+for _cls in (Identity, ApparentInertia):
+    _cls.__array_ufunc__ = None  # type: ignore[union-attr]  # NumPy leaves the operators to these classes
 
 
 @law
