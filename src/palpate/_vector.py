@@ -1,4 +1,4 @@
-"""Three-vectors, pairs of them and 3x3 matrices by value, with operators, and the few functions that laws are written in.
+"""Three-vectors, pairs of them, 3x3 matrices by value, with operators, and the few functions of which laws are made.
 
 A law calls only operators, ``.T`` and the functions of this file. Each has three meanings: on numbers and on
 `Vec3`/`Mat3` (plain Python, or compiled by Numba through `palpate._jit`), and on NumPy arrays of any size.

@@ -22,6 +22,7 @@ class Identity(NamedTuple):
     one: float = 1.0
 
     def on(A, b):
+        """b itself."""
         return b
 
     def __matmul__(A, b):
@@ -29,9 +30,11 @@ class Identity(NamedTuple):
 
     @property
     def T(A):
+        """Itself."""
         return A
 
     def map_resolve(J, a, M):
+        """a itself."""
         return a
 
 
