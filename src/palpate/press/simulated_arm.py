@@ -64,12 +64,20 @@ class SimulatedArm:
         cell: of the same.
         physics: own or mujoco.
         seed: of the noise.
+        resolution: of a joint's position [rad, m]; 0 for encoders that see everything.
     """
 
     def __init__(
-        self, arm: SerialArm, loop: Arm, place: Place, cell: Cell, physics: str = "own", seed: int = 0
+        self,
+        arm: SerialArm,
+        loop: Arm,
+        place: Place,
+        cell: Cell,
+        physics: str = "own",
+        seed: int = 0,
+        resolution: float = ENCODER,
     ):
-        self.arm, self.loop, self.cell = arm, loop, cell
+        self.arm, self.loop, self.cell, self._resolution = arm, loop, cell, resolution
         self._generator = np.random.default_rng(seed)
         sag = np.zeros(arm.joints)
         if cell.elastic:  # springs stretched by the arm's weight, which its own control knows of
@@ -165,7 +173,9 @@ class SimulatedArm:
 
     def _encoders(self) -> Array:
         turned = self._body.motor - self._sag if self.cell.elastic else self._body.q
-        return np.asarray(ENCODER * np.round(turned / ENCODER))
+        if self._resolution == 0.0:
+            return turned.copy()
+        return np.asarray(self._resolution * np.round(turned / self._resolution))
 
 
 class _TipLoop:

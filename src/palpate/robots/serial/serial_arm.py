@@ -169,6 +169,19 @@ class SerialArm:
         """Pose of the tip, shape (4, 4)."""
         return self._found(q).pose
 
+    def joint_places(self, q: ArrayLike) -> Array:
+        """Origin of the base, of each joint's frame, and of the tip [m], shape (n + 2, 3)."""
+        c, p, R, places = self.chain, np.zeros(3), np.eye(3), [np.zeros(3)]
+        for i, value in enumerate(self._checked(q, "q")):
+            p, R = p + R @ c.at[i], R @ c.turn[i]
+            if c.slide[i]:
+                p = p + value * R[:, 2]
+            else:
+                cosine, sine = np.cos(value), np.sin(value)
+                R = R @ np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+            places.append(p)
+        return np.array([*places, p + R @ c.tip])
+
     def inverse_kinematics(self, pose: ArrayLike, near: ArrayLike | None = None) -> Array:
         """Joint positions of a pose within the joints' limits, shape (n,); of several, one near `near`.
 
