@@ -94,7 +94,7 @@ class Body(NamedTuple):
     drive: Array  # torque on the links
     qdd: Array
     normal: Array  # row of J along the normal
-    yielding: Array  # M^-1 times that
+    yielding: Array  # L^-1 times that
 
 
 @part
@@ -157,13 +157,12 @@ def answered(cell, body, tip, touch):
         along = cell.normal @ Vec3(room.J[0, i], room.J[1, i], room.J[2, i])
         body.normal[i], body.yielding[i] = along, along
         body.qdd[i] = body.drive[i] - room.h[i]
-    for column in (body.yielding, body.qdd):
-        forward(body.L, column)
-        backward(body.L, column)
+    forward(body.L, body.yielding)
+    forward(body.L, body.qdd)
     mobility, free, v = 0.0, cell.normal @ tip.a, 0.0
     for i in range(n):
-        mobility += body.normal[i] * body.yielding[i]
-        free += body.normal[i] * body.qdd[i]
+        mobility += body.yielding[i] * body.yielding[i]
+        free += body.yielding[i] * body.qdd[i]
         v += body.normal[i] * body.qd[i]
     p = cell.normal @ tip.p - cell.place
     surface, impulse = follow(cell.surface, touch.surface, touch.force, p, v, 1.0 / mobility, cell.step)
@@ -174,15 +173,16 @@ def answered(cell, body, tip, touch):
         force = contact_force(elastic, opposed, 1.0 / mobility, free)
     for i in range(n):
         body.qdd[i] -= body.yielding[i] * (max(force, 0.0) + impulse / cell.step)
+    backward(body.L, body.qdd)
     return surface, force + impulse / cell.step, p
 
 
 @law
-def told(cell, touch, surface, force, depth, time, noise):
-    """The touch after a step."""
+def told(sensor, share, touch, surface, force, depth, time, noise):
+    """The touch after a step that is this share of a tick."""
     felt = max(force, 0.0)
-    reading = sensed(cell.sensor, touch.reading, felt, time, noise)
-    return Touch(surface, reading, force, touch.mean + felt / cell.steps, depth)
+    reading = sensed(sensor, touch.reading, felt, time, noise)
+    return Touch(surface, reading, force, touch.mean + share * felt, depth)
 
 
 @law
@@ -191,15 +191,16 @@ def tick(cell, body, touch, setpoint, k, noise):
 
     Semi-implicit Euler, first order; the contact force is solved together with the acceleration.
     """
+    sensor, step, share = cell.sensor, cell.step, 1.0 / cell.steps
     touch = Touch(touch.surface, touch.reading, touch.force, 0.0, touch.depth)
     for j in range(cell.steps):
         driven(cell, body, setpoint)
         tip = chain_model(cell.chain, body.q, body.qd, body.room)
         surface, force, depth = answered(cell, body, tip, touch)
         for i in range(len(body.q)):
-            body.qd[i] += cell.step * body.qdd[i]
-            body.q[i] += cell.step * body.qd[i]
-        touch = told(cell, touch, surface, force, depth, (k * cell.steps + j + 1) * cell.step, noise)
+            body.qd[i] += step * body.qdd[i]
+            body.q[i] += step * body.qd[i]
+        touch = told(sensor, share, touch, surface, force, depth, (k * cell.steps + j + 1) * step, noise)
     return touch
 
 
@@ -208,7 +209,7 @@ def foreign(cell, body, touch, tip, setpoint, time, noise):
     """One step whose M, h and J another engine has filled in; that engine moves the arm."""
     driven(cell, body, setpoint)
     surface, force, depth = answered(cell, body, tip, touch)
-    return told(cell, touch, surface, force, depth, time, noise)
+    return told(cell.sensor, 1.0 / cell.steps, touch, surface, force, depth, time, noise)
 
 
 compiled_tick = kernel(tick)

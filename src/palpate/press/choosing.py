@@ -92,6 +92,7 @@ def prepared(question: Question) -> Pressing:
         InputError: whatever of it cannot be, in one line.
     """
     _check_words(question)
+    Plan(question.force, question.seconds, question.probe)
     arm = arm_of(question.arm, question.site)
     place = place_of(arm, _array(question.at), _array(question.normal))
     gains = _gains(question, arm, place)

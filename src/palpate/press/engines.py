@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate._jit import Bound
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.press.cell import Body, Cell, Touch, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
@@ -31,9 +32,12 @@ class Engine(Protocol):
 class Own:
     """Palpate's laws."""
 
+    def __init__(self) -> None:
+        self._tick = Bound(compiled_tick)
+
     def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
         """See `Engine`."""
-        after: Touch = compiled_tick(cell, body, touch, setpoint, k, noise)
+        after: Touch = self._tick(cell, body, touch, setpoint, k, noise)
         return after
 
 
@@ -53,7 +57,7 @@ class ByMuJoCo:
         from palpate.robots.serial._extra import mujoco
         from palpate.robots.serial.to_mujoco import scene_of
 
-        self._engine = mujoco()
+        self._engine, self._step = mujoco(), Bound(compiled_foreign)
         scene = scene_of(arm)
         model = copy(scene.model)
         flags = self._engine.mjtDisableBit
@@ -79,7 +83,7 @@ class ByMuJoCo:
                 self._engine.mj_step1(self._model, data)
                 tip = self._filled(body)
                 time = (k * cell.steps + j + 1) * cell.step
-                touch = compiled_foreign(cell, body, touch, tip, setpoint, time, noise)
+                touch = self._step(cell, body, touch, tip, setpoint, time, noise)
                 data.qfrc_applied[dofs] = body.drive - body.normal * max(touch.force, 0.0)
                 self._engine.mj_step2(self._model, data)
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]

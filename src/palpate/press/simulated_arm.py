@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate._jit import Bound
 from palpate._vector import ZERO3, Mat3, Vec3, Vec6
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
@@ -17,9 +18,10 @@ from palpate.press.cell import Cell, Reading, Touch, body_at
 from palpate.press.engines import ByMuJoCo, Engine, Own
 from palpate.press.setting import Place
 from palpate.press.tip_control import Spring, compiled_tip_torque
-from palpate.robots.serial.chain import room_for
+from palpate.robots.serial.described import compiled_description, found_for
 from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate.robots.serial.task import task_room_for
 from palpate.signals.types import Task
 from palpate.wires import Command, Sense
 
@@ -195,8 +197,9 @@ class _TipLoop:
         self._chain, self._axes = arm.chain, place.axes
         self._rows, self._held = _matrix(place.axes), _matrix(place.pose[:3, :3])
         n = arm.joints
-        self._room = room_for(n), np.zeros((n, n)), np.zeros((7, n))
+        self._found, self._room = found_for(n), task_room_for(n)
         self._states: dict[type, Any] = {}
+        self._laws: dict[type, Bound] = {}
         self._n = n
 
     def towards(self, goal: Array) -> Task:
@@ -208,13 +211,14 @@ class _TipLoop:
     def torque(self, controller: Any, task: Task, q: Array, qd: Array, force: float) -> Array:
         """Of the joints [N m], shape (n,)."""
         kind = type(controller)
-        state = self._states.get(kind)
-        if state is None:
-            state = controller.start()
+        if kind not in self._states:
+            self._states[kind], self._laws[kind] = controller.start(), Bound(compiled_tip_torque)
+        state = self._states[kind]
         torque = np.zeros(self._n)
-        self._states[kind], _ = compiled_tip_torque(
-            self._chain, self._rows, self._held, controller, state, float(force), task, _SPARE, q, qd,
-            *self._room, torque,
+        compiled_description(self._chain, q, qd, self._found)
+        self._states[kind] = self._laws[kind](
+            self._rows, self._held, controller, state, float(force), task, _SPARE, q, qd, self._found,
+            self._room, torque,
         )  # fmt: skip
         return torque
 

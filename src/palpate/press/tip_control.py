@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from palpate._jit import kernel, law
 from palpate._vector import Vec3, Vec6
 from palpate.controllers.controller import controller
-from palpate.robots.serial.chain import chain_model
-from palpate.robots.serial.linear import factorise
+from palpate.robots.serial.described import tip_of
 from palpate.robots.serial.task import into, joint_torque, task_model
 from palpate.signals.types import Sense
 
@@ -42,11 +41,10 @@ def half_turn(R):
 
 
 @law
-def tip_torque(chain, axes, held, control, state, force, task, damping, q, qd, room, L, W, torque):
-    """Fills the joints' torques from encoders and force reading: the controller's state and the tip in task axes.
+def tip_torque(axes, held, control, state, force, task, damping, q, qd, found, own, torque):
+    """Fills the joints' torques from encoders and force reading: the controller's state.
 
     Args:
-        chain: the arm as the controller knows it.
         axes: of the task, in rows; the first is the surface's normal.
         held: axes of the tip when it stands as it should, in columns.
         control: in six directions.
@@ -56,18 +54,18 @@ def tip_torque(chain, axes, held, control, state, force, task, damping, q, qd, r
         damping: of joints to spare [1/s].
         q: measured [rad, m], shape (n,).
         qd: measured, shape (n,).
-        room, L, W: room for the laws.
+        found: what `described` says of these.
+        own: room for the laws.
         torque: where it goes, shape (n,).
     """
-    tip = chain_model(chain, q, qd, room)
-    factorise(room.M, L)
-    model = task_model(axes, L, room, tip, W)
+    room, tip = found.room, tip_of(found, qd)
+    model = task_model(axes, room, tip, own)
     x = into(axes, tip.p, half_turn(tip.R @ held.T))
     wrench = Vec6(Vec3(force, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
     sense = Sense(q, qd, x, into(axes, tip.v, tip.w), wrench)
     F, state = control.step(state, sense, task, model)
-    joint_torque(axes, L, room, model, W, F, damping, qd, torque)
-    return state, x
+    joint_torque(axes, room, model, own, F, damping, qd, torque)
+    return state
 
 
 compiled_tip_torque = kernel(tip_torque)

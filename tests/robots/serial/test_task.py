@@ -15,8 +15,7 @@ from palpate.controllers import (
 )
 from palpate.robots import SerialArm
 from palpate.robots.serial.chain import chain_model, room_for
-from palpate.robots.serial.linear import factorise
-from palpate.robots.serial.task import joint_torque, task_model
+from palpate.robots.serial.task import joint_torque, task_model, task_room_for
 from palpate.signals.types import Sense, Task
 
 
@@ -36,15 +35,14 @@ MAKERS = {
 DAMPING = 3.0
 
 
-def walk(chain, axes, controller, sense, task, q, qd, room, L, W, torques):
+def walk(chain, axes, controller, sense, task, q, qd, room, own, torques):
     """Some ticks under the same senses: the joints' torque at each, the wrench after it."""
     tip = chain_model(chain, q, qd, room)
-    factorise(room.M, L)
     state = controller.start()
     for k in range(len(torques)):
-        model = task_model(axes, L, room, tip, W)
+        model = task_model(axes, room, tip, own)
         F, state = controller.step(state, sense, task, model)
-        joint_torque(axes, L, room, model, W, F, DAMPING, qd, torques[k])
+        joint_torque(axes, room, model, own, F, DAMPING, qd, torques[k])
 
 
 compiled_walk = kernel(walk)
@@ -73,7 +71,7 @@ def by_value(arm, axes, sense, task, q, qd):
 
 def room(arm, ticks=3):
     n = arm.joints
-    return room_for(n), np.zeros((n, n)), np.zeros((7, n)), np.zeros((ticks, n))
+    return room_for(n), task_room_for(n), np.zeros((ticks, n))
 
 
 def told(arm, axes, q, qd):

@@ -19,6 +19,7 @@ from palpate.robots.serial.spatial import (
     cross,
     inertia_at,
     momentum_rate,
+    turned,
     turned_about_z,
 )
 
@@ -163,7 +164,7 @@ def outward(chain, q, qd, room):
         step = qd[i] * s
         A = A + V.carries(step)
         V = V + step
-        moment = R @ matrix_at(chain.inertia, i) @ R.T
+        moment = turned(R, matrix_at(chain.inertia, i))
         X = inertia_at(chain.mass[i], p + R @ vector_at(chain.com, i), moment)
         load = X.momentum(A) + momentum_rate(V, X.momentum(V))
         put_pair(room.axes, i, s.w, s.v)

@@ -1,4 +1,7 @@
-"""Positive definite systems of any small size, in place: no array is made inside a loop."""
+"""Positive definite systems of any small size, in place: no array is made inside a loop.
+
+The factor's diagonal holds reciprocals, so that solving divides by nothing.
+"""
 
 from palpate._jit import law
 from palpate._vector import sqrt
@@ -6,14 +9,19 @@ from palpate._vector import sqrt
 
 @law
 def factorise(A, L):
-    """Fills the lower triangle of L with that of A = L L^T, shape (n, n)."""
+    """Fills the lower triangle of L with that of A = L L^T, its diagonal inverted, shape (n, n)."""
     n = len(A)
-    for i in range(n):
-        for j in range(i + 1):
+    for j in range(n):
+        total = A[j, j]
+        for k in range(j):
+            total -= L[j, k] * L[j, k]
+        share = 1.0 / sqrt(total)
+        L[j, j] = share
+        for i in range(j + 1, n):
             total = A[i, j]
             for k in range(j):
                 total -= L[i, k] * L[j, k]
-            L[i, j] = sqrt(total) if i == j else total / L[j, j]
+            L[i, j] = share * total
 
 
 @law
@@ -23,7 +31,7 @@ def forward(L, b):
         total = b[i]
         for k in range(i):
             total -= L[i, k] * b[k]
-        b[i] = total / L[i, i]
+        b[i] = total * L[i, i]
 
 
 @law
@@ -32,7 +40,6 @@ def backward(L, b):
     n = len(b)
     for back in range(n):
         i = n - 1 - back
-        total = b[i]
-        for k in range(i + 1, n):
-            total -= L[k, i] * b[k]
-        b[i] = total / L[i, i]
+        b[i] *= L[i, i]
+        for k in range(i):
+            b[k] -= L[i, k] * b[i]

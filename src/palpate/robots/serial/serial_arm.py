@@ -4,43 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palpate._jit import kernel, law, part
 from palpate.errors import InputError
-from palpate.robots.serial.chain import Chain, Room, chain_model, jacobian_rate, room_for
+from palpate.robots.serial.chain import Chain
+from palpate.robots.serial.described import Found, compiled_description, found_for
 
 Array = NDArray[np.float64]
-
-
-@part
-class Found(NamedTuple):
-    """What the laws say of one state, in arrays."""
-
-    room: Room
-    Jdot: Array  # shape (6, n)
-    Jdqd: Array  # shape (6,)
-    pose: Array  # shape (4, 4)
-
-
-@law
-def described(chain, q, qd, found):
-    """Fills everything that is known of one state."""
-    tip = chain_model(chain, q, qd, found.room)
-    jacobian_rate(qd, found.room, tip, found.Jdot)
-    bias, pose = found.Jdqd, found.pose
-    bias[0], bias[1], bias[2] = tip.a.x, tip.a.y, tip.a.z
-    bias[3], bias[4], bias[5] = tip.dw.x, tip.dw.y, tip.dw.z
-    R = tip.R
-    pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3] = R.r1.x, R.r1.y, R.r1.z, tip.p.x
-    pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3] = R.r2.x, R.r2.y, R.r2.z, tip.p.y
-    pose[2, 0], pose[2, 1], pose[2, 2], pose[2, 3] = R.r3.x, R.r3.y, R.r3.z, tip.p.z
-
-
-compiled_description = kernel(described)
 
 
 @dataclass(frozen=True)
@@ -254,7 +227,7 @@ class SerialArm:
 
     def _found(self, q: ArrayLike, qd: ArrayLike | None = None) -> Found:
         rates = np.zeros(self.joints) if qd is None else self._checked(qd, "qd")
-        found = Found(room_for(self.joints), np.zeros((6, self.joints)), np.zeros(6), np.eye(4))
+        found = found_for(self.joints)
         compiled_description(self.chain, self._checked(q, "q"), rates, found)
         return found
 

@@ -18,6 +18,14 @@ def cross(a, b):
 
 
 @law
+def turned(R, S):
+    """R S R^T of a symmetric S, symmetric to the last bit."""
+    A = R @ S
+    xy, xz, yz = A.r1 @ R.r2, A.r1 @ R.r3, A.r2 @ R.r3
+    return Mat3(Vec3(A.r1 @ R.r1, xy, xz), Vec3(xy, A.r2 @ R.r2, yz), Vec3(xz, yz, A.r3 @ R.r3))
+
+
+@law
 def turned_about_z(R, angle):
     """R Rz(angle)."""
     c, s = cos(angle), sin(angle)

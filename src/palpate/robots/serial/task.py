@@ -10,9 +10,14 @@ of which the second part moves joints to spare and not the tip.
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from palpate._jit import law, part
-from palpate._vector import Mat3, Vec3, Vec6, solve
-from palpate.robots.serial.linear import backward, forward
+from palpate._vector import Vec3, Vec6
+from palpate.robots.serial.linear import backward, factorise, forward
+
+Array = NDArray[np.float64]
 
 
 @part
@@ -40,19 +45,23 @@ class Identity(NamedTuple):
 
 @part
 class ApparentInertia(NamedTuple):
-    """(J M^-1 J^T)^-1, held as what it is the inverse of: [[P, Q], [Q^T, R]]."""
+    """(J M^-1 J^T)^-1, held as the factor of what it is the inverse of.
 
-    P: Mat3
-    Q: Mat3
-    R: Mat3
+    Args:
+        L: of J M^-1 J^T = L L^T, shape (6, 6).
+        six: room, shape (6,).
+    """
+
+    L: Array
+    six: Array
 
     def on(A, b):
-        """By blocks: first the rotation's share, seen through the translation's."""
-        w = solve(A.P, b.lin)
-        columns = A.Q.T
-        X = Mat3(solve(A.P, columns.r1), solve(A.P, columns.r2), solve(A.P, columns.r3)).T
-        y = solve(A.R - A.Q.T @ X, b.ang - A.Q.T @ w)
-        return Vec6(w - X @ y, y)
+        """The wrench that gives the acceleration b."""
+        y = A.six
+        y[0], y[1], y[2], y[3], y[4], y[5] = b.lin.x, b.lin.y, b.lin.z, b.ang.x, b.ang.y, b.ang.z
+        forward(A.L, y)
+        backward(A.L, y)
+        return Vec6(Vec3(y[0], y[1], y[2]), Vec3(y[3], y[4], y[5]))
 
     def __matmul__(A, b):
         return A.on(b)
@@ -91,26 +100,45 @@ def put_six(a, i, v):
     a[3, i], a[4, i], a[5, i] = v.ang.x, v.ang.y, v.ang.z
 
 
+@part
+class TaskRoom(NamedTuple):
+    """Where the laws of this file put what they find; `task_room_for` makes it."""
+
+    L: Array  # of M = L L^T, shape (n, n)
+    W: Array  # J in the task's axes, then L^-1 J^T in rows; the last row is L^-1 h, shape (7, n)
+    mobility: Array  # J M^-1 J^T, shape (6, 6)
+    factor: Array  # of that, shape (6, 6)
+    six: Array  # shape (6,)
+
+
+def task_room_for(n: int) -> TaskRoom:
+    """Room for an arm of n joints."""
+    return TaskRoom(np.zeros((n, n)), np.zeros((7, n)), np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6))
+
+
 @law
-def task_model(axes, L, room, tip, W):
+def task_model(axes, room, tip, own):
     """The arm in the task's axes.
 
     Args:
         axes: of the task, in rows.
-        L: of M = L L^T, shape (n, n).
         room: filled by `chain_model`.
         tip: of the same.
-        W: room for J in the task's axes, then L^-1 J^T in rows, shape (7, n): the last row is L^-1 h.
+        own: a `TaskRoom`.
     """
-    n = len(room.h)
-    for i in range(n):
-        put_six(W, i, column_in(axes, room.J, i))
-        W[6, i] = room.h[i]
+    factorise(room.M, own.L)
+    for i in range(len(room.h)):
+        put_six(own.W, i, column_in(axes, room.J, i))
+        own.W[6, i] = room.h[i]
     for k in range(7):
-        forward(L, W[k])
-    A = ApparentInertia(block(W, 0, 0), block(W, 0, 3), block(W, 3, 3))
-    bias = Vec6(products(W, 0, 6), products(W, 3, 6))
-    return TaskModel(Identity(1.0), into(axes, tip.a, tip.dw), A, A @ bias)
+        forward(own.L, own.W[k])
+    for i in range(6):
+        for k in range(i + 1):
+            own.mobility[i, k] = product(own.W, i, k)
+    factorise(own.mobility, own.factor)
+    inertia = ApparentInertia(own.factor, own.six)
+    Jdqd = into(axes, tip.a, tip.dw)
+    return TaskModel(Identity(1.0), Jdqd, inertia, inertia @ passed(own))
 
 
 @law
@@ -123,51 +151,35 @@ def product(W, i, j):
 
 
 @law
-def products(W, i, j):
-    """Of three rows from i on with row j."""
-    return Vec3(product(W, i, j), product(W, i + 1, j), product(W, i + 2, j))
+def passed(own):
+    """Task acceleration that the torque of the last row gives, J M^-1 tau."""
+    y = own.six
+    for i in range(6):
+        y[i] = product(own.W, i, 6)
+    return Vec6(Vec3(y[0], y[1], y[2]), Vec3(y[3], y[4], y[5]))
 
 
 @law
-def block(W, i, j):
-    """Of three rows from i on with three from j on."""
-    return Mat3(products(W, j, i), products(W, j, i + 1), products(W, j, i + 2))
-
-
-@law
-def joint_torque(axes, L, room, model, W, F, damping, qd, torque):
+def joint_torque(axes, room, model, own, F, damping, qd, torque):
     """Fills `torque` [N m], shape (n,): J^T F, and joints to spare held against gravity and slowed down.
 
     Args:
         axes: of the task, in rows.
-        L: of M = L L^T.
         room: filled by `chain_model`.
         model: `task_model` of it.
-        W: as that left it.
+        own: as that left it.
         F: the controller's wrench in the task's axes [N, N m].
         damping: of the joints to spare, M times this and their rates [1/s].
         qd: joint rates, shape (n,).
         torque: where it goes.
     """
-    n = len(torque)
+    n, last = len(torque), own.W[6]
     for i in range(n):
         torque[i] = room.h[i]
         for k in range(n):
             torque[i] -= damping * (room.M[i, k] * qd[k])
-    y = W[6]
-    for i in range(n):
-        y[i] = torque[i]
-    forward(L, y)
-    spare = Vec6(products(W, 0, 6), products(W, 3, 6))  # J M^-1 tau_0
-    wrench = F - model.M @ spare
+        last[i] = torque[i]
+    forward(own.L, last)
+    wrench = F - model.M @ passed(own)
     for i in range(n):
         torque[i] += wrench @ column_in(axes, room.J, i)
-
-
-@law
-def accelerations(L, room, torque, qdd):
-    """Fills qdd = M^-1 (torque - h), shape (n,)."""
-    for i in range(len(torque)):
-        qdd[i] = torque[i] - room.h[i]
-    forward(L, qdd)
-    backward(L, qdd)
