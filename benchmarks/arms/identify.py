@@ -51,7 +51,9 @@ def main() -> None:
     if words.markdown:
         text = words.markdown.read_text(encoding="utf-8")
         body = f"{MARKS[0]}\n\n" + "\n".join(lines) + f"\n\n{MARKS[1]}"
-        new, count = re.subn(re.escape(MARKS[0]) + ".*?" + re.escape(MARKS[1]), lambda _: body, text, flags=re.DOTALL)
+        new, count = re.subn(
+            re.escape(MARKS[0]) + ".*?" + re.escape(MARKS[1]), lambda _: body, text, flags=re.DOTALL
+        )
         assert count == 1, f"{words.markdown} has no marks for the table"
         words.markdown.write_text(new, encoding="utf-8")
 

@@ -1,7 +1,7 @@
 """What a step of an arm before a surface costs: palpate's own laws, and MuJoCo's `mj_step`, both from compiled code.
 
-MuJoCo's step is called by its address from a Numba loop, so that nothing of Python is in it. It is measured with the arm
-alone, without shapes or contact, and with a small ball at the tip that rests on a plane, which is what a press needs.
+MuJoCo's step is called by its address from a Numba loop, so that nothing of Python is in it. It is measured with the
+arm alone, without shapes or contact, and with a small ball at the tip that rests on a plane, which a press needs.
 Palpate's step has the surface, its contact and the force sensor in it.
 """
 

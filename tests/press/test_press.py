@@ -43,7 +43,9 @@ def test_it_presses_with_the_force_asked_for_and_finds_the_surface(arm, mode, st
     assert np.abs(record["y"] - record["y"][0]).max() < 1e-3
 
 
-@pytest.mark.parametrize("controller", ["hybrid", pytest.param("proportional-integral", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "controller", ["hybrid", pytest.param("proportional-integral", marks=pytest.mark.long)]
+)
 def test_controllers_of_three_directions_press_with_seven_joints(controller):
     """Nothing of them was changed; damping of the surface is all that damps them, as on the bench."""
     _, summary = asked(controller=controller, arm="iiwa14", seconds=4.0)
@@ -158,10 +160,9 @@ def test_what_is_wrong_is_one_line(words, what, tmp_path, capsys, monkeypatch):
 
 
 def test_a_singular_pose_says_by_how_much(tmp_path, capsys):
-    text = (
-        "title = 'Straight'\nhome = [0.0, -1.2, 0.0, 0.3, 0.4, 0.0]\n"
-        + (names_file("ur5e")).split("\n", 6)[-1].split("flange", 1)[1].join(["flange", ""])
-    )
+    text = "title = 'Straight'\nhome = [0.0, -1.2, 0.0, 0.3, 0.4, 0.0]\n" + (names_file("ur5e")).split(
+        "\n", 6
+    )[-1].split("flange", 1)[1].join(["flange", ""])
     path = tmp_path / "straight.toml"
     path.write_text(text)
     code = main(["press", "--arm", str(path), *PLAIN[3:], "--out", str(tmp_path / "out")])
@@ -180,7 +181,9 @@ def names_file(name):
 def test_too_few_joints(tmp_path, capsys):
     from robots.serial.oracles import URDF
 
-    assert main(["press", "--arm", str(URDF), "--site", "probe", *PLAIN[3:], "--out", str(tmp_path / "o")]) == 2
+    assert (
+        main(["press", "--arm", str(URDF), "--site", "probe", *PLAIN[3:], "--out", str(tmp_path / "o")]) == 2
+    )
     assert "has 4 joints" in capsys.readouterr().err
 
 

@@ -115,7 +115,9 @@ def _record(screen: Console, pressing: Pressing, interrupted: Callable[[], bool]
 
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as progress:
-        bar = progress.add_task("starting (the first time it compiles, which takes some seconds)", total=None, time="")
+        bar = progress.add_task(
+            "starting (the first time it compiles, which takes some seconds)", total=None, time=""
+        )
 
         def show(time: float, phase: str) -> None:
             if interrupted():
@@ -148,7 +150,9 @@ def _tell(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bo
         print_json(summary)
         return
     screen = console()
-    head(screen, pressing.asked.arm.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
+    head(
+        screen, pressing.asked.arm.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    )
     for content in tables(summary):
         show_table(screen, content)
     for note in notes(summary):

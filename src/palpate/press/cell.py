@@ -12,7 +12,7 @@ from palpate._jit import kernel, law, part
 from palpate._vector import Mat3, Vec3
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
-from palpate.robots.serial.chain import Chain, Room, Tip, chain_model, room_for
+from palpate.robots.serial.chain import Chain, Room, chain_model, room_for
 from palpate.robots.serial.linear import backward, factorise, forward
 
 Array = NDArray[np.float64]

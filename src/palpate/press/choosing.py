@@ -182,18 +182,23 @@ def _gains(question: Question, arm: SerialArm, place: Place) -> Gains:
     mode = question.mode or usual_mode(question.arm)
     if question.controller != CAUTIOUS and question.mode is None:
         mode = "torque"
-    return gains_for(loop_of(question.arm, arm.title, mode, place.mass), question.force * (1.0 - question.probe))
+    return gains_for(
+        loop_of(question.arm, arm.title, mode, place.mass), question.force * (1.0 - question.probe)
+    )
 
 
 def _check_force(question: Question, gains: Gains) -> None:
     least, most = 8.0 * gains.arm.sensor.noise, gains.force_limit
-    if not least <= question.force * (1.0 - question.probe):
+    lowest = question.force * (1.0 - question.probe)
+    if not least <= lowest:
         raise InputError(
-            f"--force {question.force:g}, lowered by the probe to {question.force * (1.0 - question.probe):g} N, is below "
-            f"{least:g} N, 8 standard deviations of the sensor's noise; ask for more, or for a smaller --probe"
+            f"--force {question.force:g}, lowered by the probe to {lowest:g} N, is below {least:g} N, 8 "
+            "standard deviations of the sensor's noise; ask for more, or for a smaller --probe"
         )
     if question.force >= most:
-        raise InputError(f"--force {question.force:g} N is not below the force limit of {most:g} N; ask for less")
+        raise InputError(
+            f"--force {question.force:g} N is not below the force limit of {most:g} N; ask for less"
+        )
     total = question.surface.stiffness + question.surface.damping / gains.theta
     if total > gains.cap:
         raise InputError(
@@ -204,7 +209,9 @@ def _check_force(question: Question, gains: Gains) -> None:
 
 def _engine_notes(question: Question, arm: SerialArm) -> list[str]:
     if question.physics == "mujoco" and arm.scene is not None:
-        return ["motors and contacts of the model itself are off: torques are the controller's, the surface is --surface"]
+        return [
+            "motors and contacts of the model itself are off: torques are the controller's, the surface is --surface"
+        ]
     return []
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +67,8 @@ def check_mode(gains: Gains, mode: str | None) -> str:
     """
     if mode is not None and gains.arm.kind != mode:
         raise InputError(
-            f"these gains are for a {gains.arm.kind} arm, and --mode says {mode}; leave --mode out, or tune for the other"
+            f"these gains are for a {gains.arm.kind} arm, and --mode says {mode}; "
+            "leave --mode out, or tune for the other"
         )
     return gains.arm.kind
 
@@ -76,5 +76,3 @@ def check_mode(gains: Gains, mode: str | None) -> str:
 def series_of(arm: Arm) -> float | None:
     """Stiffness between the encoders and the surface [N/m]; None where the encoders sit on the links."""
     return arm.inner.stiffness if isinstance(arm.inner, PositionLoop) else None
-
-

@@ -26,7 +26,7 @@ CONTROLLERS = (CAUTIOUS, "hybrid", "proportional-integral", "impedance")
 _POSITION, _RATE = 400.0, 40.0
 """K_pp [1/s^2] and K_pv [1/s] of the directions that hold their place: 3 Hz, critically damped."""
 _BANDWIDTH = 0.25
-"""Of the proportional-integral controller [Hz]: of a surface of 50 N s/m and a tip of 6 kg a sixth of what they bear."""
+"""Of the proportional-integral controller [Hz]: a fifth of B/m, what a surface of 50 N s/m and a tip of 6 kg bear."""
 _GIVING = 2000.0
 """Stiffness of the impedance [N/m]."""
 
@@ -104,7 +104,7 @@ class ByTorque:
         if name == "impedance":
             mass = _six(self._arm.loop.inner.mass)  # type: ignore[union-attr]
             damping = 1.4 * float(np.sqrt(_GIVING * self._arm.loop.inner.mass))  # type: ignore[union-attr]
-            target = Vec6(Vec3(surface + force / _GIVING, self._at.y, self._at.z), ZERO3)
+            target: Any = Vec6(Vec3(surface + force / _GIVING, self._at.y, self._at.z), ZERO3)
             return Impedance(mass, _six(damping), _six(_GIVING), target)
         raise unknown("controller", name, CONTROLLERS)
 
@@ -119,12 +119,13 @@ class ByTorque:
             self._phase = CONTACT
         nothing = _six(0.0)
         if self._phase == CONTACT:
-            s = Vec6(Vec3(1.0, 0.0, 0.0), ZERO3)
-            self._arm.act(self._controller, Task(Vec6(self._at, ZERO3), nothing, nothing, desired * s, s))
+            at: Any = Vec6(self._at, ZERO3)
+            s: Any = Vec6(Vec3(1.0, 0.0, 0.0), ZERO3)
+            self._arm.act(self._controller, Task(at, nothing, nothing, desired * s, s))
             return Acted(CONTACT, 0.0, 0.0)
         self._gone += self._arm.loop.tick * self._speed
-        x = Vec6(self._at + Vec3(self._gone, 0.0, 0.0), ZERO3)
-        xd = Vec6(Vec3(self._speed, 0.0, 0.0), ZERO3)
+        x: Any = Vec6(self._at + Vec3(self._gone, 0.0, 0.0), ZERO3)
+        xd: Any = Vec6(Vec3(self._speed, 0.0, 0.0), ZERO3)
         self._arm.act(self._approach, Task(x, xd, nothing, nothing, nothing))
         return Acted(self._phase, self._speed, 0.0)
 
@@ -144,6 +145,7 @@ def pilot_of(name: str, arm: SimulatedArm, gains: Gains, place: Place, force: fl
     return ByTorque(arm, place, name, gains.approach, 8.0 * gains.arm.sensor.noise, force)
 
 
-def _six(value: float) -> Vec6:
+def _six(value: float) -> Any:
+    """The same number in six directions; the types of tasks and controllers name those of three."""
     one = Vec3(float(value), float(value), float(value))
     return Vec6(one, one)

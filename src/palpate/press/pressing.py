@@ -167,7 +167,9 @@ def _judged(
     q, robot = row[2 : 2 + arm.arm.joints], arm.arm
     beyond = np.flatnonzero((q < robot.lower) | (q > robot.upper))
     if len(beyond):
-        return Ending(JOINT_LIMIT, f"{robot.names[beyond[0]]} reached the end of its range at {k * tick:.3f} s")
+        return Ending(
+            JOINT_LIMIT, f"{robot.names[beyond[0]]} reached the end of its range at {k * tick:.3f} s"
+        )
     if touched is None:
         late = (k + 1) * tick >= plan.longest
         return Ending(NO_CONTACT, f"no surface was felt within {plan.longest:.3g} s") if late else None

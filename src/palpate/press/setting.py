@@ -24,7 +24,7 @@ GAP = 0.003
 _STEP = 5e-4
 """Longest step of the physics [s]."""
 _RESOLVED = 0.5
-"""Most that a step may be of the fastest spring's radian: half is an eighth of where the integration would diverge^2."""
+"""Radians of the fastest spring in a step, at most: a quarter of where semi-implicit Euler would diverge."""
 _STRUCTURE = 0.05
 """Damping ratio of a drive train's own spring, typical of strain-wave gears."""
 
@@ -99,7 +99,7 @@ def check_able(arm: SerialArm, place: Place, speed: float, force: float) -> list
             force, beside the arm's own weight, is more than a motor gives.
     """
     J = arm.jacobian(place.q)
-    U, s, V = np.linalg.svd(J)
+    _, s, V = np.linalg.svd(J)
     known = np.isfinite(arm.speed)
     most = float(arm.speed[known].min()) if known.any() else 1.0
     least = speed / most
@@ -114,10 +114,11 @@ def check_able(arm: SerialArm, place: Place, speed: float, force: float) -> list
     quick = 0.25 / most
     if s[-1] > quick:
         return []
-    return [
-        f"the pose is not far from a singular one: the smallest singular value of the Jacobian is {s[-1]:.3g}, of which "
-        f"{joint} has the largest share"
-    ]
+    note = (
+        f"the pose is not far from a singular one: the smallest singular value of the Jacobian is {s[-1]:.3g}, of "
+        f"which {joint} has the largest share"
+    )
+    return [note]
 
 
 def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None:

@@ -204,7 +204,7 @@ class _TipLoop:
 
     def towards(self, goal: Array) -> Task:
         """The task of standing at a pose; the tip keeps its turn."""
-        x = Vec6(Vec3(*(float(v) for v in self._axes @ goal[:3, 3])), ZERO3)
+        x: Any = Vec6(Vec3(*(float(v) for v in self._axes @ goal[:3, 3])), ZERO3)
         nothing = 0.0 * x
         return Task(x, nothing, nothing, nothing, nothing)
 

@@ -47,7 +47,8 @@ class Asked:
     def meta(self, record: Record) -> dict[str, Any]:
         """What the record carries along, plain values."""
         loop = self.gains.arm
-        truth = {name: {"value": value, "unit": unit} for name, (value, unit) in self.surface.truth().items()}
+        known: dict[str, tuple[float, str]] = self.surface.truth()  # type: ignore[no-untyped-call]
+        truth = {name: {"value": value, "unit": unit} for name, (value, unit) in known.items()}
         return {
             "seed": self.seed,
             "truth": truth,
@@ -100,7 +101,9 @@ def summarise(record: Record, asked: Asked) -> dict[str, Any]:
         last = pressing & (t > t[pressing][-1] - WINDOW)
         summary["force"] = force_figures(record, pressing, last)
         start = [record[name][0] for name in ("y", "z")]
-        moved = [float(np.mean(record[name][last])) - zero for name, zero in zip(("y", "z"), start, strict=True)]
+        moved = [
+            float(np.mean(record[name][last])) - zero for name, zero in zip(("y", "z"), start, strict=True)
+        ]
         summary["tip"] = {"slipped_mm": 1e3 * float(np.hypot(*moved))}
         summary["identified"] = identified(record, asked)
     return summary

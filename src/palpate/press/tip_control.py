@@ -62,7 +62,7 @@ def tip_torque(axes, held, control, state, force, task, damping, q, qd, found, o
     model = task_model(axes, room, tip, own)
     x = into(axes, tip.p, half_turn(tip.R @ held.T))
     wrench = Vec6(Vec3(force, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
-    sense = Sense(q, qd, x, into(axes, tip.v, tip.w), wrench)
+    sense = Sense(q, qd, x, into(axes, tip.v, tip.w), wrench)  # type: ignore[arg-type]
     F, state = control.step(state, sense, task, model)
     joint_torque(axes, room, model, own, F, damping, qd, torque)
     return state

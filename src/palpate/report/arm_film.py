@@ -36,6 +36,12 @@ stroke-linejoin:round;stroke-linecap:round} .joint{fill:var(--ground);stroke:var
 """
 
 
+_MARKER = (
+    '<marker id="joint" markerWidth="3" markerHeight="3" refX="1.5" refY="1.5">'
+    '<circle class="joint" cx="1.5" cy="1.5" r="0.55" stroke-width="0.22"/></marker>'
+)
+
+
 @dataclass(frozen=True)
 class _View:
     """Where a point of the base's axes is drawn."""
@@ -62,9 +68,8 @@ def film(record: Record, arm: SerialArm, place: Place) -> str:
     seconds = float(record["t"][rows[-1]] - record["t"][rows[0]])
     q = np.column_stack([record[f"q{i}"] for i in range(1, arm.joints + 1)])[rows]
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDE:g} {_HIGH:g}" role="img" '
-        'aria-label="The arm as it touches and presses">',
-        "<!-- Made by palpate -->".join(("\n", "\n")),
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDE:g} {_HIGH:g}">',
+        "<!-- Made by palpate -->",
         f"<style>{_STYLE}</style>",
         *_arm_panel(arm, place, q, seconds),
         *_tip_panel(record, rows, seconds),
@@ -88,14 +93,14 @@ def _arm_panel(arm: SerialArm, place: Place, q: Array, seconds: float) -> list[s
     view = _view_of(np.vstack([bones[0], bones[-1], patch]))
     ground = [np.column_stack([b[:, :2], 0.0 * b[:, 2]]) for b in bones[:1]]
     seen = [view(b) for b in bones]
+    moving = _animated("points", [_points(s) for s in seen], seconds)
     return [
         f'<polygon class="surface" points="{_points(view(patch))}" fill-opacity="0.55"/>',
         f'<polyline class="shadow" points="{_points(view(ground[0]))}"/>',
-        '<marker id="joint" markerWidth="3" markerHeight="3" refX="1.5" refY="1.5">'
-        '<circle class="joint" cx="1.5" cy="1.5" r="0.55" stroke-width="0.22"/></marker>',
-        f'<polyline class="arm" marker-start="url(#joint)" marker-mid="url(#joint)" points="{_points(seen[0])}">'
-        f"{_animated('points', [_points(s) for s in seen], seconds)}</polyline>",
-        f'<text x="{_ARM[0]:g}" y="{_HIGH - 8:g}">the arm, to scale</text>',
+        _MARKER,
+        '<polyline class="arm" marker-start="url(#joint)" marker-mid="url(#joint)" ',
+        f'points="{_points(seen[0])}">{moving}</polyline>',
+        _text(_ARM[0], _HIGH - 8, "the arm, to scale"),
     ]
 
 
@@ -107,11 +112,13 @@ def _tip_panel(record: Record, rows: NDArray[np.intp], seconds: float) -> list[s
     middle, y0, scale = left + 0.5 * width, top + 0.45 * height, 0.4 * height / most
     places = y0 + scale * depth
     dents = [_dent(left, width, y0, max(float(p) - y0, 0.0), top + height) for p in places]
-    probes = [f"{middle - 26:.1f},{p - 60:.1f} {middle:.1f},{p:.1f} {middle + 26:.1f},{p - 60:.1f}" for p in places]
+    probes = [
+        f"{middle - 26:.1f},{p - 60:.1f} {middle:.1f},{p:.1f} {middle + 26:.1f},{p - 60:.1f}" for p in places
+    ]
     return [
         f'<polygon class="surface" points="{dents[0]}">{_animated("points", dents, seconds)}</polygon>',
         f'<polygon class="probe" points="{probes[0]}">{_animated("points", probes, seconds)}</polygon>',
-        f'<text x="{left:g}" y="{top + height + 18:g}">the tip: its deepest is {1e3 * float(depth.max()):.3g} mm</text>',
+        _text(left, top + height + 18, f"the tip; its deepest is {1e3 * float(depth.max()):.3g} mm"),
     ]
 
 
@@ -129,16 +136,21 @@ def _force_panel(record: Record, rows: NDArray[np.intp], seconds: float) -> list
     x = left + width * (t - t[0]) / max(seconds, 1e-9)
     line = np.column_stack([x, top + height * (1.0 - force / most)])
     asked = np.column_stack([x, top + height * (1.0 - want / most)])
-    places = [f"{v:.1f}" for v in line[:, 0]], [f"{v:.1f}" for v in line[:, 1]]
+    across, along = (
+        _animated(name, [f"{v:.1f}" for v in values], seconds)
+        for name, values in zip(("cx", "cy"), line.T, strict=True)
+    )
     return [
         f'<path class="flat" d="M{left:g} {top + height:g}h{width:g}"/>',
         f'<polyline class="want" points="{_points(asked)}"/>',
         f'<polyline class="force" points="{_points(line)}"/>',
-        f'<circle class="dot" r="5" cx="{places[0][0]}" cy="{places[1][0]}">{_animated("cx", places[0], seconds)}'
-        f"{_animated('cy', places[1], seconds)}</circle>",
-        f'<text x="{left:g}" y="{top - 8:g}">force on the surface, up to {float(force.max()):.3g} N, over '
-        f"{seconds:.3g} s; asked for in the other colour</text>",
+        f'<circle class="dot" r="5" cx="{x[0]:.1f}" cy="{line[0, 1]:.1f}">{across}{along}</circle>',
+        _text(left, top - 8, f"force and desired force, up to {float(force.max()):.3g} N in {seconds:.3g} s"),
     ]
+
+
+def _text(x: float, y: float, words: str) -> str:
+    return f'<text x="{x:g}" y="{y:g}">{words}</text>'
 
 
 def _animated(name: str, values: Sequence[str], seconds: float) -> str:
