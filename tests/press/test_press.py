@@ -195,5 +195,43 @@ def test_without_mujoco_the_extra_is_named(monkeypatch, capsys, tmp_path):
 
 def test_a_force_that_the_motors_cannot_give():
     pressing = prepared(question(arm="panda"))
-    with pytest.raises(InputError, match=r"takes \d+ N m of joint\d, which gives"):
+    with pytest.raises(InputError, match=r"takes \S+ N m of joint\d, which gives"):
         check_able(pressing.asked.arm, pressing.asked.place, 0.003, 1000.0)
+
+
+#: A user's model: position servos, a gripper, damping, a floor in the way, a keyframe, and no site.
+def cell(damping=0.0):
+    from palpate.robots import SerialArm
+    from palpate.robots.serial.to_mujoco import mjcf
+
+    arm = SerialArm.named("iiwa14")
+    text = mjcf(arm).replace('armature="0.1"', f'armature="0.1" damping="{damping}"')
+    text = re.sub(
+        r"<site [^>]*>", '<body name="hand" pos="0 0 0.045"><geom size="0.02" mass="0.1"/>'
+        '<body name="finger"><joint name="grip" type="slide"/><geom size="0.01" mass="0.05"/></body></body>', text
+    )  # fmt: skip
+    servos = "".join(f'<position joint="{name}" kp="1000"/>' for name in arm.names)
+    keys = " ".join(map(str, (*arm.home, 0.0)))
+    extra = f'<actuator>{servos}</actuator><keyframe><key qpos="{keys}"/></keyframe>'
+    floor = '<worldbody><geom type="plane" size="2 2 0.1" pos="0 0 0.5"/>'
+    return text.replace("<worldbody>", floor).replace("</mujoco>", extra + "</mujoco>")
+
+
+@pytest.mark.parametrize("physics", ["own", "mujoco"])
+def test_a_users_own_model(tmp_path, physics):
+    path = tmp_path / "cell.xml"
+    path.write_text(cell())
+    pressing = prepared(question(arm=str(path), site="hand", physics=physics, seconds=0.6))
+    assert any("grip" in note for note in pressing.asked.notes)
+    record = pressing.run()
+    assert record["force"][-1] == pytest.approx(20.0, abs=1.0)
+
+
+def test_only_mujoco_knows_the_damping_of_its_joints(tmp_path):
+    path = tmp_path / "cell.xml"
+    path.write_text(cell(damping=30.0))
+    pressing = prepared(question(arm=str(path), site="hand", physics="mujoco", seconds=0.4))
+    assert any("damping" in note for note in pressing.asked.notes)
+    damped = pressing.run()
+    free = prepared(question(arm=str(path), site="hand", seconds=0.4)).run()
+    assert damped["x"][1000] < free["x"][1000] - 1e-5  # the approach is slower

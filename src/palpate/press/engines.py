@@ -69,7 +69,7 @@ class ByMuJoCo:
         self._model, self._data = model, self._engine.MjData(model)
         self._data.qpos[:] = model.qpos0
         self._data.qpos[scene.positions] = q
-        self._dofs, self._positions, self._tip = scene.dofs, scene.positions, scene.site
+        self._dofs, self._positions, self._scene = scene.dofs, scene.positions, scene
         self._M, self._J, self._Jdot = np.zeros((model.nv, model.nv)), *np.zeros((2, 6, model.nv))
 
     def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
@@ -95,15 +95,15 @@ class ByMuJoCo:
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]
         engine.mj_fullM(model, data, self._M)
         J, Jdot = self._J, self._Jdot
-        engine.mj_jacSite(model, data, J[:3], J[3:], self._tip)
-        at = data.site_xpos[self._tip]
-        engine.mj_jacDot(model, data, Jdot[:3], Jdot[3:], at, model.site_bodyid[self._tip])
+        at, axes = self._scene.tip(data)
+        engine.mj_jac(model, data, J[:3], J[3:], at, self._scene.body)
+        engine.mj_jacDot(model, data, Jdot[:3], Jdot[3:], at, self._scene.body)
         body.room.M[:] = self._M[np.ix_(dofs, dofs)]
         body.room.h[:] = (data.qfrc_bias - data.qfrc_passive)[dofs]
         body.room.J[:] = J[:, dofs]
         bias = (Jdot @ data.qvel)[:3]
         velocity = (J @ data.qvel)[:3]
-        R = Mat3(*(Vec3(*map(float, row)) for row in data.site_xmat[self._tip].reshape(3, 3)))
+        R = Mat3(*(Vec3(*map(float, row)) for row in axes))
         return Tip(_three(at), R, _three(velocity), ZERO3, _three(bias), ZERO3)
 
 

@@ -36,11 +36,11 @@ class ByMuJoCo:
         engine.mj_forward(model, data)
         M, J, Jd = np.zeros((model.nv, model.nv)), np.zeros((6, model.nv)), np.zeros((6, model.nv))
         engine.mj_fullM(model, data, M)
-        engine.mj_jacSite(model, data, J[:3], J[3:], self.scene.site)
-        at, body = data.site_xpos[self.scene.site], model.site_bodyid[self.scene.site]
-        engine.mj_jacDot(model, data, Jd[:3], Jd[3:], at, body)
+        at, axes = self.scene.tip(data)
+        engine.mj_jac(model, data, J[:3], J[3:], at, self.scene.body)
+        engine.mj_jacDot(model, data, Jd[:3], Jd[3:], at, self.scene.body)
         pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = data.site_xmat[self.scene.site].reshape(3, 3), at
+        pose[:3, :3], pose[:3, 3] = axes, at
         return pose, J, Jd @ data.qvel, M, np.array(data.qfrc_bias)
 
 

@@ -59,7 +59,7 @@ def arm_of(model: Any, site: str | None, where: str, notes: Sequence[str]) -> Se
         speed=np.full(len(joints), np.inf),
         home=_home(model, positions),
         notes=(*notes, *_left_out(model, joints, dofs)),
-        scene=Scene(model, _site_index(model, site), dofs, positions),
+        scene=Scene(model, _site_index(model, site), body, dofs, positions),
     )
 
 

@@ -22,15 +22,23 @@ class Scene:
 
     Args:
         model: `mujoco.MjModel`.
-        site: index of the site that is the tip.
+        site: index of the site that is the tip; -1 where the tip is the body's own frame.
+        body: index of the body that carries the tip.
         dofs: of the arm's joints, shape (n,).
         positions: indices of the arm's joints in qpos, shape (n,).
     """
 
     model: Any
     site: int
+    body: int
     dofs: NDArray[np.int64]
     positions: NDArray[np.int64]
+
+    def tip(self, data: Any) -> tuple[Array, Array]:
+        """Place [m] and axes of the tip in the world."""
+        if self.site < 0:
+            return data.xpos[self.body], data.xmat[self.body].reshape(3, 3)
+        return data.site_xpos[self.site], data.site_xmat[self.site].reshape(3, 3)
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,14 @@ def scene_of(arm: SerialArm) -> Scene:
     Raises:
         InputError: MuJoCo is not installed, or refuses the arm's numbers.
     """
-    return arm.scene if arm.scene is not None and arm.scene.site >= 0 else _made(arm)
+    return arm.scene or _made(arm)
 
 
 def _made(arm: SerialArm) -> Scene:
     with refusals(arm.title):
         model, _ = compiled(mujoco().MjSpec.from_string(mjcf(arm)))
     n = np.arange(arm.joints)
-    return Scene(model, 0, n, n)
+    return Scene(model, 0, int(model.site_bodyid[0]), n, n)
 
 
 def mjcf(arm: SerialArm) -> str:
