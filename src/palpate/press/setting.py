@@ -139,9 +139,10 @@ def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm) -> Ce
     links = M - np.diag(arm.chain.rotor) if elastic else M
     spring, damper = np.zeros(arm.joints), np.zeros(arm.joints)
     first = second = 0.0
-    fastest = np.sqrt(surface.stiffness / place.mass)
+    along = place.normal @ J[:3]
+    fastest = np.sqrt(surface.stiffness * float(along @ np.linalg.solve(links, along)))
     if isinstance(loop.inner, PositionLoop):
-        spring, damper = _joint_springs(arm, links, place.normal @ J[:3], loop.inner.stiffness)
+        spring, damper = _joint_springs(arm, links, along, loop.inner.stiffness)
         fastest = max(fastest, np.sqrt(np.linalg.eigvals(np.linalg.solve(links, np.diag(spring))).real.max()))
         w = 2.0 * pi * loop.inner.bandwidth
         first, second = w * w, 2.0 * loop.inner.damping * w

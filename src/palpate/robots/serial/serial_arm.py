@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from palpate.errors import InputError
-from palpate.robots.serial.chain import Chain
+from palpate.robots.serial.chain import Chain, chain_model, room_for
 from palpate.robots.serial.described import Found, compiled_description, found_for
 
 Array = NDArray[np.float64]
@@ -249,7 +249,11 @@ def _wrench(w: ArrayLike) -> Array:
 
 def _check_moves(arm: SerialArm) -> None:
     """A mass matrix that is not positive definite belongs to no arm: its joints would move without being pushed."""
-    least = np.linalg.eigvalsh(arm.mass_matrix(arm.home))[0]
+    room = room_for(arm.joints)
+    chain_model(
+        arm.chain, arm.home, 0.0 * arm.home, room
+    )  # plain: an arm that is refused has compiled nothing
+    least = np.linalg.eigvalsh(room.M)[0]
     if not least > 0.0:
         raise InputError(
             f"{arm.title}: the mass matrix at home is not positive definite (smallest eigenvalue {least:.3g}); a joint "
