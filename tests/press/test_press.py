@@ -14,11 +14,11 @@ from palpate.errors import InputError
 from palpate.press.choosing import Question, arm_of, prepared, surface_of
 from palpate.press.pilots import Cautious
 from palpate.press.pressing import Plan, press
+from palpate.press.protocol import Command
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
 from palpate.robots.serial.from_toml import names
-from palpate.wires import Command
 
 PLAIN = ("press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50")
 

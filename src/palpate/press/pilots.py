@@ -14,10 +14,10 @@ from palpate.controllers.proportional_integral import integral_gain
 from palpate.errors import InputError, unknown
 from palpate.force import ForceLoop
 from palpate.force.gains import Gains
+from palpate.press.protocol import Command, Sense, Wire
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.signals.types import Task
-from palpate.wires import Command, Sense, Wire
 
 Array = NDArray[np.float64]
 

@@ -16,6 +16,7 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
 from palpate.press.cell import Cell, Reading, Touch, body_at
 from palpate.press.engines import ByMuJoCo, Engine, Own
+from palpate.press.protocol import Command, Sense
 from palpate.press.setting import Place
 from palpate.press.tip_control import Spring, compiled_tip_torque
 from palpate.robots.serial.described import compiled_description, found_for
@@ -23,7 +24,6 @@ from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import task_room_for
 from palpate.signals.types import Task
-from palpate.wires import Command, Sense
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ class Truth:
 
 
 class SimulatedArm:
-    """Reads and commands as `palpate.wires.Wire`; `write` is a tick of the simulation.
+    """Reads and commands as `protocol.Wire`; `write` is a tick of the simulation.
 
     Args:
         arm: what moves.
