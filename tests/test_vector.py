@@ -105,7 +105,9 @@ def test_sums_and_functions_agree_to_rounding():
 def test_every_function_of_the_module_is_among_them():
     here = {n: v for n, v in vars(_vector).items() if getattr(v, "__module__", "") == _vector.__name__}
     functions = {n for n, v in here.items() if inspect.isfunction(v)}
-    assert functions - {"diagonal", "widen"} == {n for n in functions if f"{n}(" in EXACT + ROUNDED}
+    assert functions - {"diagonal", "widen", "linear", "angular"} == {
+        n for n in functions if f"{n}(" in EXACT + ROUNDED
+    }
 
 
 def test_numpy_numbers_leave_the_operators_to_the_values():

@@ -1,4 +1,4 @@
-"""Three-vectors and 3x3 matrices by value, with operators, and the few functions that laws are written in.
+"""Three-vectors, pairs of them, 3x3 matrices by value, with operators, and the few functions of which laws are made.
 
 A law calls only operators, ``.T`` and the functions of this file. Each has three meanings: on numbers and on
 `Vec3`/`Mat3` (plain Python, or compiled by Numba through `palpate._jit`), and on NumPy arrays of any size.
@@ -125,7 +125,65 @@ class Mat3(NamedTuple):
         return J.map_solve(a)
 
 
-for _cls in (Vec3, Mat3):
+class Vec6(NamedTuple):
+    """Two vectors, of translation and of rotation; the operators of `Vec3`, `@` the dot product of both."""
+
+    lin: Vec3
+    ang: Vec3
+
+    def __add__(a, b):
+        return Vec6(a.lin + linear(b), a.ang + angular(b))
+
+    def __radd__(a, k):
+        return Vec6(k + a.lin, k + a.ang)
+
+    def __sub__(a, b):
+        return Vec6(a.lin - linear(b), a.ang - angular(b))
+
+    def __rsub__(a, k):
+        return Vec6(k - a.lin, k - a.ang)
+
+    def __mul__(a, b):
+        return Vec6(a.lin * linear(b), a.ang * angular(b))
+
+    def __rmul__(a, k):
+        return Vec6(k * a.lin, k * a.ang)
+
+    def __truediv__(a, b):
+        return Vec6(a.lin / linear(b), a.ang / angular(b))
+
+    def __neg__(a):
+        return Vec6(-a.lin, -a.ang)
+
+    def __abs__(a):
+        return Vec6(abs(a.lin), abs(a.ang))
+
+    def __matmul__(a, b):
+        return a.lin @ b.lin + a.ang @ b.ang
+
+    def map_left(b, A):
+        return A.on(b)
+
+    def map_exp(a):
+        return Vec6(exp(a.lin), exp(a.ang))
+
+    def map_sqrt(a):
+        return Vec6(sqrt(a.lin), sqrt(a.ang))
+
+    def map_sign(a):
+        return Vec6(sign(a.lin), sign(a.ang))
+
+    def map_clip(a, limit):
+        return Vec6(clip(a.lin, linear(limit)), clip(a.ang, angular(limit)))
+
+    def map_linear(a):
+        return a.lin
+
+    def map_angular(a):
+        return a.ang
+
+
+for _cls in (Vec3, Mat3, Vec6):
     _cls.__array_ufunc__ = None  # type: ignore[attr-defined]  # NumPy leaves the operators to these classes
 
 ZERO3 = Vec3(0.0, 0.0, 0.0)
@@ -134,6 +192,16 @@ ZERO3 = Vec3(0.0, 0.0, 0.0)
 def widen(b):
     """A number as the vector that has it three times; a vector as it is."""
     return b if isinstance(b, tuple) else Vec3(b, b, b)
+
+
+def linear(b):
+    """The translation of a pair of vectors; a number as it is."""
+    return b.map_linear() if isinstance(b, tuple) else b
+
+
+def angular(b):
+    """The rotation of a pair of vectors; a number as it is."""
+    return b.map_angular() if isinstance(b, tuple) else b
 
 
 def outer(a, b):
@@ -210,6 +278,8 @@ def resolve(J, a, M):
 
 #: Functions that a class answers with its own method of this name.
 METHODS = {
+    linear: "map_linear",
+    angular: "map_angular",
     outer: "map_outer",
     exp: "map_exp",
     sqrt: "map_sqrt",

@@ -5,8 +5,9 @@ cache; only where the cache has none does it hand Numba every law as it stands a
 overloads, and compile.
 """
 
+from palpate._jit.bound import Bound
 from palpate._jit.kernels import Kernel, NotCompiled, kernel
 from palpate._jit.registry import law, part
 from palpate._jit.stamp import sources_stamp
 
-__all__ = ["Kernel", "NotCompiled", "kernel", "law", "part", "sources_stamp"]
+__all__ = ["Bound", "Kernel", "NotCompiled", "kernel", "law", "part", "sources_stamp"]

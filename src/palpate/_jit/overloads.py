@@ -87,6 +87,8 @@ def _scalar_functions() -> None:
         typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
         _overload(function)(typer)
 
+    numbers(_vector.linear, lambda b: b)
+    numbers(_vector.angular, lambda b: b)
     numbers(_vector.exp, lambda a: math.exp(a))
     numbers(_vector.sqrt, lambda a: math.sqrt(a))
     numbers(_vector.sin, lambda a: math.sin(a))

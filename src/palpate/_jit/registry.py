@@ -36,3 +36,4 @@ def part(cls: C) -> C:
 
 part(_vector.Vec3)
 part(_vector.Mat3)
+part(_vector.Vec6)

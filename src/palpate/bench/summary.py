@@ -37,7 +37,7 @@ def summarise(record: Record) -> dict[str, Any]:
     }
     if pressing.any():
         last = pressing & (t > t[pressing][-1] - WINDOW)
-        summary["force"] = _force(record, pressing, last)
+        summary["force"] = force_figures(record, pressing, last)
         summary["tip"] = {
             "y_error_mm": 1e3 * float(np.mean((record["y"] - record["y_desired"])[last])),
             "phi_error_deg": float(np.degrees(np.mean((record["phi"] - record["phi_desired"])[last]))),
@@ -56,8 +56,14 @@ def _share(flags: NDArray[np.float64]) -> float:
     return float(np.mean(flags)) if len(flags) else 0.0
 
 
-def _force(record: Record, pressing: NDArray[np.bool_], last: NDArray[np.bool_]) -> dict[str, Any]:
-    """Of the true force, which only a simulation knows; the noise of the measured one beside it."""
+def force_figures(record: Record, pressing: NDArray[np.bool_], last: NDArray[np.bool_]) -> dict[str, Any]:
+    """Of the true force, which only a simulation knows; the noise of the measured one beside it.
+
+    Args:
+        record: with the columns t, force, force_desired and force_measured.
+        pressing: where the force is controlled, shape (n,).
+        last: where it counts as steady, shape (n,).
+    """
     error = record["force"] - record["force_desired"]
     desired = record["force_desired"][pressing]
     steady = slice(0, _first_change(desired))

@@ -19,6 +19,7 @@ COMMANDS = {
     "excite": "Design a force that shows what a surface is, and say how well beforehand.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
+    "press": "Press on a surface with any serial arm, in simulation.",
     "press-wire": "Press with a real arm, over its wire.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
     "live": "Show an arm that presses, or a log, in a page of the browser.",

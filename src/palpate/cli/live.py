@@ -14,7 +14,7 @@ from palpate.cli._indenter_options import IndenterOptions
 from palpate.cli._log_options import LogOptions
 from palpate.cli._terminal import print_lines, say
 from palpate.cli.identify import ModelOptions
-from palpate.cli.run import _seed
+from palpate.cli.run import whole_number
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def live(
     run: Annotated[str | None, Parameter(group=_SHOWN)] = None,
     log: Annotated[Path | None, Parameter(group=_SHOWN)] = None,
     record: Annotated[Path | None, Parameter(group=_SHOWN)] = None,
-    seed: Annotated[int, Parameter(group=_SHOWN, converter=_seed)] = 0,
+    seed: Annotated[int, Parameter(group=_SHOWN, converter=whole_number)] = 0,
     whole_approach: Annotated[bool, _FLAG, Parameter(group=_SHOWN)] = False,
     port: Annotated[int, Parameter(group=_SERVED, allow_leading_hyphen=True)] = 0,
     open_: Annotated[bool, _FLAG, Parameter(name="--open", group=_SERVED)] = False,

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from palpate.records import Record
 
 
-def _seed(_: Any, tokens: Sequence[Token]) -> int:
-    """The conversion of cyclopts would round 1.5 without a word."""
+def whole_number(_: Any, tokens: Sequence[Token]) -> int:
+    """A seed; the conversion of cyclopts would round 1.5 without a word."""
     (token,) = tokens
     if not token.value.isdecimal():
         raise InputError(f"it must be a whole number, 0 or above, got {token.value!r}")
@@ -36,7 +36,7 @@ def run(
     name: str | None = None,
     /,
     *,
-    seed: Annotated[int, Parameter(converter=_seed)] = 0,
+    seed: Annotated[int, Parameter(converter=whole_number)] = 0,
     out: Path | None = None,
     force: bool = False,
     list_: Annotated[bool, Parameter(name="--list", negative="")] = False,

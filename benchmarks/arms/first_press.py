@@ -1,0 +1,55 @@
+"""The first press after installation, with all its compiling, and the next: in a cache of its own.
+
+Seconds of the processor stand beside those of the clock: they are what is left when nothing else runs. The bench's own
+first tick is compiled beside it, for a measure of the machine.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+
+COLD, WARM = 12.0, 1.0
+"""Budgets [s of the processor]."""
+PRESS = """
+import time
+from palpate.press.choosing import Question, prepared, surface_of
+wall, cpu = time.perf_counter(), time.process_time()
+prepared(Question(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
+print(time.perf_counter() - wall, time.process_time() - cpu)
+"""
+BENCH = """
+import time
+from palpate.bench import build, load
+bench = build(load("foam-neural"))
+wall, cpu = time.perf_counter(), time.process_time()
+bench.run(0.01)
+print(time.perf_counter() - wall, time.process_time() - cpu)
+"""
+
+
+def child(code: str, cache: str) -> tuple[float, float]:
+    ran = subprocess.run(  # noqa: S603 - our own interpreter
+        [sys.executable, "-c", code],
+        env={**os.environ, "NUMBA_CACHE_DIR": cache},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    wall, cpu = map(float, ran.stdout.split()[-2:])
+    return wall, cpu
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as cache:
+        for what, code, budget in (
+            ("the first press", PRESS, COLD),
+            ("the next", PRESS, WARM),
+            ("the bench's first tick", BENCH, 10.0),
+        ):
+            wall, cpu = child(code, cache)
+            print(f"{what:28}{wall:7.2f} s{cpu:9.2f} s of the processor; the budget is {budget:g} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Pressing with any serial arm: in simulation, behind the protocol of a real one."""

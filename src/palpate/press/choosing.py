@@ -1,0 +1,219 @@
+"""From what was typed to an arm, a surface and gains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.errors import InputError, unknown
+from palpate.force.gains import Gains, load_gains
+from palpate.press.engines import ENGINES
+from palpate.press.loops import MODES, check_mode, gains_for, loop_of, usual_mode
+from palpate.press.pilots import CAUTIOUS, CONTROLLERS, pilot_of
+from palpate.press.pressing import Plan, Progress, plan_for, press
+from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
+from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.summary import Asked
+from palpate.records import Record
+from palpate.robots.serial.from_toml import names
+from palpate.robots.serial.serial_arm import SerialArm
+
+Array = NDArray[np.float64]
+
+_UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked for, as it is typed but in SI.
+
+    Args:
+        arm: a name, or the path of a file that ends in .toml, .xml, .mjcf or .urdf.
+        force: [N].
+        surface: what is touched.
+        site: the tip, of a file that has several sites or links.
+        mode: torque or position; the arm's own when left out.
+        physics: own or mujoco.
+        controller: by name.
+        gains: file of `palpate tune`; made for the arm when left out.
+        at: point of the surface [m]; before the tip at home when left out.
+        normal: into the surface; the tip's own z at home when left out.
+        seconds: from the touch on [s].
+        probe: share of the force.
+        seed: of the noise.
+    """
+
+    arm: str
+    force: float
+    surface: KelvinVoigt
+    site: str | None = None
+    mode: str | None = None
+    physics: str = "own"
+    controller: str = CAUTIOUS
+    gains: Path | None = None
+    at: tuple[float, float, float] | None = None
+    normal: tuple[float, float, float] | None = None
+    seconds: float = 6.0
+    probe: float = 0.2
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Pressing:
+    """A press that is ready to run.
+
+    Args:
+        asked: with what, for the record.
+        plan: what is asked for.
+    """
+
+    asked: Asked
+    plan: Plan
+
+    def run(self, progress: Progress | None = None) -> Record:
+        """Runs it; the record says itself what it is of."""
+        asked = self.asked
+        loop = asked.gains.arm
+        cell = cell_of(asked.arm, asked.place, asked.surface, loop)
+        arm = SimulatedArm(asked.arm, loop, asked.place, cell, asked.physics, asked.seed)
+        pilot = pilot_of(asked.controller, arm, asked.gains, asked.place, self.plan.force)
+        record = press(arm, pilot, asked.place, self.plan, progress)
+        return Record(record.columns, record.units, {**record.meta, **asked.meta(record)})
+
+
+def prepared(question: Question) -> Pressing:
+    """Everything checked, nothing run.
+
+    Raises:
+        InputError: whatever of it cannot be, in one line.
+    """
+    _check_words(question)
+    Plan(question.force, question.seconds, question.probe)
+    arm = arm_of(question.arm, question.site)
+    place = place_of(arm, _array(question.at), _array(question.normal))
+    gains = _gains(question, arm, place)
+    _check_force(question, gains)
+    notes = check_able(arm, place, gains.approach, question.force)
+    asked = Asked(
+        arm=arm, gains=gains, place=place, surface=question.surface, controller=question.controller,
+        physics=question.physics, seed=question.seed, notes=(*arm.notes, *notes, *_engine_notes(question, arm)),
+    )  # fmt: skip
+    return Pressing(asked, plan_for(question.force, question.seconds, question.probe, GAP, gains.approach))
+
+
+def arm_of(name: str, site: str | None) -> SerialArm:
+    """An arm by its name, or from a file by its ending.
+
+    Raises:
+        InputError: no such arm, a file that is none.
+    """
+    if name in names():
+        if site is not None:
+            raise InputError(f"--site is for files; {name} has its flange as tip")
+        return SerialArm.named(name)
+    path, ending = Path(name), Path(name).suffix.lower()
+    if ending == ".toml":
+        return SerialArm.from_toml(path)
+    if ending in {".xml", ".mjcf"}:
+        return SerialArm.from_mujoco(path, site)
+    if ending == ".urdf":
+        if site is None:
+            raise InputError(f"{name}: which link is the tip? Give it with --site")
+        return SerialArm.from_urdf(path, site)
+    raise unknown("arm", name, [*names(), "FILE.toml", "FILE.xml", "FILE.urdf"])
+
+
+def surface_of(text: str) -> KelvinVoigt:
+    """`K=5000,B=50`, and M=0.1 if it has a mass, in SI.
+
+    Raises:
+        InputError: another text, a number out of range.
+    """
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, sign, number = (word.strip() for word in part.partition("="))
+        if name not in _UNITS or not sign:
+            raise InputError(
+                f"--surface needs K=..,B=.. in N/m and N s/m (and M=.. in kg), as K=5000,B=50; got {text!r}"
+            )
+        if name in found:
+            raise InputError(f"--surface has {name} twice: {text!r}")
+        found[name] = _number(name, number)
+    if "K" not in found:
+        raise InputError(f"--surface needs a stiffness, as K=5000; got {text!r}")
+    try:
+        return KelvinVoigt(found["K"], found.get("B", 0.0), found.get("M", 0.0))
+    except InputError as error:
+        raise InputError(f"--surface: {error}") from None
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise InputError(f"--surface: {name} needs a number in {_UNITS[name]}, got {text!r}")
+    return value
+
+
+def _check_words(question: Question) -> None:
+    if question.physics not in ENGINES:
+        raise unknown("physics", question.physics, ENGINES)
+    if question.mode is not None and question.mode not in MODES:
+        raise unknown("mode", question.mode, MODES)
+    if question.controller not in CONTROLLERS:
+        raise unknown("controller", question.controller, CONTROLLERS)
+    if question.physics == "mujoco":
+        from palpate.robots.serial._extra import mujoco
+
+        mujoco()
+
+
+def _gains(question: Question, arm: SerialArm, place: Place) -> Gains:
+    if question.gains is not None:
+        gains = load_gains(question.gains)
+        check_mode(gains, question.mode)
+        return gains
+    mode = question.mode or usual_mode(question.arm)
+    if question.controller != CAUTIOUS and question.mode is None:
+        mode = "torque"
+    return gains_for(
+        loop_of(question.arm, arm.title, mode, place.mass), question.force * (1.0 - question.probe)
+    )
+
+
+def _check_force(question: Question, gains: Gains) -> None:
+    least, most = 8.0 * gains.arm.sensor.noise, gains.force_limit
+    lowest = question.force * (1.0 - question.probe)
+    if not least <= lowest:
+        raise InputError(
+            f"--force {question.force:g}, lowered by the probe to {lowest:g} N, is below {least:g} N, 8 "
+            "standard deviations of the sensor's noise; ask for more, or for a smaller --probe"
+        )
+    if question.force >= most:
+        raise InputError(
+            f"--force {question.force:g} N is not below the force limit of {most:g} N; ask for less"
+        )
+    total = question.surface.stiffness + question.surface.damping / gains.theta
+    if total > gains.cap:
+        raise InputError(
+            f"the surface has K + B/theta = {total:.4g} N/m, and the gains are for at most {gains.cap:.4g} N/m; "
+            "press on a softer one, or tune for it"
+        )
+
+
+def _engine_notes(question: Question, arm: SerialArm) -> list[str]:
+    if question.physics == "mujoco" and arm.scene is not None:
+        return [
+            "motors and contacts of the model itself are off: torques are the controller's, the surface is --surface"
+        ]
+    return []
+
+
+def _array(values: tuple[float, float, float] | None) -> Array | None:
+    return None if values is None else np.array(values)

@@ -1,0 +1,209 @@
+"""What is to be pressed with what, checked: an arm at a pose before a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._vector import Mat3, Vec3
+from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.errors import InputError
+from palpate.force.arm import Arm, PositionLoop
+from palpate.force.sampled_loop import filter_of, held
+from palpate.press.cell import Cell, WristSensor
+from palpate.robots.serial.inverse import checked_pose
+from palpate.robots.serial.serial_arm import SerialArm
+
+Array = NDArray[np.float64]
+
+GAP = 0.003
+"""Between tip and surface at the start [m]."""
+_STEP = 5e-4
+"""Longest step of the physics [s]."""
+_RESOLVED = 0.5
+"""Radians of the fastest spring in a step, at most: a quarter of where semi-implicit Euler would diverge."""
+_STRUCTURE = 0.05
+"""Damping ratio of a drive train's own spring, typical of strain-wave gears."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the press is.
+
+    Args:
+        q: joint positions at the start, the tip before the surface, shape (n,).
+        normal: into the surface, in the base's axes, shape (3,).
+        axes: of the task in rows, the normal first, shape (3, 3).
+        pose: of the tip at the start, shape (4, 4).
+        place: of the surface along the normal [m].
+        mass: of the tip along the normal [kg].
+        weakest: smallest singular value of the Jacobian.
+    """
+
+    q: Array
+    normal: Array
+    axes: Array
+    pose: Array
+    place: float
+    mass: float
+    weakest: float
+
+
+def place_of(arm: SerialArm, at: Array | None, normal: Array | None, gap: float = GAP) -> Place:
+    """Where the arm starts and what it faces.
+
+    Args:
+        arm: what moves, six joints and more.
+        at: point of the surface that is to be touched [m]; the point before the tip at home when left out.
+        normal: into the surface; the tip's own z at home when left out.
+        gap: between tip and surface [m].
+
+    Raises:
+        InputError: too few joints; a pose out of reach; a normal of length 0.
+    """
+    if arm.joints < 6:
+        raise InputError(
+            f"{arm.title} has {arm.joints} joints; to hold its tip in all directions an arm needs 6 or more"
+        )
+    home = arm.forward_kinematics(arm.home)
+    n = home[:3, 2] if normal is None else _unit(normal)
+    if at is None and normal is None:
+        q = np.array(arm.home)
+    else:
+        point = home[:3, 3] + gap * n if at is None else np.asarray(at, dtype=float)
+        q = arm.inverse_kinematics(_facing(home, n, point - gap * n), near=arm.home)
+    pose = arm.forward_kinematics(q)
+    J, M = arm.jacobian(q), arm.mass_matrix(q)
+    along = n @ J[:3]
+    mass = 1.0 / float(along @ np.linalg.solve(M, along)) if np.linalg.norm(along) > 0.0 else np.inf
+    return Place(
+        q=q, normal=n, axes=_axes(n), pose=pose, place=float(n @ pose[:3, 3]) + gap, mass=mass,
+        weakest=float(arm.singular_values(q)[-1]),
+    )  # fmt: skip
+
+
+def check_able(arm: SerialArm, place: Place, speed: float, force: float) -> list[str]:
+    """Notes on what the pose costs.
+
+    Args:
+        arm: what moves.
+        place: where.
+        speed: of the approach [m/s].
+        force: the largest that will be asked for [N].
+
+    Raises:
+        InputError: a pose so near a singular one that a joint would have to be faster than it can, or one in which the
+            force, beside the arm's own weight, is more than a motor gives.
+    """
+    J = arm.jacobian(place.q)
+    _, s, V = np.linalg.svd(J)
+    known = np.isfinite(arm.speed)
+    most = float(arm.speed[known].min()) if known.any() else 1.0
+    least = speed / most
+    joint = arm.names[int(np.argmax(np.abs(V[len(s) - 1])))]
+    if s[-1] <= least:
+        raise InputError(
+            f"the pose is {'singular' if s[-1] < 1e-9 else 'nearly singular'}: the smallest singular value of the "
+            f"Jacobian is {s[-1]:.3g}, and at {1e3 * speed:.3g} mm/s at least {least:.3g} is needed for joints of "
+            f"{most:.3g} rad/s; move {joint} away from where it is, or choose another --at or --normal"
+        )
+    _check_torques(arm, place, J, force)
+    quick = 0.25 / most
+    if s[-1] > quick:
+        return []
+    note = (
+        f"the pose is not far from a singular one: the smallest singular value of the Jacobian is {s[-1]:.3g}, of "
+        f"which {joint} has the largest share"
+    )
+    return [note]
+
+
+def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None:
+    needed = np.abs(arm.gravity_torque(place.q) + J[:3].T @ (force * place.normal))
+    worst = int(np.argmax(needed / arm.torque))
+    if needed[worst] > arm.torque[worst]:
+        raise InputError(
+            f"{arm.title}: pressing with {force:g} N in this pose takes {needed[worst]:.3g} N m of {arm.names[worst]}, "
+            f"which gives {arm.torque[worst]:.3g}; press with less, or choose another --at"
+        )
+
+
+def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm) -> Cell:
+    """The simulated cell of an arm whose inner loop is known."""
+    elastic = isinstance(loop.inner, PositionLoop)
+    chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if elastic else arm.chain
+    J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)
+    links = M - np.diag(arm.chain.rotor) if elastic else M
+    spring, damper = np.zeros(arm.joints), np.zeros(arm.joints)
+    first = second = 0.0
+    along = place.normal @ J[:3]
+    fastest = np.sqrt(surface.stiffness * float(along @ np.linalg.solve(links, along)))
+    if isinstance(loop.inner, PositionLoop):
+        spring, damper = _joint_springs(arm, links, along, loop.inner.stiffness)
+        fastest = max(fastest, np.sqrt(np.linalg.eigvals(np.linalg.solve(links, np.diag(spring))).real.max()))
+        w = 2.0 * pi * loop.inner.bandwidth
+        first, second = w * w, 2.0 * loop.inner.damping * w
+    steps = int(np.ceil(loop.tick / min(_STEP, _RESOLVED / fastest) - 1e-9))
+    return Cell(
+        chain=chain, normal=_three(place.normal), place=place.place, surface=surface,
+        sensor=_sensor(loop, loop.tick / steps), step=loop.tick / steps, steps=steps, elastic=float(elastic),
+        spring=spring, damper=damper, first=float(first), second=float(second),
+    )  # fmt: skip
+
+
+def _joint_springs(arm: SerialArm, links: Array, along: Array, stiffness: float) -> tuple[Array, Array]:
+    """Drive trains as stiff as their motors are strong, the tip along the normal as stiff as the arm is said to be."""
+    strength = arm.torque if np.isfinite(arm.torque).all() else np.diag(links)
+    spring = strength * stiffness * float(along @ (along / strength))
+    return spring, 2.0 * _STRUCTURE * np.sqrt(spring * np.diag(links))
+
+
+def _sensor(loop: Arm, step: float) -> WristSensor:
+    A, b, c = filter_of(loop.low_pass)
+    E, e = held(A, b, step)
+    wide = np.zeros((3, 3))
+    wide[: len(b), : len(b)] = E
+    return WristSensor(
+        E=Mat3(*(_three(row) for row in wide)), e=_padded(e), c=_padded(c), d=0.0 if len(b) else 1.0,
+        sampling=float(loop.sensor.sampling), noise=float(loop.sensor.noise),
+        full_scale=float(loop.sensor.full_scale),
+    )  # fmt: skip
+
+
+def _facing(home: Array, normal: Array, point: Array) -> Array:
+    """The pose nearest to home whose z points along the normal."""
+    z, x = normal, home[:3, 0]
+    x = x - (x @ z) * z
+    if np.linalg.norm(x) < 1e-6:
+        x = home[:3, 1] - (home[:3, 1] @ z) * z
+    x = x / np.linalg.norm(x)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = np.column_stack([x, np.cross(z, x), z]), point
+    return checked_pose(pose)
+
+
+def _axes(normal: Array) -> Array:
+    """The normal, and two directions along the surface."""
+    other = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    y = other - (other @ normal) * normal
+    y /= np.linalg.norm(y)
+    return np.array([normal, y, np.cross(normal, y)])
+
+
+def _unit(direction: Array) -> Array:
+    v = np.asarray(direction, dtype=float)
+    length = float(np.linalg.norm(v))
+    if not (np.isfinite(length) and length > 0.0):
+        raise InputError(f"a normal needs a length, got {v.tolist()}")
+    return v / length
+
+
+def _padded(values: Array) -> Vec3:
+    return _three(np.concatenate([values, np.zeros(3 - len(values))]))
+
+
+def _three(values: Array) -> Vec3:
+    return Vec3(*(float(v) for v in values))

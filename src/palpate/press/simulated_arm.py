@@ -1,0 +1,237 @@
+"""An arm of the simulation behind the protocol of a real one."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._jit import Bound
+from palpate._vector import ZERO3, Mat3, Vec3, Vec6
+from palpate.environments.surface_state import UNTOUCHED
+from palpate.errors import InputError
+from palpate.force.arm import Arm, TorqueLoop
+from palpate.press.cell import Cell, Reading, Touch, body_at
+from palpate.press.engines import ByMuJoCo, Engine, Own
+from palpate.press.protocol import Command, Sense
+from palpate.press.setting import Place
+from palpate.press.tip_control import Spring, compiled_tip_torque
+from palpate.robots.serial.described import compiled_description, found_for
+from palpate.robots.serial.inverse import pose_error
+from palpate.robots.serial.serial_arm import SerialArm
+from palpate.robots.serial.task import task_room_for
+from palpate.signals.types import Task
+
+Array = NDArray[np.float64]
+
+ENCODER = 1e-7
+"""Resolution of a joint's position [rad, m]: a motor's encoder of 19 bits before a gear of 100."""
+_SPARE = 5.0
+"""Damping of the joints to spare [1/s]."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What only a simulation knows, of the last tick.
+
+    Args:
+        q: joint positions [rad, m], shape (n,).
+        qd: their rates.
+        force: on the surface, mean of the tick [N].
+        depth: of the tip [m].
+        touching: whether it touches.
+        torque: on the links, shape (n,).
+        saturated: 1 where a motor's limit held the torque back, shape (n,).
+    """
+
+    q: Array
+    qd: Array
+    force: float
+    depth: float
+    touching: bool
+    torque: Array
+    saturated: Array
+
+
+class SimulatedArm:
+    """Reads and commands as `protocol.Wire`; `write` is a tick of the simulation.
+
+    Args:
+        arm: what moves.
+        loop: its inner loop and its sensor.
+        place: where it starts.
+        cell: of the same.
+        physics: own or mujoco.
+        seed: of the noise.
+        resolution: of a joint's position [rad, m]; 0 for encoders that see everything.
+    """
+
+    def __init__(
+        self,
+        arm: SerialArm,
+        loop: Arm,
+        place: Place,
+        cell: Cell,
+        physics: str = "own",
+        seed: int = 0,
+        resolution: float = ENCODER,
+    ):
+        self.arm, self.loop, self.cell, self._resolution = arm, loop, cell, resolution
+        self._generator = np.random.default_rng(seed)
+        sag = np.zeros(arm.joints)
+        if cell.elastic:  # springs stretched by the arm's weight, which its own control knows of
+            sag = arm.gravity_torque(place.q) / cell.spring
+        self._sag = sag
+        self._body = body_at(place.q, place.q + sag)
+        first = Reading(ZERO3, 0.0, 0.0)
+        self._touch = Touch(UNTOUCHED, first, 0.0, 0.0, float(place.normal @ place.pose[:3, 3]) - place.place)
+        self._engine: Engine = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
+        self._k = 0
+        self._goal, self._setpoint = place.pose.copy(), place.q.copy()
+        self._saturated = np.zeros(arm.joints)
+        self._seen = self._before = self._encoders()
+        self._tip = _TipLoop(arm, loop, place) if isinstance(loop.inner, TorqueLoop) else None
+        rest = place.q + sag if self._tip is None else arm.gravity_torque(place.q)
+        self._line = deque([rest] * loop.delay_ticks)
+
+    def read(self) -> Sense:
+        """What the arm says at this tick."""
+        force = np.zeros(6)
+        force[:3] = self._touch.reading.value * np.array(self.cell.normal)
+        seen = self._seen
+        return Sense(self._k * self.loop.tick, force, self.arm.forward_kinematics(seen), seen)
+
+    def write(self, command: Command) -> None:
+        """Moves as told for a tick.
+
+        Raises:
+            InputError: neither a velocity nor a pose, or both.
+        """
+        self._aim(command)
+        if self._tip is None:
+            self._advance(self._followed() + self._sag)
+        else:
+            self._act(self._tip.spring, self._tip.towards(self._goal))
+
+    def act(self, controller: Any, task: Task) -> None:
+        """Moves for a tick under a controller of torques, told in the task's axes.
+
+        Raises:
+            InputError: the arm takes positions.
+        """
+        if self._tip is None:
+            raise InputError("a controller of torques needs --mode torque")
+        self._act(controller, task)
+
+    def close(self) -> None:
+        """Nothing is left to do."""
+
+    @property
+    def truth(self) -> Truth:
+        """What only a simulation knows."""
+        body, touch = self._body, self._touch
+        return Truth(
+            body.q.copy(), body.qd.copy(), touch.mean, touch.depth, touch.surface.contact == 1.0,
+            body.drive.copy(), self._saturated.copy(),
+        )  # fmt: skip
+
+    def _aim(self, command: Command) -> None:
+        if (command.velocity is None) == (command.pose is None):
+            raise InputError("a command is either a velocity or a pose")
+        if command.pose is not None:
+            self._goal = np.array(command.pose, dtype=float)
+            return
+        moved = self.loop.tick * np.asarray(command.velocity)
+        self._goal[:3, 3] += moved[:3]
+        self._goal[:3, :3] = _turn(moved[3:]) @ self._goal[:3, :3]
+
+    def _followed(self) -> Array:
+        """Set-points of the motors whose pose follows the goal, by resolved rates of least size."""
+        q, tick = self._setpoint, self.loop.tick
+        J = self.arm.jacobian(q)
+        error = pose_error(self.arm.forward_kinematics(q), self._goal)
+        step = J.T @ np.linalg.solve(J @ J.T, error)
+        self._setpoint = q + np.clip(step, -tick * self.arm.speed, tick * self.arm.speed)
+        return self._setpoint
+
+    def _act(self, controller: Any, task: Task) -> None:
+        assert self._tip is not None
+        qd = (self._seen - self._before) / self.loop.tick
+        torque = self._tip.torque(controller, task, self._seen, qd, self._touch.reading.value)
+        held = np.clip(torque, -self.arm.torque, self.arm.torque)
+        self._saturated = (np.abs(torque) > self.arm.torque).astype(float)
+        self._advance(held)
+
+    def _advance(self, setpoint: Array) -> None:
+        self._line.append(setpoint)
+        noise = self._generator.standard_normal(8)
+        now = np.ascontiguousarray(self._line.popleft())
+        self._touch = self._engine.tick(self.cell, self._body, self._touch, now, self._k, noise)
+        self._k += 1
+        self._before, self._seen = self._seen, self._encoders()
+
+    def _encoders(self) -> Array:
+        turned = self._body.motor - self._sag if self.cell.elastic else self._body.q
+        if self._resolution == 0.0:
+            return turned.copy()
+        return np.asarray(self._resolution * np.round(turned / self._resolution))
+
+
+class _TipLoop:
+    """The controller that an arm of torques runs at each tick."""
+
+    def __init__(self, arm: SerialArm, loop: Arm, place: Place):
+        inner = loop.inner
+        assert isinstance(inner, TorqueLoop)
+        J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)
+        mobility = J @ np.linalg.solve(M, J.T)
+        turning = float(1.0 / np.linalg.eigvalsh(mobility[3:, 3:])[-1]) / inner.mass
+        one = Vec3(1.0, 1.0, 1.0)
+        self.spring = Spring(
+            Vec6(float(inner.stiffness) * one, float(inner.stiffness * turning) * one),
+            Vec6(float(inner.damping) * one, float(inner.damping * turning) * one),
+        )
+        self._chain, self._axes = arm.chain, place.axes
+        self._rows, self._held = _matrix(place.axes), _matrix(place.pose[:3, :3])
+        n = arm.joints
+        self._found, self._room = found_for(n), task_room_for(n)
+        self._states: dict[type, Any] = {}
+        self._laws: dict[type, Bound] = {}
+        self._n = n
+
+    def towards(self, goal: Array) -> Task:
+        """The task of standing at a pose; the tip keeps its turn."""
+        x: Any = Vec6(Vec3(*(float(v) for v in self._axes @ goal[:3, 3])), ZERO3)
+        nothing = 0.0 * x
+        return Task(x, nothing, nothing, nothing, nothing)
+
+    def torque(self, controller: Any, task: Task, q: Array, qd: Array, force: float) -> Array:
+        """Of the joints [N m], shape (n,)."""
+        kind = type(controller)
+        if kind not in self._states:
+            self._states[kind], self._laws[kind] = controller.start(), Bound(compiled_tip_torque)
+        state = self._states[kind]
+        torque = np.zeros(self._n)
+        compiled_description(self._chain, q, qd, self._found)
+        self._states[kind] = self._laws[kind](
+            self._rows, self._held, controller, state, float(force), task, _SPARE, q, qd, self._found,
+            self._room, torque,
+        )  # fmt: skip
+        return torque
+
+
+def _turn(vector: Array) -> Array:
+    """The rotation of a rotation vector [rad] (Rodrigues)."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))
+
+
+def _matrix(rows: Array) -> Mat3:
+    return Mat3(*(Vec3(*(float(v) for v in row)) for row in rows))

@@ -1,0 +1,146 @@
+"""What a press comes to, in numbers: the keys of `palpate run`, for an arm of any number of joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.bench.sequence import CONTACT
+from palpate.bench.summary import WINDOW, force_figures, losses
+from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.errors import InputError
+from palpate.force.gains import Gains
+from palpate.identification import identify
+from palpate.identification.sample_clock import refreshes_of
+from palpate.press.loops import series_of
+from palpate.press.setting import Place
+from palpate.records import Record
+from palpate.robots.serial.serial_arm import SerialArm
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What was pressed with what, for the record.
+
+    Args:
+        arm: what moved.
+        gains: of the cautious law, and the arm as it sees it.
+        place: where.
+        surface: what was touched.
+        controller: by name.
+        physics: by name.
+        seed: of the noise.
+        notes: what a reader should know.
+    """
+
+    arm: SerialArm
+    gains: Gains
+    place: Place
+    surface: KelvinVoigt
+    controller: str
+    physics: str
+    seed: int
+    notes: tuple[str, ...]
+
+    def meta(self, record: Record) -> dict[str, Any]:
+        """What the record carries along, plain values."""
+        loop = self.gains.arm
+        known: dict[str, tuple[float, str]] = self.surface.truth()  # type: ignore[no-untyped-call]
+        truth = {name: {"value": value, "unit": unit} for name, (value, unit) in known.items()}
+        return {
+            "seed": self.seed,
+            "truth": truth,
+            "arm": self.arm.title,
+            "mode": loop.kind,
+            "controller": self.controller,
+            "physics": self.physics,
+            "rate_hz": loop.rate,
+            "instruments": {
+                "force": {"filter": loop.sensor.low_pass, "delay_s": self.delay(record)},
+                "position": {"lag_s": 0.0},
+            },
+            "notes": list(self.notes),
+        }
+
+    def delay(self, record: Record) -> float:
+        """From the sampling of a force to its reading [s]: identification finds the clock of a slower sensor itself.
+
+        Of one about as fast as the ticks it takes each row for fresh: a reading is then half a tick old in the mean.
+        """
+        as_fast = refreshes_of(record["force_sampled"]).period == 1.0
+        return 0.5 * self.gains.arm.tick if as_fast else 0.0
+
+
+def summarise(record: Record, asked: Asked) -> dict[str, Any]:
+    """Plain JSON values: how it went, the force, the motors' limits, what was identified, the truth."""
+    pressing, t = record["phase"] == CONTACT, record["t"]
+    n = asked.arm.joints
+    summary: dict[str, Any] = {
+        "arm": asked.arm.title,
+        "mode": asked.gains.arm.kind,
+        "controller": asked.controller,
+        "physics": asked.physics,
+        "end": record.meta["end"],
+        "why": record.meta["why"],
+        "seed": asked.seed,
+        "duration_s": float(t[-1]) if len(t) else 0.0,
+        "contact_at_s": float(t[np.argmax(pressing)]) if pressing.any() else None,
+        "contacts_lost": losses(record),
+        "force": None,
+        "tip": None,
+        "saturated": {f"joint{i}": _mean(record[f"saturated{i}"]) for i in range(1, n + 1)},
+        "identified": None,
+        "truth": record.meta["truth"],
+        "loop": _loop(asked),
+        "pose": {"smallest_singular_value": asked.place.weakest, "tip_mass_kg": asked.place.mass},
+        "notes": list(asked.notes),
+    }
+    if pressing.any():
+        last = pressing & (t > t[pressing][-1] - WINDOW)
+        summary["force"] = force_figures(record, pressing, last)
+        start = [record[name][0] for name in ("y", "z")]
+        moved = [
+            float(np.mean(record[name][last])) - zero for name, zero in zip(("y", "z"), start, strict=True)
+        ]
+        summary["tip"] = {"slipped_mm": 1e3 * float(np.hypot(*moved))}
+        summary["identified"] = identified(record, asked)
+    return summary
+
+
+def identified(record: Record, asked: Asked) -> dict[str, Any]:
+    """What `palpate identify` finds on the record's measured columns, told what measured them."""
+    loop = asked.gains.arm
+    log = Record(
+        {"time": record["t"], "position": record["x_measured"], "force": record["force_sampled"]},
+        {"time": "s", "position": "m", "force": "N"},
+    )
+    low_pass = loop.low_pass
+    try:
+        found = identify(
+            log,
+            lag=low_pass.lag + asked.delay(record),
+            lag_std=loop.tick / np.sqrt(12.0),
+            force_filter=low_pass if low_pass.sections else None,
+            series_stiffness=series_of(loop),
+        )
+    except InputError as error:
+        return {"why_not": str(error), "parameters": {}, "warnings": []}
+    told = found.to_json()
+    return {key: told[key] for key in ("model", "parameters", "warnings")}
+
+
+def _loop(asked: Asked) -> dict[str, Any]:
+    gains = asked.gains
+    return {
+        "rate_hz": gains.arm.rate,
+        "theta_s": gains.theta,
+        "stiffness_cap": gains.cap,
+        "approach_speed_m_s": gains.approach,
+        "series_stiffness": series_of(gains.arm),
+    }
+
+
+def _mean(values: Any) -> float:
+    return float(np.mean(values)) if len(values) else 0.0

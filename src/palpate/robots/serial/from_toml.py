@@ -1,0 +1,188 @@
+"""Serial arms from TOML files: those that come with palpate, and a user's own."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from palpate.errors import InputError, unknown
+from palpate.robots.serial.chain import Chain
+from palpate.robots.serial.inertias import check_inertia
+from palpate.robots.serial.serial_arm import SerialArm
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+NotNegative = Annotated[float, Meta(ge=0)]
+Positive = Annotated[float, Meta(gt=0)]
+GRAVITY = 9.81
+_LARGEST = 1 << 20
+"""Bytes of an arm's file."""
+
+
+class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A joint and the link that it moves."""
+
+    name: str
+    at: Triple
+    """Origin of its frame in the one before [m]."""
+    turn: Triple = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw of its frame in the one before [deg]; its axis is z."""
+    kind: Literal["revolute", "prismatic"] = "revolute"
+    range: tuple[float, float] = (-inf, inf)
+    """[rad], or [m] where it slides."""
+    torque: Positive = inf
+    """[N m, N]."""
+    speed: Positive = inf
+    """[rad/s, m/s]."""
+    rotor: NotNegative = 0.0
+    """Inertia of motor and gear at the joint [kg m^2, kg]."""
+    mass: NotNegative
+    com: Triple = (0.0, 0.0, 0.0)
+    """Centre of mass in its frame [m]."""
+    inertia: tuple[float, float, float, float, float, float] = (0.0,) * 6
+    """xx yy zz xy xz yz about the centre of mass [kg m^2]."""
+
+
+class ArmFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An arm's file."""
+
+    title: str
+    home: list[float]
+    """[rad, m]."""
+    flange: Triple = (0.0, 0.0, 0.0)
+    """The tip in the last joint's frame [m]."""
+    flange_turn: Triple = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw [deg]."""
+    gravity: Triple = (0.0, 0.0, -GRAVITY)
+    """In the base's axes [m/s^2]."""
+    joint: list[Joint]
+
+
+def names() -> list[str]:
+    """The arms that come with palpate."""
+    folder = files("palpate.robots.serial").joinpath("arms")
+    return sorted(f.name.removesuffix(".toml") for f in folder.iterdir())
+
+
+def named(name: str) -> SerialArm:
+    """An arm that comes with palpate.
+
+    Raises:
+        InputError: no such arm.
+    """
+    if name not in names():
+        raise unknown("arm", name, names())
+    file = files("palpate.robots.serial").joinpath("arms", f"{name}.toml")
+    return parse(file.read_text(encoding="utf-8"), name)
+
+
+def read(path: Path) -> SerialArm:
+    """An arm from a file.
+
+    Raises:
+        InputError: as `parse`; a file that is far too long, or no text.
+    """
+    with path.open("rb") as file:
+        data = file.read(_LARGEST + 1)
+    if len(data) > _LARGEST:
+        raise InputError(f"{path}: more than {_LARGEST} bytes are not an arm; check the path")
+    try:
+        return parse(data.decode("utf-8"), str(path))
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file; check the path") from None
+
+
+def parse(text: str, where: str) -> SerialArm:
+    """An arm from TOML; `where` names the text in errors.
+
+    Raises:
+        InputError: TOML that does not parse, an unknown or missing key, a number that is none, an inertia that is none.
+    """
+    try:
+        tables = msgspec.toml.decode(text)
+        return _built(msgspec.convert(tables, ArmFile))
+    except msgspec.ValidationError as error:
+        raise InputError(f"{where}: {error}") from None
+    except msgspec.DecodeError as error:
+        raise InputError(f"{where}: not TOML: {error}") from None
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _built(file: ArmFile) -> SerialArm:
+    joints = file.joint
+    if len(file.home) != len(joints):
+        raise InputError(f"home needs {len(joints)} numbers, one a joint, got {len(file.home)}")
+    notes = []
+    for j in joints:
+        _check_finite(f"joint {j.name}", (*j.at, *j.turn, j.rotor, *j.com))
+        if not j.range[0] < j.range[1]:
+            raise InputError(
+                f"joint {j.name}: its range must be two numbers, the lower first, got {list(j.range)}"
+            )
+        notes.append(check_inertia(j.name, j.mass, symmetric(j.inertia)))
+    _check_finite("home, flange and gravity", (*file.home, *file.flange, *file.flange_turn, *file.gravity))
+    return SerialArm(
+        title=file.title,
+        names=tuple(j.name for j in joints),
+        chain=_chain(file),
+        lower=_column(j.range[0] for j in joints),
+        upper=_column(j.range[1] for j in joints),
+        torque=_column(j.torque for j in joints),
+        speed=_column(j.speed for j in joints),
+        home=_column(file.home),
+        notes=tuple(note for note in notes if note),
+    )
+
+
+def _chain(file: ArmFile) -> Chain:
+    joints = file.joint
+    return Chain(
+        at=np.array([j.at for j in joints], float).reshape(-1, 3),
+        turn=np.array([rotation(j.turn) for j in joints]).reshape(-1, 3, 3),
+        slide=_column(float(j.kind == "prismatic") for j in joints),
+        mass=_column(j.mass for j in joints),
+        com=np.array([j.com for j in joints], float).reshape(-1, 3),
+        inertia=np.array([symmetric(j.inertia) for j in joints]).reshape(-1, 3, 3),
+        rotor=_column(j.rotor for j in joints),
+        tip=np.array(file.flange, float),
+        tip_turn=rotation(file.flange_turn),
+        gravity=np.array(file.gravity, float),
+    )
+
+
+def symmetric(numbers: Any) -> Array:
+    """A matrix from xx yy zz xy xz yz."""
+    xx, yy, zz, xy, xz, yz = map(float, numbers)
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def rotation(degrees: Triple) -> Array:
+    """Rz(yaw) Ry(pitch) Rx(roll); exact at whole quarter turns."""
+    (a, b), (c, d), (e, f) = (_cosine_and_sine(angle) for angle in degrees)
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, a, -b], [0.0, b, a]])
+    pitch = np.array([[c, 0.0, d], [0.0, 1.0, 0.0], [-d, 0.0, c]])
+    yaw = np.array([[e, -f, 0.0], [f, e, 0.0], [0.0, 0.0, 1.0]])
+    return yaw @ pitch @ roll
+
+
+def _cosine_and_sine(degrees: float) -> tuple[float, float]:
+    quarter = {0.0: (1.0, 0.0), 90.0: (0.0, 1.0), 180.0: (-1.0, 0.0), 270.0: (0.0, -1.0)}
+    found = quarter.get(degrees % 360.0)
+    return found or (float(np.cos(np.radians(degrees))), float(np.sin(np.radians(degrees))))
+
+
+def _column(values: Any) -> Array:
+    return np.array([float(v) for v in values])
+
+
+def _check_finite(what: str, values: Any) -> None:
+    if not all(np.isfinite(v) for v in values):
+        raise InputError(f"{what}: every number must be finite, got {list(values)}")

@@ -1,0 +1,261 @@
+"""Any serial arm for use outside a control loop: arrays in, arrays out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from palpate.errors import InputError
+from palpate.robots.serial.chain import Chain, chain_model, room_for
+from palpate.robots.serial.described import Found, compiled_description, found_for
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A MuJoCo model in which an arm stands.
+
+    Args:
+        model: `mujoco.MjModel`.
+        site: index of the site that is the tip; -1 where the tip is the body's own frame.
+        body: index of the body that carries the tip.
+        dofs: of the arm's joints, shape (n,).
+        positions: indices of the arm's joints in qpos, shape (n,).
+    """
+
+    model: Any
+    site: int
+    body: int
+    dofs: NDArray[np.int64]
+    positions: NDArray[np.int64]
+
+    def tip(self, data: Any) -> tuple[Array, Array]:
+        """Place [m] and axes of the tip in the world."""
+        if self.site < 0:
+            return data.xpos[self.body], data.xmat[self.body].reshape(3, 3)
+        return data.site_xpos[self.site], data.site_xmat[self.site].reshape(3, 3)
+
+
+@dataclass(frozen=True)
+class SerialArm:
+    """An arm of n revolute and prismatic joints, one after the other.
+
+    Joint positions q [rad, m], rates qd and accelerations qdd are arrays of shape (n,); torques [N m, N] too. A pose
+    is a homogeneous matrix, shape (4, 4); a wrench is force [N] above moment about the tip [N m], shape (6,), what the
+    arm exerts on what it touches. All in the base's axes. Gravity acts.
+
+    When to use it: an arm of one's own, planning, analysis, tests. Inside a control loop use the laws of `chain` and
+    `task`, of which this class is the array edge.
+
+    Args:
+        title: what it is called.
+        names: of its joints, n of them.
+        chain: its numbers.
+        lower: lowest joint positions [rad, m], shape (n,); -inf where there is no limit.
+        upper: highest.
+        torque: what each motor may give [N m, N], shape (n,); inf where nobody says.
+        speed: highest joint rates [rad/s, m/s], shape (n,); inf where nobody says.
+        home: joint positions to start from [rad, m], shape (n,).
+        notes: what a user should know of the numbers.
+        scene: the MuJoCo model that it was read from, if it was.
+
+    Raises:
+        InputError: shapes that do not fit together; a mass matrix that is not positive definite.
+    """
+
+    title: str
+    names: tuple[str, ...]
+    chain: Chain
+    lower: Array
+    upper: Array
+    torque: Array
+    speed: Array
+    home: Array
+    notes: tuple[str, ...] = ()
+    scene: Scene | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        if n == 0:
+            raise InputError(f"{self.title}: an arm needs at least one joint")
+        for name in ("lower", "upper", "torque", "speed", "home"):
+            values = np.array(getattr(self, name), dtype=float)
+            if values.shape != (n,):
+                raise InputError(f"{self.title}: {name} needs {n} numbers, got shape {values.shape}")
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
+        _check_moves(self)
+
+    @classmethod
+    def named(cls, name: str) -> SerialArm:
+        """An arm that comes with palpate: ur5e, panda, fr3, iiwa14.
+
+        Raises:
+            InputError: no such arm.
+        """
+        from palpate.robots.serial.from_toml import named
+
+        return named(name)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> SerialArm:
+        """An arm from a file as those that come with palpate.
+
+        Raises:
+            InputError: TOML that does not parse, an unknown or missing key, an inertia that is none.
+        """
+        from palpate.robots.serial.from_toml import read
+
+        return read(Path(path))
+
+    @classmethod
+    def from_mujoco(cls, model: Any, site: str | None = None) -> SerialArm:
+        """An arm from MJCF, or from a `mujoco.MjModel`; needs the extra `arms`.
+
+        Args:
+            model: the path of a file, or a model.
+            site: name of the site (or of the body) that is the tip; may be left out where there is one site only.
+
+        Raises:
+            InputError: what MuJoCo refuses, in its words; no such site; a ball or free joint below it.
+        """
+        from palpate.robots.serial.from_mujoco import from_mujoco
+
+        return from_mujoco(model, site)
+
+    @classmethod
+    def from_urdf(cls, path: str | Path, link: str) -> SerialArm:
+        """An arm from URDF, its tip the origin of a link; read by MuJoCo, needs the extra `arms`.
+
+        Meshes are neither needed nor read.
+
+        Raises:
+            InputError: what MuJoCo refuses, in its words; no such link.
+        """
+        from palpate.robots.serial.from_urdf import from_urdf
+
+        return from_urdf(Path(path), link)
+
+    @property
+    def joints(self) -> int:
+        """n."""
+        return len(self.names)
+
+    def forward_kinematics(self, q: ArrayLike) -> Array:
+        """Pose of the tip, shape (4, 4)."""
+        return self._found(q).pose
+
+    def joint_places(self, q: ArrayLike) -> Array:
+        """Origin of the base, of each joint's frame, and of the tip [m], shape (n + 2, 3)."""
+        c, p, R, places = self.chain, np.zeros(3), np.eye(3), [np.zeros(3)]
+        for i, value in enumerate(self._checked(q, "q")):
+            p, R = p + R @ c.at[i], R @ c.turn[i]
+            if c.slide[i]:
+                p = p + value * R[:, 2]
+            else:
+                cosine, sine = np.cos(value), np.sin(value)
+                R = R @ np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+            places.append(p)
+        return np.array([*places, p + R @ c.tip])
+
+    def inverse_kinematics(self, pose: ArrayLike, near: ArrayLike | None = None) -> Array:
+        """Joint positions of a pose within the joints' limits, shape (n,); of several, one near `near`.
+
+        Args:
+            pose: shape (4, 4).
+            near: joint positions to start the search from; `home` when left out.
+
+        Raises:
+            InputError: no pose, or one out of reach: it says by how much.
+        """
+        from palpate.robots.serial.inverse import inverse_kinematics
+
+        return inverse_kinematics(self, pose, self.home if near is None else self._checked(near, "near"))
+
+    def jacobian(self, q: ArrayLike) -> Array:
+        """J, velocity of the tip [m/s] above its turning [rad/s] by joint rates, shape (6, n)."""
+        return self._found(q).room.J
+
+    def jacobian_dot(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """dJ/dt, shape (6, n)."""
+        return self._found(q, qd).Jdot
+
+    def jacobian_dot_qd(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """dJ/dt qd: acceleration of the tip at rest of the joints' accelerations, shape (6,)."""
+        return self._found(q, qd).Jdqd
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """M(q) [kg m^2], rotors included, shape (n, n)."""
+        return self._found(q).room.M
+
+    def bias_torque(self, q: ArrayLike, qd: ArrayLike) -> Array:
+        """h(q, qd): centrifugal, Coriolis and gravity torque [N m], shape (n,)."""
+        return self._found(q, qd).room.h
+
+    def gravity_torque(self, q: ArrayLike) -> Array:
+        """Torque that holds the arm at rest [N m], shape (n,)."""
+        return self._found(q).room.h
+
+    def inverse_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, tip_wrench: ArrayLike | None = None
+    ) -> Array:
+        """Joint torques M qdd + h + J^T w [N m], shape (n,)."""
+        found = self._found(q, qd)
+        torque = found.room.M @ self._checked(qdd, "qdd") + found.room.h
+        return torque if tip_wrench is None else torque + found.room.J.T @ _wrench(tip_wrench)
+
+    def forward_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, torque: ArrayLike, tip_wrench: ArrayLike | None = None
+    ) -> Array:
+        """Joint accelerations, the qdd of torque = M qdd + h + J^T w, shape (n,)."""
+        found = self._found(q, qd)
+        push = self._checked(torque, "torque") - found.room.h
+        if tip_wrench is not None:
+            push = push - found.room.J.T @ _wrench(tip_wrench)
+        return np.asarray(np.linalg.solve(found.room.M, push))
+
+    def singular_values(self, q: ArrayLike) -> Array:
+        """Of J, largest first, shape (min(6, n),): the last is 0 in a singular pose."""
+        return np.asarray(np.linalg.svd(self.jacobian(q), compute_uv=False))
+
+    def _checked(self, values: ArrayLike, name: str) -> Array:
+        array = np.array(values, dtype=np.float64)
+        if array.shape != (self.joints,) or not np.isfinite(array).all():
+            raise InputError(
+                f"{name} of {self.title} must be {self.joints} finite numbers, got shape {array.shape}"
+                if array.shape != (self.joints,)
+                else f"{name} of {self.title} must be finite, got {array.tolist()}"
+            )
+        return array
+
+    def _found(self, q: ArrayLike, qd: ArrayLike | None = None) -> Found:
+        rates = np.zeros(self.joints) if qd is None else self._checked(qd, "qd")
+        found = found_for(self.joints)
+        compiled_description(self.chain, self._checked(q, "q"), rates, found)
+        return found
+
+
+def _wrench(w: ArrayLike) -> Array:
+    array = np.asarray(w, dtype=float)
+    if array.shape != (6,):
+        raise InputError(f"tip_wrench must have shape (6,), force above moment, got {array.shape}")
+    return array
+
+
+def _check_moves(arm: SerialArm) -> None:
+    """A mass matrix that is not positive definite belongs to no arm: its joints would move without being pushed."""
+    room = room_for(arm.joints)
+    chain_model(
+        arm.chain, arm.home, 0.0 * arm.home, room
+    )  # plain: an arm that is refused has compiled nothing
+    least = np.linalg.eigvalsh(room.M)[0]
+    if not least > 0.0:
+        raise InputError(
+            f"{arm.title}: the mass matrix at home is not positive definite (smallest eigenvalue {least:.3g}); a joint "
+            "moves nothing: give its link a mass and an inertia, or the joint a rotor inertia"
+        )

@@ -1,0 +1,103 @@
+"""Motion, wrench and inertia of rigid bodies, all about the world's origin and in the world's axes.
+
+There twists, wrenches and inertias of all bodies simply add (Featherstone, 2008, ch. 2).
+"""
+
+from typing import NamedTuple
+
+from palpate._jit import law, part
+from palpate._vector import Mat3, Vec3, cos, outer, sin
+
+UNIT3 = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
+
+
+@law
+def cross(a, b):
+    """a x b."""
+    return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+
+
+@law
+def turned(R, S):
+    """R S R^T of a symmetric S, symmetric to the last bit."""
+    A = R @ S
+    xy, xz, yz = A.r1 @ R.r2, A.r1 @ R.r3, A.r2 @ R.r3
+    return Mat3(Vec3(A.r1 @ R.r1, xy, xz), Vec3(xy, A.r2 @ R.r2, yz), Vec3(xz, yz, A.r3 @ R.r3))
+
+
+@law
+def turned_about_z(R, angle):
+    """R Rz(angle)."""
+    c, s = cos(angle), sin(angle)
+    columns = R.T
+    return Mat3(c * columns.r1 + s * columns.r2, c * columns.r2 - s * columns.r1, columns.r3).T
+
+
+@part
+class Twist(NamedTuple):
+    """Turning [rad/s] of a body, and velocity [m/s] of its point at the origin; or the rates of both."""
+
+    w: Vec3
+    v: Vec3
+
+    def __add__(a, b):
+        return Twist(a.w + b.w, a.v + b.v)
+
+    def __rmul__(a, k):
+        return Twist(k * a.w, k * a.v)
+
+    def carries(a, b):
+        """The rate of b, which a body carries along whose twist is a."""
+        return Twist(cross(a.w, b.w), cross(a.w, b.v) + cross(a.v, b.w))
+
+    def at(a, p):
+        """Velocity of the body's point p."""
+        return a.v + cross(a.w, p)
+
+
+@part
+class Wrench(NamedTuple):
+    """Moment about the origin [N m], and force [N]."""
+
+    m: Vec3
+    f: Vec3
+
+    def __add__(a, b):
+        return Wrench(a.m + b.m, a.f + b.f)
+
+    def power(a, s):
+        """Power on the twist s."""
+        return a.m @ s.w + a.f @ s.v
+
+
+@law
+def momentum_rate(V, momentum):
+    """Rate of a momentum that a body of twist V carries along."""
+    return Wrench(cross(V.w, momentum.m) + cross(V.v, momentum.f), cross(V.w, momentum.f))
+
+
+@part
+class Inertia(NamedTuple):
+    """Mass [kg], mass times its centre [kg m], second moment about the origin [kg m^2]."""
+
+    mass: float
+    first: Vec3
+    second: Mat3
+
+    def __add__(a, b):
+        return Inertia(a.mass + b.mass, a.first + b.first, a.second + b.second)
+
+    def momentum(a, s):
+        """Of the twist s; or the wrench that gives the acceleration s."""
+        return Wrench(a.second @ s.w + cross(a.first, s.v), a.mass * s.v - cross(a.first, s.w))
+
+
+@law
+def inertia_at(mass, centre, moment):
+    """A body's inertia from that about its centre of mass, in the world's axes."""
+    spread = (centre @ centre) * UNIT3 - outer(centre, centre)
+    return Inertia(mass, mass * centre, moment + mass * spread)
+
+
+for _cls in (Twist, Wrench, Inertia):
+    _cls.__array_ufunc__ = None  # type: ignore[union-attr]  # NumPy leaves the operators to these classes

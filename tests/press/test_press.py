@@ -1,0 +1,294 @@
+"""`palpate press`: what it does with each arm, what it writes, and what it refuses."""
+
+import json
+import re
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from palpate import read_log
+from palpate.cli import main
+from palpate.errors import InputError
+from palpate.press.choosing import Question, arm_of, prepared, surface_of
+from palpate.press.pilots import Cautious
+from palpate.press.pressing import Plan, press
+from palpate.press.protocol import Command
+from palpate.press.setting import cell_of, check_able
+from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.summary import summarise
+from palpate.robots.serial.from_toml import names
+
+PLAIN = ("press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50")
+
+
+def question(**changes):
+    return Question(**{"arm": "fr3", "force": 20.0, "surface": surface_of("K=5000,B=50"), **changes})
+
+
+def asked(**changes):
+    pressing = prepared(question(**changes))
+    record = pressing.run()
+    return record, summarise(record, pressing.asked)
+
+
+@pytest.mark.parametrize(("arm", "mode", "stiffness"), [("fr3", "torque", 6e4), ("ur5e", "position", 5e3)])
+def test_it_presses_with_the_force_asked_for_and_finds_the_surface(arm, mode, stiffness):
+    record, summary = asked(arm=arm, mode=mode, surface=surface_of(f"K={stiffness},B=50"), seconds=4.0)
+    assert summary["end"] == "done"
+    assert summary["force"]["mean_N"] == pytest.approx(20.0, abs=0.1)
+    assert summary["force"]["overshoot_N"] < 0.1 * 20.0
+    assert summary["force"]["settling_s"] < 0.5
+    assert summary["contacts_lost"] == 0
+    K = summary["identified"]["parameters"]["K"]
+    assert K["verdict"] == "identified"
+    assert K["ci95"][0] < stiffness < K["ci95"][1]
+    assert np.abs(record["y"] - record["y"][0]).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    "controller", ["hybrid", pytest.param("proportional-integral", marks=pytest.mark.long)]
+)
+def test_controllers_of_three_directions_press_with_seven_joints(controller):
+    """Nothing of them was changed; damping of the surface is all that damps them, as on the bench."""
+    _, summary = asked(controller=controller, arm="iiwa14", seconds=4.0)
+    assert summary["end"] == "done"
+    assert summary["force"]["mean_N"] == pytest.approx(20.0, abs=0.5)
+
+
+def test_the_impedance_shares_the_depth_with_the_surface():
+    _, summary = asked(controller="impedance", seconds=2.5, probe=0.0)
+    assert summary["force"]["mean_N"] == pytest.approx(20.0 * 5000.0 / (5000.0 + 2000.0), rel=0.01)
+
+
+def test_the_same_seed_gives_the_same_numbers_and_another_others():
+    one, again, other = (asked(seconds=0.3, seed=seed)[0] for seed in (1, 1, 2))
+    assert np.array_equal(one["force"], again["force"])
+    assert not np.array_equal(one["force_sampled"][:100], other["force_sampled"][:100])
+
+
+def test_the_folder_and_what_is_printed(tmp_path, capsys):
+    out = tmp_path / "press"
+    assert main([*PLAIN, "--seconds", "3", "--out", str(out), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == json.loads((out / "summary.json").read_text())
+    assert {"end", "force", "identified", "truth", "saturated", "contacts_lost", "seed"} <= set(printed)
+    assert printed["command"].startswith("palpate press --arm fr3")
+    page = (out / "report.html").read_text()
+    assert "data:image/svg+xml" in page
+    assert "<script" not in page
+    film = (out / "film.svg").read_text()
+    assert film.count("<animate ") >= 5
+    assert len(film) < 100_000
+    record = read_log(out / "record.parquet", time="t", position="x_measured", force="force_sampled")
+    assert len(record) > 3000
+    assert main([*PLAIN, "--seconds", "1", "--out", str(out)]) == 2
+    assert "exists" in capsys.readouterr().err
+    assert main(["identify", str(out / "record.parquet"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["parameters"]["K"]
+    assert found["ci95"][0] < 5000.0 < found["ci95"][1]
+
+
+def simulated(arm="fr3", **changes):
+    """A press that is over soon: the arm, its pilot, its place."""
+    asked = prepared(question(arm=arm)).asked
+    robot = replace(asked.arm, **changes)
+    cell = cell_of(robot, asked.place, asked.surface, asked.gains.arm)
+    one = SimulatedArm(robot, asked.gains.arm, asked.place, cell)
+    return one, Cautious(one, asked.gains, asked.place.normal), asked.place
+
+
+def test_it_ends_at_the_end_of_a_joints_range():
+    home = prepared(question()).asked.arm.home
+    one, pilot, place = simulated(lower=home - 1e-4, upper=home + 1e-4)
+    record = press(one, pilot, place, Plan(20.0, 1.0))
+    assert record.meta["end"] == "joint limit"
+    assert "reached the end of its range" in record.meta["why"]
+
+
+def test_it_gives_up_where_there_is_no_surface():
+    one, pilot, place = simulated()
+    record = press(one, pilot, place, Plan(20.0, 1.0, longest=0.05))
+    assert record.meta["end"] == "no contact"
+    assert len(record) == 50
+
+
+def test_an_interrupted_press_keeps_what_there_is():
+    one, pilot, place = simulated()
+
+    def progress(time, phase):
+        if time > 0.3:
+            raise KeyboardInterrupt
+
+    record = press(one, pilot, place, Plan(20.0, 1.0), progress)
+    assert record.meta["end"] == "interrupted"
+    assert len(record) == 400
+
+
+@pytest.mark.parametrize(("velocity", "pose"), [(None, None), (np.zeros(6), np.eye(4))])
+def test_a_command_is_one_of_two(velocity, pose):
+    with pytest.raises(InputError, match="either a velocity or a pose"):
+        simulated()[0].write(Command(velocity, pose))
+
+
+def test_a_commanded_pose_is_reached():
+    """Under gravity, weight compensated; of 2 mm and of what the tip turned meanwhile little is left after 0.5 s."""
+    one, _, place = simulated()
+    goal = place.pose.copy()
+    goal[:3, 3] -= 0.002 * place.normal
+    for _ in range(500):
+        one.write(Command(pose=goal))
+    assert one.read().pose[:3, 3] == pytest.approx(goal[:3, 3], abs=1e-5)
+    assert one.read().pose == pytest.approx(goal, abs=1e-4)
+
+
+def test_a_place_and_a_normal_of_ones_own():
+    pressing = prepared(question(at=(0.45, 0.1, 0.4), normal=(0.3, 0.0, -1.0)))
+    place = pressing.asked.place
+    assert place.pose[:3, 2] == pytest.approx(np.array([0.3, 0.0, -1.0]) / np.sqrt(1.09), abs=1e-8)
+    surface = place.pose[:3, 3] + 0.003 * place.normal
+    assert surface == pytest.approx([0.45, 0.1, 0.4], abs=1e-8)
+
+
+def test_a_users_own_gains(tmp_path):
+    pressing = prepared(question(force=15.0))
+    path = tmp_path / "gains.toml"
+    path.write_text(pressing.asked.gains.to_toml())
+    again = prepared(question(force=15.0, gains=path))
+    assert again.asked.gains == pressing.asked.gains
+    with pytest.raises(InputError, match="for a torque arm, and --mode says position"):
+        prepared(question(force=15.0, gains=path, mode="position"))
+
+
+def test_a_plan_is_steady_at_both_ends():
+    plan = Plan(20.0, 6.0, 0.2)
+    assert [plan.desired(t) for t in (0.0, 1.9, 2.1, 2.4, 4.1, 5.9)] == [20.0, 20.0, 16.0, 20.0, 20.0, 20.0]
+
+
+def test_every_arm_by_its_name():
+    assert names() == ["fr3", "iiwa14", "panda", "ur5e"]
+    for name in names():
+        assert arm_of(name, None).joints in (6, 7)
+
+
+WRONG = [
+    (["--arm", "fr33"], "did you mean 'fr3'"),
+    (["--arm", "nowhere.xml"], "nowhere.xml"),
+    (["--arm", "nowhere.urdf"], "give it with --site|Give it with --site"),
+    (["--arm", "nowhere.urdf", "--site", "tip"], "No such file"),
+    (["--site", "tip"], "--site is for files"),
+    (["--force", "0"], "above 0 N"),
+    (["--force", "-3"], "above 0 N"),
+    (["--force", "20:m"], "unit of force"),
+    (["--force", "0.5"], "standard deviations of the sensor's noise"),
+    (["--force", "500"], "force limit|full scale"),
+    (["--surface", "soft"], "needs K=..,B=.."),
+    (["--surface", "B=50"], "needs a stiffness"),
+    (["--surface", "K=5000,K=3"], "has K twice"),
+    (["--surface", "K=many"], "K needs a number"),
+    (["--surface", "K=-5"], "stiffness must be above 0"),
+    (["--surface", "K=2e6"], "the gains are for at most"),
+    (["--mode", "speed"], "unknown mode 'speed'"),
+    (["--physics", "bullet"], "unknown physics 'bullet'"),
+    (["--controller", "hybird"], "did you mean 'hybrid'"),
+    (["--controller", "hybrid", "--mode", "position"], "gives torques"),
+    (["--at", "3,0,0"], r"out of reach of Franka Research 3 by \d"),
+    (["--at", "3,0"], "three numbers"),
+    (["--normal", "0,0,0"], "a normal needs a length"),
+    (["--seconds", "0"], "longer than 0 s"),
+    (["--seconds", "nan"], "longer than 0 s"),
+    (["--probe", "1.5"], "share of the force"),
+    (["--seed", "1.5"], "whole number"),
+    (["--gains", "nowhere.toml"], "No such file"),
+]
+
+
+@pytest.mark.parametrize(("words", "what"), WRONG, ids=[" ".join(words) for words, _ in WRONG])
+def test_what_is_wrong_is_one_line(words, what, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given = dict(zip(PLAIN[1::2], PLAIN[2::2], strict=True)) | dict(zip(words[::2], words[1::2], strict=True))
+    code = main(["press", *(word for pair in given.items() for word in pair), "--out", "here"])
+    said = capsys.readouterr().err
+    assert code == 2, said
+    assert len(said.strip().splitlines()) == 1
+    assert re.search(what, said), said
+    assert not (tmp_path / "here").exists()
+
+
+def test_a_singular_pose_says_by_how_much(tmp_path, capsys):
+    text = "title = 'Straight'\nhome = [0.0, -1.2, 0.0, 0.3, 0.4, 0.0]\n" + (names_file("ur5e")).split(
+        "\n", 6
+    )[-1].split("flange", 1)[1].join(["flange", ""])
+    path = tmp_path / "straight.toml"
+    path.write_text(text)
+    code = main(["press", "--arm", str(path), *PLAIN[3:], "--out", str(tmp_path / "out")])
+    said = capsys.readouterr().err
+    assert code == 2
+    assert "singular: the smallest singular value of the Jacobian is" in said
+    assert "at least" in said
+
+
+def names_file(name):
+    from importlib.resources import files
+
+    return files("palpate.robots.serial").joinpath("arms", f"{name}.toml").read_text(encoding="utf-8")
+
+
+def test_too_few_joints(tmp_path, capsys):
+    from robots.serial.oracles import URDF
+
+    assert (
+        main(["press", "--arm", str(URDF), "--site", "probe", *PLAIN[3:], "--out", str(tmp_path / "o")]) == 2
+    )
+    assert "has 4 joints" in capsys.readouterr().err
+
+
+def test_without_mujoco_the_extra_is_named(monkeypatch, capsys, tmp_path):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert main([*PLAIN, "--physics", "mujoco", "--out", str(tmp_path / "out")]) == 2
+    assert "palpate[arms]" in capsys.readouterr().err
+
+
+def test_a_force_that_the_motors_cannot_give():
+    pressing = prepared(question(arm="panda"))
+    with pytest.raises(InputError, match=r"takes \S+ N m of joint\d, which gives"):
+        check_able(pressing.asked.arm, pressing.asked.place, 0.003, 1000.0)
+
+
+#: A user's model: position servos, a gripper, damping, a floor in the way, a keyframe, and no site.
+def cell(damping=0.0):
+    from palpate.robots import SerialArm
+    from palpate.robots.serial.to_mujoco import mjcf
+
+    arm = SerialArm.named("iiwa14")
+    text = mjcf(arm).replace('armature="0.1"', f'armature="0.1" damping="{damping}"')
+    text = re.sub(
+        r"<site [^>]*>", '<body name="hand" pos="0 0 0.045"><geom size="0.02" mass="0.1"/>'
+        '<body name="finger"><joint name="grip" type="slide"/><geom size="0.01" mass="0.05"/></body></body>', text
+    )  # fmt: skip
+    servos = "".join(f'<position joint="{name}" kp="1000"/>' for name in arm.names)
+    keys = " ".join(map(str, (*arm.home, 0.0)))
+    extra = f'<actuator>{servos}</actuator><keyframe><key qpos="{keys}"/></keyframe>'
+    floor = '<worldbody><geom type="plane" size="2 2 0.1" pos="0 0 0.5"/>'
+    return text.replace("<worldbody>", floor).replace("</mujoco>", extra + "</mujoco>")
+
+
+@pytest.mark.parametrize("physics", ["own", "mujoco"])
+def test_a_users_own_model(tmp_path, physics):
+    path = tmp_path / "cell.xml"
+    path.write_text(cell())
+    pressing = prepared(question(arm=str(path), site="hand", physics=physics, seconds=0.6))
+    assert any("grip" in note for note in pressing.asked.notes)
+    record = pressing.run()
+    assert record["force"][-1] == pytest.approx(20.0, abs=1.0)
+
+
+def test_only_mujoco_knows_the_damping_of_its_joints(tmp_path):
+    path = tmp_path / "cell.xml"
+    path.write_text(cell(damping=30.0))
+    pressing = prepared(question(arm=str(path), site="hand", physics="mujoco", seconds=0.4))
+    assert any("damping" in note for note in pressing.asked.notes)
+    damped = pressing.run()
+    free = prepared(question(arm=str(path), site="hand", seconds=0.4)).run()
+    assert damped["x"][1000] < free["x"][1000] - 1e-5  # the approach is slower
