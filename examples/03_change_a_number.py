@@ -3,7 +3,7 @@
 import msgspec
 
 from palpate.bench import build, load
-from palpate.bench.experiment import KelvinVoigtSurface, Run
+from palpate.bench.experiments.tables import KelvinVoigtSurface, Run
 
 foam = load("foam-hybrid")
 for stiffness in (5e3, 1e4, 2e4):

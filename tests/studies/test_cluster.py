@@ -13,8 +13,8 @@ from palpate.errors import InputError
 from palpate.studies import cluster as clusters
 from palpate.studies.cluster import Certificates, Cluster, run_batch
 from palpate.studies.local import Local
-from palpate.studies.one import Job
-from palpate.studies.running import Work
+from palpate.studies.run_one import Job
+from palpate.studies.run_study import Work
 from palpate.studies.sources import sources
 from studies.cluster import local_cluster
 from studies.small import SMALL, Formula, planned

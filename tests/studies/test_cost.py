@@ -5,7 +5,7 @@ import time
 from palpate.bench.speed import cores
 from palpate.studies.cost import seconds_a_run, told, too_much
 from palpate.studies.local import Local
-from palpate.studies.one import Job
+from palpate.studies.run_one import Job
 from studies.small import SMALL, planned, text
 
 

@@ -8,15 +8,21 @@ from palpate.bench import build, changed, load
 from palpate.environments import KelvinVoigt
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
-from palpate.thesis.decoupling import Pair, Stray, pressed, stray
+from palpate.thesis.conditions import SHORT, rougher
 from palpate.thesis.explanations import e6_friction_compensation as compensation
 from palpate.thesis.figures import fig_2_01, fig_2_02, fig_2_04, fig_2_05, fig_4_03, fig_4_19
-from palpate.thesis.force_loop import ForceLoop
-from palpate.thesis.force_tracking import since_contact
-from palpate.thesis.regain import Regain, drawn_back, found_again, regained
+from palpate.thesis.force_control.contact_loss import Regain, drawn_back, found_again, regained
+from palpate.thesis.force_control.decoupling import Pair, Stray, pressed, stray
+from palpate.thesis.force_control.disturbances import (
+    Turn,
+    desired_pose,
+    other_surface,
+    run_with,
+    surface_back,
+)
+from palpate.thesis.force_control.loop import ForceLoop
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.turns import Turn, desired_pose, other_surface, run_with, surface_back
-from palpate.thesis.worlds import SHORT, rougher
 
 FOAM = changed(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
 RUBBER = KelvinVoigt(34500.0, 480.0, 0.05)

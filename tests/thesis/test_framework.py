@@ -18,9 +18,9 @@ from palpate.bench import changed, load
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.thesis.claims import Claim, decided, spread, with_wholes
-from palpate.thesis.measuring import STATE, measure
+from palpate.thesis.figure import studies, study
+from palpate.thesis.measure import STATE, measure
 from palpate.thesis.runs import Runs
-from palpate.thesis.study import studies, study
 
 FIELDS = ["id", "source", "claim", "thesis", "measured", "tolerance", "verdict", "note"]
 VERDICTS = {"reproduced", "differs", "not checkable"}
@@ -323,7 +323,7 @@ def test_the_program_says_that_it_goes_on(tmp_path, capsys, monkeypatch):
     """After a Ctrl-C where what is done is, and at the next start how much of it there is."""
     done = []
     toys = [toy("1.1", done), toy("1.2", done, KeyboardInterrupt)]
-    monkeypatch.setattr(palpate.thesis.study, "studies", lambda: toys)
+    monkeypatch.setattr(palpate.thesis.figure, "studies", lambda: toys)
     assert main(["thesis", "--out", str(tmp_path / "t")]) == 130
     told = capsys.readouterr().err
     assert told.count("\n") == 1

@@ -9,9 +9,11 @@ from palpate.bench import changed
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
+from palpate.thesis.conditions import moved, rougher
 from palpate.thesis.explanations import e2_integrator, e3_divergence
+from palpate.thesis.figure import study
 from palpate.thesis.figures import fig_6_10, fig_6_14, fig_6_15, fig_6_17
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.tracking import (
     FOAM,
     LIMIT,
     RUBBER,
@@ -23,10 +25,8 @@ from palpate.thesis.force_tracking import (
     tracking,
     variations,
 )
+from palpate.thesis.force_control.weights import watch
 from palpate.thesis.runs import Runs
-from palpate.thesis.study import study
-from palpate.thesis.watching import watch
-from palpate.thesis.worlds import moved, rougher
 
 OURS = [f"6.{i}" for i in range(10, 18)] + [
     "neural-is-an-integrator",

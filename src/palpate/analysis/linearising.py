@@ -7,13 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.constants import change
+from palpate.analysis.constant_modes import change
+from palpate.analysis.equilibrium import pressing, still
 from palpate.analysis.linear_loop import LinearLoop
 from palpate.analysis.motion import Motion
-from palpate.analysis.still import pressing, still
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.experiment import Experiment
+from palpate.bench.experiments.tables import Experiment
 from palpate.bench.row import COLUMNS
 from palpate.bench.tick import Loop
 from palpate.errors import InputError

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3, diagonal
 from palpate.bench.bench import Bench
-from palpate.bench.checking import check, matched_delay
 from palpate.bench.conditioning import Conditioning
 from palpate.bench.controller_tables import controller_of
 from palpate.bench.estimators import Estimators
-from palpate.bench.experiment import (
+from palpate.bench.experiments.consistency import check, matched_delay
+from palpate.bench.experiments.tables import (
     Experiment,
     HuntCrossleySurface,
     KelvinVoigtSurface,

@@ -8,7 +8,14 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from palpate._vector import Vec3
-from palpate.bench.part_table import NotNegative, NotNegativeTriple, Part, Positive, PositiveTriple, Triple
+from palpate.bench.experiments.part_table import (
+    NotNegative,
+    NotNegativeTriple,
+    Part,
+    Positive,
+    PositiveTriple,
+    Triple,
+)
 from palpate.controllers import (
     CautiousPress,
     DecoupledHybrid,

@@ -60,7 +60,7 @@ def run(
         dpi: of a PNG; 110 if not given.
         movie: write a film of the arm too, arm.gif; it takes some ten seconds.
     """
-    from palpate.bench import experiment as experiments
+    from palpate.bench.experiments import tables as experiments
 
     if list_:
         listed(experiments.FILES, lambda known: experiments.load(known).title)
@@ -121,7 +121,7 @@ def _run(
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise
-    from palpate.bench.experiment import parse
+    from palpate.bench.experiments.tables import parse
     from palpate.logs import write_record
     from palpate.report.identification.source import sha256_of
     from palpate.report.run.figures import draw

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from palpate.studies.cluster import Cluster
     from palpate.studies.plan import Plan
-    from palpate.studies.presenting import Findings
-    from palpate.studies.running import Runner
+    from palpate.studies.run_study import Runner
+    from palpate.studies.summary import Findings
 
 
 @Parameter(name="*", group=Group("A cluster", sort_key=1))
@@ -119,9 +119,9 @@ def study(
 def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
     from palpate.studies.plan import plan
-    from palpate.studies.presenting import present
-    from palpate.studies.running import Work, begun
+    from palpate.studies.run_study import Work, begun
     from palpate.studies.study import parse
+    from palpate.studies.summary import present
 
     screen = console(stderr=True)
     try:

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from palpate.bench import build
 from palpate.bench.speed import cores
 from palpate.errors import InputError
-from palpate.studies.one import Stopped
 from palpate.studies.plan import Plan
+from palpate.studies.run_one import Stopped
 
 LOOKED_AT = 0.5
 """Seconds of this machine's time that the piece may take [s]."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from palpate.bench.part_table import Part, Positive
+from palpate.bench.experiments.part_table import Part, Positive
 
 Points = Annotated[int, Meta(ge=1, le=1_000_000)]
 Seed = Annotated[int, Meta(ge=0)]

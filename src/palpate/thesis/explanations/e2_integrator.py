@@ -13,8 +13,8 @@ from palpate.bench import Experiment, changed
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import PALE, limits, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.panels import PALE, limits, panels
+from palpate.thesis.force_control.tracking import (
     FOAM,
     RUBBER,
     SINE,
@@ -26,8 +26,8 @@ from palpate.thesis.force_tracking import (
     tracking,
     variations,
 )
+from palpate.thesis.force_control.weights import COLUMN, HOLD, TORQUES, Look, hold, watch
 from palpate.thesis.runs import Runs
-from palpate.thesis.watching import COLUMN, HOLD, TORQUES, Look, hold, watch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

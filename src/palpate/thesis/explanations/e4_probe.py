@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.thesis import probing, probing_drawing
-from palpate.thesis import probing_causes as causes
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.probing import Choice
-from palpate.thesis.probing_causes import PARAMETERS, STRAIGHT, Data, Surface
-from palpate.thesis.probing_claims import ENOUGH
-from palpate.thesis.probing_notes import share_of_starts
-from palpate.thesis.rls import Array
+from palpate.thesis.least_squares.press_runs import Array
+from palpate.thesis.neural_identifier import ablation as causes
+from palpate.thesis.neural_identifier import network, panels
+from palpate.thesis.neural_identifier.ablation import PARAMETERS, STRAIGHT, Data, Surface
+from palpate.thesis.neural_identifier.claims import ENOUGH
+from palpate.thesis.neural_identifier.network import Choice
+from palpate.thesis.neural_identifier.notes import share_of_starts
 from palpate.thesis.runs import Runs
 
 __all__ = ["CAPTION", "NUMBER", "PARAMETERS", "TITLE", "check", "plot", "run"]
@@ -156,9 +156,9 @@ def _steady_conditions(data: Data) -> tuple[int, int]:
     """Under how many conditions the starts keep the signs that they have as chosen, and of how many."""
     kept = []
     for surface in data.values():
-        usual = np.sign(np.median(surface.masses, axis=0))[: probing.VARIED_STARTS]
+        usual = np.sign(np.median(surface.masses, axis=0))[: network.VARIED_STARTS]
         for some in surface.varied.values():
-            found = np.sign(np.array([a.M for a in some]).reshape(-1, probing.VARIED_STARTS))
+            found = np.sign(np.array([a.M for a in some]).reshape(-1, network.VARIED_STARTS))
             kept.append(np.mean(found == usual) >= ENOUGH)
     return sum(map(bool, kept)), len(kept)
 
@@ -239,4 +239,4 @@ def _enough(holds: Sequence[bool]) -> bool:
 
 def plot(data: Data) -> Figure:
     """What the networks know, how K follows from it, every toggle, and M by start."""
-    return probing_drawing.causes(data, replace(Choice(), thresholds=False), STRAIGHT)
+    return panels.causes(data, replace(Choice(), thresholds=False), STRAIGHT)

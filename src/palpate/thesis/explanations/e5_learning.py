@@ -11,11 +11,11 @@ import numpy as np
 from palpate.bench import Experiment, changed
 from palpate.report import style
 from palpate.thesis.claims import Claim
-from palpate.thesis.force_panels import legend_inside, panels
-from palpate.thesis.force_tracking import FOAM, RUBBER, Tracking, tracking
+from palpate.thesis.conditions import RELAXING_FOAM
+from palpate.thesis.force_control.panels import legend_inside, panels
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, Tracking, tracking
+from palpate.thesis.force_control.weights import watch
 from palpate.thesis.runs import Runs
-from palpate.thesis.watching import watch
-from palpate.thesis.worlds import RELAXING_FOAM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,16 +11,24 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
-from palpate.bench.summary import losses
+from palpate.bench.metrics.summary import losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, by_world, since_contact, stops_holding
-from palpate.thesis.regain import Regain, Trace, drawn_back, found_again, regain_panel, regained, trace_of
+from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
+from palpate.thesis.force_control.contact_loss import (
+    Regain,
+    Trace,
+    drawn_back,
+    found_again,
+    regain_panel,
+    regained,
+    trace_of,
+)
+from palpate.thesis.force_control.panels import across, dots_panel, panels
+from palpate.thesis.force_control.tracking import ENOUGH, VARIED_SEEDS, by_world, since_contact, stops_holding
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import changed, load
-from palpate.bench.summary import losses
+from palpate.bench.metrics.summary import losses
 from palpate.controllers import RaibertCraig
 from palpate.controllers.raibert_craig import growth_rate
 from palpate.records import Record
 from palpate.report import style
 from palpate.robots.arm3 import Arm3
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, by_world, since_contact, stops_holding
+from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
+from palpate.thesis.force_control.panels import across, dots_panel, panels
+from palpate.thesis.force_control.tracking import ENOUGH, by_world, since_contact, stops_holding
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
-from palpate.bench.summary import losses
+from palpate.bench.metrics.summary import losses
 from palpate.bench.tick import Loop, LoopState
 from palpate.controllers import Impedance
 from palpate.controllers.any_controller import AnyController
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, by_world, since_contact, stops_holding
+from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
+from palpate.thesis.force_control.disturbances import Change, Turn, run_with
+from palpate.thesis.force_control.panels import dots_panel, panels
+from palpate.thesis.force_control.tracking import ENOUGH, by_world, since_contact, stops_holding
 from palpate.thesis.runs import Runs
-from palpate.thesis.turns import Change, Turn, run_with
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,8 +18,16 @@ from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, LIMIT, SETTLE, SHARE, VARIED_SEEDS, rms, stops_holding
+from palpate.thesis.force_control.panels import across, dots_panel, panels
+from palpate.thesis.force_control.tracking import (
+    ENOUGH,
+    LIMIT,
+    SETTLE,
+    SHARE,
+    VARIED_SEEDS,
+    rms,
+    stops_holding,
+)
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

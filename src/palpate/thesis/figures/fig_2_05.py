@@ -14,8 +14,10 @@ from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, force_panel, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
+from palpate.thesis.force_control.disturbances import Turn, other_surface, run_with
+from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
+from palpate.thesis.force_control.tracking import (
     ENOUGH,
     FOLLOWS,
     LIMIT,
@@ -29,8 +31,6 @@ from palpate.thesis.force_tracking import (
     tracking,
 )
 from palpate.thesis.runs import Runs
-from palpate.thesis.turns import Turn, other_surface, run_with
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,7 +16,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.rls import conditions, nearer
+from palpate.thesis.least_squares.press_runs import conditions, nearer
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

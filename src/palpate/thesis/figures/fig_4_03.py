@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
-from palpate.bench.summary import losses
+from palpate.bench.metrics.summary import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.force_loop import ForceLoop
-from palpate.thesis.force_panels import across, panels
-from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact
+from palpate.thesis.conditions import SHORT, rougher
+from palpate.thesis.force_control.loop import ForceLoop
+from palpate.thesis.force_control.panels import across, panels
+from palpate.thesis.force_control.tracking import ENOUGH, VARIED_SEEDS, since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import SHORT, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

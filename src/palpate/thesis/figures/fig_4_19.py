@@ -13,11 +13,20 @@ from palpate.bench import Experiment, changed, load
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.decoupling import COUPLED, JUMP, JUMPS, PRINTED, Pair, as_printed, pair_of, pressed
-from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, SHARE, VARIED_SEEDS, since_contact, stops_holding
+from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose, rougher
+from palpate.thesis.force_control.decoupling import (
+    COUPLED,
+    JUMP,
+    JUMPS,
+    PRINTED,
+    Pair,
+    as_printed,
+    pair_of,
+    pressed,
+)
+from palpate.thesis.force_control.panels import across, dots_panel, panels
+from palpate.thesis.force_control.tracking import ENOUGH, SHARE, VARIED_SEEDS, since_contact, stops_holding
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from palpate.thesis import rls, rls_first
 from palpate.thesis.claims import Claim
+from palpate.thesis.least_squares import press_runs, settling
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -19,20 +19,20 @@ CAPTION = (
     "and on one that relaxes. The thesis: practically identified in the first 0.12 s (dotted). Insets: the first "
     "0.3 s. (g), (h): what the thesis does not give, varied."
 )
-PARAMETERS = rls.FOAMS
+PARAMETERS = press_runs.FOAMS
 LIMIT = 0.12
 
 
-def run(runs: Runs) -> rls_first.Data:
+def run(runs: Runs) -> settling.Data:
     """One press a seed on each foam."""
-    return rls_first.run(runs, PARAMETERS)
+    return settling.run(runs, PARAMETERS)
 
 
-def check(data: rls_first.Data) -> Sequence[Claim]:
+def check(data: settling.Data) -> Sequence[Claim]:
     """K, B and M one by one."""
-    return rls_first.settling_claims(data, "plain foam", "RLS-S1", "fig. 6.1, sec. 6.1", LIMIT)
+    return settling.settling_claims(data, "plain foam", "RLS-S1", "fig. 6.1, sec. 6.1", LIMIT)
 
 
-def plot(data: rls_first.Data) -> Figure:
+def plot(data: settling.Data) -> Figure:
     """The six panels, and the time to settle."""
-    return rls_first.plot(data, LIMIT)
+    return settling.plot(data, LIMIT)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from palpate.thesis import rls, rls_later
 from palpate.thesis.claims import Claim
+from palpate.thesis.least_squares import press_runs, steady_state
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -19,29 +19,29 @@ CAPTION = (
     "44 kN/m; B_e plausible; M_e negative. (g): the difference under varied conditions. (h): what single samples give "
     "by the ratios of section 5.1."
 )
-PARAMETERS = {"rubber": rls.RUBBER}
+PARAMETERS = {"rubber": press_runs.RUBBER}
 SOURCE = "fig. 6.5, sec. 6.1"
 APART = 0.02
 
 
-def run(runs: Runs) -> rls_later.Data:
+def run(runs: Runs) -> steady_state.Data:
     """One press a seed."""
-    return rls_later.run(runs, PARAMETERS, vary=1)
+    return steady_state.run(runs, PARAMETERS, vary=1)
 
 
-def check(data: rls_later.Data) -> Sequence[Claim]:
+def check(data: steady_state.Data) -> Sequence[Claim]:
     """How near K_e is to f/x, its level, B and M, and the ratios."""
     return [
         _apart(data),
         _level(data),
         _damping(data),
         _inertia(data),
-        rls_later.ratio_claim(data, "RLS-RATIO.R"),
+        steady_state.ratio_claim(data, "RLS-RATIO.R"),
     ]
 
 
-def _apart(data: rls_later.Data) -> Claim:
-    return rls_later.found_claim(
+def _apart(data: steady_state.Data) -> Claim:
+    return steady_state.found_claim(
         data,
         ("RLS-R2", SOURCE, "K_e and f/x are the same to two digits.", "44 and 44 kN/m"),
         lambda f: 100.0 * f.apart,
@@ -53,8 +53,8 @@ def _apart(data: rls_later.Data) -> Claim:
     )
 
 
-def _level(data: rls_later.Data) -> Claim:
-    return rls_later.level_claim(
+def _level(data: steady_state.Data) -> Claim:
+    return steady_state.level_claim(
         data,
         "RLS-R2.K",
         SOURCE,
@@ -65,8 +65,8 @@ def _level(data: rls_later.Data) -> Claim:
     )
 
 
-def _damping(data: rls_later.Data) -> Claim:
-    return rls_later.damping_claim(
+def _damping(data: steady_state.Data) -> Claim:
+    return steady_state.damping_claim(
         data,
         "RLS-R2.B",
         SOURCE,
@@ -75,8 +75,8 @@ def _damping(data: rls_later.Data) -> Claim:
     )
 
 
-def _inertia(data: rls_later.Data) -> Claim:
-    return rls_later.inertia_claim(
+def _inertia(data: steady_state.Data) -> Claim:
+    return steady_state.inertia_claim(
         data,
         "RLS-R2.M",
         SOURCE,
@@ -84,6 +84,6 @@ def _inertia(data: rls_later.Data) -> Claim:
     )
 
 
-def plot(data: rls_later.Data) -> Figure:
+def plot(data: steady_state.Data) -> Figure:
     """The six panels, the differences, and the ratios."""
-    return rls_later.plot(data, APART)
+    return steady_state.plot(data, APART)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from palpate.thesis import probing, probing_claims, probing_figure
 from palpate.thesis.claims import Claim
+from palpate.thesis.neural_identifier import claims, figure, network
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -20,19 +20,19 @@ CAPTION = (
     "6.7 kN/m, B like that of least squares, M small and positive. (g), (h): output amplitude, initial weights and "
     "thresholds, which it does not give; a dot where a part of the claim holds."
 )
-PARAMETERS = probing.FOAM
+PARAMETERS = network.FOAM
 
 
-def run(runs: Runs) -> probing_figure.Data:
+def run(runs: Runs) -> figure.Data:
     """One press a noise seed, ten starts on each."""
-    return probing_figure.run(runs, PARAMETERS, "foam")
+    return figure.run(runs, PARAMETERS, "foam")
 
 
-def check(data: probing_figure.Data) -> Sequence[Claim]:
+def check(data: figure.Data) -> Sequence[Claim]:
     """When K, B and M are there, and what they are."""
-    return probing_claims.claims(data.grounds, probing_claims.FOAM, "NN-S", "fig. 6.7, sec. 6.2")
+    return claims.claims(data.grounds, claims.FOAM, "NN-S", "fig. 6.7, sec. 6.2")
 
 
-def plot(data: probing_figure.Data) -> Figure:
+def plot(data: figure.Data) -> Figure:
     """The six panels, and where the claims hold."""
-    return probing_figure.plot(data, probing_claims.FOAM, probing_claims.FOAM_BAND)
+    return figure.plot(data, claims.FOAM, claims.FOAM_BAND)

@@ -11,8 +11,8 @@ import numpy as np
 from palpate.bench import changed
 from palpate.records import Record
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, force_panel, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
+from palpate.thesis.force_control.tracking import (
     ENOUGH,
     FOAM,
     RUBBER,

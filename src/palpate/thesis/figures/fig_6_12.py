@@ -9,8 +9,8 @@ import numpy as np
 
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.force_panels import tracked_figure
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.panels import tracked_figure
+from palpate.thesis.force_control.tracking import (
     FOAM,
     FOLLOWS,
     SINE,

@@ -14,9 +14,10 @@ from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.conditions import RELAXING_FOAM
 from palpate.thesis.figures.fig_6_13 import SLOW
-from palpate.thesis.force_panels import force_panel, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.panels import force_panel, panels
+from palpate.thesis.force_control.tracking import (
     FOAM,
     FOLLOWS,
     LIMIT,
@@ -31,7 +32,6 @@ from palpate.thesis.force_tracking import (
     tracking,
 )
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import RELAXING_FOAM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

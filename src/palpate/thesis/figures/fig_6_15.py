@@ -12,10 +12,19 @@ from palpate.bench import changed, load
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, FOAM, RUBBER, VARIED_SEEDS, Slot, rms, since_contact, slot
+from palpate.thesis.conditions import rougher
+from palpate.thesis.force_control.panels import dots_panel, panels
+from palpate.thesis.force_control.tracking import (
+    ENOUGH,
+    FOAM,
+    RUBBER,
+    VARIED_SEEDS,
+    Slot,
+    rms,
+    since_contact,
+    slot,
+)
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,16 @@ from typing import TYPE_CHECKING
 
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.force_panels import tracked_figure
-from palpate.thesis.force_tracking import FOLLOWS, RUBBER, Tracked, following, stops_holding, told, tracked
+from palpate.thesis.force_control.panels import tracked_figure
+from palpate.thesis.force_control.tracking import (
+    FOLLOWS,
+    RUBBER,
+    Tracked,
+    following,
+    stops_holding,
+    told,
+    tracked,
+)
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

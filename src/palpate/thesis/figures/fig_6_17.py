@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from palpate.bench import changed
 from palpate.records import Record
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import following_panel, force_panel, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.panels import following_panel, force_panel, panels
+from palpate.thesis.force_control.tracking import (
     FOLLOWS,
     LIMIT,
     RUBBER,
