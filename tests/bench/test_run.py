@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bench.quick import DURATION, PRESS, changed, quick
 from palpate._vector import Vec3
 from palpate.bench import bench as running
-from palpate.bench import build, load, names, part
+from palpate.bench import build, load, names, part, simulation
 from palpate.environments import KelvinVoigt, SurfaceState
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
@@ -108,13 +108,13 @@ def test_what_comes_after_the_stop_does_not_end_the_run(foam, monkeypatch):
     """A chunk reaches beyond the end of the press; what it holds there is nobody's."""
 
     def march(loop, state, k, noise, out):
-        state = running.march(loop, state, k, noise, out)
+        state = simulation.march(loop, state, k, noise, out)
         out[k + np.arange(len(out)) >= 380] = np.nan
         return state
 
     contact = int(np.argmax(press(foam)["phase"] == 1.0))
     assert contact + 200 < 380 < 500
-    monkeypatch.setattr(running, "_march_plain", march)
+    monkeypatch.setattr(simulation, "_march_plain", march)
     record = press(foam, compiled=False)
     assert record.meta["end"] == "done"
     assert len(record) == contact + 200
@@ -160,7 +160,7 @@ def test_the_keyboard_interrupts_and_what_was_done_is_kept(foam):
     times = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(running, "CHUNK", 100)
-        patch.setattr(running, "compiled_march", Interrupting(running.compiled_march))
+        patch.setattr(simulation, "compiled_march", Interrupting(simulation.compiled_march))
         record = foam.run(1.0, progress=lambda time, _: times.append(time))
     assert record.meta["end"] == "interrupted"
     assert len(record) == 200

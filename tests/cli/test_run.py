@@ -14,7 +14,7 @@ import pytest
 
 import palpate.logs
 from palpate.bench import bench as running
-from palpate.bench import names, source
+from palpate.bench import names, simulation, source
 from palpate.bench.row import COLUMNS
 from palpate.cli import main
 from palpate.logs import read_record
@@ -173,7 +173,7 @@ def test_an_interrupted_run_is_saved_and_exits_130(mine, monkeypatch):
             return self.march.run(*arguments)
 
     monkeypatch.setattr(running, "CHUNK", 100)
-    monkeypatch.setattr(running, "compiled_march", Interrupting(running.compiled_march))
+    monkeypatch.setattr(simulation, "compiled_march", Interrupting(simulation.compiled_march))
     assert main(["run", "mine.toml", "--out", "results"]) == 130
     summary = json.loads((mine.parent / "results" / "summary.json").read_text())
     assert summary["end"] == "interrupted"
@@ -185,7 +185,7 @@ def test_interrupted_at_once_there_is_still_a_folder(mine, monkeypatch):
         def run(self, *arguments):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(running, "compiled_march", Interrupting())
+    monkeypatch.setattr(simulation, "compiled_march", Interrupting())
     assert main(["run", "mine.toml", "--out", "results"]) == 130
     assert len(read_record(mine.parent / "results" / "record.parquet")) == 0
 

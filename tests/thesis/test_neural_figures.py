@@ -6,22 +6,21 @@ import numpy as np
 import pytest
 
 from palpate.bench import changed
+from palpate.bench.metrics.following import LIMIT
+from palpate.bench.metrics.window import SETTLE
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
-from palpate.thesis.conditions import moved, rougher
+from palpate.thesis.conditions import moved, rougher, stops_holding
 from palpate.thesis.explanations import e2_integrator, e3_divergence
 from palpate.thesis.figure import study
 from palpate.thesis.figures import fig_6_10, fig_6_14, fig_6_15, fig_6_17
 from palpate.thesis.force_control.tracking import (
     FOAM,
-    LIMIT,
     RUBBER,
-    SETTLE,
     SINE,
     Tracking,
     following,
-    stops_holding,
     tracking,
     variations,
 )

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, TypeVar
 
 from palpate.bench import Experiment
+from palpate.thesis.runs import Runs
+
+T = TypeVar("T")
+W = TypeVar("W")
+
+ENOUGH = 0.9
+"""Share of the seeds that a claim has to hold for."""
+VARIED_SEEDS = 3
+"""Runs of each variation; the nominal case has all seeds."""
 
 SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3}
 """The last millimetres of the approach: the rest of it takes sixteen seconds and moves errors in contact by 4 %."""
@@ -48,3 +57,33 @@ def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
         "wall at\n0.40 m": moved(experiment, 0.40),
         "wall at\n0.49 m": moved(experiment, 0.49),
     }
+
+
+def by_world(
+    runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
+) -> dict[str, list[T]]:
+    """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
+    cases = [
+        (name, world, seed)
+        for name, world in worlds.items()
+        for seed in (runs.seeds if name in full else runs.seeds[:VARIED_SEEDS])
+    ]
+    found: dict[str, list[T]] = {}
+    for (name, _, _), one in zip(cases, runs.map(lambda case: work(*case[1:]), cases), strict=True):
+        found.setdefault(name, []).append(one)
+    return found
+
+
+def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:
+    """A sentence: under which variations a conclusion holds, and under which it does not."""
+    broken, kept = [], []
+    for name, runs in found.items():
+        good = sum(map(holds, runs))
+        told = name.replace("\n", " ")
+        if good >= ENOUGH * len(runs):
+            kept.append(told)
+        else:
+            broken.append(f"{told} ({good} of {len(runs)} runs)")
+    parts = [f"holds with: {', '.join(kept)}"] if kept else []
+    parts += [f"does not with: {', '.join(broken)}"] if broken else ["and under every variation tried"]
+    return f"It {'; it '.join(parts) if broken else ', '.join(parts)}."

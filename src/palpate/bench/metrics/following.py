@@ -6,6 +6,11 @@ import numpy as np
 
 from palpate.bench.metrics.window import SETTLE, Look, Metric, Value, rms
 
+LIMIT = 1.5
+"""Largest RMS error of a force that follows [N]: 10 % of 15 N, which is what is asked for on average."""
+SHARE = 0.10
+"""Largest mean error in the last second of an interval, as a share of the desired force there."""
+
 
 def _mean_error(look: Look) -> Value:
     return float(np.mean(look.error)) if len(look.error) else None
@@ -23,7 +28,7 @@ def interval_error(look: Look) -> Value:
 
 def settled_rms(look: Look) -> Value:
     """RMS error outside the first half second after each step [N]."""
-    return rms(look.after_steps)
+    return rms(look.after_steps) if len(look.after_steps) else None
 
 
 def _of_force(key: str) -> Metric:

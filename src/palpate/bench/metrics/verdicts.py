@@ -6,15 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from palpate.bench.metrics.following import interval_error, settled_rms
+from palpate.bench.metrics.following import LIMIT, SHARE, interval_error, settled_rms
 from palpate.bench.metrics.summary import losses
 from palpate.bench.metrics.surface import QUOTIENT, estimate
 from palpate.bench.metrics.window import Look, Metric, Value
 
-LIMIT = 1.5
-"""Largest RMS error of a force that follows [N]: 10 % of 15 N, which is what is asked for on average."""
-SHARE = 0.10
-"""Largest mean error in the last second of an interval, as a share of the desired force there."""
 APART = 0.10
 """How far two numbers for the stiffness may be apart, as a share, to be called the same."""
 QUIET = 0.02

@@ -130,6 +130,6 @@ SETTLE = 0.5
 """Seconds after a step of the desired force that are not judged where so it is said [s]."""
 
 
-def rms(error: Array) -> Value:
-    """Root of the mean square; None of nothing."""
-    return float(np.sqrt(np.mean(error**2))) if len(error) else None
+def rms(error: Array) -> float:
+    """Root of the mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(error**2))) if len(error) else math.nan

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed
+from palpate.bench.metrics.window import rms
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
@@ -20,7 +21,6 @@ from palpate.thesis.force_control.tracking import (
     SINE,
     Slot,
     Tracking,
-    rms,
     since_contact,
     slot,
     tracking,

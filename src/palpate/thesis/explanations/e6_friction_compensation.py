@@ -16,7 +16,16 @@ from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    VARIED_SEEDS,
+    by_world,
+    friction_and_pose,
+    stops_holding,
+)
 from palpate.thesis.force_control.contact_loss import (
     Regain,
     Trace,
@@ -27,7 +36,7 @@ from palpate.thesis.force_control.contact_loss import (
     trace_of,
 )
 from palpate.thesis.force_control.panels import across, dots_panel, panels
-from palpate.thesis.force_control.tracking import ENOUGH, VARIED_SEEDS, by_world, since_contact, stops_holding
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

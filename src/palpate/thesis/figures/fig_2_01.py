@@ -18,9 +18,17 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.robots.arm3 import Arm3
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_world,
+    friction_and_pose,
+    stops_holding,
+)
 from palpate.thesis.force_control.panels import across, dots_panel, panels
-from palpate.thesis.force_control.tracking import ENOUGH, by_world, since_contact, stops_holding
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

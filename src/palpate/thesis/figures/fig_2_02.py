@@ -18,10 +18,19 @@ from palpate.controllers.any_controller import AnyController
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_world,
+    moved,
+    rougher,
+    stops_holding,
+)
 from palpate.thesis.force_control.disturbances import Change, Turn, run_with
 from palpate.thesis.force_control.panels import dots_panel, panels
-from palpate.thesis.force_control.tracking import ENOUGH, by_world, since_contact, stops_holding
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.bench.metrics.following import LIMIT, SHARE
+from palpate.bench.metrics.window import SETTLE, rms
 from palpate.bench.one_joint import JOINT_FRICTION, one_joint
 from palpate.controllers.direct_neural import DirectIntegral, DirectNeural, direct_neural
 from palpate.environments import KelvinVoigt, StandardLinearSolid
@@ -18,16 +20,8 @@ from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.conditions import ENOUGH, VARIED_SEEDS, stops_holding
 from palpate.thesis.force_control.panels import across, dots_panel, panels
-from palpate.thesis.force_control.tracking import (
-    ENOUGH,
-    LIMIT,
-    SETTLE,
-    SHARE,
-    VARIED_SEEDS,
-    rms,
-    stops_holding,
-)
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

@@ -10,26 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.following import LIMIT
 from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_world,
+    moved,
+    rougher,
+    stops_holding,
+)
 from palpate.thesis.force_control.disturbances import Turn, other_surface, run_with
 from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
-from palpate.thesis.force_control.tracking import (
-    ENOUGH,
-    FOLLOWS,
-    LIMIT,
-    Slot,
-    Tracking,
-    by_world,
-    since_contact,
-    slot,
-    stops_holding,
-    told,
-    tracking,
-)
+from palpate.thesis.force_control.tracking import FOLLOWS, Slot, Tracking, since_contact, slot, told, tracking
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

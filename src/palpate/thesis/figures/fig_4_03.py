@@ -14,10 +14,10 @@ from palpate.bench.metrics.summary import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.conditions import SHORT, rougher
+from palpate.thesis.conditions import ENOUGH, SHORT, VARIED_SEEDS, rougher
 from palpate.thesis.force_control.loop import ForceLoop
 from palpate.thesis.force_control.panels import across, panels
-from palpate.thesis.force_control.tracking import ENOUGH, VARIED_SEEDS, since_contact
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

@@ -10,10 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.conditions import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose, rougher
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    VARIED_SEEDS,
+    friction_and_pose,
+    rougher,
+    stops_holding,
+)
 from palpate.thesis.force_control.decoupling import (
     COUPLED,
     JUMP,
@@ -25,7 +35,7 @@ from palpate.thesis.force_control.decoupling import (
     pressed,
 )
 from palpate.thesis.force_control.panels import across, dots_panel, panels
-from palpate.thesis.force_control.tracking import ENOUGH, SHARE, VARIED_SEEDS, since_contact, stops_holding
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

@@ -9,21 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.bench import changed
+from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
 from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.conditions import ENOUGH, VARIED_SEEDS, stops_holding
 from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
-from palpate.thesis.force_control.tracking import (
-    ENOUGH,
-    FOAM,
-    RUBBER,
-    SHARE,
-    VARIED_SEEDS,
-    Slot,
-    since_contact,
-    slot,
-    stops_holding,
-    variations,
-)
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, Slot, since_contact, slot, variations
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

@@ -9,17 +9,9 @@ import numpy as np
 
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
+from palpate.thesis.conditions import stops_holding
 from palpate.thesis.force_control.panels import tracked_figure
-from palpate.thesis.force_control.tracking import (
-    FOAM,
-    FOLLOWS,
-    SINE,
-    Tracked,
-    following,
-    stops_holding,
-    told,
-    tracked,
-)
+from palpate.thesis.force_control.tracking import FOAM, FOLLOWS, SINE, Tracked, following, told, tracked
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

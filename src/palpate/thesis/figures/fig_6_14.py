@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import changed
+from palpate.bench.metrics.following import LIMIT
+from palpate.bench.metrics.window import SETTLE, rms
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
@@ -20,12 +22,9 @@ from palpate.thesis.force_control.panels import force_panel, panels
 from palpate.thesis.force_control.tracking import (
     FOAM,
     FOLLOWS,
-    LIMIT,
-    SETTLE,
     Slot,
     Tracking,
     following,
-    rms,
     since_contact,
     slot,
     told,

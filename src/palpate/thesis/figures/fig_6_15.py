@@ -9,21 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench import changed, load
+from palpate.bench.metrics.window import rms
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.conditions import rougher
+from palpate.thesis.conditions import ENOUGH, VARIED_SEEDS, rougher
 from palpate.thesis.force_control.panels import dots_panel, panels
-from palpate.thesis.force_control.tracking import (
-    ENOUGH,
-    FOAM,
-    RUBBER,
-    VARIED_SEEDS,
-    Slot,
-    rms,
-    since_contact,
-    slot,
-)
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, Slot, since_contact, slot
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

@@ -7,16 +7,9 @@ from typing import TYPE_CHECKING
 
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
+from palpate.thesis.conditions import stops_holding
 from palpate.thesis.force_control.panels import tracked_figure
-from palpate.thesis.force_control.tracking import (
-    FOLLOWS,
-    RUBBER,
-    Tracked,
-    following,
-    stops_holding,
-    told,
-    tracked,
-)
+from palpate.thesis.force_control.tracking import FOLLOWS, RUBBER, Tracked, following, told, tracked
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import changed
+from palpate.bench.metrics.following import LIMIT
 from palpate.records import Record
 from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.conditions import stops_holding
 from palpate.thesis.force_control.panels import following_panel, force_panel, panels
 from palpate.thesis.force_control.tracking import (
     FOLLOWS,
-    LIMIT,
     RUBBER,
     SINE,
     Tracked,
     following,
     since_contact,
-    stops_holding,
     told,
     tracked,
 )

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import changed, load
+from palpate.bench.metrics.following import SHARE
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.conditions import SHORT
+from palpate.thesis.conditions import ENOUGH, SHORT
 from palpate.thesis.force_control.disturbances import Turn, run_with, surface_back
-from palpate.thesis.force_control.tracking import ENOUGH, SHARE, since_contact
+from palpate.thesis.force_control.tracking import since_contact
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,8 +11,7 @@ import numpy as np
 from palpate._vector import Vec3
 from palpate.bench import Experiment, build
 from palpate.bench.row import COLUMNS
-from palpate.bench.sequence import CONTACT
-from palpate.bench.tick import Loop, LoopState, compiled_march, start_at
+from palpate.bench.tick import Loop, LoopState
 from palpate.environments import KelvinVoigt, join
 from palpate.records import Record
 
@@ -50,56 +49,27 @@ def run_with(
         All rows up to the end, or up to the first number that is none; ``meta["turns"]`` holds the times [s].
     """
     bench = build(experiment)
-    march = _March(bench.loop, start_at(bench.loop, bench.q), np.random.default_rng(seed), waiting)  # type: ignore[no-untyped-call]
-    total = round(experiment.run.duration / bench.loop.tick)
-    while march.k < total and march.fine and not march.touched:
-        march.on(LOOK)
-    begun = march.begun
-    for turn in turns:
-        march.on(begun + round(turn.at / bench.loop.tick) - march.k)
-        march.loop, march.state = turn.change(march.loop, march.state)
-    march.on(begun + round(experiment.run.press / bench.loop.tick) - march.k)
-    rows = np.concatenate(march.rows)
-    finite = np.isfinite(rows).all(axis=1)
-    rows = rows if finite.all() else rows[: int(np.argmin(finite))]
-    columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
-    times = [(begun * bench.loop.tick) + turn.at for turn in turns]
+    tick, march = bench.loop.tick, bench.simulation(seed, waiting=waiting)
+    rows = [march.advance(LOOK)]
+    while march.ticks < round(experiment.run.duration / tick) and _finite(rows) and march.contact is None:
+        rows.append(march.advance(LOOK))
+    begun = march.ticks if march.contact is None else march.contact
+    for at, change in [(t.at, t.change) for t in turns] + [(experiment.run.press, None)]:
+        left = begun + round(at / tick) - march.ticks
+        if left > 0 and _finite(rows):
+            rows.append(march.advance(left))
+        if change is not None:
+            march.loop, march.state = change(march.loop, march.state)
+    all_rows = np.concatenate(rows)
+    finite = np.isfinite(all_rows).all(axis=1)
+    kept = all_rows if finite.all() else all_rows[: int(np.argmin(finite))]
+    columns = {name: kept[:, i].copy() for i, name in enumerate(COLUMNS)}
+    times = [(begun * tick) + turn.at for turn in turns]
     return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "turns": times})
 
 
-@dataclass
-class _March:
-    loop: Loop
-    state: LoopState
-    generator: np.random.Generator
-    waiting: Callable[[], None] | None
-    k: int = 0
-
-    def __post_init__(self) -> None:
-        self.rows: list[np.ndarray] = []
-
-    @property
-    def begun(self) -> int:
-        """The tick of the first contact, if it lies among the last rows; else the next tick."""
-        return self.k - LOOK + int(np.argmax(self.rows[-1][:, 1] == CONTACT)) if self.touched else self.k
-
-    @property
-    def touched(self) -> bool:
-        return bool(self.rows) and bool((self.rows[-1][:, 1] == CONTACT).any())
-
-    @property
-    def fine(self) -> bool:
-        return not self.rows or bool(np.isfinite(self.rows[-1]).all())
-
-    def on(self, ticks: int) -> None:
-        """So many ticks further; none once a number is none."""
-        if ticks <= 0 or not self.fine:
-            return
-        out = np.empty((ticks, len(COLUMNS)))
-        noise = self.generator.standard_normal(ticks)
-        self.state = compiled_march.run(self.waiting, self.loop, self.state, self.k, noise, out)
-        self.rows.append(out)
-        self.k += ticks
+def _finite(rows: Sequence[np.ndarray]) -> bool:
+    return bool(np.isfinite(rows[-1]).all())
 
 
 def other_surface(surface: KelvinVoigt) -> Change:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from palpate.bench.metrics.following import LIMIT
 from palpate.report import style
-from palpate.thesis.force_control.tracking import LIMIT, Slot, Tracked, Tracking
+from palpate.thesis.force_control.tracking import Slot, Tracked, Tracking
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,42 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics import Look
+from palpate.bench.metrics.following import LIMIT, SHARE, interval_error
 from palpate.bench.metrics.summary import losses
+from palpate.bench.metrics.window import SETTLE, rms
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 from palpate.thesis.claims import spread
-from palpate.thesis.conditions import RELAXING_FOAM, SHORT, friction_and_pose
+from palpate.thesis.conditions import ENOUGH, RELAXING_FOAM, SHORT, VARIED_SEEDS, friction_and_pose
 from palpate.thesis.runs import Runs
 
-SETTLE = 0.5
-"""Seconds after a step of the desired force that are not judged [s]."""
-LIMIT = 1.5
-"""Largest RMS error of a force that follows [N]: 10 % of 15 N, which is what is asked for on average."""
-SHARE = 0.10
-"""Largest mean error in the last second of an interval, as a share of the desired force there."""
-ENOUGH = 0.9
-"""Share of the seeds that a claim has to hold for."""
 FOLLOWING = (
     f"no loss of contact; RMS of the true force's error at most {LIMIT:g} N (10 % of the mean desired force) "
     f"outside the first {SETTLE:g} s after each step; mean error in the last second of each interval at most "
     f"{100 * SHARE:.0f} % of the desired force"
 )
 FOLLOWS = f"in 9 of 10 runs: {FOLLOWING}"
-VARIED_SEEDS = 3
-"""Runs of each variation; the nominal case has all seeds."""
-
 Array = NDArray[np.float64]
-T = TypeVar("T")
-W = TypeVar("W")
-
 SINE = {"force.amplitude": 4.0, "force.frequency": 0.5, "force.restart": 5.0}
 """4 sin(pi t), its clock started anew every 5 s as the listing does; that turns the sine's sign each time."""
 FOAM = changed(load("foam-neural"), SHORT)
@@ -78,35 +66,21 @@ def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
     """Measures a record from `start` to `end` after contact [s]."""
 
     def measure(record: Record) -> Tracking:
-        pressing = record["phase"] == CONTACT
-        if not pressing.any():
+        look = Look(record, (start, end))
+        if not look.touched:
             return NEVER
-        t = since_contact(record)
-        inside = pressing & (t >= start - 5e-7) & (t < end - 5e-7)
-        if not inside.any():
+        if not len(look.error):
             return Tracking(np.nan, np.nan, np.nan, np.nan, losses(record))
-        period = record.meta["experiment"]["force"]["period"]
-        t, desired, force = t[inside], record["force_desired"][inside], record["force"][inside]
-        interval = np.floor((t + 5e-7) / period)
-        late = t - period * interval
-        error = force - desired
-        settled = late >= SETTLE
-        ends = [(interval == i) & (late >= period - 1.0) for i in np.unique(interval)]
-        off = [abs(error[e].mean()) / desired[e].mean() for e in ends if e.any()]
+        off = interval_error(look)
         return Tracking(
-            rms(error),
-            rms(error[settled]),
-            float(max(off)),
-            float(record["saturated2"][inside].mean()),
+            rms(look.error),
+            rms(look.after_steps),
+            np.nan if off is None else off,
+            float(look["saturated2"].mean()),
             losses(record),
         )
 
     return measure
-
-
-def rms(error: Array) -> float:
-    """Root of the mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
 
 
 def following(found: Sequence[Tracking]) -> bool:
@@ -208,33 +182,3 @@ def tracked(
     return Tracked(
         slot(runs.one(experiment), *shown), nominal, robustness(runs, experiment, nominal, measure)
     )
-
-
-def by_world(
-    runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
-) -> dict[str, list[T]]:
-    """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
-    cases = [
-        (name, world, seed)
-        for name, world in worlds.items()
-        for seed in (runs.seeds if name in full else runs.seeds[:VARIED_SEEDS])
-    ]
-    found: dict[str, list[T]] = {}
-    for (name, _, _), one in zip(cases, runs.map(lambda case: work(*case[1:]), cases), strict=True):
-        found.setdefault(name, []).append(one)
-    return found
-
-
-def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:
-    """A sentence: under which variations a conclusion holds, and under which it does not."""
-    broken, kept = [], []
-    for name, runs in found.items():
-        good = sum(map(holds, runs))
-        told = name.replace("\n", " ")
-        if good >= ENOUGH * len(runs):
-            kept.append(told)
-        else:
-            broken.append(f"{told} ({good} of {len(runs)} runs)")
-    parts = [f"holds with: {', '.join(kept)}"] if kept else []
-    parts += [f"does not with: {', '.join(broken)}"] if broken else ["and under every variation tried"]
-    return f"It {'; it '.join(parts) if broken else ', '.join(parts)}."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 from palpate.bench import Experiment, build
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT, LOST
-from palpate.bench.tick import compiled_march, start_at
 from palpate.controllers.neural import NeuralState
 
 LOOK = 1000
@@ -50,33 +50,24 @@ def watch(
     Returns:
         When contact was lost, since it was made [s]; None if it was not, NaN if it was never made.
     """
-    bench = build(experiment)
-    loop, state = bench.loop, start_at(bench.loop, bench.q)  # type: ignore[no-untyped-call]
-    generator = np.random.default_rng(seed)
-    begun, k = None, 0
-    rows = np.empty((every, len(COLUMNS)))
-    phase = rows[:, COLUMN["phase"]]
-    while k * loop.tick < experiment.run.duration + duration:
-        state = compiled_march.run(waiting, loop, state, k, generator.standard_normal(every), rows)
-        if begun is None and (phase == CONTACT).any():
-            begun = k + int(np.argmax(phase == CONTACT))
-        k += every
-        if begun is None:
+    march = build(experiment).simulation(seed, waiting=waiting)
+    while march.ticks * march.loop.tick < experiment.run.duration + duration:
+        rows = march.advance(every)
+        if march.contact is None:
             continue
+        phase = rows[:, COLUMN["phase"]]
         gone = (phase == LOST) | ~np.isfinite(rows).all(axis=1)
         if gone.any():
-            return (k - every + int(np.argmax(gone)) - begun) * loop.tick
-        neural = state.controller[0] if isinstance(state.controller, tuple) else None
-        look(
-            Look(
-                (k - begun) * loop.tick,
-                rows[phase == CONTACT],
-                neural if type(neural) is NeuralState else None,
-            )
-        )
-        if (k - begun) * loop.tick >= duration:
+            return (march.ticks - every + int(np.argmax(gone)) - march.contact) * march.loop.tick
+        look(Look(march.since_contact, rows[phase == CONTACT], _neural(march.state.controller)))
+        if march.since_contact >= duration:
             return None
-    return None if begun is not None else float("nan")
+    return None if march.contact is not None else float("nan")
+
+
+def _neural(controller: Any) -> NeuralState | None:
+    state = controller[0] if isinstance(controller, tuple) else None
+    return state if type(state) is NeuralState else None
 
 
 POSES, TORQUE1, TORQUES = slice(1, 7), slice(7, 8), slice(7, 10)
