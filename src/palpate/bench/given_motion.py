@@ -14,7 +14,7 @@ from palpate.bench.force_input import ForceInput, ForceInputState
 from palpate.bench.paths import Path, positions
 from palpate.bench.rest_length import rest_for
 from palpate.environments import SurfaceState, join
-from palpate.environments.surface import BUILT_IN
+from palpate.environments.surface import members
 from palpate.environments.surface_state import follow
 from palpate.errors import InputError
 from palpate.instruments import Converter, analog_filter_190, force_sensor
@@ -224,7 +224,9 @@ def _in_turn(surface: Any | list[tuple[float, Any]]) -> tuple[tuple[float, Any],
         raise InputError(
             f"surfaces must start at growing times [s], the first at 0, got {[t for t, _ in turns]}"
         )
-    return tuple((float(since), join(one) if isinstance(one, BUILT_IN) else one) for since, one in turns)
+    return tuple(
+        (float(since), join(one) if type(one) in map(type, members()) else one) for since, one in turns
+    )
 
 
 def _truth(surface: Any) -> dict[str, dict[str, Any]]:

@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta
 
-from palpate.bench.controller_tables import ControllerTable, HybridController
 from palpate.bench.experiments.error_messages import explained, not_finite
-from palpate.bench.experiments.part_table import (
+from palpate.bench.experiments.toml_files import TomlFiles, decoded
+from palpate.controllers import ControllerTable, HybridController
+from palpate.environments import SurfaceTable
+from palpate.errors import InputError
+from palpate.signals.tables import (
     NotNegative,
     NotNegativeTriple,
-    Part,
     Positive,
     PositiveTriple,
+    Table,
     Triple,
+    any_of,
 )
-from palpate.bench.experiments.toml_files import TomlFiles, decoded
-from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    AnyController: TypeAlias = Any  # which fields it has depends on its kind
+    AnySurface: TypeAlias = Any
+else:
+    AnyController, AnySurface = any_of(ControllerTable), any_of(SurfaceTable)
 
 
-class Run(Part):
+class Run(Table):
     """How long it goes on, and how finely."""
 
     press: Positive = 6.0
@@ -37,7 +45,7 @@ class Run(Part):
     """Steps of the physics between ticks."""
 
 
-class Robot(Part):
+class Robot(Table):
     """The thesis' arm; its masses and lengths are those of appendix D."""
 
     start: Triple = (0.454, 0.0, 0.0)
@@ -48,7 +56,7 @@ class Robot(Part):
     """[kg m^2]; in the plant, not in the controller's model."""
 
 
-class Friction(Part):
+class Friction(Table):
     """LuGre friction of the joints."""
 
     coulomb: PositiveTriple = (3.0, 0.25, 0.03)
@@ -59,34 +67,7 @@ class Friction(Part):
     viscous: NotNegativeTriple = (0.0, 0.0, 0.0)
 
 
-class KelvinVoigtSurface(Part, tag="kelvin-voigt", tag_field="kind"):
-    """Mass, damper and spring: f = M a + B v + K x."""
-
-    stiffness: Positive
-    damping: NotNegative
-    mass: NotNegative
-
-
-class StandardLinearSolidSurface(Part, tag="standard-linear-solid", tag_field="kind"):
-    """A spring and damper beside a spring that relaxes: foam under load."""
-
-    stiffness: Positive
-    damping: NotNegative
-    mass: NotNegative
-    branch_stiffness: NotNegative
-    branch_time: Positive
-
-
-class HuntCrossleySurface(Part, tag="hunt-crossley", tag_field="kind"):
-    """A spring that stiffens and damping that grows with depth: f = K x^n + B x^n v."""
-
-    stiffness: Positive
-    damping: NotNegative
-    exponent: Annotated[float, Meta(ge=1)]
-    mass: NotNegative
-
-
-class Wall(Part):
+class Wall(Table):
     """Where the surface is, and how the tip sticks to it."""
 
     x: float = 0.465
@@ -95,13 +76,13 @@ class Wall(Part):
     side_friction: NotNegative = 0.7
 
 
-class Encoders(Part):
+class Encoders(Table):
     """Of the joints: counts a turn."""
 
     counts: PositiveTriple = (614400.0, 409600.0, 2000.0)
 
 
-class ForceSensor(Part):
+class ForceSensor(Table):
     """Its noise and its chain: low-pass [Hz], sampling [Hz], bits over a full scale [N]."""
 
     noise: NotNegative = 0.6
@@ -116,7 +97,7 @@ class ForceSensor(Part):
     """The 190 Hz low-pass of fig. 3.6 between sensor and controller."""
 
 
-class Filters(Part):
+class Filters(Table):
     """The controller's own low-passes [Hz]."""
 
     motion: Positive = 35.0
@@ -124,7 +105,7 @@ class Filters(Part):
     force: Positive = 120.0
 
 
-class ApproachTable(Part):
+class ApproachTable(Table):
     """How the arm looks for the surface: a hold [s], then steps of x [m] each period [s]; the gains of the position."""
 
     hold: NotNegative = 5.0
@@ -140,7 +121,7 @@ class ApproachTable(Part):
     kv: NotNegative = 80.0
 
 
-class ChirpTable(Part):
+class ChirpTable(Table):
     """A sine [N] that sweeps from a low to a high frequency [Hz] in so many seconds of contact, once."""
 
     low: Positive
@@ -151,7 +132,7 @@ class ChirpTable(Part):
     """Its frequency grows by the same factor each second, not by the same difference."""
 
 
-class MultisineTable(Part):
+class MultisineTable(Table):
     """Sines side by side: frequencies [Hz], amplitudes [N], and phases at contact [rad]."""
 
     frequencies: tuple[Positive, ...]
@@ -159,7 +140,7 @@ class MultisineTable(Part):
     phases: tuple[float, ...]
 
 
-class DesiredForce(Part):
+class DesiredForce(Table):
     """Steps between two forces [N] each period [s], and a sine [N], [Hz] whose clock may restart [s]."""
 
     first: float = 20.0
@@ -173,14 +154,14 @@ class DesiredForce(Part):
     multisine: MultisineTable | None = None
 
 
-class Compensation(Part):
+class Compensation(Table):
     """Of friction, by Coulomb's law with a blend through zero; level zero leaves it out."""
 
     level: NotNegativeTriple = (0.0, 0.0, 0.0)
     blend: PositiveTriple = (0.002, 0.002, 0.002)
 
 
-class Identification(Part):
+class Identification(Table):
     """The recursive least squares that watches."""
 
     forgetting: Annotated[float, Meta(gt=0, le=1)] = 1.0
@@ -194,12 +175,12 @@ class Identification(Part):
     """Of the matched estimator's state-variable filter [Hz]."""
 
 
-class Experiment(Part, kw_only=True):
+class Experiment(Table, kw_only=True):
     """Every number of a run."""
 
     title: str
     about: str = ""
-    surface: KelvinVoigtSurface | StandardLinearSolidSurface | HuntCrossleySurface
+    surface: AnySurface
     run: Run = Run()
     robot: Robot = Robot()
     friction: Friction = Friction()
@@ -209,7 +190,7 @@ class Experiment(Part, kw_only=True):
     filters: Filters = Filters()
     approach: ApproachTable = ApproachTable()
     force: DesiredForce = DesiredForce()
-    controller: ControllerTable = HybridController()
+    controller: AnyController = HybridController()
     compensation: Compensation = Compensation()
     identification: Identification = Identification()
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.bench import Experiment, changed
-from palpate.bench.controller_tables import NeuralController
+from palpate.controllers import NeuralController
 from palpate.errors import InputError
 from palpate.report.study.axes import Scale
 from palpate.report.study.maps import Bound

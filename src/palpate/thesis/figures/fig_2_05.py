@@ -81,7 +81,7 @@ def run(runs: Runs) -> Data:
     t = since_contact(record)
     inside = (t >= SHOWN[0]) & (t < SHOWN[1])
     c = PARAMETERS.controller
-    middle = np.array([c.kf, c.ki, c.kd])  # type: ignore[union-attr]
+    middle = np.array([c.kf, c.ki, c.kd])
     gains = np.column_stack([record[f"adapted{i}"] for i in (1, 2, 3)])[inside] / middle
     return Data(slot(record, *SHOWN), gains, tuned, fixed, turned)
 
