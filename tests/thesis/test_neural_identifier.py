@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.thesis.explanations import e4_probe
-from palpate.thesis.figures import fig_6_06, fig_6_07, fig_6_08, fig_6_09
+from palpate.thesis.figures import fig_6_06, fig_6_08
 from palpate.thesis.neural_identifier import ablation, claims, network, notes
 from palpate.thesis.neural_identifier.network import Answer, Choice, Press
 from palpate.thesis.runs import Runs
@@ -171,9 +171,17 @@ def test_a_sign_is_firm_when_no_noise_seed_turns_it():
     ("study", "ids", "panels"),
     [
         (fig_6_06, ["NN-ETA.slower", "NN-ETA.too-large"], 4),
-        (fig_6_07, ["NN-S.time-K", "NN-S.time-B", "NN-S.time-M", "NN-S.K", "NN-S.B", "NN-S.M"], 10),
+        (
+            first_seconds.FOAM,
+            ["NN-S.time-K", "NN-S.time-B", "NN-S.time-M", "NN-S.K", "NN-S.B", "NN-S.M"],
+            10,
+        ),
         (fig_6_08, ["NN-S.error"], 4),
-        (fig_6_09, ["NN-R.time-K", "NN-R.time-B", "NN-R.time-M", "NN-R.K", "NN-R.B", "NN-R.M"], 10),
+        (
+            first_seconds.RUBBER,
+            ["NN-R.time-K", "NN-R.time-B", "NN-R.time-M", "NN-R.K", "NN-R.B", "NN-R.M"],
+            10,
+        ),
         (e4_probe, ["WHY-PROBE.K", "WHY-PROBE.M", "WHY-PROBE.outside", "WHY-PROBE.scale"], 8),
     ],
     ids=lambda value: getattr(value, "NUMBER", ""),

@@ -45,7 +45,11 @@ class Study(Protocol):
 
 def studies() -> list[Study]:
     """All figures in the thesis' order, then all explanations."""
-    return [*_of(figures), *_of(explanations)]
+    return [*sorted(_of(figures), key=_place), *_of(explanations)]
+
+
+def _place(figure: Study) -> tuple[int, ...]:
+    return tuple(map(int, figure.NUMBER.split(".")))
 
 
 def study(number: str) -> Study:
@@ -61,5 +65,7 @@ def study(number: str) -> Study:
 
 
 def _of(package: ModuleType) -> list[Study]:
+    """Each module of a package is a study, or has several as `STUDIES`."""
     names = sorted(m.name for m in pkgutil.iter_modules(package.__path__))
-    return [cast("Study", import_module(f"{package.__name__}.{name}")) for name in names]
+    modules = [import_module(f"{package.__name__}.{name}") for name in names]
+    return [cast("Study", study) for module in modules for study in getattr(module, "STUDIES", (module,))]
