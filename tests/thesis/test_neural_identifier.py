@@ -7,6 +7,7 @@ import pytest
 
 from palpate.thesis.explanations import e4_probe
 from palpate.thesis.figures import fig_6_06, fig_6_08
+from palpate.thesis.figures import neural_identifier_first_seconds as first_seconds
 from palpate.thesis.neural_identifier import ablation, claims, network, notes
 from palpate.thesis.neural_identifier.network import Answer, Choice, Press
 from palpate.thesis.runs import Runs
