@@ -226,7 +226,7 @@ def test_figures_draw_what_they_ran_and_check_it(tmp_path):
     """The cheapest study whole; the others go the same way in the program's own test."""
     data = fig_2_04.run(Runs((0, 1)))
     claims = fig_2_04.check(data)
-    assert [c.id for c in claims] == ["YY", "YY.INTEGRAL"]
+    assert [c.id for c in claims] == ["network-alone", "network-alone.integrator"]
     drawing = fig_2_04.plot(data)
     drawing.savefig(tmp_path / "one.png")
     assert (tmp_path / "one.png").stat().st_size > 10_000

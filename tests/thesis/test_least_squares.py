@@ -240,20 +240,35 @@ def test_the_starts_reach_is_told_in_words():
 
 
 STUDIES = {
-    fig_3_05: {"F3.5": "reproduced", "F3.5.fold": "differs"},
-    fig_3_07: {"F3.7": "reproduced", "F3.7.cutoff": "differs"},
-    fig_4_02: {"F4.2": "reproduced", "F4.2.threshold": "reproduced"},
-    first_seconds.FOAM: {"RLS-S1.K": "reproduced", "RLS-S1.B": "reproduced", "RLS-S1.M": "differs"},
-    later.FOAM: {"RLS-S2": "reproduced", "RLS-S2.M": "reproduced", "RLS-RATIO.S": "reproduced"},
-    fig_6_03: {
-        "RLS-S3.B": "differs",
-        "RLS-S3.M": "reproduced",
-        "RLS-S3.K": "reproduced",
-        "RLS-S.together": "differs",
+    fig_3_05: {"anti-alias-spectra": "reproduced", "anti-alias-spectra.aliasing": "differs"},
+    fig_3_07: {"anti-alias-components": "reproduced", "anti-alias-components.cutoff": "differs"},
+    fig_4_02: {"switch-at-5N": "reproduced", "switch-at-5N.threshold": "reproduced"},
+    first_seconds.FOAM: {
+        "least-squares-foam-settles.K": "reproduced",
+        "least-squares-foam-settles.B": "reproduced",
+        "least-squares-foam-settles.M": "differs",
     },
-    first_seconds.RUBBER: {"RLS-R1.K": "reproduced", "RLS-R1.M": "differs"},
-    later.RUBBER: {"RLS-R2": "reproduced", "RLS-R2.M": "reproduced"},
-    e1_why_negative_mass: {"WHY-M.small": "differs", "WHY-M.lag": "reproduced", "WHY-M.model": "reproduced"},
+    later.FOAM: {
+        "least-squares-foam-level": "reproduced",
+        "least-squares-foam-level.M": "reproduced",
+        "single-sample-ratios.foam": "reproduced",
+    },
+    fig_6_03: {
+        "least-squares-raw-signals.B": "differs",
+        "least-squares-raw-signals.M": "reproduced",
+        "least-squares-raw-signals.K": "reproduced",
+        "least-squares-one-foam": "differs",
+    },
+    first_seconds.RUBBER: {
+        "least-squares-rubber-settles.K": "reproduced",
+        "least-squares-rubber-settles.M": "differs",
+    },
+    later.RUBBER: {"least-squares-rubber-level": "reproduced", "least-squares-rubber-level.M": "reproduced"},
+    e1_why_negative_mass: {
+        "negative-mass.small": "differs",
+        "negative-mass.lag": "reproduced",
+        "negative-mass.model": "reproduced",
+    },
 }
 """What these figures have come to, where it is no close matter."""
 

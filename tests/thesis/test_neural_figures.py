@@ -228,6 +228,6 @@ def test_a_figure_from_its_runs_to_its_file(tmp_path):
     one = study("6.13")
     data = one.run(Runs(range(2)))
     (claim,) = one.check(data)
-    assert claim.id == "NNC-SLOW.first"
+    assert claim.id == "neural-slow-rate.first"
     assert claim.verdict in ("reproduced", "differs")
     assert style.save(one.plot(data), tmp_path / "6.13.png").stat().st_size > 10_000

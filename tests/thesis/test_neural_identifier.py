@@ -105,8 +105,10 @@ def test_a_cut_press_has_the_ratio_of_its_own_end():
 
 
 def test_every_part_holds_of_an_answer_as_the_thesis_has_it():
-    found = claims.claims(grounds([GOOD] * 100), claims.FOAM, "NN-S", "fig. 6.7")
-    assert [c.id for c in found] == [f"NN-S.{s}" for s in ("time-K", "time-B", "time-M", "K", "B", "M")]
+    found = claims.claims(grounds([GOOD] * 100), claims.FOAM, "network-foam", "fig. 6.7")
+    assert [c.id for c in found] == [
+        f"network-foam.{s}" for s in ("time-K", "time-B", "time-M", "K", "B", "M")
+    ]
     assert {c.verdict for c in found} == {"reproduced"}
 
 
@@ -124,8 +126,8 @@ def test_every_part_holds_of_an_answer_as_the_thesis_has_it():
 )
 def test_a_part_differs_alone_when_its_own_number_does(suffix, change):
     bad = replace(GOOD, **change)
-    found = claims.claims(grounds([bad] * 100), claims.FOAM, "NN-S", "fig. 6.7")
-    assert [c.id for c in found if c.verdict == "differs"] == [f"NN-S.{suffix}"]
+    found = claims.claims(grounds([bad] * 100), claims.FOAM, "network-foam", "fig. 6.7")
+    assert [c.id for c in found if c.verdict == "differs"] == [f"network-foam.{suffix}"]
 
 
 def test_nine_of_ten_runs_are_enough_and_fewer_are_not():
@@ -171,19 +173,33 @@ def test_a_sign_is_firm_when_no_noise_seed_turns_it():
 @pytest.mark.parametrize(
     ("study", "ids", "panels"),
     [
-        (fig_6_06, ["NN-ETA.slower", "NN-ETA.too-large"], 4),
+        (fig_6_06, ["network-learning-rate.slower", "network-learning-rate.too-large"], 4),
         (
             first_seconds.FOAM,
-            ["NN-S.time-K", "NN-S.time-B", "NN-S.time-M", "NN-S.K", "NN-S.B", "NN-S.M"],
+            [
+                "network-foam.time-K",
+                "network-foam.time-B",
+                "network-foam.time-M",
+                "network-foam.K",
+                "network-foam.B",
+                "network-foam.M",
+            ],
             10,
         ),
-        (fig_6_08, ["NN-S.error"], 4),
+        (fig_6_08, ["network-foam.error"], 4),
         (
             first_seconds.RUBBER,
-            ["NN-R.time-K", "NN-R.time-B", "NN-R.time-M", "NN-R.K", "NN-R.B", "NN-R.M"],
+            [
+                "network-rubber.time-K",
+                "network-rubber.time-B",
+                "network-rubber.time-M",
+                "network-rubber.K",
+                "network-rubber.B",
+                "network-rubber.M",
+            ],
             10,
         ),
-        (e4_probe, ["WHY-PROBE.K", "WHY-PROBE.M", "WHY-PROBE.outside", "WHY-PROBE.scale"], 8),
+        (e4_probe, ["network-probe.K", "network-probe.M", "network-probe.outside", "network-probe.scale"], 8),
     ],
     ids=lambda value: getattr(value, "NUMBER", ""),
 )

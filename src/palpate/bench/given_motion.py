@@ -171,6 +171,7 @@ class GivenMotion:
         return {"truth": told[-1]["truth"], "surfaces": told, "instruments": instruments}
 
 
+# More than seven arguments: each is an instrument or a surface of its own, and has a default.
 def given_motion(
     surface: Any | list[tuple[float, Any]],
     *,

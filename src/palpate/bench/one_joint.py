@@ -202,6 +202,7 @@ class OneJoint:
 JOINT_FRICTION = LuGre(1250.0, 11.0, 0.0, 0.25, 0.3, 0.01)  # type: ignore[arg-type]
 
 
+# More than seven arguments: each is a number of the experiment, and most have a default.
 def one_joint(
     surface: KelvinVoigt | StandardLinearSolid | HuntCrossley,
     controller: Any,

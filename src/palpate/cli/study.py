@@ -65,6 +65,7 @@ class ClusterOptions:
         return Cluster(self.scheduler, certificates=Certificates(*given) if given else None)
 
 
+# More than seven arguments: each is a flag of the command.
 def study(
     name: str | None = None,
     /,

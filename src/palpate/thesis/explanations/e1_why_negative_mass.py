@@ -122,7 +122,7 @@ def _smallness(data: Data) -> Claim:
     right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in surfaces)
     told = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in surfaces)
     return Claim(
-        id="WHY-M.small",
+        id="negative-mass.small",
         source="sec. 6.1",
         claim="M_e is negative because it is very small and hard to estimate exactly.",
         thesis="in words",
@@ -185,7 +185,7 @@ def _lag(data: Data) -> Claim:
             f"{surface}: M {fitted[0]:.2f} ({predicted[0]:.2f}) kg, B {fitted[1]:.0f} ({predicted[1]:.0f}) N s/m"
         )
     return Claim(
-        id="WHY-M.lag",
+        id="negative-mass.lag",
         source="ours",
         claim="A force late by T turns M into M - B T + K T²/2 and B into B - K T.",
         thesis="not said",
@@ -219,7 +219,7 @@ def _reach(data: Data) -> str:
 def _wrong_model(data: Data) -> Claim:
     masses = _masses(data, "relaxing foam", "perfect signals")
     return Claim(
-        id="WHY-M.model",
+        id="negative-mass.model",
         source="ours",
         claim="On a foam that relaxes M_e is negative even with perfect signals.",
         thesis="not said",
@@ -249,7 +249,7 @@ def _matched(data: Data) -> Claim:
             f"M {spread(found['M'], 'kg', 2)}, true {truth['M']:g}"
         )
     return Claim(
-        id="WHY-M.matched",
+        id="negative-mass.matched",
         source="ours",
         claim="With all channels matched in lag and the offset taken out, least squares finds the surface.",
         thesis="not said",

@@ -115,7 +115,7 @@ def check(data: Data) -> Sequence[Claim]:
     gone = sum(lost is not None for lost in others)
     return [
         Claim(
-            id="E3.loss",
+            id="neural-diverges.loss",
             source="explanation of sec. 6.3; stability is left open in sec. 7.2",
             claim="Going on, the neural controller loses the foam at every learning rate, where a PI is steady.",
             thesis="not in the thesis, which shows ten seconds, and a few minutes at 1e-5",
@@ -138,7 +138,7 @@ def check(data: Data) -> Sequence[Claim]:
             ),
         ),
         Claim(
-            id="E3.everywhere",
+            id="neural-diverges.everywhere",
             source="explanation of sec. 6.3; stability is left open in sec. 7.2",
             claim="It does so on every surface.",
             thesis="not in the thesis",

@@ -49,7 +49,7 @@ def check(data: Data) -> Sequence[Claim]:
 def _stiffness(data: Data) -> Claim:
     inside = {name: [STUDY[0] <= a.over <= STUDY[1] for a in s.nominal] for name, s in data.items()}
     return Claim(
-        id="WHY-PROBE.K",
+        id="network-probe.K",
         source="ours, on sec. 6.2",
         claim="With thresholds that learn, K by probing is 1.3 to 2.3 times f/x.",
         thesis="0.985 (foam), 0.90 (rubber)",
@@ -122,7 +122,7 @@ def _mass(data: Data) -> Claim:
     }
     steady, total = _steady_conditions(data)
     return Claim(
-        id="WHY-PROBE.M",
+        id="network-probe.M",
         source="ours, on sec. 6.2",
         claim="The sign of M by probing follows the initial weights.",
         thesis="small, positive, and taken for realistic",
@@ -167,7 +167,7 @@ def _outside(data: Data) -> Claim:
     wrong = [abs(force - 1.0) > FAR and warned for s in data.values() for force, warned in s.far]
     near = [force for s in data.values() for force in s.near]
     return Claim(
-        id="WHY-PROBE.outside",
+        id="network-probe.outside",
         source="sec. 5.2",
         claim="Far from what was learned the network's output is wrong.",
         thesis="in words",
@@ -196,7 +196,7 @@ def _scaling(data: Data) -> Claim:
     holds = all(np.median(without) < 0.1 * np.median(scaled) for scaled, without in slopes.values())
     K = {name: _median(s, "inputs not scaled") for name, s in data.items()}
     return Claim(
-        id="WHY-PROBE.scale",
+        id="network-probe.scale",
         source="sec. 6.2",
         claim="Without scaling, small inputs are almost ignored.",
         thesis="in words",

@@ -92,7 +92,7 @@ def check(data: Data) -> Sequence[Claim]:
     gone = f"{min(times):.0f} to {max(times):.0f} s" if times else "never"
     return [
         Claim(
-            id="FUT",
+            id="open-questions",
             source="sec. 7.2",
             claim="Which learning rate is best, how many layers and neurons are needed, and is the controller stable?",
             thesis="left to future work",

@@ -125,7 +125,7 @@ def check(data: Data) -> Sequence[Claim]:
 def _never(data: Data) -> Claim:
     factors = [h.factor for h in data.plain]
     return Claim(
-        id="FRICTION.PRINTED",
+        id="friction-compensation.printed",
         source="eq. 4.8-4.13, appendix E",
         claim="The controllers compensate the Coulomb friction of the joints.",
         thesis="F_c sgn(q') is part of every torque law; the listing blends it through 0.002 rad/s",
@@ -150,7 +150,7 @@ def _acting(data: Data) -> Claim:
     wide = [np.median([h.error for h in found]) for found in data.sweep]
     best = BLENDS[int(np.argmin(wide))]
     return Claim(
-        id="FRICTION.BLEND",
+        id="friction-compensation.blend",
         source="eq. 4.13; ours",
         claim=(
             "A compensation whose blend spans several velocity quanta takes away the better part of the "
@@ -181,7 +181,7 @@ def _hammer(data: Data) -> Claim:
     still = [h.shaking for h in data.plain]
     shares = [h.shaking / p for h, p in zip(data.printed_blend, still, strict=True)]
     return Claim(
-        id="FRICTION.HAMMER",
+        id="friction-compensation.hammer",
         source="appendix E; ours",
         claim="Made to act, the listing's blend of 0.002 rad/s shakes the arm.",
         thesis="not said in the thesis",

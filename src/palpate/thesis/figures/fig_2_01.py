@@ -129,7 +129,7 @@ def _problems(data: Data) -> Claim:
     always = float((data.any_gain[reach] > GROWS).mean())
     line = data.growth[np.argmin(np.abs(YS))]
     return Claim(
-        id="RC.PROBLEMS",
+        id="original-hybrid.problems",
         source="fig. 2.1, sec. 2.1",
         claim="The original hybrid controller has some problems.",
         thesis="some problems, two papers cited; not said which",
@@ -170,7 +170,7 @@ def _lost(data: Data) -> str:
 def _dynamics(data: Data) -> Claim:
     foam = data.varied["foam"]
     return Claim(
-        id="RC.DYNAMICS",
+        id="original-hybrid.dynamics",
         source="fig. 2.1, sec. 2.1",
         claim="Leaving out the robot's dynamics makes the original worse than (4.13).",
         thesis="does not include the dynamics; therefore developed further",

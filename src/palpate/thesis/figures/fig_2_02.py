@@ -113,7 +113,10 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[Claim]:
     """Spring, damper and mass, each by itself, on foam and rubber."""
-    return [_claim(data, *pair) for pair in (("IMP.K", "K"), ("IMP.B", "B"), ("IMP.M", "M"))]
+    return [
+        _claim(data, *pair)
+        for pair in (("impedance-holds.K", "K"), ("impedance-holds.B", "B"), ("impedance-holds.M", "M"))
+    ]
 
 
 _WORDS = {"K": "spring", "B": "damper", "M": "mass"}

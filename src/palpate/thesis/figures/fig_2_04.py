@@ -141,7 +141,7 @@ def _follows(data: Data) -> Claim:
     )
     slow = _span(data)
     return Claim(
-        id="YY",
+        id="network-alone",
         source="fig. 2.3, 2.4, sec. 2.2 (after Yabuta and Yamada)",
         claim="A neural network alone controls the force of a one-joint robot.",
         thesis="proposed, and tested by experiment; no numbers",
@@ -166,7 +166,7 @@ def _is_integral(data: Data) -> Claim:
     }
     gains = [p.gain for n in data.integral for p in data.worlds[n]]
     return Claim(
-        id="YY.INTEGRAL",
+        id="network-alone.integrator",
         source="fig. 2.4; ours",
         claim="To first order it is an integral controller of the gain that its weights give it.",
         thesis="not said in the thesis",

@@ -94,7 +94,7 @@ def check(data: Data) -> Sequence[Claim]:
 def _environment(data: Data) -> Claim:
     found = {"foam into\nrubber": data.turned, **{n: data.tuned[n] for n in _SURFACES}}
     return Claim(
-        id="FUK.ENVIRONMENT",
+        id="self-tuning-robust.environment",
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the environment's dynamics.",
         thesis="robust, by their simulations and experiments",
@@ -115,7 +115,7 @@ def _configuration(data: Data) -> Claim:
     found = {n: data.tuned[n] for n in _POSES}
     reach = spread([100 * f.saturated for f in data.tuned["wall at\n0.40 m"]], "%", 2)
     return Claim(
-        id="FUK.CONFIGURATION",
+        id="self-tuning-robust.configuration",
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the arm's configuration.",
         thesis="robust, by their simulations and experiments",
@@ -135,7 +135,7 @@ def _network(data: Data) -> Claim:
     shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
     good = {n: sum(s <= BETTER for s in v) for n, v in shares.items()}
     return Claim(
-        id="FUK.NETWORK",
+        id="self-tuning-robust.tuning",
         source="fig. 2.5; ours",
         claim=(
             "It is the tuning that makes it so: with the gains of the start left alone the force follows "

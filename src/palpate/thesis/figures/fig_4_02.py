@@ -113,7 +113,7 @@ def _clean(data: Data) -> Claim:
     fails = [name for name, some in data.varied.items() if 2 * sum(s.clean for s in some) <= len(some)]
     foam, rubber = data.switches["foam"], data.switches["rubber"]
     return Claim(
-        id="F4.2",
+        id="switch-at-5N",
         source="fig. 4.2, ch. 4",
         claim="When the force reaches 5 N control is switched from position to hybrid, and the force goes on to 20 N.",
         thesis="switch at 5 N",
@@ -145,7 +145,7 @@ def _threshold(data: Data) -> Claim:
     enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
     chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
     return Claim(
-        id="F4.2.threshold",
+        id="switch-at-5N.threshold",
         source="ch. 4",
         claim="With noise of almost ±2 N contact is not evident at low force; 5 N is a proper threshold.",
         thesis="5 N",

@@ -98,7 +98,7 @@ def _share(data: Data, *what: str) -> str:
 def _inertia(data: Data) -> Claim:
     return steady_state.found_claim(
         data.later,
-        ("RLS-S3.M", SOURCE, "From raw signals M_e is negative.", "negative"),
+        ("least-squares-raw-signals.M", SOURCE, "From raw signals M_e is negative.", "negative"),
         lambda f: f.M_raw,
         lambda f: f.M_raw < 0.0,
         "kg",
@@ -111,7 +111,7 @@ def _inertia(data: Data) -> Claim:
 def _damping(data: Data) -> Claim:
     return steady_state.found_claim(
         data.later,
-        ("RLS-S3.B", SOURCE, "From raw signals B_e is negative.", "negative"),
+        ("least-squares-raw-signals.B", SOURCE, "From raw signals B_e is negative.", "negative"),
         lambda f: f.B_raw,
         lambda f: f.B_raw < 0.0,
         "N s/m",
@@ -126,7 +126,7 @@ def _damping(data: Data) -> Claim:
 def _stiffness(data: Data) -> Claim:
     return steady_state.found_claim(
         data.later,
-        ("RLS-S3.K", SOURCE, "From raw signals K_e is still right.", "almost f/x"),
+        ("least-squares-raw-signals.K", SOURCE, "From raw signals K_e is still right.", "almost f/x"),
         lambda f: 100.0 * f.apart_raw,
         lambda f: abs(f.apart_raw) < NEAR,
         "%",
@@ -143,7 +143,7 @@ def _together(data: Data) -> Claim:
     lacking = [what for what, shown in zip(SHOWS, data.table[best], strict=True) if not shown]
     lack = f"; the best lacks {', '.join(lacking)}" if lacking else ""
     return Claim(
-        id="RLS-S.together",
+        id="least-squares-one-foam",
         source="fig. 6.1 to 6.3, sec. 6.1",
         claim="One and the same foam shows all that figures 6.1 to 6.3 do.",
         thesis="one foam",

@@ -84,7 +84,7 @@ def _slower(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
     )
     nearest = min(found, key=lambda rate: abs(float(np.median([a.error_gone for a in found[rate]])) - 0.6))
     return Claim(
-        id="NN-ETA.slower",
+        id="network-learning-rate.slower",
         source="fig. 6.6, sec. 6.2",
         claim="A smaller learning rate takes longer.",
         thesis="in words",
@@ -114,7 +114,7 @@ def _too_large(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
     )
     largest = found[RATES[-1]]
     return Claim(
-        id="NN-ETA.too-large",
+        id="network-learning-rate.too-large",
         source="sec. 6.2",
         claim="There are learning rates so large that the network never settles.",
         thesis="in words",

@@ -48,7 +48,7 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[Claim]:
     """When the error is almost zero."""
-    return claims.claims(data.shown.grounds, (claims.ERROR,), "NN-S", "fig. 6.8, sec. 6.2")
+    return claims.claims(data.shown.grounds, (claims.ERROR,), "network-foam", "fig. 6.8, sec. 6.2")
 
 
 def plot(data: Data) -> Figure:

@@ -67,7 +67,7 @@ def check(data: Data) -> Sequence[Claim]:
     """At both levels the force has to stay off by more than a tenth of what is asked for."""
     return [
         Claim(
-            id="HYB",
+            id="hybrid-alone-falls-short",
             source="fig. 6.10, sec. 6.3",
             claim="The hybrid controller alone (K_fp 0.25, no integral) cannot reach the force of the 10/20 N steps.",
             thesis="cannot reach the desired force",

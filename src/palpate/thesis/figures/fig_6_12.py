@@ -38,7 +38,7 @@ def check(data: Tracked) -> Sequence[Claim]:
     limited = 100 * float(np.median([one.saturated for one in data.nominal]))
     return [
         Claim(
-            id="NNC-S2",
+            id="neural-foam-sine",
             source="fig. 6.12, sec. 6.3",
             claim="On foam it also follows the steps with 4 sin(πt) added.",
             thesis="follows acceptably well",

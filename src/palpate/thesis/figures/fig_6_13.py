@@ -35,7 +35,7 @@ def check(data: Tracked) -> Sequence[Claim]:
     """The force must not follow in the first ten seconds."""
     return [
         Claim(
-            id="NNC-SLOW.first",
+            id="neural-slow-rate.first",
             source="fig. 6.13, sec. 6.3",
             claim="With a learning rate of 1e-5 the force cannot follow at first.",
             thesis="cannot follow immediately",

@@ -88,7 +88,7 @@ def check(data: Data) -> Sequence[Claim]:
     other = f"loses contact after {np.median(lost):.0f} s" if lost else "keeps contact"
     return [
         Claim(
-            id="NNC-SLOW.later",
+            id="neural-slow-rate.later",
             source="fig. 6.14, sec. 6.3",
             claim="After a few minutes the same slow controller follows.",
             thesis="follows after a few minutes",

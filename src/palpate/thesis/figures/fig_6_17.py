@@ -73,7 +73,7 @@ def check(data: Data) -> Sequence[Claim]:
     middle = float(np.median(data.adapted))
     return [
         Claim(
-            id="NNC-R2",
+            id="neural-rubber-sine",
             source="fig. 6.17, sec. 6.3",
             claim="On rubber it follows steps with 4 sin(πt) added, from the start.",
             thesis="follows well",
@@ -89,7 +89,7 @@ def check(data: Data) -> Sequence[Claim]:
             ),
         ),
         Claim(
-            id="NNC-R2.adapts",
+            id="neural-rubber-sine.adapts",
             source="fig. 6.17, sec. 6.3",
             claim="The controller adapts in almost 5 s.",
             thesis="almost 5 s",

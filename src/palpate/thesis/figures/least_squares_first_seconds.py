@@ -51,7 +51,7 @@ FOAM = FirstSeconds(
     ),
     press_runs.FOAMS,
     "plain foam",
-    "RLS-S1",
+    "least-squares-foam-settles",
     0.12,
 )
 RUBBER = FirstSeconds(
@@ -64,7 +64,7 @@ RUBBER = FirstSeconds(
     ),
     {"rubber": press_runs.RUBBER},
     "rubber",
-    "RLS-R1",
+    "least-squares-rubber-settles",
     0.05,
 )
 STUDIES = (FOAM, RUBBER)

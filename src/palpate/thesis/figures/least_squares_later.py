@@ -86,8 +86,8 @@ FOAM = Later(
     press_runs.FOAMS,
     "relaxing foam",
     "the foam",
-    "RLS-S2",
-    "RLS-RATIO.S",
+    "least-squares-foam-level",
+    "single-sample-ratios.foam",
     0.06,
     7.2,
     (
@@ -128,8 +128,8 @@ RUBBER = Later(
     {"rubber": press_runs.RUBBER},
     "rubber",
     "the rubber",
-    "RLS-R2",
-    "RLS-RATIO.R",
+    "least-squares-rubber-level",
+    "single-sample-ratios.rubber",
     0.02,
     44.0,
     (

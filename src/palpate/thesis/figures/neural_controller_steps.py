@@ -66,7 +66,7 @@ FOAM = Steps(
         "the same over the seeds and under what was varied."
     ),
     changed(tracking.FOAM, {"run.press": 15.0}),
-    "NNC-S1",
+    "neural-foam-steps",
     "On foam the neural controller follows steps between 10 and 20 N, about 10 s after the start.",
     "follows acceptably well",
     (
@@ -85,7 +85,7 @@ RUBBER = Steps(
         "rate that were used on foam. The thesis says that the force follows pretty well."
     ),
     changed(tracking.RUBBER, {"run.press": 15.0}),
-    "NNC-R1",
+    "neural-rubber-steps",
     "On rubber, with the same gains, it follows steps between 10 and 20 N, about 10 s after the start.",
     "follows pretty well",
     (

@@ -52,7 +52,7 @@ FOAM = FirstSeconds(
     ),
     network.FOAM,
     "foam",
-    "NN-S",
+    "network-foam",
     claims.FOAM,
     claims.FOAM_BAND,
 )
@@ -66,7 +66,7 @@ RUBBER = FirstSeconds(
     ),
     network.RUBBER,
     "rubber",
-    "NN-R",
+    "network-rubber",
     claims.RUBBER,
     claims.RUBBER_BAND,
 )

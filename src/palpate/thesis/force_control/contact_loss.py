@@ -58,7 +58,7 @@ class Trace:
 def found_again(found: Sequence[Regain]) -> Claim:
     """Whether contact comes back in time, and gently."""
     return Claim(
-        id="REGAIN",
+        id="contact-regained",
         source="ch. 4; ours",
         claim="Contact that is lost is found again by the approach, and the force comes back.",
         thesis="position control until 5 N are felt; nothing is said of a loss",
