@@ -54,5 +54,5 @@ def test_all_have_one_type_for_the_compiler():
 
 
 def test_one_that_is_not_built_in_is_refused():
-    with pytest.raises(InputError, match="cannot join a Hybrid; there are: Neural"):
+    with pytest.raises(InputError, match="cannot join a Hybrid; there are: DecoupledHybrid"):
         join(Hybrid(ZERO3, ZERO3, ZERO3, ZERO3))

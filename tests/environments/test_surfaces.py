@@ -19,6 +19,7 @@ from palpate.environments import (
     part_from,
     touch,
 )
+from palpate.environments.surface import members
 
 DT = 50e-6
 SURFACES = {
@@ -34,6 +35,12 @@ SURFACES = {
     "almost massless": KelvinVoigt(5200, 200, 1e-9),
 }
 each = pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES.keys())
+
+
+def test_every_surface_that_an_experiment_can_ask_for_is_here():
+    assert set(map(type, members())) == set(map(type, SURFACES.values()))
+
+
 HEAVY = {name: surface for name, surface in SURFACES.items() if surface.mass > 1e-6}
 with_mass = pytest.mark.parametrize("surface", HEAVY.values(), ids=HEAVY.keys())
 
