@@ -149,9 +149,9 @@ def test_where_a_claim_fails_is_told(press):
     good, bad = (press_runs.Found(*[1.0] * 8, settled, 0.0, 0.0, 200.0) for settled in (1.0, 9.0))
     answers = {"friction halved": [good, good, bad], "friction doubled": [bad, bad, good]}
     assert press_runs.failing(answers, lambda f: f.settled_B < 2.0) == ["friction doubled"]
-    assert "friction doubled" in press_runs.told(["friction doubled"], 2)
-    assert "none" in press_runs.told(["a", "b"], 2)
-    assert "all 2" in press_runs.told([], 2)
+    assert "friction doubled" in press_runs.where_it_fails(["friction doubled"], 2)
+    assert "none" in press_runs.where_it_fails(["a", "b"], 2)
+    assert "all 2" in press_runs.where_it_fails([], 2)
 
 
 def test_perfect_signals_find_the_surface_however_late_the_filters_are():

@@ -29,7 +29,7 @@ def exact(loop: Loop) -> Loop:
     )
 
 
-def still(loop: Loop, force: float, *, friction: bool) -> Loop:
+def at_equilibrium(loop: Loop, force: float, *, friction: bool) -> Loop:
     """The same loop, exact, with a constant desired force [N] and, unless wanted, without friction of joints.
 
     Friction that is left in acts as it does at rest, before anything slips: as a spring and a damper. The motors are

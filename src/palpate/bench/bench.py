@@ -110,7 +110,10 @@ class Bench:
         rows, ending = self._rows(simulation, total, None if press is None else round(press / tick), progress)
         columns = {name: _column(rows, i) for i, name in enumerate(COLUMNS)}
         told = {
-            "instruments": {"force": self.loop.force.told(), "position": {"lag_s": self.loop.encoder.lag}}
+            "instruments": {
+                "force": self.loop.force.description(),
+                "position": {"lag_s": self.loop.encoder.lag},
+            }
         }
         return Record(
             columns, COLUMNS, {**self.meta, **told, "seed": seed, "end": ending.end, "why": ending.why}

@@ -15,6 +15,7 @@ from palpate.bench.estimators import Estimators
 from palpate.bench.experiments.consistency import check, matched_delay
 from palpate.bench.experiments.tables import Experiment
 from palpate.bench.force_input import ForceInput
+from palpate.bench.matched_channels import Centring, Matched
 from palpate.bench.plant import Plant
 from palpate.bench.sequence import Sequence
 from palpate.bench.tick import Loop
@@ -22,7 +23,6 @@ from palpate.controllers import ResolvedAcceleration, controller_of
 from palpate.environments import StickSlip, join
 from palpate.errors import InputError
 from palpate.friction import Coulomb, LuGre
-from palpate.identifiers.front_ends import Centring, Matched
 from palpate.identifiers.kernels.least_squares import LeastSquares
 from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
 from palpate.references import Approach, Chirp, ForceSchedule, Multisine

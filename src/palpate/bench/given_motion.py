@@ -167,7 +167,7 @@ class GivenMotion:
             {"from_s": since, "rest_m": rest, "truth": _truth(surface)}
             for (since, surface), rest in zip(self.surfaces, rests, strict=False)
         ]
-        instruments = {"force": self.line.told(), "position": {"lag_s": 0.0}}
+        instruments = {"force": self.line.description(), "position": {"lag_s": 0.0}}
         return {"truth": told[-1]["truth"], "surfaces": told, "instruments": instruments}
 
 

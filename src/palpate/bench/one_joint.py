@@ -194,7 +194,7 @@ class OneJoint:
         end = "done" if finite.all() else "diverged"
         rows = rows if finite.all() else rows[: int(np.argmin(finite))]
         columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
-        told = {"force": self.loop.force.told(), "position": {"lag_s": 0.0}}
+        told = {"force": self.loop.force.description(), "position": {"lag_s": 0.0}}
         return Record(columns, COLUMNS, {"seed": seed, "end": end, "instruments": told})
 
 

@@ -202,7 +202,7 @@ class Lines:
 
     def show(self, finished: int) -> None:
         """How many runs are finished, and what is left by the pace so far."""
-        from palpate.studies.cost import told
+        from palpate.studies.cost import in_words
 
         self._first = finished if self._first is None else self._first
         now = time.monotonic()
@@ -210,7 +210,7 @@ class Lines:
             return
         self._told = now
         left = (now - self._begun) / (finished - self._first) * (self._total - finished)
-        self._screen.print(f"{finished} of {self._total} runs, some {told(left)} left", soft_wrap=True)
+        self._screen.print(f"{finished} of {self._total} runs, some {in_words(left)} left", soft_wrap=True)
 
 
 def _tell(found: Findings, folder: Path, as_json: bool) -> None:

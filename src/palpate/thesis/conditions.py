@@ -59,7 +59,7 @@ def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
     }
 
 
-def by_world(
+def by_condition(
     runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
 ) -> dict[str, list[T]]:
     """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""

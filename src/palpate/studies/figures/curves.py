@@ -11,7 +11,7 @@ from palpate.bench.ending import DONE
 from palpate.bench.metrics import METRICS
 from palpate.report.study.axes import Scale, decades
 from palpate.report.study.lines import Curve, Line, curves_figure
-from palpate.studies.figures.rows import FEW, Drawn, Rows, sentence, short, where_told, with_unit
+from palpate.studies.figures.rows import FEW, Drawn, Rows, restricted_to, sentence, short, with_unit
 from palpate.studies.tables import Curves
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def curves_of(table: Rows, asked: Curves, number: int) -> Drawn:
 
     against = " Dashed: what it is compared with." if table.plan.study.against else ""
     caption = (
-        f"{sentence(metric)}, over {x.label}{where_told(asked)}: median, and the range over the seeds and "
+        f"{sentence(metric)}, over {x.label}{restricted_to(asked)}: median, and the range over the seeds and "
         f"whatever else varies. Settings with a run that did not come to its end have no point.{against}"
     )
     return Drawn(f"curves{number}", caption, made)

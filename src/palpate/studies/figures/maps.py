@@ -14,7 +14,7 @@ from palpate.bench.ending import DONE
 from palpate.bench.metrics import METRICS, Metric
 from palpate.report.study.axes import Scale
 from palpate.report.study.maps import Heat, heat_figure
-from palpate.studies.figures.rows import Drawn, Rows, sentence, where_told, with_unit
+from palpate.studies.figures.rows import Drawn, Rows, restricted_to, sentence, with_unit
 from palpate.studies.tables import Map
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def map_of(table: Rows, asked: Map, number: int) -> Drawn:
         else f"{sentence(metric)}: the median of the runs of each cell"
     )
     line = " The line is where the linear model of the loop loses its stability." if asked.bound else ""
-    over = f"over {x.label} and {y.label}{where_told(asked)}"
+    over = f"over {x.label} and {y.label}{restricted_to(asked)}"
     caption = f"{what}, {over}. Crosses: most runs did not come to their end.{line}"
     return Drawn(f"map{number}", caption, made)
 

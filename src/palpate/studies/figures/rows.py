@@ -109,7 +109,7 @@ def _unevenness(values: NDArray[np.float64]) -> float:
     return float(np.std(steps) / np.mean(steps))
 
 
-def where_told(asked: Map | Curves) -> str:
+def restricted_to(asked: Map | Curves) -> str:
     """What a figure's runs have in common, for its caption."""
     return "".join(f", {name} {short(value)}" for name, value in flat(asked.where).items())
 

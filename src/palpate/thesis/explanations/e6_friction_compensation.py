@@ -22,16 +22,16 @@ from palpate.thesis.conditions import (
     RUBBER_SURFACE,
     SHORT,
     VARIED_SEEDS,
-    by_world,
+    by_condition,
     friction_and_pose,
     stops_holding,
 )
 from palpate.thesis.force_control.contact_loss import (
-    Regain,
+    Recovery,
     Trace,
     drawn_back,
     found_again,
-    regain_panel,
+    loss_panel,
     regained,
     trace_of,
 )
@@ -96,7 +96,7 @@ class Data:
     printed_blend: list[Held]
     sweep: list[list[Held]]  # over BLENDS
     varied: dict[str, list[Ratio]]
-    regains: list[Regain]
+    regains: list[Recovery]
     regain: Trace
 
 
@@ -230,7 +230,7 @@ def plot(data: Data) -> Figure:
         label="error left [%]",
         title="with a blend of 0.05 rad/s over without; each dot a run; dashed: half",
     )
-    regain_panel(wide[2], data.regain)
+    loss_panel(wide[2], data.regain)
     return drawing
 
 
@@ -277,7 +277,7 @@ def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
         compensated = runs.one(changed(PARAMETERS, world), seed)
         return Ratio(_held(compensated).error / without.error, losses(compensated) > 0)
 
-    return by_world(runs, _worlds(), ratio, {"foam"})
+    return by_condition(runs, _worlds(), ratio, {"foam"})
 
 
 def _held(record: Record) -> Held:

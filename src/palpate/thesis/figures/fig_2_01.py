@@ -23,7 +23,7 @@ from palpate.thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
     SHORT,
-    by_world,
+    by_condition,
     friction_and_pose,
     stops_holding,
 )
@@ -109,8 +109,8 @@ class Data:
 def run(runs: Runs) -> Data:
     """Both laws in each world; the original's growth at each posture."""
     worlds = {name: changed(PARAMETERS, changes) for name, changes in _changes().items()}
-    original = by_world(runs, worlds, lambda e, s: _measured(runs.one(e, s)), {"foam"})
-    dynamic = by_world(runs, worlds, lambda e, s: _measured(runs.one(changed(e, DYNAMIC), s)), {"foam"})
+    original = by_condition(runs, worlds, lambda e, s: _measured(runs.one(e, s)), {"foam"})
+    dynamic = by_condition(runs, worlds, lambda e, s: _measured(runs.one(changed(e, DYNAMIC), s)), {"foam"})
     varied = {n: [Pair(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
     traces = {LAWS[0]: _trace(runs.one(PARAMETERS)), LAWS[1]: _trace(runs.one(changed(PARAMETERS, DYNAMIC)))}
     growth = _growth(1.0, np.ones((len(YS), len(XS)), dtype=bool))

@@ -23,12 +23,12 @@ from palpate.thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
     SHORT,
-    by_world,
+    by_condition,
     moved,
     rougher,
     stops_holding,
 )
-from palpate.thesis.force_control.disturbances import Change, Turn, run_with
+from palpate.thesis.force_control.disturbances import Change, Disturbance, run_with
 from palpate.thesis.force_control.panels import dots_panel, panels
 from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
@@ -101,7 +101,7 @@ class Data:
 def run(runs: Runs) -> Data:
     """Jumps of the desired depth on foam and rubber, and under what is varied."""
     worlds = _worlds()
-    varied = by_world(runs, worlds, lambda e, s: _found(_record(e, s)), _ALL)
+    varied = by_condition(runs, worlds, lambda e, s: _found(_record(e, s)), _ALL)
     rough, free = (_record(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
     traces = {
         "with friction": _trace(rough),
@@ -228,8 +228,8 @@ def _aimed(controller: Any, x: float) -> Any:
 
 
 def _record(experiment: Experiment, seed: int) -> Record:
-    turns = [Turn(float(i), drawn_to(experiment.wall.x + d)) for i, d in enumerate(DEPTHS) if i]
-    return run_with(experiment, seed, turns)
+    disturbances = [Disturbance(float(i), drawn_to(experiment.wall.x + d)) for i, d in enumerate(DEPTHS) if i]
+    return run_with(experiment, seed, disturbances)
 
 
 def _found(record: Record) -> Found:

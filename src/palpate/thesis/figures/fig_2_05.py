@@ -20,14 +20,22 @@ from palpate.thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
     SHORT,
-    by_world,
+    by_condition,
     moved,
     rougher,
     stops_holding,
 )
-from palpate.thesis.force_control.disturbances import Turn, other_surface, run_with
+from palpate.thesis.force_control.disturbances import Disturbance, other_surface, run_with
 from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
-from palpate.thesis.force_control.tracking import FOLLOWS, Slot, Tracking, since_contact, slot, told, tracking
+from palpate.thesis.force_control.tracking import (
+    FOLLOWS,
+    Slot,
+    Tracking,
+    described,
+    since_contact,
+    slot,
+    tracking,
+)
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -74,8 +82,8 @@ def run(runs: Runs) -> Data:
     worlds = _worlds()
     measure = tracking(*JUDGED)
     full = {*_SURFACES, *_POSES}
-    tuned = by_world(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
-    fixed = by_world(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
+    tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
+    fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
     turned = runs.map(lambda seed: measure(_turned(seed)), list(runs.seeds))
     record = _turned(runs.seeds[0])
     t = since_contact(record)
@@ -98,7 +106,7 @@ def _environment(data: Data) -> Claim:
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the environment's dynamics.",
         thesis="robust, by their simulations and experiments",
-        measured=f"foam turned into rubber: {told(data.turned)}; {_told(found)}",
+        measured=f"foam turned into rubber: {described(data.turned)}; {_told(found)}",
         tolerance=f"on foam, on rubber and after foam turned into rubber, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(_follow(f) for f in found.values())),
         note=(
@@ -205,7 +213,7 @@ def _worlds() -> dict[str, Experiment]:
 
 
 def _turned(seed: int) -> Record:
-    return run_with(PARAMETERS, seed, [Turn(TURN, other_surface(UNDER))])
+    return run_with(PARAMETERS, seed, [Disturbance(TURN, other_surface(UNDER))])
 
 
 def _follow(found: Sequence[Tracking]) -> bool:

@@ -129,7 +129,7 @@ def _clean(data: Data) -> Claim:
         note=(
             "The figure is lost and the text gives no number but the 5 N; the threshold is ours. Friction of joint 2 "
             "decides how the last newtons are reached: without the integral gain some 2 N would stay. "
-            f"{press_runs.told(fails, len(data.varied))} With the wall at 0.40 m joint 2's limit of 2.5 N m "
+            f"{press_runs.where_it_fails(fails, len(data.varied))} With the wall at 0.40 m joint 2's limit of 2.5 N m "
             f"holds the force at {press_runs.median([s.last for s in data.varied['wall at 0.40 m']]):.1f} N."
         ),
     )

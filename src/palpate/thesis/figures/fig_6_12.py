@@ -11,7 +11,7 @@ from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
 from palpate.thesis.conditions import stops_holding
 from palpate.thesis.force_control.panels import tracked_figure
-from palpate.thesis.force_control.tracking import FOAM, FOLLOWS, SINE, Tracked, following, told, tracked
+from palpate.thesis.force_control.tracking import FOAM, FOLLOWS, SINE, Tracked, described, following, tracked
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def check(data: Tracked) -> Sequence[Claim]:
             source="fig. 6.12, sec. 6.3",
             claim="On foam it also follows the steps with 4 sin(πt) added.",
             thesis="follows acceptably well",
-            measured=f"{told(data.nominal)}; motor 2 at its limit {limited:.0f} % of the time",
+            measured=f"{described(data.nominal)}; motor 2 at its limit {limited:.0f} % of the time",
             tolerance=f"{FOLLOWS}, from 10 to 15 s",
             verdict=decided(following(data.nominal)),
             note=(

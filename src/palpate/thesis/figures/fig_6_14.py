@@ -24,10 +24,10 @@ from palpate.thesis.force_control.tracking import (
     FOLLOWS,
     Slot,
     Tracking,
+    described,
     following,
     since_contact,
     slot,
-    told,
     tracking,
 )
 from palpate.thesis.runs import Runs
@@ -92,7 +92,7 @@ def check(data: Data) -> Sequence[Claim]:
             source="fig. 6.14, sec. 6.3",
             claim="After a few minutes the same slow controller follows.",
             thesis="follows after a few minutes",
-            measured=f"{told(data.nominal)}; in the first ten seconds {first}",
+            measured=f"{described(data.nominal)}; in the first ten seconds {first}",
             tolerance=f"{FOLLOWS}, from 180 to 190 s",
             verdict=decided(following(data.nominal)),
             note=(

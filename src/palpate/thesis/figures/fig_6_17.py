@@ -20,9 +20,9 @@ from palpate.thesis.force_control.tracking import (
     RUBBER,
     SINE,
     Tracked,
+    described,
     following,
     since_contact,
-    told,
     tracked,
 )
 from palpate.thesis.runs import Runs
@@ -77,7 +77,7 @@ def check(data: Data) -> Sequence[Claim]:
             source="fig. 6.17, sec. 6.3",
             claim="On rubber it follows steps with 4 sin(πt) added, from the start.",
             thesis="follows well",
-            measured=f"{told(found.nominal)}; motor 2 at its limit {limited:.0f} % of the time",
+            measured=f"{described(found.nominal)}; motor 2 at its limit {limited:.0f} % of the time",
             tolerance=f"{FOLLOWS}, from 0 to 10 s",
             verdict=decided(following(found.nominal)),
             note=(

@@ -11,7 +11,7 @@ from palpate.thesis.claims import Claim, decided
 from palpate.thesis.conditions import stops_holding
 from palpate.thesis.force_control import tracking
 from palpate.thesis.force_control.panels import tracked_figure
-from palpate.thesis.force_control.tracking import FOLLOWS, Tracked, following, told, tracked
+from palpate.thesis.force_control.tracking import FOLLOWS, Tracked, described, following, tracked
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Steps:
                 source=f"fig. {self.NUMBER}, sec. 6.3",
                 claim=self.claim,
                 thesis=self.thesis,
-                measured=told(data.nominal),
+                measured=described(data.nominal),
                 tolerance=f"{FOLLOWS}, from 10 to 15 s",
                 verdict=decided(following(data.nominal)),
                 note=self.note.format(stops_holding(data.varied, lambda one: one.follows)),

@@ -16,7 +16,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.conditions import ENOUGH, SHORT
-from palpate.thesis.force_control.disturbances import Turn, run_with, surface_back
+from palpate.thesis.force_control.disturbances import Disturbance, run_with, surface_back
 from palpate.thesis.force_control.tracking import since_contact
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ AGAIN, PEAK = 3.0, 1.25
 
 
 @dataclass(frozen=True)
-class Regain:
+class Recovery:
     """What became of a contact that was lost."""
 
     took: float  # from loss to contact [s]; infinite if never
@@ -55,7 +55,7 @@ class Trace:
     phase: Array
 
 
-def found_again(found: Sequence[Regain]) -> Claim:
+def found_again(found: Sequence[Recovery]) -> Claim:
     """Whether contact comes back in time, and gently."""
     return Claim(
         id="contact-regained",
@@ -82,7 +82,7 @@ def found_again(found: Sequence[Regain]) -> Claim:
     )
 
 
-def regain_panel(axis: Axes, one: Trace) -> None:
+def loss_panel(axis: Axes, one: Trace) -> None:
     """The true force, and when there was no contact."""
     axis.plot(one.t, one.signal, color=style.BLUE, linewidth=1.1, label="true force")
     away = (one.phase != CONTACT).astype(float)
@@ -99,22 +99,22 @@ def regain_panel(axis: Axes, one: Trace) -> None:
 
 def drawn_back(seed: int) -> Record:
     """A press whose surface goes."""
-    return run_with(LOSS, seed, [Turn(GONE, surface_back(BACK))])
+    return run_with(LOSS, seed, [Disturbance(GONE, surface_back(BACK))])
 
 
-def regained(record: Record) -> Regain:
+def regained(record: Record) -> Recovery:
     """What became of the contact after its first loss."""
     t, phase, force = since_contact(record), record["phase"], record["force"]
     lost = np.flatnonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT)) + 1
     if not len(lost):
-        return Regain(np.inf, np.inf, np.inf, 0)
+        return Recovery(np.inf, np.inf, np.inf, 0)
     after = np.flatnonzero((phase == CONTACT) & (t > t[lost[0]]))
     if not len(after):
-        return Regain(np.inf, np.inf, np.inf, len(lost))
+        return Recovery(np.inf, np.inf, np.inf, len(lost))
     back = t[after[0]]
     late = (t >= back + AGAIN - 0.1) & (t < back + AGAIN + 0.1)
     off = abs(float(force[late].mean()) / 20.0 - 1.0) if late.any() else np.inf
-    return Regain(float(back - t[lost[0]]), off, float(force[lost[0] :].max()) / 20.0, len(lost))
+    return Recovery(float(back - t[lost[0]]), off, float(force[lost[0] :].max()) / 20.0, len(lost))
 
 
 def trace_of(record: Record) -> Trace:

@@ -13,7 +13,7 @@ from palpate._vector import Vec3
 from palpate.bench import Experiment, changed
 from palpate.bench.metrics.summary import losses
 from palpate.records import Record
-from palpate.thesis.force_control.disturbances import Turn, desired_pose, run_with
+from palpate.thesis.force_control.disturbances import Disturbance, desired_pose, run_with
 from palpate.thesis.force_control.tracking import since_contact
 
 Array = NDArray[np.float64]
@@ -82,7 +82,8 @@ def identified(world: Experiment, seed: int) -> float:
 def pressed(experiment: Experiment, seed: int) -> Record:
     """A press in whose course the desired y jumps."""
     jumps = [
-        Turn(at, desired_pose(Vec3(0.0, sign * JUMP, 0.0))) for at, sign in zip(JUMPS, (1, -1), strict=True)
+        Disturbance(at, desired_pose(Vec3(0.0, sign * JUMP, 0.0)))
+        for at, sign in zip(JUMPS, (1, -1), strict=True)
     ]
     return run_with(experiment, seed, jumps)
 
@@ -93,7 +94,7 @@ def stray(record: Record) -> Stray:
     begun = record["t"][0] - t[0]
     y = [furthest(t, record["y"], at) for at in STEPS]
     phi = [furthest(t, record["phi"], at) for at in STEPS]
-    pushed = [furthest(t, force, at - begun) / 10.0 for at in record.meta["turns"]]
+    pushed = [furthest(t, force, at - begun) / 10.0 for at in record.meta["disturbances"]]
     return Stray(
         1e3 * float(np.mean(y)), float(np.degrees(np.mean(phi))), float(np.mean(pushed)), losses(record)
     )

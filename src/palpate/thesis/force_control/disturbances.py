@@ -22,7 +22,7 @@ Change = Callable[[Loop, LoopState], tuple[Loop, LoopState]]
 
 
 @dataclass(frozen=True)
-class Turn:
+class Disturbance:
     """Something that changes between two ticks.
 
     Args:
@@ -35,18 +35,21 @@ class Turn:
 
 
 def run_with(
-    experiment: Experiment, seed: int, turns: Sequence[Turn], waiting: Callable[[], None] | None = None
+    experiment: Experiment,
+    seed: int,
+    disturbances: Sequence[Disturbance],
+    waiting: Callable[[], None] | None = None,
 ) -> Record:
-    """Runs like `Bench.run`, from the same random numbers, for `press` seconds of contact, through the turns.
+    """Runs like `Bench.run`, from the same random numbers, for `press` seconds of contact, through the disturbances.
 
     Args:
         experiment: any; it runs on after losses of contact.
         seed: of the noise.
-        turns: in the order of their times.
+        disturbances: in the order of their times.
         waiting: called when the loop has to be compiled first.
 
     Returns:
-        All rows up to the end, or up to the first number that is none; ``meta["turns"]`` holds the times [s].
+        All rows up to the end, or up to the first number that is none; ``meta["disturbances"]`` holds the times [s].
     """
     bench = build(experiment)
     tick, march = bench.loop.tick, bench.simulation(seed, waiting=waiting)
@@ -54,7 +57,7 @@ def run_with(
     while march.ticks < round(experiment.run.duration / tick) and _finite(rows) and march.contact is None:
         rows.append(march.advance(LOOK))
     begun = march.ticks if march.contact is None else march.contact
-    for at, change in [(t.at, t.change) for t in turns] + [(experiment.run.press, None)]:
+    for at, change in [(t.at, t.change) for t in disturbances] + [(experiment.run.press, None)]:
         left = begun + round(at / tick) - march.ticks
         if left > 0 and _finite(rows):
             rows.append(march.advance(left))
@@ -64,8 +67,8 @@ def run_with(
     finite = np.isfinite(all_rows).all(axis=1)
     kept = all_rows if finite.all() else all_rows[: int(np.argmin(finite))]
     columns = {name: kept[:, i].copy() for i, name in enumerate(COLUMNS)}
-    times = [(begun * tick) + turn.at for turn in turns]
-    return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "turns": times})
+    times = [(begun * tick) + one.at for one in disturbances]
+    return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "disturbances": times})
 
 
 def _finite(rows: Sequence[np.ndarray]) -> bool:

@@ -88,7 +88,7 @@ def following(found: Sequence[Tracking]) -> bool:
     return sum(f.follows for f in found) >= ENOUGH * len(found)
 
 
-def told(found: Sequence[Tracking]) -> str:
+def described(found: Sequence[Tracking]) -> str:
     """The measured column of a claim."""
     worst = spread([100 * f.off for f in found], "%", 2)
     text = f"RMS {spread([f.settled for f in found], 'N')} outside the steps, interval ends off by {worst}"

@@ -194,7 +194,7 @@ def failing(answers: Mapping[str, Sequence[Found]], holds: Callable[[Found], boo
     return [name for name, some in answers.items() if 2 * sum(map(holds, some)) <= len(some)]
 
 
-def told(fails: Sequence[str], among: int) -> str:
+def where_it_fails(fails: Sequence[str], among: int) -> str:
     """In words, where a claim stops holding."""
     if not fails:
         return f"It holds under all {among} varied conditions (friction, pose, the surface's M and B)."

@@ -96,7 +96,7 @@ def _settling_claim(data: Data, surface: str, id_: str, source: str, limit: floa
         tolerance=f"stays within 10 % of its value at 4 s from {limit:g} s on; the middle of the seeds, {surface}",
         verdict=decided(median(times[surface]) <= limit),
         note=f"{_edge(times[surface], limit)}{_why(data, surface, key, limit)} "
-        f"{press_runs.told(fails, len(data.varied))}",
+        f"{press_runs.where_it_fails(fails, len(data.varied))}",
     )
 
 

@@ -109,7 +109,7 @@ def found_claim(
     measured = "; ".join(f"{n} {spread([measure(f) for f in some], unit)}" for n, some in data.found.items())
     others = [n for n in data.found if n != surface]
     there = "".join(_elsewhere(n, sum(map(holds, data.found[n])), len(data.found[n])) for n in others)
-    note = f"{why} {press_runs.told(fails, len(data.varied[surface]))}{there}"
+    note = f"{why} {press_runs.where_it_fails(fails, len(data.varied[surface]))}{there}"
     verdict = decided(2 * sum(map(holds, nominal)) > len(nominal))
     return Claim(
         what[0], what[1], what[2], what[3], measured, f"{tolerance}; most seeds, {surface}", verdict, note

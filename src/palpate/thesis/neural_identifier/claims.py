@@ -123,7 +123,8 @@ def claims(grounds: Grounds, parts: Sequence[Part], id_: str, source: str) -> li
 def _claim(grounds: Grounds, part: Part, id_: str, source: str, parts: Sequence[Part]) -> Claim:
     values = [part.value(a) for a in grounds.nominal]
     good = sum(map(part.holds, grounds.nominal))
-    measured = f"{told(values, part.unit, grounds.starts)}{_figures(part, grounds)}; holds in {good} of {len(values)}"
+    shown = described(values, part.unit, grounds.starts)
+    measured = f"{shown}{_figures(part, grounds)}; holds in {good} of {len(values)}"
     note = " ".join(
         [
             why(part.suffix, grounds),
@@ -154,7 +155,7 @@ def _figures(part: Part, grounds: Grounds) -> str:
     return f", {stiffness:.3g} against {ratio:.3g} kN/m"
 
 
-def told(values: Sequence[float], unit: str, starts: int) -> str:
+def described(values: Sequence[float], unit: str, starts: int) -> str:
     """Median and range over noise seeds and starts."""
     return spread(values, unit).replace(
         f"{len(values)} seeds", f"{len(values) // starts} seeds x {starts} starts"

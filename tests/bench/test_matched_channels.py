@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate._vector import Mat3, Vec3
-from palpate.identifiers.front_ends import Centring, Matched, centred
+from palpate.bench.matched_channels import Centring, Matched, centred
 from palpate.identifiers.kernels.least_squares import LeastSquares
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth3, delay, state_variable
