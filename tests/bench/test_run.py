@@ -33,12 +33,23 @@ def press(bench, seed=0, **options):
     return bench.run(DURATION, seed, press=PRESS, **options)
 
 
-@pytest.mark.parametrize("name", names())
+def kinds_of_loop():
+    """One experiment of each controller, surface and wave: others differ from it in numbers alone."""
+    found = {}
+    for name in names():
+        e = load(name)
+        waves = e.force.chirp is not None, e.force.multisine is not None
+        found.setdefault((type(e.controller), type(e.surface), waves), name)
+    return list(found.values())
+
+
+@pytest.mark.parametrize("name", kinds_of_loop())
 def test_compiled_and_stepped_runs_agree_to_the_bit(name):
     """Over the approach, the touch and the switch. Networks call exp, of which there are two in a process."""
     bench = build(quick(name))
-    compiled, stepped = press(bench, compiled=True), press(bench, compiled=False)
-    assert (compiled["phase"] == 1.0).sum() == round(PRESS / bench.loop.tick)
+    short = 0.4 * PRESS
+    compiled, stepped = (bench.run(DURATION, press=short, compiled=how) for how in (True, False))
+    assert (compiled["phase"] == 1.0).sum() == round(short / bench.loop.tick)
     assert compiled.meta["end"] == stepped.meta["end"] == "done"
     same(compiled, stepped, tolerance=1e-12 if ("neural" in name or "tuning" in name) else 0.0)
 
