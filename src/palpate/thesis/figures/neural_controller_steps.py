@@ -1,10 +1,12 @@
-"""Figures 6.11 and 6.16: the neural controller follows steps of force, on styrofoam and on rubber."""
+"""Figures 6.11, 6.12 and 6.16: the neural controller follows steps, with a sine on top too, on foam and on rubber."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from palpate.bench import Experiment, changed
 from palpate.thesis.claims import Claim, decided
@@ -17,12 +19,12 @@ from palpate.thesis.runs import Runs
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHOWN, JUDGED = (9.5, 13.5), (10.0, 15.0)
+JUDGED = (10.0, 15.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """The figure of one surface."""
+    """The figure of one surface and one desired force."""
 
     NUMBER: str
     TITLE: str
@@ -32,20 +34,24 @@ class Steps:
     claim: str
     thesis: str
     note: str  # with a place for where the claim stops holding
+    shown: tuple[float, float] = (9.5, 13.5)  # from when to when after contact [s]
+    limited: bool = False  # whether it is told how long motor 2 is at its limit
 
     def run(self, runs: Runs) -> Tracked:
         """Fifteen seconds of contact, the last five judged."""
-        return tracked(runs, self.PARAMETERS, SHOWN, JUDGED)
+        return tracked(runs, self.PARAMETERS, self.shown, JUDGED)
 
     def check(self, data: Tracked) -> Sequence[Claim]:
-        """The force has to follow from 10 to 15 s."""
+        """The force has to follow from 10 to 15 s, by the same limits whatever is asked for."""
+        share = 100 * float(np.median([one.saturated for one in data.nominal]))
+        limited = f"; motor 2 at its limit {share:.0f} % of the time" if self.limited else ""
         return [
             Claim(
                 id=self.id,
                 source=f"fig. {self.NUMBER}, sec. 6.3",
                 claim=self.claim,
                 thesis=self.thesis,
-                measured=described(data.nominal),
+                measured=f"{described(data.nominal)}{limited}",
                 tolerance=f"{FOLLOWS}, from 10 to 15 s",
                 verdict=decided(following(data.nominal)),
                 note=self.note.format(stops_holding(data.varied, lambda one: one.follows)),
@@ -96,4 +102,27 @@ RUBBER = Steps(
         "its limit below 20 N."
     ),
 )
-STUDIES = (FOAM, RUBBER)
+SINE = Steps(
+    "6.12",
+    "Neural controller on foam: steps with 4 sin(πt) added",
+    (
+        "The same controller, asked for steps between 10 and 20 N with a sine of 4 N on top, which starts anew "
+        "every 5 s as in the listing. The thesis says that the force follows acceptably well. The red bar at the "
+        "lower edge: motor 2 at its limit of 2.5 N m, near the peaks of 24 N."
+    ),
+    changed(tracking.FOAM, {**tracking.SINE, "run.press": 15.0}),
+    "neural-foam-sine",
+    "On foam it also follows the steps with 4 sin(πt) added.",
+    "follows acceptably well",
+    (
+        "The limits are those of the plain steps, set before looking, and the outcome lies close to them: with 2 "
+        "N instead of 1.5 N this would be following. By eye the force comes a fifth of a second late and turns "
+        "flat at the crests. Two causes: friction in the joints turns around with every half wave, and the "
+        "network, a slow integrator, has to learn its new sign each time (half the friction takes a third off "
+        "the error, and so does the listing's rate, twice that of the text); and at the 24 N peaks motor 2 is at "
+        "its limit, which matters less on foam: a stronger motor hardly helps. {}"
+    ),
+    shown=(9.75, 15.0),
+    limited=True,
+)
+STUDIES = (FOAM, SINE, RUBBER)
