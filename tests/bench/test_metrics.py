@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.quick import quick
-from palpate.bench import build
 from palpate.bench.metrics import METRICS, Look
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import APPROACH, CONTACT, LOST
 from palpate.records import Record
-from palpate.thesis.force_control.tracking import tracking
 
 TICK = 1e-3
 
@@ -82,19 +79,6 @@ def test_follows_slow_and_rings():
         assert of("follows", one) == float(name == "follows")
         assert of("steady", one) == float(name != "rings")
     assert told == {name: name for name in told}
-
-
-@pytest.mark.parametrize("surface", ["foam", "rubber"])
-def test_following_is_what_the_figures_of_the_thesis_mean_by_it(surface):
-    run = quick(f"{surface}-neural", run={"press": 3.0, "duration": 6.0})
-    one = build(run).run(6.0, press=3.0)
-    for window in ((0.0, 3.0), (0.0, 2.5)):
-        theirs = tracking(*window)(one)
-        assert of("force_rms", one, window) == pytest.approx(theirs.rms, rel=1e-12)
-        assert of("force_rms_settled", one, window) == pytest.approx(theirs.settled, rel=1e-12)
-        assert of("interval_error", one, window) == pytest.approx(theirs.off, rel=1e-12)
-        assert of("saturation2", one, window) == pytest.approx(theirs.saturated, rel=1e-12)
-        assert of("follows", one, window) == float(theirs.follows)
 
 
 def test_adaptation_ends_with_the_last_interval_that_is_off():
