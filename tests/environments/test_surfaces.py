@@ -262,6 +262,7 @@ def test_joined_it_is_the_same(surface):
     press.plain(surface, 1.5, -1e-4, 0.1, push, DT, alone)
     press.plain(join(surface), 1.5, -1e-4, 0.1, push, DT, joined)
     np.testing.assert_array_equal(alone, joined)
+    assert alone(join(surface)) is surface
     assert join(surface).truth() == surface.truth()
     assert join(surface).mass == surface.mass
 

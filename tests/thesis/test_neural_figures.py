@@ -46,7 +46,7 @@ def pressed(force, seconds=10.0, before=0.2, **columns) -> Record:
     table["force_desired"] = desired
     table["force"] = table["force_measured"] = force(since, desired)
     table.update(columns)
-    return Record(table, COLUMNS, {"experiment": {"force": {"period": 2.5}}})
+    return Record(table, COLUMNS, {"experiment": {"force": {"period": 2.5}}, "end": "done"})
 
 
 def test_a_perfect_force_follows():

@@ -4,7 +4,7 @@ A controller is a part: a frozen NamedTuple of gains with ``start()``, the state
 ``step(state, sense, task, model) -> (torque, state)``. Gains are `Vec3` for the planar arm, or arrays of shape (m,).
 """
 
-from palpate.controllers.any_controller import AnyController, controller_of, join
+from palpate.controllers.any_controller import AnyController, alone, controller_of, join
 from palpate.controllers.cautious_press import CautiousController, CautiousPress, cautious_on_bench
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.decoupled_hybrid import DecoupledHybrid, DecoupledHybridController
@@ -36,6 +36,7 @@ __all__ = [
     "ResolvedAcceleration",
     "SelfTuning",
     "SelfTuningController",
+    "alone",
     "cautious_on_bench",
     "controller",
     "controller_of",

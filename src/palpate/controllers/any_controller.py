@@ -80,3 +80,11 @@ def join(one: Any) -> Any:
     for first in reversed(others):
         joined = AnyController(int(first is one), first, joined)
     return joined
+
+
+def alone(controller: Any, state: Any) -> tuple[Any, Any]:
+    """The controller that acts and its state, taken out of what `join` made."""
+    while isinstance(controller, AnyController):
+        chosen = controller.chosen == 1
+        controller, state = (controller.first, state[0]) if chosen else (controller.second, state[1])
+    return controller, state

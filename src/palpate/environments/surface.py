@@ -78,3 +78,10 @@ def join(one: Any) -> Surface:
     for first in reversed(others):
         joined = Surface(int(first is one), one.mass, first, joined)
     return joined
+
+
+def alone(surface: Any) -> Any:
+    """The surface that is meant, taken out of what `join` made."""
+    while isinstance(surface, Surface):
+        surface = surface.first if surface.chosen == 1 else surface.second
+    return surface

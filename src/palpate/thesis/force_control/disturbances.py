@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, build
+from palpate.bench.ending import DIVERGED, DONE
 from palpate.bench.row import COLUMNS
 from palpate.bench.tick import Loop, LoopState
 from palpate.environments import KelvinVoigt, join
@@ -68,7 +69,8 @@ def run_with(
     kept = all_rows if finite.all() else all_rows[: int(np.argmin(finite))]
     columns = {name: kept[:, i].copy() for i, name in enumerate(COLUMNS)}
     times = [(begun * tick) + one.at for one in disturbances]
-    return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "disturbances": times})
+    end = DONE if finite.all() else DIVERGED
+    return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "end": end, "disturbances": times})
 
 
 def _finite(rows: Sequence[np.ndarray]) -> bool:

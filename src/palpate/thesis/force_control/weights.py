@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from palpate.bench import Experiment, build
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT, LOST
+from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
 
 LOOK = 1000
@@ -59,15 +59,12 @@ def watch(
         gone = (phase == LOST) | ~np.isfinite(rows).all(axis=1)
         if gone.any():
             return (march.ticks - every + int(np.argmax(gone)) - march.contact) * march.loop.tick
-        look(Look(march.since_contact, rows[phase == CONTACT], _neural(march.state.controller)))
+        _, own = alone(march.loop.controller, march.state.controller)
+        neural = own if isinstance(own, NeuralState) else None
+        look(Look(march.since_contact, rows[phase == CONTACT], neural))
         if march.since_contact >= duration:
             return None
     return None if march.contact is not None else float("nan")
-
-
-def _neural(controller: Any) -> NeuralState | None:
-    state = controller[0] if isinstance(controller, tuple) else None
-    return state if type(state) is NeuralState else None
 
 
 POSES, TORQUE1, TORQUES = slice(1, 7), slice(7, 8), slice(7, 10)
