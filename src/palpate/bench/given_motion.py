@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from palpate._jit import kernel, law
 from palpate.bench.force_input import ForceInput, ForceInputState
 from palpate.bench.paths import Path, positions
-from palpate.bench.rest_length import rest_for
 from palpate.environments import SurfaceState, join
 from palpate.environments.surface import members
 from palpate.environments.surface_state import follow
@@ -30,6 +29,10 @@ COLUMNS = {
 }
 RIGID = 1e12
 """Effective mass of a tip that nothing turns from its path [kg]."""
+SHALLOW = 1e-6
+"""Depth at which the search begins [m]."""
+DEEPEST = 10.0
+"""Depth at which it is given up [m]."""
 
 
 @law
@@ -152,7 +155,7 @@ class GivenMotion:
         old, new = self.surfaces[i - 1][1], self.surfaces[i][1]
         now, rate, second = self._motion(x, rest)
         force = old.force(state, now, rate) + old.mass * second
-        depth = rest_for(new, force - new.mass * second, rate)
+        depth = _rest_for(new, force - new.mass * second, rate)
         return rest + now - depth, SurfaceState(depth, rate, 0.0, 1.0)
 
     def _motion(self, x: NDArray[np.float64], rest: float) -> tuple[float, float, float]:
@@ -234,3 +237,26 @@ def _truth(surface: Any) -> dict[str, dict[str, Any]]:
     """{name: {"value", "unit"}}; empty of a part that does not tell."""
     truth = surface.truth() if hasattr(surface, "truth") else {}
     return {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
+
+
+def _rest_for(surface: Any, force: float, rate: float) -> float:
+    """Penetration [m] at which a surface that moves at a rate [m/s], relaxed, bears a force [N], inertia left out.
+
+    Negative where the damping alone bears more than that.
+
+    Raises:
+        InputError: no depth within metres bears it.
+    """
+    from scipy.optimize import brentq
+
+    def short(depth: float) -> float:
+        return float(surface.force(SurfaceState(depth, rate, 0.0, 1.0), depth, rate)) - force
+
+    bound = SHALLOW if short(0.0) < 0.0 else -SHALLOW
+    while short(0.0) * short(bound) > 0.0:
+        bound *= 2.0
+        if abs(bound) > DEEPEST:
+            raise InputError(
+                f"no depth of the new surface bears the {force:g} N of the old one; change the surface"
+            )
+    return float(brentq(short, 0.0, bound, xtol=1e-18, rtol=1e-15))
