@@ -20,6 +20,7 @@ class Table:
     rows: Sequence[Sequence[str]]
 
 
+# More than seven arguments: the parts of a page, each by its name.
 def page(
     *,
     title: str,
@@ -28,9 +29,21 @@ def page(
     figures: Mapping[Path, str],
     command: str,
     source: str = "",
+    of: str = "experiment",
     notes: Sequence[str] = (),
 ) -> str:
-    """The page as HTML; `figures` are PNG files with a caption each, put into the page."""
+    """The page as HTML.
+
+    Args:
+        title: its heading.
+        about: a paragraph under it.
+        tables: in the order to be read.
+        figures: PNG files with a caption each, put into the page.
+        command: that makes it.
+        source: the file that was run.
+        of: what that file is.
+        notes: what a reader must not miss.
+    """
     return render(
         "page.html",
         title=title,
@@ -39,6 +52,7 @@ def page(
         tables=tables,
         figures=captioned(figures),
         source=source,
+        of=of,
         command=command,
     )
 
