@@ -221,14 +221,14 @@ class Rigid(NamedTuple):
 
 def test_a_surface_of_ones_own_is_pressed(foam):
     bench = foam.with_surface(Rigid(10_000.0, 300.0))
-    record = press(bench, compiled=False)
+    record = bench.run(DURATION, press=0.05, compiled=False)
     assert record.meta["truth"] == {}
     touching = record["touching"] == 1.0
     assert touching.any()
     assert foam.meta["truth"]["K"]["value"] == 5200.0, "the other bench stays as it was"
     stiff = foam.with_surface(KelvinVoigt(10_000.0, 300.0, 0.0))
     assert stiff.meta["truth"]["K"] == {"value": 10_000.0, "unit": "N/m"}
-    same(record, press(stiff, compiled=False))
+    same(record, stiff.run(DURATION, press=0.05, compiled=False))
 
 
 @part
@@ -245,7 +245,7 @@ class Limp(NamedTuple):
 
 
 def test_a_controller_of_ones_own_is_obeyed_in_contact(foam):
-    record = press(foam.with_controller(Limp(0.0)), compiled=False)
+    record = foam.with_controller(Limp(0.0)).run(DURATION, press=0.05, compiled=False)
     pressing = record["phase"] == 1.0
     assert pressing.any()
     for i in (1, 2, 3):

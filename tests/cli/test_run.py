@@ -137,12 +137,12 @@ def test_what_is_in_the_file_cannot_break_the_page(tmp_path, monkeypatch):
 
 
 def test_the_same_seed_writes_the_same_record(mine):
-    for out, seed in (("a", 5), ("b", 5), ("c", 6)):
-        assert main(["run", "mine.toml", "--seed", str(seed), "--out", out]) == 0
-    a, b, c = (read_record(mine.parent / out / "record.parquet") for out in "abc")
+    """And another seed another one: see the bench's own tests."""
+    for out in "ab":
+        assert main(["run", "mine.toml", "--seed", "5", "--out", out]) == 0
+    a, b = (read_record(mine.parent / out / "record.parquet") for out in "ab")
     for name in COLUMNS:
         np.testing.assert_array_equal(a[name], b[name])
-    assert not np.array_equal(a["force_sampled"][:300], c["force_sampled"][:300])
 
 
 def test_left_out_the_folder_is_named_after_experiment_and_seed(mine):
