@@ -30,9 +30,10 @@ def here(tmp_path_factory):
     return (folder / "results.parquet").read_bytes()
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    with local_cluster(tmp_path, workers=2) as running:
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """Workers take seconds to start: one cluster for all, which loses a worker first and its scheduler at last."""
+    with local_cluster(tmp_path_factory.mktemp("cluster"), workers=2) as running:
         yield running
 
 
