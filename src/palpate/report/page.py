@@ -20,7 +20,6 @@ class Table:
     rows: Sequence[Sequence[str]]
 
 
-# More than seven arguments: the parts of a page, each by its name.
 def page(
     *,
     title: str,
@@ -29,21 +28,9 @@ def page(
     figures: Mapping[Path, str],
     command: str,
     source: str = "",
-    of: str = "experiment",
     notes: Sequence[str] = (),
 ) -> str:
-    """The page as HTML.
-
-    Args:
-        title: its heading.
-        about: a paragraph under it.
-        tables: in the order to be read.
-        figures: PNG files with a caption each, put into the page.
-        command: that makes it.
-        source: the file that was run.
-        of: what that file is.
-        notes: what a reader must not miss.
-    """
+    """The page as HTML; `figures` are PNG files with a caption each, put into the page."""
     return render(
         "page.html",
         title=title,
@@ -52,7 +39,6 @@ def page(
         tables=tables,
         figures=captioned(figures),
         source=source,
-        of=of,
         command=command,
     )
 

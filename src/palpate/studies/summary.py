@@ -13,7 +13,8 @@ import numpy as np
 from palpate.bench.ending import DONE
 from palpate.bench.metrics import METRICS
 from palpate.files import signed, write_json, write_text
-from palpate.report.page import Table, page
+from palpate.report.page import Table
+from palpate.report.study.page import study_page
 from palpate.studies.figures.draw import draw
 from palpate.studies.figures.rows import short, with_unit
 from palpate.studies.plan import MAIN, Plan
@@ -51,17 +52,16 @@ def present(frame: DataFrame, plan: Plan, folder: Path, source: str, command: st
     told = signed({"command": command, **summary(frame, plan, ranked)})
     found = Findings(told, tables(frame, plan, ranked), notes(frame, plan, ranked))
     described = Table("What is measured", ("metric", "is"), [(m, _told(m)) for m in plan.study.metrics])
-    html = page(
+    page = study_page(
         title=plan.study.title,
         about=plan.study.about,
         notes=found.notes,
         tables=[*found.tables, described],
         figures=draw(frame, plan, folder),
         command=command,
-        source=source,
-        of="study",
+        study=source,
     )
-    write_text(folder / PAGE, html)
+    write_text(folder / PAGE, page)
     write_json(folder / SUMMARY, found.summary)
     return found
 
