@@ -73,40 +73,6 @@ class CautiousPress(NamedTuple):
         return Vec3(0.0, 0.0, 0.0), Vec3(inner.bound.stiffness, inner.stage.phase, inner.bound.tau)
 
 
-def cautious_on_bench(tick, spring, damping, force, cap, room):
-    """The controller for the bench's arm, its lag worked out for this spring.
-
-    Args:
-        tick: time between steps [s].
-        spring: K_p, K_y, K_phi [N/m, N/m, N m/rad].
-        damping: of the three.
-        force: smallest that is asked for [N].
-        cap: stiffest surface that there may be [N/m].
-        room: force by which the spring may be drawn beyond what is felt [N].
-    """
-    gains = gains_on_bench(tick, spring, damping, force, cap)
-    return CautiousPress(
-        gains.cautious(), triple(spring), triple(damping), room / float(spring[0]), float(tick)
-    )
-
-
-def gains_on_bench(tick, spring, damping, force, cap):
-    """The gains of that law, as `palpate.force.certify` takes them; arguments as `cautious_on_bench` has them."""
-    own = load_arm("thesis")
-    assert isinstance(own.inner, TorqueLoop)
-    inner = TorqueLoop(
-        mass=own.inner.mass, stiffness=float(spring[0]), damping=float(damping[0]), delay=float(tick)
-    )
-    limits = Limits(speed=own.limits.speed, stiffness=float(cap))
-    arm = Arm(title=own.title, rate=1.0 / tick, inner=inner, sensor=own.sensor, limits=limits)
-    theta = lag_of(arm)
-    return Gains(
-        arm=arm, force=float(force), theta=theta, cap=float(cap), force_limit=own.sensor.full_scale,
-        approach=approach_speed(arm, float(force), theta, float(cap)),
-    )  # fmt: skip
-
-
-
 class CautiousController(ControllerTable, tag="cautious"):
     """A stiff spring whose far end the cautious force law moves; it learns the surface and needs to be told none."""
 
@@ -124,3 +90,31 @@ class CautiousController(ControllerTable, tag="cautious"):
     def made(self, tick: float, wall: float) -> CautiousPress:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         return cautious_on_bench(tick, self.spring, self.damping, self.force, self.cap, self.room)
+
+
+def cautious_on_bench(tick, spring, damping, force, cap, room):
+    """The controller for the bench's arm, its lag worked out for this spring.
+
+    Args:
+        tick: time between steps [s].
+        spring: K_p, K_y, K_phi [N/m, N/m, N m/rad].
+        damping: of the three.
+        force: smallest that is asked for [N].
+        cap: stiffest surface that there may be [N/m].
+        room: force by which the spring may be drawn beyond what is felt [N].
+    """
+    own = load_arm("thesis")
+    assert isinstance(own.inner, TorqueLoop)
+    inner = TorqueLoop(
+        mass=own.inner.mass, stiffness=float(spring[0]), damping=float(damping[0]), delay=float(tick)
+    )
+    limits = Limits(speed=own.limits.speed, stiffness=float(cap))
+    arm = Arm(title=own.title, rate=1.0 / tick, inner=inner, sensor=own.sensor, limits=limits)
+    theta = lag_of(arm)
+    gains = Gains(
+        arm=arm, force=float(force), theta=theta, cap=float(cap), force_limit=own.sensor.full_scale,
+        approach=approach_speed(arm, float(force), theta, float(cap)),
+    )  # fmt: skip
+    return CautiousPress(
+        gains.cautious(), triple(spring), triple(damping), room / float(spring[0]), float(tick)
+    )
