@@ -258,10 +258,10 @@ def test_compiled_is_plain_bit_for_bit(surface):
 @each
 def test_joined_it_is_the_same(surface):
     push = 15.0 * np.sin(np.arange(3000) * 0.004)
-    alone, joined = np.empty((3000, 4)), np.empty((3000, 4))
-    press.plain(surface, 1.5, -1e-4, 0.1, push, DT, alone)
+    single, joined = np.empty((3000, 4)), np.empty((3000, 4))
+    press.plain(surface, 1.5, -1e-4, 0.1, push, DT, single)
     press.plain(join(surface), 1.5, -1e-4, 0.1, push, DT, joined)
-    np.testing.assert_array_equal(alone, joined)
+    np.testing.assert_array_equal(single, joined)
     assert alone(join(surface)) is surface
     assert join(surface).truth() == surface.truth()
     assert join(surface).mass == surface.mass
