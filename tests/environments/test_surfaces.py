@@ -19,7 +19,7 @@ from palpate.environments import (
     part_from,
     touch,
 )
-from palpate.environments.surface import members
+from palpate.environments.surface import alone, members
 
 DT = 50e-6
 SURFACES = {
