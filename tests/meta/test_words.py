@@ -41,9 +41,11 @@ STILL = {
     "src/palpate/identifiers/kernels/contact_state.py",
     "src/palpate/identifiers/kernels/error_covariance.py",
     "src/palpate/identifiers/kernels/state_layout.py",
+    "src/palpate/live/player.py",
     "src/palpate/logs/bags/reading.py",
     "src/palpate/logs/doubts.py",
     "src/palpate/report/identification/words.py",
+    "src/palpate/report/run/page.py",
     "src/palpate/wires/lateness.py",
     "src/palpate/wires/press.py",
 }

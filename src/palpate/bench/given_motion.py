@@ -155,7 +155,7 @@ class GivenMotion:
         old, new = self.surfaces[i - 1][1], self.surfaces[i][1]
         now, rate, second = self._motion(x, rest)
         force = old.force(state, now, rate) + old.mass * second
-        depth = _rest_for(new, force - new.mass * second, rate)
+        depth = rest_for(new, force - new.mass * second, rate)
         return rest + now - depth, SurfaceState(depth, rate, 0.0, 1.0)
 
     def _motion(self, x: NDArray[np.float64], rest: float) -> tuple[float, float, float]:
@@ -239,7 +239,7 @@ def _truth(surface: Any) -> dict[str, dict[str, Any]]:
     return {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
 
 
-def _rest_for(surface: Any, force: float, rate: float) -> float:
+def rest_for(surface: Any, force: float, rate: float) -> float:
     """Penetration [m] at which a surface that moves at a rate [m/s], relaxed, bears a force [N], inertia left out.
 
     Negative where the damping alone bears more than that.

@@ -32,6 +32,7 @@ def _seed(_: Any, tokens: Sequence[Token]) -> int:
     return int(token.value)
 
 
+# More than seven arguments: each is an option with a name of its own.
 def run(
     name: str | None = None,
     /,
@@ -109,6 +110,7 @@ class _Ran:
     undrawn: str
 
 
+# More than seven arguments: each is an option with a name of its own.
 def _run(
     name: str,
     source: str,

@@ -103,6 +103,14 @@ def cautious_on_bench(tick, spring, damping, force, cap, room):
         cap: stiffest surface that there may be [N/m].
         room: force by which the spring may be drawn beyond what is felt [N].
     """
+    gains = gains_on_bench(tick, spring, damping, force, cap)
+    return CautiousPress(
+        gains.cautious(), triple(spring), triple(damping), room / float(spring[0]), float(tick)
+    )
+
+
+def gains_on_bench(tick, spring, damping, force, cap):
+    """The gains of that law, as `palpate.force.certify` takes them; arguments as `cautious_on_bench` has them."""
     own = load_arm("thesis")
     assert isinstance(own.inner, TorqueLoop)
     inner = TorqueLoop(
@@ -111,10 +119,7 @@ def cautious_on_bench(tick, spring, damping, force, cap, room):
     limits = Limits(speed=own.limits.speed, stiffness=float(cap))
     arm = Arm(title=own.title, rate=1.0 / tick, inner=inner, sensor=own.sensor, limits=limits)
     theta = lag_of(arm)
-    gains = Gains(
+    return Gains(
         arm=arm, force=float(force), theta=theta, cap=float(cap), force_limit=own.sensor.full_scale,
         approach=approach_speed(arm, float(force), theta, float(cap)),
     )  # fmt: skip
-    return CautiousPress(
-        gains.cautious(), triple(spring), triple(damping), room / float(spring[0]), float(tick)
-    )

@@ -31,6 +31,7 @@ def study_page(
     """
     return render(
         "study.html",
+        room="study",
         title=title,
         about=about,
         notes=notes,
