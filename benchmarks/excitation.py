@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import build, load
-from palpate.bench.experiment import changed, parse
+from palpate.bench.experiments.tables import changed, parse
 from palpate.excitation import Budget, Design, HybridLoop, Question, SurfaceRange, design
 from palpate.identification import identify
 from palpate.records import Record
-from palpate.report.excitation_files import experiment
+from palpate.report.excitation.files import experiment
 from palpate.signals.low_pass import LowPass
 
 RUNS = 20

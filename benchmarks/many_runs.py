@@ -11,7 +11,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 from palpate.bench import build, load
-from palpate.bench.experiment import changed
+from palpate.bench.experiments.tables import changed
 from palpate.bench.speed import cores
 
 SHORT = {"approach.hold": 0.2, "approach.first": 0.464, "run.duration": 6.0, "run.press": 5.0}

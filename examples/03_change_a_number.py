@@ -3,7 +3,8 @@
 import msgspec
 
 from palpate.bench import build, load
-from palpate.bench.experiment import KelvinVoigtSurface, Run
+from palpate.bench.experiments.tables import Run
+from palpate.environments import KelvinVoigtSurface
 
 foam = load("foam-hybrid")
 for stiffness in (5e3, 1e4, 2e4):

@@ -7,10 +7,10 @@ account, tells something of its own about K.
 
 import palpate
 from palpate.bench import build
-from palpate.bench.experiment import parse
+from palpate.bench.experiments.tables import parse
 from palpate.excitation import Budget, Question, SurfaceRange, design
 from palpate.records import Record
-from palpate.report.excitation_files import experiment
+from palpate.report.excitation.files import experiment
 from palpate.signals.low_pass import LowPass
 
 truth = {"K": 5200.0, "B": 200.0, "M": 0.3}

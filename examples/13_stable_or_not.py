@@ -6,7 +6,7 @@ The model is the bench's own tick, differentiated where the arm presses at rest:
 
 from palpate.analysis import linearise, margins, stable_intervals, stable_stiffness
 from palpate.bench import load
-from palpate.bench.experiment import changed
+from palpate.bench.experiments.tables import changed
 
 foam = load("foam-hybrid")
 loop = linearise(foam)

@@ -87,7 +87,7 @@ def _read(kind: str, path: Path) -> str:
     try:
         if kind == "experiment":
             from palpate.bench import build
-            from palpate.bench.experiment import load
+            from palpate.bench.experiments.tables import load
 
             build(load(str(path)))
         elif kind == "study":

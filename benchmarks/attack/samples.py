@@ -77,7 +77,7 @@ def study(path: Path) -> None:
 def journal(path: Path) -> None:
     """Finished runs of a study."""
     from palpate.studies import journal as journals
-    from palpate.studies.one import Row
+    from palpate.studies.run_one import Row
 
     with journals.opened(path, HEAD()) as book:
         for run in range(10):

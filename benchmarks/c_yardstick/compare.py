@@ -21,11 +21,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.still import exact
-from palpate.analysis.trees import vector
+from palpate.analysis.equilibrium import exact
+from palpate.analysis.flatten import vector
 from palpate.bench import build, load, start_at
 from palpate.bench.row import COLUMNS
 from palpate.bench.tick import Loop, compiled_march
+from palpate.controllers import alone
+from palpate.environments.surface import alone as alone_surface
 
 HERE = Path(__file__).parent
 FLAGS = "-O3 -march=native -ffp-contract=off -fno-math-errno -std=c11 -shared -fPIC"
@@ -122,13 +124,11 @@ def in_c(lib: ctypes.CDLL, loop: Loop, q) -> March:
 def laid_out(loop: Loop, q) -> tuple[Array, Array]:
     """The loop's numbers in the order of `numbers` in parts.h, and the network's weights at the start."""
     plant, estimators, front = loop.plant, loop.estimators, loop.estimators.front
-    neural, schedule = loop.controller.first, loop.schedule
-    assert loop.controller.chosen == 1
-    assert plant.surface.kind == 0
+    (neural, _), schedule = alone(loop.controller, loop.controller.start()), loop.schedule
     assert len(schedule.wave) == 0
     sequence = loop.sequence
     parts = (
-        (loop.start, plant.arm, plant.friction, plant.surface.kelvin_voigt, plant.side, plant.wall),
+        (loop.start, plant.arm, plant.friction, alone_surface(plant.surface), plant.side, plant.wall),
         loop.encoder,
         loop.force,
         loop.output,

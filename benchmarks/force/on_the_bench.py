@@ -16,7 +16,7 @@ import numpy as np
 from rich.progress import track
 
 from palpate.bench.build import build
-from palpate.bench.experiment import changed, load
+from palpate.bench.experiments.tables import changed, load
 
 CONTROLLERS = ("foam-cautious", "foam-hybrid", "foam-pi", "foam-neural")
 PRESS = 4.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.bench import build, load
-from palpate.bench.experiment import changed
+from palpate.bench.experiments.tables import changed
 from palpate.excitation.fisher_information import ForceChain, bound, phase_std
 from palpate.identification import identify
 from palpate.records import Record

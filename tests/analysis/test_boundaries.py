@@ -4,7 +4,7 @@ import pytest
 
 from analysis.worlds import surface
 from palpate.analysis import linearise, stable_intervals, stable_stiffness
-from palpate.bench.experiment import changed
+from palpate.bench.experiments.tables import changed
 from palpate.errors import InputError
 
 # Of a tip alone, y and phi left out, as a feasibility study had them [N/m].

@@ -4,7 +4,7 @@ import numpy as np
 
 from palpate._vector import Vec3, solve
 from palpate.bench import load
-from palpate.bench.experiment import changed
+from palpate.bench.experiments.tables import changed
 from palpate.bench.row import COLUMNS
 from palpate.bench.tick import compiled_march
 

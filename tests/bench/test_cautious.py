@@ -7,7 +7,7 @@ import pytest
 
 from palpate._vector import Mat3, Vec3
 from palpate.bench.build import build
-from palpate.bench.experiment import changed, load
+from palpate.bench.experiments.tables import changed, load
 from palpate.controllers.cautious_press import without_last_joint
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.bench.ending import Watchman
+from palpate.bench.ending import StopCondition
 from palpate.bench.row import COLUMNS
 
 
@@ -17,28 +17,28 @@ def test_the_row_before_a_number_that_is_none_is_the_last():
     out = rows([0, 1, 1, 1])
     out[2, list(COLUMNS).index("torque2")] = np.nan
     out[3] = np.inf
-    keep, ending = Watchman(0).judge(out, "")
+    keep, ending = StopCondition(0).judge(out, "")
     assert keep == 2
     assert ending.end == "diverged"
     assert ending.why == "torque2 is not a finite number from 0.002 s on"
 
 
 def test_losses_are_counted_across_chunks():
-    watchman = Watchman(3)
-    assert watchman.judge(rows([0, 1, 2, 1]), "") == (4, None)
-    assert watchman.judge(rows([2, 2, 0], 4), "") == (3, None)
-    keep, ending = watchman.judge(rows([1, 1, 2, 2, 0], 7), "")
+    condition = StopCondition(3)
+    assert condition.judge(rows([0, 1, 2, 1]), "") == (4, None)
+    assert condition.judge(rows([2, 2, 0], 4), "") == (3, None)
+    keep, ending = condition.judge(rows([1, 1, 2, 2, 0], 7), "")
     assert keep == 3
     assert ending.end == "lost contact"
     assert ending.why == "contact was lost for the third time at 0.009 s"
 
 
 def test_a_run_that_is_to_go_on_goes_on():
-    assert Watchman(0).judge(rows([1, 2] * 50), "the controller is unwell") == (100, None)
+    assert StopCondition(0).judge(rows([1, 2] * 50), "the controller is unwell") == (100, None)
 
 
 def test_a_controller_in_trouble_ends_the_run():
-    keep, ending = Watchman(1).judge(rows([1, 1]), "the controller is unwell")
+    keep, ending = StopCondition(1).judge(rows([1, 1]), "the controller is unwell")
     assert keep == 2
     assert ending.end == "diverged"
     assert ending.why == "the controller is unwell, found at 0.001 s"

@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from palpate.bench import Experiment, build, changed, load, names, source
-from palpate.bench.experiment import parse
+from palpate.bench.experiments.tables import parse
 from palpate.errors import InputError
 
 GOOD = """
@@ -77,7 +77,7 @@ WRONG_VALUES = {
     "table": ("[run]", "[runn]", r"unknown key 'runn'; did you mean 'run'"),
     "kind of surface": ('"kelvin-voigt"', '"kelvin"', r"kind 'kelvin' in \[surface\]; did you mean 'kelvin-voigt'"),
     "kind of controller": ('"hybrid"', '"hybird"', r"unknown kind 'hybird' in \[controller\]; did you mean 'hybrid'"),
-    "kind left out": ('kind = "kelvin-voigt"', "", r"'kind' is missing in \[surface\]; it is one of: kelvin-voigt"),
+    "kind left out": ('kind = "kelvin-voigt"', "", r"'kind' is missing in \[surface\]; it is one of: hunt-crossley"),
     "key left out": ("stiffness = 5200.0", "", r"the key 'stiffness' is missing in \[surface\]$"),
     "title left out": ('title = "A press"', "", r"the key 'title' is missing$"),
     "another kind's key": ("mass = 0.10", "mass = 0.1\nexponent = 1.5", r"unknown key 'exponent' in \[surface\]"),

@@ -59,7 +59,7 @@ def test_a_fresh_reading_is_the_filtered_force_of_its_instant(phase):
     smooth = CubicSpline(time, lsim(butter(3, 2 * np.pi * 120, analog=True), force, time)[1])
     clock = phase + np.arange(240, 950) / 480.0 + 1.0 / RATE
     fresh = readings[np.ceil(clock * 1000 - 1e-9).astype(int)]
-    measured = clock - line.told()["delay_s"]
+    measured = clock - line.description()["delay_s"]
     off, slope = fresh - smooth(measured), smooth.derivative()(measured)
     assert abs(off @ slope) / (slope @ slope) < 1e-6, "the bilinear filter itself is 0.3 us off"
     # Sampling on steps of 50 us: uniform within them, 14 us rms.

@@ -11,6 +11,7 @@ from palpate._jit import kernel
 from palpate._vector import ZERO3, Vec3, solve
 from palpate.bench.plant import Plant
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, StickSlip, join
+from palpate.environments.surface import alone
 from palpate.environments.surface_state import SurfaceState
 from palpate.friction import LuGre
 from palpate.robots.arm3 import Arm3
@@ -36,7 +37,7 @@ def at_rest(plant, x):
 def pressed(plant, depth=1e-3):
     """In contact and at rest at a depth [m], the branch of a relaxing surface stretched with it."""
     state = at_rest(plant, plant.wall + depth)
-    internal = depth if plant.surface.kind == 1 else 0.0
+    internal = depth if isinstance(alone(plant.surface), StandardLinearSolid) else 0.0
     return state._replace(surface=SurfaceState(depth, 0.0, internal, 1.0))
 
 

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from palpate.bench.experiment import parse
+from palpate.bench.experiments.tables import parse
 from palpate.cli import main
 from palpate.logs.store import read_record
 

@@ -14,7 +14,7 @@ import pytest
 
 import palpate.logs
 from palpate.bench import bench as running
-from palpate.bench import names, source
+from palpate.bench import names, simulation, source
 from palpate.bench.row import COLUMNS
 from palpate.cli import main
 from palpate.logs import read_record
@@ -137,12 +137,12 @@ def test_what_is_in_the_file_cannot_break_the_page(tmp_path, monkeypatch):
 
 
 def test_the_same_seed_writes_the_same_record(mine):
-    for out, seed in (("a", 5), ("b", 5), ("c", 6)):
-        assert main(["run", "mine.toml", "--seed", str(seed), "--out", out]) == 0
-    a, b, c = (read_record(mine.parent / out / "record.parquet") for out in "abc")
+    """And another seed another one: see the bench's own tests."""
+    for out in "ab":
+        assert main(["run", "mine.toml", "--seed", "5", "--out", out]) == 0
+    a, b = (read_record(mine.parent / out / "record.parquet") for out in "ab")
     for name in COLUMNS:
         np.testing.assert_array_equal(a[name], b[name])
-    assert not np.array_equal(a["force_sampled"][:300], c["force_sampled"][:300])
 
 
 def test_left_out_the_folder_is_named_after_experiment_and_seed(mine):
@@ -173,7 +173,7 @@ def test_an_interrupted_run_is_saved_and_exits_130(mine, monkeypatch):
             return self.march.run(*arguments)
 
     monkeypatch.setattr(running, "CHUNK", 100)
-    monkeypatch.setattr(running, "compiled_march", Interrupting(running.compiled_march))
+    monkeypatch.setattr(simulation, "compiled_march", Interrupting(simulation.compiled_march))
     assert main(["run", "mine.toml", "--out", "results"]) == 130
     summary = json.loads((mine.parent / "results" / "summary.json").read_text())
     assert summary["end"] == "interrupted"
@@ -185,7 +185,7 @@ def test_interrupted_at_once_there_is_still_a_folder(mine, monkeypatch):
         def run(self, *arguments):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(running, "compiled_march", Interrupting())
+    monkeypatch.setattr(simulation, "compiled_march", Interrupting())
     assert main(["run", "mine.toml", "--out", "results"]) == 130
     assert len(read_record(mine.parent / "results" / "record.parquet")) == 0
 

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from cli.test_run import FILES, text_of
-from palpate.bench import bench as running
+from palpate.bench import simulation
 from palpate.cli import main
 
 
@@ -33,7 +33,7 @@ def test_a_report_that_is_not_there_is_not_named(mine, capsys, monkeypatch):
         def run(self, *arguments):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(running, "compiled_march", Interrupting())
+    monkeypatch.setattr(simulation, "compiled_march", Interrupting())
     assert main(["run", "mine.toml", "--out", "results"]) == 130
     told = capsys.readouterr().out
     assert "report.html" not in told

@@ -6,7 +6,7 @@ from itertools import count
 import pytest
 
 from palpate.bench import build, load, speed
-from palpate.bench.experiment import changed
+from palpate.bench.experiments.tables import changed
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate._vector import ZERO3, Vec3
-from palpate.controllers import Hybrid, join
+from palpate.controllers import Hybrid, alone, join
 from palpate.controllers.any_controller import members
 from palpate.errors import InputError
 from palpate.robots.arm3 import Arm3
@@ -54,5 +54,13 @@ def test_all_have_one_type_for_the_compiler():
 
 
 def test_one_that_is_not_built_in_is_refused():
-    with pytest.raises(InputError, match="cannot join a Hybrid; there are: Neural"):
+    with pytest.raises(InputError, match="cannot join a Hybrid; there are: DecoupledHybrid"):
         join(Hybrid(ZERO3, ZERO3, ZERO3, ZERO3))
+
+
+@each
+def test_what_was_joined_is_taken_out_again(one):
+    joined = join(one)
+    own, state = alone(joined, joined.start())
+    assert own is one
+    assert type(state) is type(one.start())

@@ -154,7 +154,7 @@ def test_an_exponent_of_one_has_a_linear_spring():
         (lambda: HuntCrossley(1, 1, 0.5, 1), "exponent must be at least 1, got 0.5"),
         (
             lambda: join("foam"),
-            "cannot join a str; there are: KelvinVoigt, StandardLinearSolid, HuntCrossley",
+            "cannot join a str; there are: HuntCrossley, KelvinVoigt, StandardLinearSolid",
         ),
     ],
 )

@@ -19,6 +19,7 @@ from palpate.environments import (
     part_from,
     touch,
 )
+from palpate.environments.surface import alone, members
 
 DT = 50e-6
 SURFACES = {
@@ -34,6 +35,12 @@ SURFACES = {
     "almost massless": KelvinVoigt(5200, 200, 1e-9),
 }
 each = pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES.keys())
+
+
+def test_every_surface_that_an_experiment_can_ask_for_is_here():
+    assert set(map(type, members())) == set(map(type, SURFACES.values()))
+
+
 HEAVY = {name: surface for name, surface in SURFACES.items() if surface.mass > 1e-6}
 with_mass = pytest.mark.parametrize("surface", HEAVY.values(), ids=HEAVY.keys())
 
@@ -251,10 +258,11 @@ def test_compiled_is_plain_bit_for_bit(surface):
 @each
 def test_joined_it_is_the_same(surface):
     push = 15.0 * np.sin(np.arange(3000) * 0.004)
-    alone, joined = np.empty((3000, 4)), np.empty((3000, 4))
-    press.plain(surface, 1.5, -1e-4, 0.1, push, DT, alone)
+    single, joined = np.empty((3000, 4)), np.empty((3000, 4))
+    press.plain(surface, 1.5, -1e-4, 0.1, push, DT, single)
     press.plain(join(surface), 1.5, -1e-4, 0.1, push, DT, joined)
-    np.testing.assert_array_equal(alone, joined)
+    np.testing.assert_array_equal(single, joined)
+    assert alone(join(surface)) is surface
     assert join(surface).truth() == surface.truth()
     assert join(surface).mass == surface.mass
 

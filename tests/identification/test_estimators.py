@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from functools import cache
+
 import pytest
 
 from identification.problems import problem
@@ -19,6 +21,7 @@ LOG = shaken(n=3000, noise=1e-3, position_noise=1e-4)
 ASKED = problem(LOG, bonded=True, cutoff=60.0)
 
 
+@cache
 def by(method):
     return estimated_by(method, KELVIN_VOIGT_MASS, ASKED, channels_of(LOG))
 

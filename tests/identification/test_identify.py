@@ -203,8 +203,7 @@ def test_an_offset_of_the_force_does_no_harm():
         assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
 
 
-@pytest.mark.parametrize("offset", [-60.0, -7.0, -4.0, 7.0, 60.0])
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("offset", "sign"), [(-60.0, 1), (-7.0, -1), (-4.0, 1), (7.0, -1), (60.0, 1)])
 def test_the_weight_of_a_tool_is_no_contact(offset, sign):
     # The force rests anywhere, even so that it changes sign in contact: what matters is where the probe moves freely.
     rng = np.random.default_rng(0)

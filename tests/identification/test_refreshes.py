@@ -76,7 +76,7 @@ def test_the_spread_holds_the_true_phase(phase, seed):
 def test_at_its_rate():
     """Over all phases, the error has the deviation that is stated and no mean."""
     errors, spreads = [], []
-    for seed in range(100):
+    for seed in range(40):
         phase = np.random.default_rng([seed, 1]).uniform(0, 25 / 12)
         instants = grid(25 / 12, phase, 500)
         found = refreshes_of(held(instants, noisy(seed, len(instants)), 500))
@@ -84,8 +84,10 @@ def test_at_its_rate():
         errors.append(found.instants[place] - instants[5])
         spreads.append(found.spread)
     scaled = np.array(errors) / spreads
-    assert abs(scaled.mean()) < 3 / np.sqrt(100)
-    assert scaled.std() == pytest.approx(1.0, abs=0.15)  # of 100 numbers of an even distribution: 5 %
+    assert abs(scaled.mean()) < 3 / np.sqrt(40)
+    assert scaled.std() == pytest.approx(
+        1.0, abs=0.21
+    )  # three deviations of 40 numbers of an even distribution
 
 
 @settings(max_examples=40)

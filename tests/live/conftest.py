@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 import numpy as np
 import pytest
 
-from palpate.bench.experiment import changed, load
+from palpate.bench.experiments.tables import changed, load
 from palpate.live.feed import Feed
 from palpate.live.player import Player
 from palpate.live.server import served

@@ -47,13 +47,14 @@ def test_palpate_understands_each_command(root, page):
         assert bound is not None, line
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_make_knows_each_target(root, page):
-    for line in commands(root, page, "make"):
-        ran = subprocess.run(
-            [*shlex.split(line), "--dry-run"], cwd=root, capture_output=True, text=True, check=False
-        )
-        assert ran.returncode == 0, f"{line}: {ran.stderr}"
+def test_make_knows_each_target(root):
+    lines = {line for page in PAGES for line in commands(root, page, "make")}
+    words = {word for line in lines for word in shlex.split(line)[1:]}
+    assert {"test", "demo"} <= words
+    ran = subprocess.run(
+        ["make", "--dry-run", *sorted(words)], cwd=root, capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
 
 
 def test_each_make_target_has_a_line_of_help(root):

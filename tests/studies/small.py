@@ -2,8 +2,8 @@
 
 import msgspec
 
-from palpate.studies.one import Row
 from palpate.studies.plan import plan
+from palpate.studies.run_one import Row
 from palpate.studies.study import parse
 
 NEAR = """

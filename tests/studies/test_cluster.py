@@ -13,8 +13,8 @@ from palpate.errors import InputError
 from palpate.studies import cluster as clusters
 from palpate.studies.cluster import Certificates, Cluster, run_batch
 from palpate.studies.local import Local
-from palpate.studies.one import Job
-from palpate.studies.running import Work
+from palpate.studies.run_one import Job
+from palpate.studies.run_study import Work
 from palpate.studies.sources import sources
 from studies.cluster import local_cluster
 from studies.small import SMALL, Formula, planned
@@ -30,9 +30,10 @@ def here(tmp_path_factory):
     return (folder / "results.parquet").read_bytes()
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    with local_cluster(tmp_path, workers=2) as running:
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """Workers take seconds to start: one cluster for all, which loses a worker first and its scheduler at last."""
+    with local_cluster(tmp_path_factory.mktemp("cluster"), workers=2) as running:
         yield running
 
 

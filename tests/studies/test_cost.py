@@ -3,9 +3,9 @@
 import time
 
 from palpate.bench.speed import cores
-from palpate.studies.cost import seconds_a_run, told, too_much
+from palpate.studies.cost import in_words, seconds_a_run, too_much
 from palpate.studies.local import Local
-from palpate.studies.one import Job
+from palpate.studies.run_one import Job
 from studies.small import SMALL, planned, text
 
 
@@ -43,7 +43,7 @@ def test_only_what_takes_long_is_warned_of():
 
 
 def test_times_are_told_in_a_fitting_unit():
-    assert told(50.0) == "50 seconds"
-    assert told(600.0) == "10 minutes"
-    assert told(7200.0) == "2 hours"
-    assert told(3.2e9) == "101 years"
+    assert in_words(50.0) == "50 seconds"
+    assert in_words(600.0) == "10 minutes"
+    assert in_words(7200.0) == "2 hours"
+    assert in_words(3.2e9) == "101 years"

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from palpate.bench import load
+from palpate.bench.metrics import METRICS
 from palpate.errors import InputError
-from palpate.report.study_axes import Scale
-from palpate.studies import drawing
-from palpate.studies.bounds import bounds, equivalent
-from palpate.studies.clouds import points
-from palpate.studies.curves import lines, references
-from palpate.studies.maps import cells
-from palpate.studies.metrics import METRICS
-from palpate.studies.one import Row
+from palpate.report.study.axes import Scale
+from palpate.studies.figures import draw
+from palpate.studies.figures.curves import lines, references
+from palpate.studies.figures.maps import cells
+from palpate.studies.figures.rows import Rows
+from palpate.studies.figures.scatter import points
+from palpate.studies.figures.stability_boundary import bounds, equivalent
 from palpate.studies.plan import MAIN
-from palpate.studies.presenting import interval, present, tables
 from palpate.studies.ranking import Mean, rankings
 from palpate.studies.results import table
-from palpate.studies.rows import Rows
+from palpate.studies.run_one import Row
+from palpate.studies.summary import interval, present, tables
 from palpate.studies.tables import Map
 from studies.small import planned, text
 
@@ -81,7 +81,7 @@ def lost(at):
 
 
 def test_every_figure_that_is_asked_for_is_drawn_and_none_is_left_open(plan, tmp_path):
-    files = drawing.draw(results(plan, lost), plan, tmp_path)
+    files = draw.draw(results(plan, lost), plan, tmp_path)
     assert [path.name for path in files] == ["map1.png", "map2.png", "curves1.png"]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in files)
     assert all(caption.endswith(".") for caption in files.values())
@@ -135,7 +135,7 @@ def test_points_that_were_drawn_make_clouds(tmp_path):
     )
     drawn = planned(source)
     frame = results(drawn)
-    assert [f.name for f in drawing.draw(frame, drawn, tmp_path)] == [
+    assert [f.name for f in draw.draw(frame, drawn, tmp_path)] == [
         "clouds-force_rms.png",
         "clouds-outcome.png",
     ]
@@ -148,7 +148,7 @@ def test_points_that_were_drawn_make_clouds(tmp_path):
 
 def test_figures_are_suggested_where_none_are_asked_for(plan, tmp_path):
     plain = planned(GRID[: GRID.index("[[maps]]")] + GRID[GRID.index("[parameters]") :])
-    names = [one.name for one in drawing.figures(results(plain), plain)]
+    names = [one.name for one in draw.figures(results(plain), plain)]
     assert names == ["map1", "curves1"]
 
 

@@ -6,7 +6,7 @@ import optuna
 import polars
 import pytest
 
-from palpate.studies.running import Work
+from palpate.studies.run_study import Work
 from palpate.studies.search import NAME, Searching, objective
 from studies.small import Formula, planned, text
 

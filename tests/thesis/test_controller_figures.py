@@ -8,15 +8,21 @@ from palpate.bench import build, changed, load
 from palpate.environments import KelvinVoigt
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
-from palpate.thesis.decoupling import Pair, Stray, pressed, stray
+from palpate.thesis.conditions import SHORT, rougher
 from palpate.thesis.explanations import e6_friction_compensation as compensation
 from palpate.thesis.figures import fig_2_01, fig_2_02, fig_2_04, fig_2_05, fig_4_03, fig_4_19
-from palpate.thesis.force_loop import ForceLoop
-from palpate.thesis.force_tracking import since_contact
-from palpate.thesis.regain import Regain, drawn_back, found_again, regained
+from palpate.thesis.force_control.contact_loss import Recovery, drawn_back, found_again, regained
+from palpate.thesis.force_control.decoupling import Pair, Stray, pressed, stray
+from palpate.thesis.force_control.disturbances import (
+    Disturbance,
+    desired_pose,
+    other_surface,
+    run_with,
+    surface_back,
+)
+from palpate.thesis.force_control.loop import ForceLoop
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.turns import Turn, desired_pose, other_surface, run_with, surface_back
-from palpate.thesis.worlds import SHORT, rougher
 
 FOAM = changed(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
 RUBBER = KelvinVoigt(34500.0, 480.0, 0.05)
@@ -38,7 +44,7 @@ def test_a_run_without_turns_is_the_benchs_own_bit_for_bit():
 
 
 def test_another_surface_takes_over_the_force():
-    record = run_with(FOAM, 0, [Turn(0.6, other_surface(RUBBER))])
+    record = run_with(FOAM, 0, [Disturbance(0.6, other_surface(RUBBER))])
     before, after = around(record, "force", 0.6)
     assert after == pytest.approx(before, abs=0.3)
     deep, shallow = around(record, "penetration", 0.6)
@@ -46,7 +52,7 @@ def test_another_surface_takes_over_the_force():
 
 
 def test_a_surface_drawn_back_is_lost_and_found():
-    record = run_with(FOAM, 0, [Turn(0.6, surface_back(0.006))])
+    record = run_with(FOAM, 0, [Disturbance(0.6, surface_back(0.006))])
     before, after = around(record, "force", 0.6)
     assert before > 15.0
     assert after < 2.0
@@ -56,7 +62,7 @@ def test_a_surface_drawn_back_is_lost_and_found():
 
 
 def test_a_jump_of_the_desired_pose_moves_the_error_and_not_the_rate():
-    record = run_with(FOAM, 0, [Turn(0.6, desired_pose(Vec3(0.0, 0.005, 0.0)))])
+    record = run_with(FOAM, 0, [Disturbance(0.6, desired_pose(Vec3(0.0, 0.005, 0.0)))])
     before, after = around(record, "y_measured", 0.6)
     assert after - before == pytest.approx(-0.005, abs=3e-4)
     before, after = around(record, "x_measured", 0.6)
@@ -188,9 +194,13 @@ def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
 
 
 def test_a_regain_that_is_late_hard_or_missing_is_not_well():
-    good = Regain(8.0, 0.02, 1.05, 1)
+    good = Recovery(8.0, 0.02, 1.05, 1)
     assert found_again([good] * 10).verdict == "reproduced"
-    for bad in (Regain(12.0, 0.02, 1.05, 1), Regain(8.0, 0.02, 1.5, 1), Regain(np.inf, np.inf, np.inf, 1)):
+    for bad in (
+        Recovery(12.0, 0.02, 1.05, 1),
+        Recovery(8.0, 0.02, 1.5, 1),
+        Recovery(np.inf, np.inf, np.inf, 1),
+    ):
         assert found_again([bad] * 10).verdict == "differs"
 
 
@@ -220,7 +230,7 @@ def test_figures_draw_what_they_ran_and_check_it(tmp_path):
     """The cheapest study whole; the others go the same way in the program's own test."""
     data = fig_2_04.run(Runs((0, 1)))
     claims = fig_2_04.check(data)
-    assert [c.id for c in claims] == ["YY", "YY.INTEGRAL"]
+    assert [c.id for c in claims] == ["network-alone", "network-alone.integrator"]
     drawing = fig_2_04.plot(data)
     drawing.savefig(tmp_path / "one.png")
     assert (tmp_path / "one.png").stat().st_size > 10_000

@@ -18,16 +18,37 @@ from palpate.bench import changed, load
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.thesis.claims import Claim, decided, spread, with_wholes
-from palpate.thesis.measuring import STATE, measure
+from palpate.thesis.figure import studies, study
+from palpate.thesis.measure import STATE, measure
 from palpate.thesis.runs import Runs
-from palpate.thesis.study import studies, study
 
 FIELDS = ["id", "source", "claim", "thesis", "measured", "tolerance", "verdict", "note"]
 VERDICTS = {"reproduced", "differs", "not checkable"}
 CLAIMS = (
-    *("F3.5", "F3.7", "F4.2", "F4.4", "RLS-S1", "RLS-S2", "RLS-S3", "RLS-R1", "RLS-R2"),
-    *("NN-ETA", "NN-S", "NN-R", "HYB", "NNC-S1", "NNC-S2", "NNC-SLOW", "NNC-Y", "NNC-R1", "NNC-R2"),
-    *("DEC", "IMP", "YY", "FUK", "FUT"),
+    *(
+        "anti-alias-spectra",
+        "anti-alias-components",
+        "switch-at-5N",
+        "force-noise",
+        "least-squares-foam-settles",
+        "least-squares-foam-level",
+        "least-squares-raw-signals",
+        "least-squares-rubber-settles",
+        "least-squares-rubber-level",
+    ),
+    *(
+        "network-learning-rate",
+        "network-foam",
+        "network-rubber",
+        "hybrid-alone-falls-short",
+        "neural-foam-steps",
+        "neural-foam-sine",
+        "neural-slow-rate",
+        "neural-free-directions",
+        "neural-rubber-steps",
+        "neural-rubber-sine",
+    ),
+    *("decoupled-control", "impedance-holds", "network-alone", "self-tuning-robust", "open-questions"),
 )
 """Every claim of the thesis that has a row."""
 SEEDS = range(10)
@@ -45,7 +66,7 @@ def toy(number: str, done: list[str], fails: type[BaseException] | None = None) 
     def check(data: float) -> list[Claim]:
         return [
             Claim(
-                f"T{number}",
+                f"T{number.replace('.', '-')}",
                 "here",
                 "<it> holds & is told",
                 "1",
@@ -92,7 +113,7 @@ def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
     assert names(folder) == {"claims.json", "index.html", STATE, "1.1.png", "1.2.png"}
     claims = json.loads((folder / "claims.json").read_text("utf-8"))
     assert [list(claim) for claim in claims] == [FIELDS, FIELDS]
-    assert [claim["id"] for claim in claims] == ["T1.1", "T1.2"]
+    assert [claim["id"] for claim in claims] == ["T1-1", "T1-2"]
     assert {claim["verdict"] for claim in claims} <= VERDICTS
     page = (folder / "index.html").read_text("utf-8")
     assert "&lt;it&gt; holds &amp; is told" in page
@@ -106,7 +127,7 @@ def test_what_is_done_is_kept_and_not_done_again(tmp_path, error):
     with pytest.raises(error):
         measured([toy("1.1", done), toy("1.2", done, error), toy("1.3", done)], folder)
     assert done == ["1.1", "1.2"]
-    assert [c["id"] for c in json.loads((folder / "claims.json").read_text())] == ["T1.1"]
+    assert [c["id"] for c in json.loads((folder / "claims.json").read_text())] == ["T1-1"]
     assert "Unfinished" in (folder / "index.html").read_text("utf-8")
     measured([toy("1.1", done), toy("1.2", done), toy("1.3", done)], folder)
     assert done == ["1.1", "1.2", "1.2", "1.3"]
@@ -286,12 +307,21 @@ def test_a_claim_measured_in_parts_has_a_row_of_its_own():
         return Claim(name, "sec. 1", f"says {name}", "1", "1", "none", verdict, "why")
 
     parts = [
-        claim("A.K", "reproduced"), claim("A.B", "differs"), claim("F3.5", "reproduced"), claim("F3.5.fold", "differs"),
+        claim("A.K", "reproduced"), claim("A.B", "differs"), claim("B", "reproduced"), claim("B.K", "differs"),
         claim("C.K", "reproduced"), claim("C.B", "reproduced"),
     ]  # fmt: skip
     rows = {row.id: row.verdict for row in with_wholes(parts)}
-    assert list(rows) == ["A", "A.K", "A.B", "F3.5", "F3.5.fold", "C", "C.K", "C.B"]
-    assert (rows["A"], rows["C"], rows["F3.5"]) == ("differs", "reproduced", "reproduced")
+    assert list(rows) == [
+        "A",
+        "A.K",
+        "A.B",
+        "B",
+        "B.K",
+        "C",
+        "C.K",
+        "C.B",
+    ]
+    assert (rows["A"], rows["C"], rows["B"]) == ("differs", "reproduced", "reproduced")
     assert with_wholes([]) == []
 
 
@@ -323,7 +353,7 @@ def test_the_program_says_that_it_goes_on(tmp_path, capsys, monkeypatch):
     """After a Ctrl-C where what is done is, and at the next start how much of it there is."""
     done = []
     toys = [toy("1.1", done), toy("1.2", done, KeyboardInterrupt)]
-    monkeypatch.setattr(palpate.thesis.study, "studies", lambda: toys)
+    monkeypatch.setattr(palpate.thesis.figure, "studies", lambda: toys)
     assert main(["thesis", "--out", str(tmp_path / "t")]) == 130
     told = capsys.readouterr().err
     assert told.count("\n") == 1

@@ -6,27 +6,26 @@ import numpy as np
 import pytest
 
 from palpate.bench import changed
+from palpate.bench.metrics.following import LIMIT
+from palpate.bench.metrics.window import SETTLE
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
+from palpate.thesis.conditions import moved, rougher, stops_holding
 from palpate.thesis.explanations import e2_integrator, e3_divergence
+from palpate.thesis.figure import study
 from palpate.thesis.figures import fig_6_10, fig_6_14, fig_6_15, fig_6_17
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.tracking import (
     FOAM,
-    LIMIT,
     RUBBER,
-    SETTLE,
     SINE,
     Tracking,
     following,
-    stops_holding,
     tracking,
     variations,
 )
+from palpate.thesis.force_control.weights import watch
 from palpate.thesis.runs import Runs
-from palpate.thesis.study import study
-from palpate.thesis.watching import watch
-from palpate.thesis.worlds import moved, rougher
 
 OURS = [f"6.{i}" for i in range(10, 18)] + [
     "neural-is-an-integrator",
@@ -47,7 +46,7 @@ def pressed(force, seconds=10.0, before=0.2, **columns) -> Record:
     table["force_desired"] = desired
     table["force"] = table["force_measured"] = force(since, desired)
     table.update(columns)
-    return Record(table, COLUMNS, {"experiment": {"force": {"period": 2.5}}})
+    return Record(table, COLUMNS, {"experiment": {"force": {"period": 2.5}}, "end": "done"})
 
 
 def test_a_perfect_force_follows():
@@ -229,6 +228,6 @@ def test_a_figure_from_its_runs_to_its_file(tmp_path):
     one = study("6.13")
     data = one.run(Runs(range(2)))
     (claim,) = one.check(data)
-    assert claim.id == "NNC-SLOW.first"
+    assert claim.id == "neural-slow-rate.first"
     assert claim.verdict in ("reproduced", "differs")
     assert style.save(one.plot(data), tmp_path / "6.13.png").stat().st_size > 10_000

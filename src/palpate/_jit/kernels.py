@@ -6,11 +6,11 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from palpate._jit.inside import inside
+from palpate._jit.inline_compiler import inside
+from palpate._jit.interrupts import uninterrupted
 from palpate._jit.overloads import operators_and_members
 from palpate._jit.registry import OPTIONS, laws
 from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
-from palpate._jit.unbroken import unbroken
 
 _MAKING = threading.Lock()
 
@@ -37,7 +37,7 @@ class Kernel:
         return self._dispatcher
 
     def __call__(self, *args: Any) -> Any:
-        with unbroken():
+        with uninterrupted():
             try:
                 return self.compiled(*args)
             except Exception as error:

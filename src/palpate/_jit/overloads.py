@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from palpate import _vector
-from palpate._jit.inside import inside
+from palpate._jit.inline_compiler import inside
 from palpate._jit.registry import OPTIONS, parts
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.analysis.linearising import linearise
-from palpate.bench.experiment import Experiment, changed
+from palpate.bench.experiments.tables import Experiment, changed
 from palpate.errors import InputError
 
 LOW, HIGH = 100.0, 3e6

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.constants import CONSTANT, moving
+from palpate.analysis.constant_modes import CONSTANT, moving
 from palpate.analysis.motion import SHOWN, Motion
 
 Array = NDArray[np.float64]

@@ -7,13 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.constants import change
+from palpate.analysis.constant_modes import change
+from palpate.analysis.equilibrium import at_equilibrium, pressing
 from palpate.analysis.linear_loop import LinearLoop
 from palpate.analysis.motion import Motion
-from palpate.analysis.still import pressing, still
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.experiment import Experiment
+from palpate.bench.experiments.tables import Experiment
 from palpate.bench.row import COLUMNS
 from palpate.bench.tick import Loop
 from palpate.errors import InputError
@@ -50,7 +50,7 @@ def linearise(
     wanted = float(bench.loop.schedule.first if force is None else force)
     if not wanted > 0.0:
         raise InputError(f"force must be above 0 N, got {wanted:g}: without contact there is no force loop")
-    loop = still(bench.loop, wanted, friction=friction)
+    loop = at_equilibrium(bench.loop, wanted, friction=friction)
     motion = Motion(*pressing(loop, wanted, math.copysign(1.0, bench.q.y), x))
     period = period_of(loop)
     at = at_rest(motion, period)

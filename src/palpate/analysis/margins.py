@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palpate.analysis.constants import moving
+from palpate.analysis.constant_modes import moving
 from palpate.analysis.linear_loop import LinearLoop
 from palpate.errors import InputError
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.trees import leaves, rebuilt, vector
+from palpate.analysis.flatten import leaves, rebuilt, vector
 from palpate.bench.row import COLUMNS
 from palpate.bench.tick import Loop, LoopState, compiled_march
 from palpate.controllers.any_controller import AnyController

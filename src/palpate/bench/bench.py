@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palpate._jit import NotCompiled
 from palpate._vector import Vec3
-from palpate.bench.diagnosis import diagnosed
-from palpate.bench.ending import DONE, INTERRUPTED, NO_CONTACT, Ending, Watchman
+from palpate.bench.ending import DONE, INTERRUPTED, NO_CONTACT, Ending, StopCondition
 from palpate.bench.row import COLUMNS
-from palpate.bench.sequence import CONTACT
-from palpate.bench.tick import Loop, LoopState, compiled_march, march, start_at
+from palpate.bench.simulation import Simulation
+from palpate.bench.tick import Loop, start_at
 from palpate.controllers.controller import controller
 from palpate.errors import InputError
 from palpate.records import Record
@@ -107,82 +105,53 @@ class Bench:
             raise InputError(f"duration must be at least one tick ({tick} s), got {duration}")
         if press is not None and not press >= tick:
             raise InputError(f"press must be at least one tick ({tick} s), got {press}")
+        simulation = self.simulation(seed, compiled=compiled, waiting=waiting)
         total = round(duration / tick)
-        rows, ending = _Run(self.loop, seed, compiled, waiting, Watchman(self.losses)).rows(
-            start_at(self.loop, self.q), total, None if press is None else round(press / tick), progress
-        )
+        rows, ending = self._rows(simulation, total, None if press is None else round(press / tick), progress)
         columns = {name: _column(rows, i) for i, name in enumerate(COLUMNS)}
         told = {
-            "instruments": {"force": self.loop.force.told(), "position": {"lag_s": self.loop.encoder.lag}}
+            "instruments": {
+                "force": self.loop.force.description(),
+                "position": {"lag_s": self.loop.encoder.lag},
+            }
         }
         return Record(
             columns, COLUMNS, {**self.meta, **told, "seed": seed, "end": ending.end, "why": ending.why}
         )
 
+    def simulation(
+        self, seed: int = 0, *, compiled: bool = True, waiting: Callable[[], None] | None = None
+    ) -> Simulation:
+        """The run at its start, to be marched a step at a time; arguments as of `run`."""
+        return Simulation(self.loop, start_at(self.loop, self.q), seed, compiled, waiting)
 
-@dataclass
-class _Run:
-    loop: Loop
-    seed: int
-    compiled: bool
-    waiting: Callable[[], None] | None
-    watchman: Watchman
-
-    def rows(
-        self, state: LoopState, total: int, press: int | None, progress: Progress | None
+    def _rows(
+        self, simulation: Simulation, total: int, press: int | None, progress: Progress | None
     ) -> tuple[list[NDArray[np.float64]], Ending]:
         """The rows of a run, chunk after chunk, and why it ended."""
-        generator = np.random.default_rng(self.seed)
         chunks: list[NDArray[np.float64]] = []
-        done, first, stop = 0, None, total
+        condition = StopCondition(self.losses)
+        done, stop = 0, total
         end: Ending | None = None
         while done < stop and end is None:
             try:
-                out = np.empty((min(CHUNK, stop - done), len(COLUMNS)))
-                state = self._march(state, done, generator.standard_normal(len(out)), out)
-                if first is None and (out[:, 1] == CONTACT).any():
-                    first = done + int(np.argmax(out[:, 1] == CONTACT))
-                    stop = total if press is None else min(total, first + press)
+                out = simulation.advance(min(CHUNK, stop - done))
+                if simulation.contact is not None and press is not None:
+                    stop = min(total, simulation.contact + press)
                 # What comes after the stop is no part of the run, whatever it holds.
                 out = out[: stop - done]
-                keep, end = self.watchman.judge(out, self.loop.controller.trouble(state.controller))
+                keep, end = condition.judge(out, self.loop.controller.trouble(simulation.state.controller))
                 chunks.append(out[:keep])
                 done += keep
                 if progress is not None:
-                    progress(done * self.loop.tick, "approach" if first is None else "contact")
+                    progress(done * self.loop.tick, "approach" if simulation.contact is None else "contact")
             except KeyboardInterrupt:  # wherever in a round it comes
                 end = Ending(INTERRUPTED, f"interrupted at {done * self.loop.tick:.3f} s")
-        if end is None:
-            end = Ending(NO_CONTACT, "no surface was felt") if first is None else Ending(DONE, "as asked for")
-        return chunks, end
-
-    def _march(
-        self, state: LoopState, k: int, noise: NDArray[np.float64], out: NDArray[np.float64]
-    ) -> LoopState:
-        if not self.compiled:
-            return _march_plain(self.loop, state, k, noise, out)
-        try:
-            return compiled_march.run(self.waiting, self.loop, state, k, noise, out)
-        except NotCompiled as error:
-            found = diagnosed(self.loop, state)
-            raise found from found.__cause__ or error.__cause__
+        if end is None and simulation.contact is None:
+            end = Ending(NO_CONTACT, "no surface was felt")
+        return chunks, end or Ending(DONE, "as asked for")
 
 
 def _column(rows: list[NDArray[np.float64]], i: int) -> NDArray[np.float64]:
     """One column of all chunks, without another copy of them all."""
     return np.concatenate([chunk[:, i] for chunk in rows]) if rows else np.empty(0)
-
-
-def _march_plain(
-    loop: Loop, state: LoopState, k: int, noise: NDArray[np.float64], out: NDArray[np.float64]
-) -> LoopState:
-    """As compiled also where numbers are none: plain Python raises there, after the row that has them."""
-    out[:] = np.nan
-    try:
-        with np.errstate(all="ignore"):
-            return march(loop, state, k, noise, out)
-    except (ArithmeticError, ValueError):
-        written = np.isfinite(out[:, 0])
-        if np.isfinite(out[written]).all():
-            raise
-        return state

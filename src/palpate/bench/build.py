@@ -10,25 +10,19 @@ from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3, diagonal
 from palpate.bench.bench import Bench
-from palpate.bench.checking import check, matched_delay
 from palpate.bench.conditioning import Conditioning
-from palpate.bench.controller_tables import controller_of
 from palpate.bench.estimators import Estimators
-from palpate.bench.experiment import (
-    Experiment,
-    HuntCrossleySurface,
-    KelvinVoigtSurface,
-    StandardLinearSolidSurface,
-)
+from palpate.bench.experiments.consistency import check, matched_delay
+from palpate.bench.experiments.tables import Experiment
 from palpate.bench.force_input import ForceInput
+from palpate.bench.matched_channels import Centring, Matched
 from palpate.bench.plant import Plant
 from palpate.bench.sequence import Sequence
 from palpate.bench.tick import Loop
-from palpate.controllers import ResolvedAcceleration
-from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, StickSlip, join
+from palpate.controllers import ResolvedAcceleration, controller_of
+from palpate.environments import StickSlip, join
 from palpate.errors import InputError
 from palpate.friction import Coulomb, LuGre
-from palpate.identifiers.front_ends import Centring, Matched
 from palpate.identifiers.kernels.least_squares import LeastSquares
 from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
 from palpate.references import Approach, Chirp, ForceSchedule, Multisine
@@ -36,12 +30,6 @@ from palpate.references.force_schedule import NO_WAVE
 from palpate.robots.arm3 import MOTOR_TORQUE, Arm3
 from palpate.signals.filters import butterworth2, butterworth3, delay, state_variable
 from palpate.signals.parameters import alike, triple
-
-SURFACES = {
-    KelvinVoigtSurface: KelvinVoigt,
-    StandardLinearSolidSurface: StandardLinearSolid,
-    HuntCrossleySurface: HuntCrossley,
-}
 
 
 def build(experiment: Experiment) -> Bench:
@@ -103,7 +91,7 @@ def _plant(arm: Arm3, e: Experiment) -> Plant:
         triple(f.static),
         triple(f.stribeck),
     ).checked()
-    surface = SURFACES[type(e.surface)](**{k: float(v) for k, v in msgspec.structs.asdict(e.surface).items()})
+    surface = e.surface.made()
     side = StickSlip(e.wall.side_stiffness, e.wall.side_damping, e.wall.side_friction)
     return Plant(arm.with_rotors(), friction, join(surface), side, float(e.wall.x))
 

@@ -32,7 +32,7 @@ class Ending:
     why: str
 
 
-class Watchman:
+class StopCondition:
     """Looks through the rows as they come and says when the run should end.
 
     Args:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from palpate._jit import part
 from palpate._vector import Vec3
-from palpate.identifiers.front_ends import Centring, CentringState, Matched, MatchedState
+from palpate.bench.matched_channels import Centring, CentringState, Matched, MatchedState
 from palpate.identifiers.kernels.least_squares import LeastSquares, LeastSquaresState
 
 

@@ -48,7 +48,7 @@ class ForceInput(NamedTuple):
         """What the converter reads now [N]."""
         return self.converter.convert(state.line)
 
-    def told(self):
+    def description(self):
         """What an identifier has to know of the sampled force: its low-pass, its sampling [Hz], its delay [s].
 
         The delay is that of a reading that is fresh, beside the low-pass: from its sampling to the line. The

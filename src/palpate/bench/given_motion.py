@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from palpate._jit import kernel, law
 from palpate.bench.force_input import ForceInput, ForceInputState
 from palpate.bench.paths import Path, positions
-from palpate.bench.rest_length import rest_for
 from palpate.environments import SurfaceState, join
-from palpate.environments.surface import BUILT_IN
+from palpate.environments.surface import members
 from palpate.environments.surface_state import follow
 from palpate.errors import InputError
 from palpate.instruments import Converter, analog_filter_190, force_sensor
@@ -30,6 +29,10 @@ COLUMNS = {
 }
 RIGID = 1e12
 """Effective mass of a tip that nothing turns from its path [kg]."""
+SHALLOW = 1e-6
+"""Depth at which the search begins [m]."""
+DEEPEST = 10.0
+"""Depth at which it is given up [m]."""
 
 
 @law
@@ -167,10 +170,11 @@ class GivenMotion:
             {"from_s": since, "rest_m": rest, "truth": _truth(surface)}
             for (since, surface), rest in zip(self.surfaces, rests, strict=False)
         ]
-        instruments = {"force": self.line.told(), "position": {"lag_s": 0.0}}
+        instruments = {"force": self.line.description(), "position": {"lag_s": 0.0}}
         return {"truth": told[-1]["truth"], "surfaces": told, "instruments": instruments}
 
 
+# More than seven arguments: each is an instrument or a surface of its own, and has a default.
 def given_motion(
     surface: Any | list[tuple[float, Any]],
     *,
@@ -224,10 +228,35 @@ def _in_turn(surface: Any | list[tuple[float, Any]]) -> tuple[tuple[float, Any],
         raise InputError(
             f"surfaces must start at growing times [s], the first at 0, got {[t for t, _ in turns]}"
         )
-    return tuple((float(since), join(one) if isinstance(one, BUILT_IN) else one) for since, one in turns)
+    return tuple(
+        (float(since), join(one) if type(one) in map(type, members()) else one) for since, one in turns
+    )
 
 
 def _truth(surface: Any) -> dict[str, dict[str, Any]]:
     """{name: {"value", "unit"}}; empty of a part that does not tell."""
     truth = surface.truth() if hasattr(surface, "truth") else {}
     return {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
+
+
+def rest_for(surface: Any, force: float, rate: float) -> float:
+    """Penetration [m] at which a surface that moves at a rate [m/s], relaxed, bears a force [N], inertia left out.
+
+    Negative where the damping alone bears more than that.
+
+    Raises:
+        InputError: no depth within metres bears it.
+    """
+    from scipy.optimize import brentq
+
+    def short(depth: float) -> float:
+        return float(surface.force(SurfaceState(depth, rate, 0.0, 1.0), depth, rate)) - force
+
+    bound = SHALLOW if short(0.0) < 0.0 else -SHALLOW
+    while short(0.0) * short(bound) > 0.0:
+        bound *= 2.0
+        if abs(bound) > DEEPEST:
+            raise InputError(
+                f"no depth of the new surface bears the {force:g} N of the old one; change the surface"
+            )
+    return float(brentq(short, 0.0, bound, xtol=1e-18, rtol=1e-15))

@@ -194,7 +194,7 @@ class OneJoint:
         end = "done" if finite.all() else "diverged"
         rows = rows if finite.all() else rows[: int(np.argmin(finite))]
         columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
-        told = {"force": self.loop.force.told(), "position": {"lag_s": 0.0}}
+        told = {"force": self.loop.force.description(), "position": {"lag_s": 0.0}}
         return Record(columns, COLUMNS, {"seed": seed, "end": end, "instruments": told})
 
 
@@ -202,6 +202,7 @@ class OneJoint:
 JOINT_FRICTION = LuGre(1250.0, 11.0, 0.0, 0.25, 0.3, 0.01)  # type: ignore[arg-type]
 
 
+# More than seven arguments: each is a number of the experiment, and most have a default.
 def one_joint(
     surface: KelvinVoigt | StandardLinearSolid | HuntCrossley,
     controller: Any,

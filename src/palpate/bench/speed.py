@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from palpate.bench.build import build
-from palpate.bench.experiment import changed, load
+from palpate.bench.experiments.tables import changed, load
 from palpate.bench.row import COLUMNS
 from palpate.bench.tick import compiled_march, start_at
 

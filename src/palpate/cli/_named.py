@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.text import shown
 
 if TYPE_CHECKING:
-    from palpate.bench.toml_files import TomlFiles
+    from palpate.bench.experiments.toml_files import TomlFiles
 
 
 def listed(files: TomlFiles, title: Callable[[str], str]) -> None:

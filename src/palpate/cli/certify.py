@@ -20,6 +20,7 @@ _FLAG = Parameter(negative=())
 _NUMBER = Parameter(allow_leading_hyphen=True)
 
 
+# More than seven arguments: each is a flag of the command.
 def certify(
     gains: Path | None = None,
     /,
@@ -85,6 +86,7 @@ def certify(
     return _made(gains, stiffness, damping_time, jitter, margin, held_only, out, json)
 
 
+# More than seven arguments: the flags of the command.
 def _made(
     path: Path,
     stiffness: str | None,

@@ -309,7 +309,7 @@ def _picture(output: OutputOptions) -> Path | None:
 
 
 def _check_places(output: OutputOptions) -> None:
-    from palpate.report.excitation_files import check_ending
+    from palpate.report.excitation.files import check_ending
 
     if output.out is not None:
         check_ending(output.out)
@@ -329,7 +329,7 @@ def _answer(question: Question, rate: int, output: OutputOptions, picture: Path 
     if found.feasible:
         _write(found, rate, output.out, output.experiment)
     if picture is not None:
-        from palpate.report.excitation import write_figure
+        from palpate.report.excitation.figure import write_figure
 
         write_figure(found, picture)
     _print(found, helps, [output.out, output.experiment] if found.feasible else [], picture, output.json)
@@ -338,7 +338,7 @@ def _answer(question: Question, rate: int, output: OutputOptions, picture: Path 
 
 def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
     from palpate.files import write_text
-    from palpate.report import excitation_files as files
+    from palpate.report.excitation import files
 
     if out is not None:
         files.write_force(found, out, float(rate))
@@ -350,11 +350,11 @@ def _print(
     found: Design, helps: list[Remedy], written: list[Path | None], picture: Path | None, json: bool
 ) -> None:
     if json:
-        from palpate.report.excitation_files import summary
+        from palpate.report.excitation.files import summary
 
         print_json(summary(found, helps))
         return
-    from palpate.report.excitation_table import show
+    from palpate.report.excitation.table import show
 
     screen = console()
     screen.soft_wrap = True

@@ -27,6 +27,7 @@ _SERVED = Group("How it is served", sort_key=7)
 _DEFAULT = "foam-hybrid"
 
 
+# More than seven arguments: each is an option with a name of its own.
 def live(
     *,
     run: Annotated[str | None, Parameter(group=_SHOWN)] = None,
@@ -106,7 +107,7 @@ def live(
 
 
 def _simulation(name: str, seed: int, whole: bool) -> Source:
-    from palpate.bench.experiment import load
+    from palpate.bench.experiments.tables import load
     from palpate.cli._waiting import COMPILING
     from palpate.live.simulation import Simulation
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _FLAG = Parameter(negative=())
 
 
+# More than seven arguments: each is a flag of the command.
 def payload(
     log: Path,
     /,

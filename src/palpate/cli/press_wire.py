@@ -24,6 +24,7 @@ _WORD = "press"
 _SI = {"force": "N", "velocity": "m/s", "length": "m", "time": "s"}
 
 
+# More than seven arguments: the flags of the command.
 def press_wire(
     *,
     wire: str | None = None,
@@ -146,6 +147,7 @@ def _pressed(
         raise
 
 
+# More than seven arguments: the flags of the command.
 def _told(
     gains: Path | None, certificate: Path | None, force: str | None, direction: str | None, force_limit: str | None,
     speed_limit: str | None, travel_limit: str | None, time_limit: str | None, hold: str, retreat: str,

@@ -32,6 +32,7 @@ def whole_number(_: Any, tokens: Sequence[Token]) -> int:
     return int(token.value)
 
 
+# More than seven arguments: each is an option with a name of its own.
 def run(
     name: str | None = None,
     /,
@@ -60,7 +61,7 @@ def run(
         dpi: of a PNG; 110 if not given.
         movie: write a film of the arm too, arm.gif; it takes some ten seconds.
     """
-    from palpate.bench import experiment as experiments
+    from palpate.bench.experiments import tables as experiments
 
     if list_:
         listed(experiments.FILES, lambda known: experiments.load(known).title)
@@ -109,6 +110,7 @@ class _Ran:
     undrawn: str
 
 
+# More than seven arguments: each is an option with a name of its own.
 def _run(
     name: str,
     source: str,
@@ -121,7 +123,7 @@ def _run(
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise
-    from palpate.bench.experiment import parse
+    from palpate.bench.experiments.tables import parse
     from palpate.logs import write_record
     from palpate.report.identification.source import sha256_of
     from palpate.report.run.figures import draw

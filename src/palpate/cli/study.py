@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from palpate.studies.cluster import Cluster
     from palpate.studies.plan import Plan
-    from palpate.studies.presenting import Findings
-    from palpate.studies.running import Runner
+    from palpate.studies.run_study import Runner
+    from palpate.studies.summary import Findings
 
 
 @Parameter(name="*", group=Group("A cluster", sort_key=1))
@@ -65,6 +65,7 @@ class ClusterOptions:
         return Cluster(self.scheduler, certificates=Certificates(*given) if given else None)
 
 
+# More than seven arguments: each is a flag of the command.
 def study(
     name: str | None = None,
     /,
@@ -119,9 +120,9 @@ def study(
 def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
     from palpate.studies.plan import plan
-    from palpate.studies.presenting import present
-    from palpate.studies.running import Work, begun
+    from palpate.studies.run_study import Work, begun
     from palpate.studies.study import parse
+    from palpate.studies.summary import present
 
     screen = console(stderr=True)
     try:
@@ -201,7 +202,7 @@ class Lines:
 
     def show(self, finished: int) -> None:
         """How many runs are finished, and what is left by the pace so far."""
-        from palpate.studies.cost import told
+        from palpate.studies.cost import in_words
 
         self._first = finished if self._first is None else self._first
         now = time.monotonic()
@@ -209,7 +210,7 @@ class Lines:
             return
         self._told = now
         left = (now - self._begun) / (finished - self._first) * (self._total - finished)
-        self._screen.print(f"{finished} of {self._total} runs, some {told(left)} left", soft_wrap=True)
+        self._screen.print(f"{finished} of {self._total} runs, some {in_words(left)} left", soft_wrap=True)
 
 
 def _tell(found: Findings, folder: Path, as_json: bool) -> None:

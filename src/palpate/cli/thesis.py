@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from palpate.thesis.measuring import Done
-    from palpate.thesis.study import Study
+    from palpate.thesis.figure import Study
+    from palpate.thesis.measure import Done
 
 COLORS = {"reproduced": "green", "differs": "red", "not checkable": "bright_black"}
 
@@ -39,7 +39,7 @@ def thesis(
         force: replace the measurement that stands there already.
         list_: list figures and explanations and stop.
     """
-    from palpate.thesis.study import studies, study
+    from palpate.thesis.figure import studies, study
 
     if list_:
         everything = studies()
@@ -62,7 +62,7 @@ def _measure(chosen: Sequence[Study], folder: Path, seeds: Sequence[int], comman
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from palpate.cli._waiting import COMPILING
-    from palpate.thesis.measuring import measure
+    from palpate.thesis.measure import measure
     from palpate.thesis.runs import Runs
 
     screen = console()

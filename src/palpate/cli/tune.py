@@ -22,6 +22,7 @@ _NUMBER = Parameter(allow_leading_hyphen=True)
 _LARGEST = 1 << 26
 
 
+# More than seven arguments: each is a flag of the command.
 def tune(
     found: Path | None = None,
     /,

@@ -23,6 +23,7 @@ _FINE = np.radians(2.0)
 """Within which a mean of rotations is as good as a rotation [rad]."""
 
 
+# More than seven arguments: what each doubt is told from, by itself.
 def doubts_of(
     record: Record, frame: ContactFrame, signals: Signals, there: Rows, poses: Poses, fitted: Fitted, means: Array,
     parameters: dict[str, Told],

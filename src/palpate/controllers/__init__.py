@@ -4,30 +4,41 @@ A controller is a part: a frozen NamedTuple of gains with ``start()``, the state
 ``step(state, sense, task, model) -> (torque, state)``. Gains are `Vec3` for the planar arm, or arrays of shape (m,).
 """
 
-from palpate.controllers.any_controller import AnyController, join
-from palpate.controllers.cautious_press import CautiousPress, cautious_on_bench
-from palpate.controllers.controller import controller
-from palpate.controllers.decoupled_hybrid import DecoupledHybrid
-from palpate.controllers.hybrid import Hybrid
-from palpate.controllers.impedance import Impedance
-from palpate.controllers.neural import Neural
-from palpate.controllers.proportional_integral import ProportionalIntegral
-from palpate.controllers.raibert_craig import RaibertCraig
+from palpate.controllers.any_controller import AnyController, alone, controller_of, join
+from palpate.controllers.cautious_press import CautiousController, CautiousPress, cautious_on_bench
+from palpate.controllers.controller import ControllerTable, controller
+from palpate.controllers.decoupled_hybrid import DecoupledHybrid, DecoupledHybridController
+from palpate.controllers.hybrid import Hybrid, HybridController
+from palpate.controllers.impedance import Impedance, ImpedanceController
+from palpate.controllers.neural import Neural, NeuralController
+from palpate.controllers.proportional_integral import ProportionalIntegral, ProportionalIntegralController
+from palpate.controllers.raibert_craig import RaibertCraig, RaibertCraigController
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
-from palpate.controllers.self_tuning import SelfTuning
+from palpate.controllers.self_tuning import SelfTuning, SelfTuningController
 
 __all__ = [
     "AnyController",
+    "CautiousController",
     "CautiousPress",
+    "ControllerTable",
     "DecoupledHybrid",
+    "DecoupledHybridController",
     "Hybrid",
+    "HybridController",
     "Impedance",
+    "ImpedanceController",
     "Neural",
+    "NeuralController",
     "ProportionalIntegral",
+    "ProportionalIntegralController",
     "RaibertCraig",
+    "RaibertCraigController",
     "ResolvedAcceleration",
     "SelfTuning",
+    "SelfTuningController",
+    "alone",
     "cautious_on_bench",
     "controller",
+    "controller_of",
     "join",
 ]

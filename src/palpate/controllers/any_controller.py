@@ -3,34 +3,21 @@
 from functools import cache
 from typing import Any, NamedTuple
 
-from palpate._vector import ZERO3, Vec3
-from palpate.controllers.controller import controller
-from palpate.controllers.decoupled_hybrid import DecoupledHybrid
-from palpate.controllers.impedance import Impedance
-from palpate.controllers.neural import Neural
-from palpate.controllers.proportional_integral import ProportionalIntegral
-from palpate.controllers.raibert_craig import RaibertCraig
+from palpate.controllers.controller import ControllerTable, controller
 from palpate.errors import InputError
+from palpate.signals.tables import example, kinds
 
 
 @cache
 def members() -> tuple[Any, ...]:
-    """One of each built-in controller, with any numbers: the type is what counts.
+    """One of each controller that shares the compiled loop, with any numbers: the type is what counts."""
+    return tuple(example(kind).made(0.001, 0.5) for kind in kinds(ControllerTable) if kind.shares_loop)
 
-    A new one needs its line here and nothing else. Each costs half a second of compiling for all, a second one
-    with arrays in its state four: that one (`SelfTuning`) has a loop of its own.
-    """
-    some = Vec3(1.0, 1.0, 1.0)
-    every = (
-        Neural.thesis(),
-        ProportionalIntegral(some, some, some, some, 0.001),
-        DecoupledHybrid(some, some, some, some, 1.0),
-        Impedance(some, some, some, some),
-        RaibertCraig(some, some, ZERO3, 1.0, 1.0, 1.0, 0.001),
-    )
-    for one in every:
-        controller(type(one))
-    return every
+
+def controller_of(table: ControllerTable, tick: float, wall: float) -> Any:
+    """The controller of a table, for a time between ticks [s] and a surface at x = `wall` [m]."""
+    one = table.made(tick, wall)
+    return join(one) if table.shares_loop else one
 
 
 @controller
@@ -93,3 +80,11 @@ def join(one: Any) -> Any:
     for first in reversed(others):
         joined = AnyController(int(first is one), first, joined)
     return joined
+
+
+def alone(controller: Any, state: Any) -> tuple[Any, Any]:
+    """The controller that acts and its state, taken out of what `join` made."""
+    while isinstance(controller, AnyController):
+        chosen = controller.chosen == 1
+        controller, state = (controller.first, state[0]) if chosen else (controller.second, state[1])
+    return controller, state

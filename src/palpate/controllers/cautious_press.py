@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, clip
-from palpate.controllers.controller import controller
+from palpate.controllers.controller import ControllerTable, controller
 from palpate.force.arm import Arm, Limits, TorqueLoop, load_arm
 from palpate.force.gains import Gains, approach_speed
 from palpate.force.lag import lag_of
 from palpate.force.law import Cautious, CautiousState
 from palpate.signals.parameters import triple
+from palpate.signals.tables import NotNegativeTriple, Positive, PositiveTriple
 
 
 @part
@@ -70,6 +71,25 @@ class CautiousPress(NamedTuple):
         """Nothing learned of force; K_u [N/m], phase, tau [s]."""
         inner = state.inner
         return Vec3(0.0, 0.0, 0.0), Vec3(inner.bound.stiffness, inner.stage.phase, inner.bound.tau)
+
+
+class CautiousController(ControllerTable, tag="cautious"):
+    """A stiff spring whose far end the cautious force law moves; it learns the surface and needs to be told none."""
+
+    spring: PositiveTriple = (1e5, 2e4, 4.0)
+    """K_p, K_y, K_phi [N/m, N/m, N m/rad]."""
+    damping: NotNegativeTriple = (1450.0, 1000.0, 0.1)
+    """Of the three."""
+    force: Positive = 20.0
+    """The smallest that is asked for [N]."""
+    cap: Positive = 4e5
+    """The stiffest surface that there may be [N/m]."""
+    room: Positive = 80.0
+    """Farthest that the spring is drawn beyond what is felt [N]."""
+
+    def made(self, tick: float, wall: float) -> CautiousPress:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        return cautious_on_bench(tick, self.spring, self.damping, self.force, self.cap, self.room)
 
 
 def cautious_on_bench(tick, spring, damping, force, cap, room):

@@ -1,9 +1,10 @@
-"""What every controller answers beside its law."""
+"""What every controller answers beside its law, and the table by which an experiment asks for it."""
 
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from palpate._jit import part
 from palpate._vector import ZERO3
+from palpate.signals.tables import Table
 
 C = TypeVar("C", bound=type)
 
@@ -32,3 +33,17 @@ def _nothing(self: Any, state: Any) -> Any:
 
 def _none(self: Any, state: Any) -> str:
     return ""
+
+
+class ControllerTable(Table, tag_field="kind"):
+    """The [controller] table of an experiment. Derive from it beside the part, with the word that is its `kind` as tag.
+
+    ``shares_loop``: whether the part has its place in the one loop that is compiled for several controllers. That costs
+    half a second of compiling for all, a second part with arrays in its state four; others have a loop of their own.
+    """
+
+    shares_loop: ClassVar[bool] = False
+
+    def made(self, tick: float, wall: float) -> Any:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        raise NotImplementedError

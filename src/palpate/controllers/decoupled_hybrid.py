@@ -1,11 +1,13 @@
 """Hybrid control that decouples force from position by the identified stiffness (thesis, sec. 4.4)."""
 
-from typing import NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 from palpate._jit import law
 from palpate._vector import Vec3
-from palpate.controllers.controller import controller
+from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.resolved_acceleration import position_command, resolved_acceleration
+from palpate.signals.parameters import alike
+from palpate.signals.tables import NotNegative, Positive
 
 
 @law
@@ -64,3 +66,27 @@ class DecoupledHybrid(NamedTuple):
         u_f = self.force_gain * (task.f - sense.f) + self.rate_gain * (task.xd - sense.xd)
         f = self.measured * sense.f + (1.0 - self.measured) * (task.s * task.f)
         return decoupled_hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, u_f, f), state
+
+
+class DecoupledHybridController(ControllerTable, tag="decoupled-hybrid"):
+    """Force and position by accelerations, with the identified stiffness of the surface."""
+
+    shares_loop: ClassVar[bool] = True
+
+    stiffness: Positive
+    """K_e [N/m]."""
+    form: Literal["corrected", "printed"] = "corrected"
+    """The printed one multiplies by K_e, damps nothing and feeds the desired force forward."""
+    kp: NotNegative = 400.0
+    kv: NotNegative = 80.0
+    kf: NotNegative = 3000.0
+    """[1/s^2]; as printed it multiplies K_e."""
+    kfv: NotNegative = 110.0
+    """Of the force's rate [1/s]; not used as printed."""
+
+    def made(self, tick: float, wall: float) -> DecoupledHybrid:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        kp, kv, kf = alike(self.kp), alike(self.kv), alike(self.kf)
+        if self.form == "printed":
+            return DecoupledHybrid.printed(kp, kv, kf, float(self.stiffness))
+        return DecoupledHybrid.corrected(kp, kv, kf, alike(self.kfv), float(self.stiffness))

@@ -4,8 +4,10 @@ from typing import NamedTuple
 
 from palpate._jit import law
 from palpate._vector import ZERO3, Vec3
-from palpate.controllers.controller import controller
+from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.resolved_acceleration import position_command, resolved_acceleration
+from palpate.signals.parameters import alike
+from palpate.signals.tables import NotNegative
 
 
 @law
@@ -44,3 +46,17 @@ class Hybrid(NamedTuple):
     def report(self, state):
         """The force integral."""
         return state, ZERO3
+
+
+class HybridController(ControllerTable, tag="hybrid"):
+    """Hybrid control with the robot's dynamics, the integral gain per sample as in the thesis."""
+
+    kp: NotNegative = 400.0
+    kv: NotNegative = 80.0
+    kf: NotNegative = 1.0
+    ki: NotNegative = 0.003
+    """Per sample."""
+
+    def made(self, tick: float, wall: float) -> Hybrid:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        return Hybrid(alike(self.kp), alike(self.kv), alike(self.kf), alike(self.ki))

@@ -1,11 +1,13 @@
 """Impedance control: the tip gives way like a mass, a damper and a spring (thesis, (2.1)-(2.3); Hogan, 1985)."""
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from palpate._jit import law
 from palpate._vector import Vec3
-from palpate.controllers.controller import controller
+from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.resolved_acceleration import resolved_acceleration
+from palpate.signals.parameters import triple
+from palpate.signals.tables import NotNegativeTriple, PositiveTriple
 
 
 @law
@@ -44,3 +46,20 @@ class Impedance(NamedTuple):
         )
         torque = resolved_acceleration(model.J, model.Jdqd, model.M, model.h, u)
         return torque + model.J.T @ sense.f, state
+
+
+class ImpedanceController(ControllerTable, tag="impedance"):
+    """A target impedance in x [m], y [m] and phi [rad]."""
+
+    shares_loop: ClassVar[bool] = True
+
+    mass: PositiveTriple = (5.0, 11.0, 0.25)
+    damping: NotNegativeTriple = (600.0, 880.0, 20.0)
+    stiffness: NotNegativeTriple = (2000.0, 4400.0, 100.0)
+    beyond: float = 0.0138
+    """How far beyond the wall the desired x lies [m]."""
+
+    def made(self, tick: float, wall: float) -> Impedance:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        target = Vec3(float(wall + self.beyond), 0.0, 0.0)
+        return Impedance(triple(self.mass), triple(self.damping), triple(self.stiffness), target)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
+
+from msgspec import Meta
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3
-from palpate.controllers.controller import controller
+from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.errors import InputError
-from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, thesis_layers
-from palpate.signals.parameters import alike, coerced
+from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, random_layers, thesis_layers
+from palpate.signals.parameters import alike, coerced, triple
+from palpate.signals.tables import NotNegative, PositiveTriple, Size, Triple
 
 INPUTS, OUTPUTS = 9, 3
 STUCK = 1e-3
@@ -115,3 +118,42 @@ def see(signals, x, x_before, torque):
     signals[0], signals[1], signals[2] = x.x, x.y, x.z
     signals[3], signals[4], signals[5] = x_before.x, x_before.y, x_before.z
     signals[6], signals[7], signals[8] = torque.x, torque.y, torque.z
+
+
+class NeuralController(ControllerTable, tag="neural"):
+    """The hybrid controller without integral, and a network that learns what it lacks."""
+
+    shares_loop: ClassVar[bool] = True
+
+    kp: NotNegative = 400.0
+    kv: NotNegative = 80.0
+    kf: NotNegative = 0.25
+    learning_rate: Annotated[float, Meta(gt=0, le=1e300)] = 5e-5
+    """5e-5 in the thesis' text, 1e-4 in its listing."""
+    layers: tuple[Size, ...] = (12,)
+    """Neurons of each hidden layer."""
+    weights: Literal["thesis", "random"] = "thesis"
+    """At the start: those of the listing, or drawn evenly from -scale ... scale."""
+    weights_seed: Annotated[int, Meta(ge=0)] = 0
+    scale: NotNegative = 0.01
+    amplitude: PositiveTriple = (20.0, 10.0, 1.0)
+    """Of the outputs [N, N, N m]."""
+    offset: Triple = (0.0, 0.01, 0.01)
+    """Added to the poses that the network sees [m, m, rad]."""
+
+    def made(self, tick: float, wall: float) -> Neural:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        return Neural(alike(self.kp), alike(self.kv), alike(self.kf), triple(self.offset), self._network())
+
+    def _network(self) -> Network:
+        sizes = (INPUTS, *self.layers, OUTPUTS)
+        if self.weights == "random":
+            layers = random_layers(sizes, self.weights_seed, self.scale)
+        elif self.layers == (12,):
+            layers = thesis_layers()
+        else:
+            raise InputError(
+                f'weights = "thesis" are for layers = [12], got {list(self.layers)} in [controller]; '
+                'set weights = "random"'
+            )
+        return network(list(layers), self.amplitude, self.learning_rate)

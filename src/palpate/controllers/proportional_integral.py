@@ -1,12 +1,14 @@
 """Proportional-integral force control of a chosen bandwidth: what any other force controller is judged by."""
 
 import math
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from palpate._vector import ZERO3, Vec3
-from palpate.controllers.controller import controller
+from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.hybrid import Hybrid
-from palpate.signals.parameters import require
+from palpate.errors import InputError
+from palpate.signals.parameters import alike, require
+from palpate.signals.tables import NotNegative, Positive
 
 
 @controller
@@ -47,3 +49,25 @@ def integral_gain(bandwidth: float, kf: float = 0.0) -> float:
     require(bandwidth > 0.0, "bandwidth", "above 0 Hz", bandwidth)
     require(kf > -1.0, "force gain", "above -1", kf)
     return 2.0 * math.pi * bandwidth * (1.0 + kf)
+
+
+class ProportionalIntegralController(ControllerTable, tag="proportional-integral"):
+    """PI on the force, hybrid control in all else: what other force controllers are judged by."""
+
+    shares_loop: ClassVar[bool] = True
+
+    kp: NotNegative = 400.0
+    kv: NotNegative = 80.0
+    kf: NotNegative = 0.25
+    ki: NotNegative | None = None
+    """[1/s]; 5 when left out, which is what the neural controller amounts to."""
+    bandwidth: Positive | None = None
+    """Of the force loop [Hz], instead of ki."""
+
+    def made(self, tick: float, wall: float) -> ProportionalIntegral:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        if self.ki is not None and self.bandwidth is not None:
+            raise InputError("ki and bandwidth in [controller] say the same thing; leave one out")
+        wanted = 5.0 if self.ki is None else float(self.ki)
+        ki = wanted if self.bandwidth is None else integral_gain(self.bandwidth, self.kf)
+        return ProportionalIntegral(alike(self.kp), alike(self.kv), alike(self.kf), alike(ki), tick)

@@ -1,12 +1,14 @@
 """The original hybrid position/force control, without dynamics (thesis, fig. 2.1; Raibert and Craig, 1981)."""
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from palpate._jit import law, part
 from palpate._vector import Vec3, resolve
-from palpate.controllers.controller import controller
+from palpate.controllers.controller import ControllerTable, controller
+from palpate.signals.parameters import triple
+from palpate.signals.tables import NotNegative, NotNegativeTriple
 
 
 @law
@@ -85,3 +87,28 @@ def growth_rate(controller: RaibertCraig, model: Any, s: Any) -> float:
     n = len(M)
     motion = np.block([[np.zeros((n, n)), np.eye(n)], [-spring, -damper]])
     return float(np.linalg.eigvals(motion).real.max())
+
+
+class RaibertCraigController(ControllerTable, tag="raibert-craig"):
+    """The original hybrid control: joint by joint, no dynamics. One number a joint."""
+
+    shares_loop: ClassVar[bool] = True
+
+    stiffness: NotNegativeTriple = (414.0, 47.0, 1.15)
+    """[N m/rad]; 400 times each joint's own inertia where the thesis' arm starts."""
+    damping: NotNegativeTriple = (83.0, 9.4, 0.23)
+    """[N m s/rad]; 80 times."""
+    integral: NotNegativeTriple = (0.0, 0.0, 0.0)
+    """[N m/(rad s)]."""
+    kf: NotNegative = 1.0
+    ki: NotNegative = 3.0
+    """[1/s]."""
+    feed_forward: NotNegative = 1.0
+    """Share of the desired force that is fed forward."""
+
+    def made(self, tick: float, wall: float) -> RaibertCraig:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        stiffness, damping, integral = triple(self.stiffness), triple(self.damping), triple(self.integral)
+        return RaibertCraig(
+            stiffness, damping, integral, float(self.kf), float(self.ki), float(self.feed_forward), tick
+        )

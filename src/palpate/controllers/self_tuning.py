@@ -1,13 +1,17 @@
 """Force control whose gains a network tunes in the loop: the indirect scheme (thesis, fig. 2.5; Fukuda et al.)."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
+
+from msgspec import Meta
 
 from palpate._jit import law, part
 from palpate._vector import Vec3, clip
-from palpate.controllers.controller import controller
+from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
-from palpate.networks import Network, NetworkState
+from palpate.networks import Network, NetworkState, network, random_layers
+from palpate.signals.parameters import alike, triple
+from palpate.signals.tables import NotNegative, Positive, PositiveTriple, Size
 
 INPUTS, OUTPUTS = 3, 3
 
@@ -111,3 +115,35 @@ class SelfTuning(NamedTuple):
 def see(signals, error, integral, rate, scale):
     """Writes the network's three inputs."""
     signals[0], signals[1], signals[2] = error / scale[0], integral / scale[1], rate / scale[2]
+
+
+class SelfTuningController(ControllerTable, tag="self-tuning"):
+    """PID on the force; a network tunes its gains in the loop, each between 0 and twice its middle value."""
+
+    kp: NotNegative = 400.0
+    kv: NotNegative = 80.0
+    kf: Positive = 0.25
+    ki: Positive = 5.0
+    """[1/s]."""
+    kd: Positive = 0.004
+    """[s]."""
+    learning_rate: Positive = 1e-3
+    layers: tuple[Size, ...] = (6,)
+    """Neurons of each hidden layer."""
+    weights_seed: Annotated[int, Meta(ge=0)] = 0
+    scale: NotNegative = 0.3
+    """The weights are drawn evenly from -scale ... scale."""
+    inputs: PositiveTriple = (10.0, 5.0, 100.0)
+    """What the network's inputs are divided by: force error [N], the integral's share [N], force rate [N/s]."""
+    dead_zone: NotNegative = 1.0
+    """Force error that is not learned from [N]."""
+    smoothing: Positive = 0.01
+    """Time constant of the force rate [s]."""
+
+    def made(self, tick: float, wall: float) -> SelfTuning:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
+        middle = (self.kf, self.ki, self.kd)
+        layers = random_layers((INPUTS, *self.layers, OUTPUTS), self.weights_seed, self.scale)
+        net = network(list(layers), middle, self.learning_rate)
+        numbers = (float(self.dead_zone), float(self.smoothing), tick)
+        return SelfTuning(alike(self.kp), alike(self.kv), triple(middle), triple(self.inputs), *numbers, net)

@@ -1,20 +1,25 @@
 """What is touched: one-sided surfaces along their normal, and friction along them."""
 
-from palpate.environments.hunt_crossley import HuntCrossley
-from palpate.environments.kelvin_voigt import KelvinVoigt
-from palpate.environments.standard_linear_solid import StandardLinearSolid
+from palpate.environments.hunt_crossley import HuntCrossley, HuntCrossleySurface
+from palpate.environments.kelvin_voigt import KelvinVoigt, KelvinVoigtSurface
+from palpate.environments.standard_linear_solid import StandardLinearSolid, StandardLinearSolidSurface
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import Surface, join
 from palpate.environments.surface_state import SurfaceState, contact_force, impact, part_from, touch
+from palpate.environments.surface_table import SurfaceTable
 
 __all__ = [
     "HuntCrossley",
+    "HuntCrossleySurface",
     "KelvinVoigt",
+    "KelvinVoigtSurface",
     "StandardLinearSolid",
+    "StandardLinearSolidSurface",
     "StickSlip",
     "StickSlipState",
     "Surface",
     "SurfaceState",
+    "SurfaceTable",
     "contact_force",
     "impact",
     "join",

@@ -1,11 +1,15 @@
 """A contact whose area grows as it is pressed."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
+
+from msgspec import Meta
 
 from palpate._jit import part
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
+from palpate.environments.surface_table import SurfaceTable
 from palpate.signals.parameters import coerced, require
+from palpate.signals.tables import NotNegative, Positive
 
 
 def _check(self):
@@ -70,3 +74,14 @@ class HuntCrossley(NamedTuple):
             "n": (self.exponent, "1"),
             "M": (self.mass, "kg"),
         }
+
+
+class HuntCrossleySurface(SurfaceTable, tag="hunt-crossley"):
+    """A spring that stiffens and damping that grows with depth: f = K x^n + B x^n v."""
+
+    part: ClassVar[type] = HuntCrossley
+
+    stiffness: Positive
+    damping: NotNegative
+    exponent: Annotated[float, Meta(ge=1)]
+    mass: NotNegative

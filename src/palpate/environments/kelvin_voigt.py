@@ -1,10 +1,12 @@
 """Spring, damper and mass side by side."""
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from palpate._jit import part
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
+from palpate.environments.surface_table import SurfaceTable
 from palpate.signals.parameters import coerced, require
+from palpate.signals.tables import NotNegative, Positive
 
 
 def _check(self):
@@ -55,3 +57,13 @@ class KelvinVoigt(NamedTuple):
     def truth(self):
         """Parameter names with value and unit, for reports."""
         return {"K": (self.stiffness, "N/m"), "B": (self.damping, "N s/m"), "M": (self.mass, "kg")}
+
+
+class KelvinVoigtSurface(SurfaceTable, tag="kelvin-voigt"):
+    """Mass, damper and spring: f = M a + B v + K x."""
+
+    part: ClassVar[type] = KelvinVoigt
+
+    stiffness: Positive
+    damping: NotNegative
+    mass: NotNegative

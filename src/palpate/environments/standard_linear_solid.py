@@ -1,10 +1,12 @@
 """A Kelvin-Voigt surface with a Maxwell branch beside it: it relaxes under load."""
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from palpate._jit import law, part
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
+from palpate.environments.surface_table import SurfaceTable
 from palpate.signals.parameters import coerced, require
+from palpate.signals.tables import NotNegative, Positive
 
 
 def _check(self):
@@ -89,3 +91,15 @@ class StandardLinearSolid(NamedTuple):
             "K_instant": (self.stiffness + self.branch_stiffness, "N/m"),
             "tau": (self.branch_time, "s"),
         }
+
+
+class StandardLinearSolidSurface(SurfaceTable, tag="standard-linear-solid"):
+    """A spring and damper beside a spring that relaxes: foam under load."""
+
+    part: ClassVar[type] = StandardLinearSolid
+
+    stiffness: Positive
+    damping: NotNegative
+    mass: NotNegative
+    branch_stiffness: NotNegative
+    branch_time: Positive

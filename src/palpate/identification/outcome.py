@@ -37,6 +37,7 @@ _NARROWER = 0.5
 """Share of the prior's interval at or below which the log has told a lag something."""
 
 
+# More than seven arguments: it gathers what every stage has found.
 def outcome(
     channels: Channels,
     chain: Chain,

@@ -24,6 +24,7 @@ _MOST_SAMPLES = 2_000_000
 _FOLLOWS = 0.3
 
 
+# More than seven arguments: the options of a user's call.
 def identify(
     record: Record,
     *,

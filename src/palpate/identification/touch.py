@@ -32,6 +32,7 @@ class Touch:
     force: Array
 
 
+# More than seven arguments: what a touch is told from, each by itself.
 def touching(
     force: Array,
     resting: float,

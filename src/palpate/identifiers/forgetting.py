@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
-from palpate._jit import law, part
-from palpate._vector import solve, sqrt
-from palpate.identifiers.kernels.square_root import stretched
+from palpate._jit import part
+from palpate._vector import solve
+from palpate.identifiers.kernels.square_root import stretch_of, stretched
 from palpate.signals.parameters import coerced, require
 
 
@@ -28,12 +28,6 @@ class Forgetting(Protocol):
 
 def _factor(policy: Any) -> None:
     require(0.0 < policy.keep <= 1.0, "forgetting", "in (0, 1]", policy.keep)
-
-
-@law
-def stretch_of(keep):
-    """How much longer a root gets when its information shrinks to `keep` of what it was."""
-    return 1.0 / sqrt(keep)
 
 
 @part

@@ -59,6 +59,7 @@ class NeuralProbe:
         InputError: numbers out of range.
     """
 
+    # More than seven arguments: the settings of the thesis' network, most with a default.
     def __init__(
         self,
         scale: ArrayLike,
@@ -261,6 +262,7 @@ def ask(sizes, weights, amplitude, signals, scale, values):
     return pressed / values[0], (moving - pressed) / values[1], (hastened - moving) / values[2]
 
 
+# More than seven arguments: arrays that are changed in place, each by itself, as Numba has them fastest.
 @kernel
 def _follow(
     sizes,

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.ending import Watchman
-from palpate.bench.experiment import Experiment, changed
-from palpate.bench.rest_length import rest_for
+from palpate.bench.ending import StopCondition
+from palpate.bench.experiments.tables import Experiment, changed
+from palpate.bench.given_motion import rest_for
 from palpate.bench.row import COLUMNS as ROW
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.bench.tick import LoopState, compiled_march, start_at
@@ -168,7 +168,7 @@ class Simulation:
         self._now: LoopState = start_at(self._loop, bench.q)  # type: ignore[no-untyped-call]
         self._generator = np.random.default_rng(self.state.seed)
         self._k = 0
-        self._watchman = Watchman(self._experiment.run.losses)
+        self._watchman = StopCondition(self._experiment.run.losses)
         self._phase, self._contacts = 0.0, 0
         self._high = True
         self._truth = _truth(self._experiment)

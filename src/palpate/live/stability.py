@@ -17,8 +17,8 @@ from typing import Any
 
 import msgspec
 
-from palpate.bench.controller_tables import CautiousController
-from palpate.bench.experiment import Experiment
+from palpate.bench.experiments.tables import Experiment
+from palpate.controllers import CautiousController
 from palpate.errors import InputError, PalpateError
 from palpate.report.numbers import plain, quantity
 

@@ -23,6 +23,7 @@ from palpate.records import Record
 from palpate.units import split_spec
 
 
+# More than seven arguments: the options of a user's call.
 def read_log(
     path: str | Path,
     *,

@@ -14,7 +14,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from palpate.errors import InputError
-from palpate.studies.one import FAILED, Done, Job, Row, run_one
+from palpate.studies.run_one import FAILED, Done, Job, Row, run_one
 from palpate.studies.sources import sources
 
 UNIT = 0.2

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from palpate.bench import build
 from palpate.bench.speed import cores
 from palpate.errors import InputError
-from palpate.studies.one import Stopped
 from palpate.studies.plan import Plan
+from palpate.studies.run_one import Stopped
 
 LOOKED_AT = 0.5
 """Seconds of this machine's time that the piece may take [s]."""
@@ -67,10 +67,10 @@ def too_much(plan: Plan, seconds: float) -> str:
     total = seconds * len(plan) / cores()
     if len(plan) < MANY and total < LONG:
         return ""
-    return f"the study has {len(plan):,} runs, which take some {told(total)} on the {cores()} cores here"
+    return f"the study has {len(plan):,} runs, which take some {in_words(total)} on the {cores()} cores here"
 
 
-def told(seconds: float) -> str:
+def in_words(seconds: float) -> str:
     """A time in words of a fitting unit."""
     for size, unit in ((365.25 * 86400.0, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
         if seconds >= 2.0 * size:

@@ -17,7 +17,7 @@ import msgspec
 
 from palpate.errors import InputError
 from palpate.files import check_place, whole
-from palpate.studies.one import Row
+from palpate.studies.run_one import Row
 
 NAME = "runs.jsonl"
 SYNC = 1.0

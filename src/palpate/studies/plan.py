@@ -15,7 +15,7 @@ import msgspec
 from palpate.bench import Experiment, build, load
 from palpate.errors import InputError, unknown
 from palpate.studies.applying import Tables, experiment_of, put, tables_of
-from palpate.studies.axes import Axis, Label, axis, label
+from palpate.studies.parameters import Axis, Label, axis, label
 from palpate.studies.sobol import Sobol
 from palpate.studies.study import flat
 from palpate.studies.tables import Against, Parameter, Study

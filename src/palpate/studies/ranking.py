@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench.ending import DONE
-from palpate.studies.axes import Label
+from palpate.studies.parameters import Label
 from palpate.studies.plan import MAIN, Plan
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from palpate.bench.metrics import METRICS
 from palpate.errors import InputError
 from palpate.logs.store import write_parquet
-from palpate.studies.metrics import METRICS
-from palpate.studies.one import Row
 from palpate.studies.plan import Plan
+from palpate.studies.run_one import Row
 
 if TYPE_CHECKING:
     from polars import DataFrame

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, check_place
-from palpate.studies.axes import Axis
+from palpate.studies.parameters import Axis
 from palpate.studies.plan import Plan
 
 if TYPE_CHECKING:

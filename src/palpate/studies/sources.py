@@ -20,8 +20,7 @@ OF_A_RUN = (
     "references",
     "robots",
     "signals",
-    "studies/metrics",
-    "studies/one.py",
+    "studies/run_one.py",
 )
 """Files and folders of the package that a row depends on; what reads studies and draws pages may change."""
 

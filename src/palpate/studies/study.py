@@ -7,10 +7,10 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from palpate.bench.explaining import explained, not_finite
-from palpate.bench.toml_files import TomlFiles, decoded
+from palpate.bench.experiments.error_messages import explained, not_finite
+from palpate.bench.experiments.toml_files import TomlFiles, decoded
+from palpate.bench.metrics import METRICS
 from palpate.errors import InputError, unknown
-from palpate.studies.metrics import METRICS
 from palpate.studies.tables import Against, Curves, Map, Parameter, Study
 
 T = TypeVar("T")

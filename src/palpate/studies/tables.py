@@ -7,14 +7,14 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from palpate.bench.part_table import Part, Positive
+from palpate.signals.tables import Positive, Table
 
 Points = Annotated[int, Meta(ge=1, le=1_000_000)]
 Seed = Annotated[int, Meta(ge=0)]
 Path = str
 
 
-class Parameter(Part, frozen=True):
+class Parameter(Table, frozen=True):
     """One parameter: the values that it takes, and what of the experiment they are.
 
     The values are one of `values`, `range` or `log` (with `points`, or drawn at `random`), or `cases`.
@@ -44,7 +44,7 @@ class Parameter(Part, frozen=True):
     """For figures, with the unit."""
 
 
-class Best(Part, frozen=True):
+class Best(Table, frozen=True):
     """What the settings are ranked by: one metric."""
 
     least: str = ""
@@ -58,7 +58,7 @@ class Best(Part, frozen=True):
         return self.least or self.most
 
 
-class Search(Part, frozen=True):
+class Search(Table, frozen=True):
     """A search by Optuna in place of a grid."""
 
     trials: Annotated[int, Meta(ge=1)]
@@ -68,7 +68,7 @@ class Search(Part, frozen=True):
     seed: Seed = 0
 
 
-class Map(Part, frozen=True):
+class Map(Table, frozen=True):
     """A figure: a metric over two parameters, the median over seeds and all else."""
 
     x: str
@@ -82,7 +82,7 @@ class Map(Part, frozen=True):
     """Draws where the linear model of the loop loses its stability."""
 
 
-class Curves(Part, frozen=True):
+class Curves(Table, frozen=True):
     """A figure: a metric over one parameter, with its spread over the seeds."""
 
     x: str
@@ -95,7 +95,7 @@ class Curves(Part, frozen=True):
     """Only the runs with these values of other parameters."""
 
 
-class Against(Part, frozen=True):
+class Against(Table, frozen=True):
     """Runs that the study is compared with: another controller, say, with the same seeds and metrics."""
 
     experiment: str = ""
@@ -106,7 +106,7 @@ class Against(Part, frozen=True):
     parameters: dict[str, Parameter] = msgspec.field(default_factory=dict)
 
 
-class Study(Part, frozen=True, kw_only=True):
+class Study(Table, frozen=True, kw_only=True):
     """A whole study."""
 
     title: str

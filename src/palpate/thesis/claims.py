@@ -16,7 +16,7 @@ class Claim:
     """One row of claims.json.
 
     Args:
-        id: as in the table of claims, "RLS-S2"; with a suffix where one sentence claims several things: "RLS-S2.K".
+        id: what is claimed, "least-squares-foam-level"; with a suffix where one sentence claims several things, ".K".
         source: where the thesis says it.
         claim: what it says, in our words.
         thesis: its value, with unit; or "in words" where it gives none.
@@ -54,7 +54,7 @@ def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
 
 
 def with_wholes(claims: Sequence[Claim]) -> list[Claim]:
-    """The claims, and before the first part of each that was only measured in parts ("NN-S.K", "NN-S.B") the whole.
+    """The claims, and before the first part of each that was only measured in parts ("a.K", "a.B") the whole, "a".
 
     A whole is reproduced if all its parts are; "not checkable" if all are that.
     """
@@ -70,9 +70,8 @@ def with_wholes(claims: Sequence[Claim]) -> list[Claim]:
 
 
 def _name(claim: Claim) -> str:
-    """The claim that this one is, or is a part of: "NN-S" of "NN-S.K"; "F3.5" is a name of its own."""
-    name, _, part = claim.id.rpartition(".")
-    return name if name and not part.isdigit() else claim.id
+    """The claim that this one is, or is a part of: "a" of "a.K"."""
+    return claim.id.partition(".")[0]
 
 
 def _whole(name: str, parts: Sequence[Claim]) -> Claim:

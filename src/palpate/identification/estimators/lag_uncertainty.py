@@ -45,6 +45,7 @@ def undone(
     return Compensation(np.append(part.step, 0.0), np.pad(part.less, (0, 1)), np.pad(part.doubt, (0, 1)))
 
 
+# More than seven arguments: what two estimates differ in, each by itself.
 def with_lag(
     jacobian: Array,
     fixed: Array,

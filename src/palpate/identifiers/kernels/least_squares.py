@@ -4,10 +4,9 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, outer, sqrt, trace
-from palpate.identifiers.forgetting import stretch_of
 from palpate.identifiers.kernels.dimension import Three
 from palpate.identifiers.kernels.error_covariance import Doubt, unsure
-from palpate.identifiers.kernels.square_root import measured
+from palpate.identifiers.kernels.square_root import measured, stretch_of
 from palpate.identifiers.kernels.state_layout import bounded
 
 _SIZE = Three()

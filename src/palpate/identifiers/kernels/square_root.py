@@ -11,6 +11,12 @@ from palpate._vector import outer, solve, sqrt
 
 
 @law
+def stretch_of(keep):
+    """How much longer a root gets when its information shrinks to `keep` of what it was."""
+    return 1.0 / sqrt(keep)
+
+
+@law
 def stretched(S, u, s):
     """S after its direction u is made s times as long: P changes by (s^2 - 1) (S u)(S u)^T / u^T u."""
     q = u @ u

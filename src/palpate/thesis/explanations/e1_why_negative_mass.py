@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from palpate.bench import changed
 from palpate.records import Record
 from palpate.report import style
-from palpate.thesis import rls, rls_drawing
-from palpate.thesis.causes import CAUSES, delayed_fit, estimate, window
 from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.least_squares import panels, press_runs
+from palpate.thesis.least_squares.bias_sources import CAUSES, delayed_fit, estimate, window
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -33,7 +33,11 @@ CAPTION = (
 )
 PARAMETERS = {
     name: changed(e, {"run.press": 4.2})
-    for name, e in {"plain foam": rls.PLAIN, "rubber": rls.RUBBER, "relaxing foam": rls.RELAXING}.items()
+    for name, e in {
+        "plain foam": press_runs.PLAIN,
+        "rubber": press_runs.RUBBER,
+        "relaxing foam": press_runs.RELAXING,
+    }.items()
 }
 LAGS = 1e-3 * np.arange(0.0, 11.0)
 SENSOR_LAG = 5.6e-3
@@ -76,12 +80,12 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """One press a seed on each surface; conditions varied on the two that the model fits."""
-    few = list(runs.seeds)[: rls.SWEPT_SEEDS]
+    few = list(runs.seeds)[: press_runs.SWEPT_SEEDS]
     plain = {name: PARAMETERS[name] for name in ("plain foam", "rubber")}
     varied = {
         name: {
             condition: runs.over([(e, seed) for seed in few], _press)
-            for condition, e in rls.conditions(one).items()
+            for condition, e in press_runs.conditions(one).items()
         }
         for name, one in plain.items()
     }
@@ -118,7 +122,7 @@ def _smallness(data: Data) -> Claim:
     right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in surfaces)
     told = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in surfaces)
     return Claim(
-        id="WHY-M.small",
+        id="negative-mass.small",
         source="sec. 6.1",
         claim="M_e is negative because it is very small and hard to estimate exactly.",
         thesis="in words",
@@ -181,7 +185,7 @@ def _lag(data: Data) -> Claim:
             f"{surface}: M {fitted[0]:.2f} ({predicted[0]:.2f}) kg, B {fitted[1]:.0f} ({predicted[1]:.0f}) N s/m"
         )
     return Claim(
-        id="WHY-M.lag",
+        id="negative-mass.lag",
         source="ours",
         claim="A force late by T turns M into M - B T + K T²/2 and B into B - K T.",
         thesis="not said",
@@ -215,7 +219,7 @@ def _reach(data: Data) -> str:
 def _wrong_model(data: Data) -> Claim:
     masses = _masses(data, "relaxing foam", "perfect signals")
     return Claim(
-        id="WHY-M.model",
+        id="negative-mass.model",
         source="ours",
         claim="On a foam that relaxes M_e is negative even with perfect signals.",
         thesis="not said",
@@ -245,7 +249,7 @@ def _matched(data: Data) -> Claim:
             f"M {spread(found['M'], 'kg', 2)}, true {truth['M']:g}"
         )
     return Claim(
-        id="WHY-M.matched",
+        id="negative-mass.matched",
         source="ours",
         claim="With all channels matched in lag and the offset taken out, least squares finds the surface.",
         thesis="not said",
@@ -264,11 +268,11 @@ def _matched(data: Data) -> Claim:
 
 def plot(data: Data) -> Figure:
     """Waterfalls of M and B on three surfaces, the lag formula, and conditions."""
-    drawing, axes = rls_drawing.grid(5)
+    drawing, axes = panels.grid(5)
     for row, surface in enumerate(PARAMETERS):
         for column, (index, label) in enumerate((((0), "$M_e$ [kg]"), ((1), "$B_e$ [N s/m]"))):
             axis = axes[2 * row + column]
-            rls_drawing.titled(axis, "abcdef"[2 * row + column], f"{label.split(' ')[0]} on {surface}")
+            panels.titled(axis, "abcdef"[2 * row + column], f"{label.split(' ')[0]} on {surface}")
             _waterfall(axis, data, surface, index)
             axis.set_xlabel(label)
             if column:
@@ -304,12 +308,10 @@ def _waterfall(axis: Axes, data: Data, surface: str, index: int) -> None:
 
 
 def _lag_panel(axis: Axes, data: Data, index: int) -> None:
-    rls_drawing.titled(
-        axis, "gh"[index], f"{('$M_e$', '$B_e$')[index]} of perfect signals, the force late by T"
-    )
+    panels.titled(axis, "gh"[index], f"{('$M_e$', '$B_e$')[index]} of perfect signals, the force late by T")
     fine = np.linspace(0.0, float(LAGS[-1]), 100)
     for surface in ("plain foam", "rubber"):
-        color = rls_drawing.COLORS[surface]
+        color = panels.COLORS[surface]
         axis.plot(
             1e3 * LAGS, data.middle(surface, "lags")[:, index], "o", color=color, markersize=4, label=surface
         )
@@ -321,7 +323,7 @@ def _lag_panel(axis: Axes, data: Data, index: int) -> None:
 
 
 def _conditions(axis: Axes, data: Data, surface: str, letter: str) -> None:
-    rls_drawing.titled(axis, letter, f"$M_e$ under varied conditions, {surface}")
+    panels.titled(axis, letter, f"$M_e$ under varied conditions, {surface}")
     colors = dict(zip(CHAINS, (style.GREEN, style.VIOLET, style.BLUE, style.RED), strict=True))
     groups = {
         chain: {
@@ -330,6 +332,6 @@ def _conditions(axis: Axes, data: Data, surface: str, letter: str) -> None:
         }
         for i, chain in enumerate(CHAINS)
     }
-    rls_drawing.dots(axis, groups, colors)
+    panels.dots(axis, groups, colors)
     axis.axvline(0.0, color=style.GREY, linewidth=0.9)
     axis.set_xlabel("$M_e$ [kg]")

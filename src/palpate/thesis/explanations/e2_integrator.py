@@ -10,24 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed
+from palpate.bench.metrics.window import rms
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import PALE, limits, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.panels import PALE, limits, panels
+from palpate.thesis.force_control.tracking import (
     FOAM,
     RUBBER,
     SINE,
     Slot,
     Tracking,
-    rms,
     since_contact,
     slot,
     tracking,
     variations,
 )
+from palpate.thesis.force_control.weights import COLUMN, HOLD, TORQUES, Look, hold, watch
 from palpate.thesis.runs import Runs
-from palpate.thesis.watching import COLUMN, HOLD, TORQUES, Look, hold, watch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -106,7 +106,7 @@ def check(data: Data) -> Sequence[Claim]:
     apart = max(abs(_median(p.network_found) / _median(p.pi_found) - 1.0) for p in data.pairs.values())
     return [
         Claim(
-            id="E2.gain",
+            id="neural-integrator.gain",
             source="explanation of sec. 4.5",
             claim="The network's command is the integral of the force error, with K_i = eta (A/2)²/Ts.",
             thesis=f"not in the thesis; {GAIN:g} per second follows from its numbers",
@@ -127,7 +127,7 @@ def check(data: Data) -> Sequence[Claim]:
             ),
         ),
         Claim(
-            id="E2.errors",
+            id="neural-integrator.errors",
             source="explanation of figs. 6.11 to 6.17",
             claim="A plain PI with that K_i makes the same errors on all four experiments.",
             thesis="not in the thesis, which compares with no integral term",

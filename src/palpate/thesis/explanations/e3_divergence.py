@@ -10,7 +10,9 @@ import numpy as np
 
 from palpate.bench import Experiment, changed
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.divergence_drawing import (
+from palpate.thesis.conditions import RELAXING_FOAM, moved, rougher
+from palpate.thesis.explanations.e2_integrator import PI
+from palpate.thesis.force_control.divergence_panels import (
     DURATION,
     Array,
     Course,
@@ -22,12 +24,10 @@ from palpate.thesis.divergence_drawing import (
     times_panel,
     weights_panel,
 )
-from palpate.thesis.explanations.e2_integrator import PI
-from palpate.thesis.force_panels import across, legend_inside, panels
-from palpate.thesis.force_tracking import FOAM, RUBBER, SINE, since_contact
+from palpate.thesis.force_control.panels import across, legend_inside, panels
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, SINE, since_contact
+from palpate.thesis.force_control.weights import HOLD, POSES, TORQUE1, TORQUES, Look, hold, layers, watch
 from palpate.thesis.runs import Runs
-from palpate.thesis.watching import HOLD, POSES, TORQUE1, TORQUES, Look, hold, layers, watch
-from palpate.thesis.worlds import RELAXING_FOAM, moved, rougher
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -115,7 +115,7 @@ def check(data: Data) -> Sequence[Claim]:
     gone = sum(lost is not None for lost in others)
     return [
         Claim(
-            id="E3.loss",
+            id="neural-diverges.loss",
             source="explanation of sec. 6.3; stability is left open in sec. 7.2",
             claim="Going on, the neural controller loses the foam at every learning rate, where a PI is steady.",
             thesis="not in the thesis, which shows ten seconds, and a few minutes at 1e-5",
@@ -138,7 +138,7 @@ def check(data: Data) -> Sequence[Claim]:
             ),
         ),
         Claim(
-            id="E3.everywhere",
+            id="neural-diverges.everywhere",
             source="explanation of sec. 6.3; stability is left open in sec. 7.2",
             claim="It does so on every surface.",
             thesis="not in the thesis",

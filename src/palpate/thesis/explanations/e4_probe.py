@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.thesis import probing, probing_drawing
-from palpate.thesis import probing_causes as causes
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.probing import Choice
-from palpate.thesis.probing_causes import PARAMETERS, STRAIGHT, Data, Surface
-from palpate.thesis.probing_claims import ENOUGH
-from palpate.thesis.probing_notes import share_of_starts
-from palpate.thesis.rls import Array
+from palpate.thesis.least_squares.press_runs import Array
+from palpate.thesis.neural_identifier import ablation as causes
+from palpate.thesis.neural_identifier import network, panels
+from palpate.thesis.neural_identifier.ablation import PARAMETERS, STRAIGHT, Data, Surface
+from palpate.thesis.neural_identifier.claims import ENOUGH
+from palpate.thesis.neural_identifier.network import Choice
+from palpate.thesis.neural_identifier.notes import share_of_starts
 from palpate.thesis.runs import Runs
 
 __all__ = ["CAPTION", "NUMBER", "PARAMETERS", "TITLE", "check", "plot", "run"]
@@ -49,7 +49,7 @@ def check(data: Data) -> Sequence[Claim]:
 def _stiffness(data: Data) -> Claim:
     inside = {name: [STUDY[0] <= a.over <= STUDY[1] for a in s.nominal] for name, s in data.items()}
     return Claim(
-        id="WHY-PROBE.K",
+        id="network-probe.K",
         source="ours, on sec. 6.2",
         claim="With thresholds that learn, K by probing is 1.3 to 2.3 times f/x.",
         thesis="0.985 (foam), 0.90 (rubber)",
@@ -122,7 +122,7 @@ def _mass(data: Data) -> Claim:
     }
     steady, total = _steady_conditions(data)
     return Claim(
-        id="WHY-PROBE.M",
+        id="network-probe.M",
         source="ours, on sec. 6.2",
         claim="The sign of M by probing follows the initial weights.",
         thesis="small, positive, and taken for realistic",
@@ -156,9 +156,9 @@ def _steady_conditions(data: Data) -> tuple[int, int]:
     """Under how many conditions the starts keep the signs that they have as chosen, and of how many."""
     kept = []
     for surface in data.values():
-        usual = np.sign(np.median(surface.masses, axis=0))[: probing.VARIED_STARTS]
+        usual = np.sign(np.median(surface.masses, axis=0))[: network.VARIED_STARTS]
         for some in surface.varied.values():
-            found = np.sign(np.array([a.M for a in some]).reshape(-1, probing.VARIED_STARTS))
+            found = np.sign(np.array([a.M for a in some]).reshape(-1, network.VARIED_STARTS))
             kept.append(np.mean(found == usual) >= ENOUGH)
     return sum(map(bool, kept)), len(kept)
 
@@ -167,7 +167,7 @@ def _outside(data: Data) -> Claim:
     wrong = [abs(force - 1.0) > FAR and warned for s in data.values() for force, warned in s.far]
     near = [force for s in data.values() for force in s.near]
     return Claim(
-        id="WHY-PROBE.outside",
+        id="network-probe.outside",
         source="sec. 5.2",
         claim="Far from what was learned the network's output is wrong.",
         thesis="in words",
@@ -196,7 +196,7 @@ def _scaling(data: Data) -> Claim:
     holds = all(np.median(without) < 0.1 * np.median(scaled) for scaled, without in slopes.values())
     K = {name: _median(s, "inputs not scaled") for name, s in data.items()}
     return Claim(
-        id="WHY-PROBE.scale",
+        id="network-probe.scale",
         source="sec. 6.2",
         claim="Without scaling, small inputs are almost ignored.",
         thesis="in words",
@@ -239,4 +239,4 @@ def _enough(holds: Sequence[bool]) -> bool:
 
 def plot(data: Data) -> Figure:
     """What the networks know, how K follows from it, every toggle, and M by start."""
-    return probing_drawing.causes(data, replace(Choice(), thresholds=False), STRAIGHT)
+    return panels.causes(data, replace(Choice(), thresholds=False), STRAIGHT)

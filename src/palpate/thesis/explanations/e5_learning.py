@@ -11,11 +11,11 @@ import numpy as np
 from palpate.bench import Experiment, changed
 from palpate.report import style
 from palpate.thesis.claims import Claim
-from palpate.thesis.force_panels import legend_inside, panels
-from palpate.thesis.force_tracking import FOAM, RUBBER, Tracking, tracking
+from palpate.thesis.conditions import RELAXING_FOAM
+from palpate.thesis.force_control.panels import legend_inside, panels
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, Tracking, tracking
+from palpate.thesis.force_control.weights import watch
 from palpate.thesis.runs import Runs
-from palpate.thesis.watching import watch
-from palpate.thesis.worlds import RELAXING_FOAM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,7 +92,7 @@ def check(data: Data) -> Sequence[Claim]:
     gone = f"{min(times):.0f} to {max(times):.0f} s" if times else "never"
     return [
         Claim(
-            id="FUT",
+            id="open-questions",
             source="sec. 7.2",
             claim="Which learning rate is best, how many layers and neurons are needed, and is the controller stable?",
             thesis="left to future work",

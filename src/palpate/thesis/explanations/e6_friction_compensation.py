@@ -11,16 +11,33 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
-from palpate.bench.summary import losses
+from palpate.bench.metrics.summary import losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, by_world, since_contact, stops_holding
-from palpate.thesis.regain import Regain, Trace, drawn_back, found_again, regain_panel, regained, trace_of
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    VARIED_SEEDS,
+    by_condition,
+    friction_and_pose,
+    stops_holding,
+)
+from palpate.thesis.force_control.contact_loss import (
+    Recovery,
+    Trace,
+    drawn_back,
+    found_again,
+    loss_panel,
+    regained,
+    trace_of,
+)
+from palpate.thesis.force_control.panels import across, dots_panel, panels
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,7 +96,7 @@ class Data:
     printed_blend: list[Held]
     sweep: list[list[Held]]  # over BLENDS
     varied: dict[str, list[Ratio]]
-    regains: list[Regain]
+    regains: list[Recovery]
     regain: Trace
 
 
@@ -108,7 +125,7 @@ def check(data: Data) -> Sequence[Claim]:
 def _never(data: Data) -> Claim:
     factors = [h.factor for h in data.plain]
     return Claim(
-        id="FRICTION.PRINTED",
+        id="friction-compensation.printed",
         source="eq. 4.8-4.13, appendix E",
         claim="The controllers compensate the Coulomb friction of the joints.",
         thesis="F_c sgn(q') is part of every torque law; the listing blends it through 0.002 rad/s",
@@ -133,7 +150,7 @@ def _acting(data: Data) -> Claim:
     wide = [np.median([h.error for h in found]) for found in data.sweep]
     best = BLENDS[int(np.argmin(wide))]
     return Claim(
-        id="FRICTION.BLEND",
+        id="friction-compensation.blend",
         source="eq. 4.13; ours",
         claim=(
             "A compensation whose blend spans several velocity quanta takes away the better part of the "
@@ -164,7 +181,7 @@ def _hammer(data: Data) -> Claim:
     still = [h.shaking for h in data.plain]
     shares = [h.shaking / p for h, p in zip(data.printed_blend, still, strict=True)]
     return Claim(
-        id="FRICTION.HAMMER",
+        id="friction-compensation.hammer",
         source="appendix E; ours",
         claim="Made to act, the listing's blend of 0.002 rad/s shakes the arm.",
         thesis="not said in the thesis",
@@ -213,7 +230,7 @@ def plot(data: Data) -> Figure:
         label="error left [%]",
         title="with a blend of 0.05 rad/s over without; each dot a run; dashed: half",
     )
-    regain_panel(wide[2], data.regain)
+    loss_panel(wide[2], data.regain)
     return drawing
 
 
@@ -260,7 +277,7 @@ def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
         compensated = runs.one(changed(PARAMETERS, world), seed)
         return Ratio(_held(compensated).error / without.error, losses(compensated) > 0)
 
-    return by_world(runs, _worlds(), ratio, {"foam"})
+    return by_condition(runs, _worlds(), ratio, {"foam"})
 
 
 def _held(record: Record) -> Held:

@@ -1,1 +1,1 @@
-"""One file for each figure that the thesis' text describes: ``fig_6_11.py`` for figure 6.11."""
+"""Figures that the thesis describes: ``fig_6_10.py`` for figure 6.10; foam and rubber are a pair in one file."""

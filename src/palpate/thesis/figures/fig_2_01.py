@@ -11,17 +11,25 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import changed, load
-from palpate.bench.summary import losses
+from palpate.bench.metrics.summary import losses
 from palpate.controllers import RaibertCraig
 from palpate.controllers.raibert_craig import growth_rate
 from palpate.records import Record
 from palpate.report import style
 from palpate.robots.arm3 import Arm3
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, by_world, since_contact, stops_holding
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_condition,
+    friction_and_pose,
+    stops_holding,
+)
+from palpate.thesis.force_control.panels import across, dots_panel, panels
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,8 +109,8 @@ class Data:
 def run(runs: Runs) -> Data:
     """Both laws in each world; the original's growth at each posture."""
     worlds = {name: changed(PARAMETERS, changes) for name, changes in _changes().items()}
-    original = by_world(runs, worlds, lambda e, s: _measured(runs.one(e, s)), {"foam"})
-    dynamic = by_world(runs, worlds, lambda e, s: _measured(runs.one(changed(e, DYNAMIC), s)), {"foam"})
+    original = by_condition(runs, worlds, lambda e, s: _measured(runs.one(e, s)), {"foam"})
+    dynamic = by_condition(runs, worlds, lambda e, s: _measured(runs.one(changed(e, DYNAMIC), s)), {"foam"})
     varied = {n: [Pair(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
     traces = {LAWS[0]: _trace(runs.one(PARAMETERS)), LAWS[1]: _trace(runs.one(changed(PARAMETERS, DYNAMIC)))}
     growth = _growth(1.0, np.ones((len(YS), len(XS)), dtype=bool))
@@ -121,7 +129,7 @@ def _problems(data: Data) -> Claim:
     always = float((data.any_gain[reach] > GROWS).mean())
     line = data.growth[np.argmin(np.abs(YS))]
     return Claim(
-        id="RC.PROBLEMS",
+        id="original-hybrid.problems",
         source="fig. 2.1, sec. 2.1",
         claim="The original hybrid controller has some problems.",
         thesis="some problems, two papers cited; not said which",
@@ -162,7 +170,7 @@ def _lost(data: Data) -> str:
 def _dynamics(data: Data) -> Claim:
     foam = data.varied["foam"]
     return Claim(
-        id="RC.DYNAMICS",
+        id="original-hybrid.dynamics",
         source="fig. 2.1, sec. 2.1",
         claim="Leaving out the robot's dynamics makes the original worse than (4.13).",
         thesis="does not include the dynamics; therefore developed further",

@@ -11,18 +11,27 @@ from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
-from palpate.bench.summary import losses
+from palpate.bench.metrics.summary import losses
 from palpate.bench.tick import Loop, LoopState
 from palpate.controllers import Impedance
 from palpate.controllers.any_controller import AnyController
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, by_world, since_contact, stops_holding
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_condition,
+    moved,
+    rougher,
+    stops_holding,
+)
+from palpate.thesis.force_control.disturbances import Change, Disturbance, run_with
+from palpate.thesis.force_control.panels import dots_panel, panels
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.turns import Change, Turn, run_with
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,7 +101,7 @@ class Data:
 def run(runs: Runs) -> Data:
     """Jumps of the desired depth on foam and rubber, and under what is varied."""
     worlds = _worlds()
-    varied = by_world(runs, worlds, lambda e, s: _found(_record(e, s)), _ALL)
+    varied = by_condition(runs, worlds, lambda e, s: _found(_record(e, s)), _ALL)
     rough, free = (_record(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
     traces = {
         "with friction": _trace(rough),
@@ -104,7 +113,10 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[Claim]:
     """Spring, damper and mass, each by itself, on foam and rubber."""
-    return [_claim(data, *pair) for pair in (("IMP.K", "K"), ("IMP.B", "B"), ("IMP.M", "M"))]
+    return [
+        _claim(data, *pair)
+        for pair in (("impedance-holds.K", "K"), ("impedance-holds.B", "B"), ("impedance-holds.M", "M"))
+    ]
 
 
 _WORDS = {"K": "spring", "B": "damper", "M": "mass"}
@@ -216,8 +228,8 @@ def _aimed(controller: Any, x: float) -> Any:
 
 
 def _record(experiment: Experiment, seed: int) -> Record:
-    turns = [Turn(float(i), drawn_to(experiment.wall.x + d)) for i, d in enumerate(DEPTHS) if i]
-    return run_with(experiment, seed, turns)
+    disturbances = [Disturbance(float(i), drawn_to(experiment.wall.x + d)) for i, d in enumerate(DEPTHS) if i]
+    return run_with(experiment, seed, disturbances)
 
 
 def _found(record: Record) -> Found:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.bench.metrics.following import LIMIT, SHARE
+from palpate.bench.metrics.window import SETTLE, rms
 from palpate.bench.one_joint import JOINT_FRICTION, one_joint
 from palpate.controllers.direct_neural import DirectIntegral, DirectNeural, direct_neural
 from palpate.environments import KelvinVoigt, StandardLinearSolid
@@ -18,8 +20,8 @@ from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, LIMIT, SETTLE, SHARE, VARIED_SEEDS, rms, stops_holding
+from palpate.thesis.conditions import ENOUGH, VARIED_SEEDS, stops_holding
+from palpate.thesis.force_control.panels import across, dots_panel, panels
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -139,7 +141,7 @@ def _follows(data: Data) -> Claim:
     )
     slow = _span(data)
     return Claim(
-        id="YY",
+        id="network-alone",
         source="fig. 2.3, 2.4, sec. 2.2 (after Yabuta and Yamada)",
         claim="A neural network alone controls the force of a one-joint robot.",
         thesis="proposed, and tested by experiment; no numbers",
@@ -164,7 +166,7 @@ def _is_integral(data: Data) -> Claim:
     }
     gains = [p.gain for n in data.integral for p in data.worlds[n]]
     return Claim(
-        id="YY.INTEGRAL",
+        id="network-alone.integrator",
         source="fig. 2.4; ours",
         claim="To first order it is an integral controller of the gain that its weights give it.",
         thesis="not said in the thesis",

@@ -10,27 +10,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.following import LIMIT
 from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, force_panel, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.conditions import (
     ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_condition,
+    moved,
+    rougher,
+    stops_holding,
+)
+from palpate.thesis.force_control.disturbances import Disturbance, other_surface, run_with
+from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
+from palpate.thesis.force_control.tracking import (
     FOLLOWS,
-    LIMIT,
     Slot,
     Tracking,
-    by_world,
+    described,
     since_contact,
     slot,
-    stops_holding,
-    told,
     tracking,
 )
 from palpate.thesis.runs import Runs
-from palpate.thesis.turns import Turn, other_surface, run_with
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, moved, rougher
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,14 +82,14 @@ def run(runs: Runs) -> Data:
     worlds = _worlds()
     measure = tracking(*JUDGED)
     full = {*_SURFACES, *_POSES}
-    tuned = by_world(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
-    fixed = by_world(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
+    tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
+    fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
     turned = runs.map(lambda seed: measure(_turned(seed)), list(runs.seeds))
     record = _turned(runs.seeds[0])
     t = since_contact(record)
     inside = (t >= SHOWN[0]) & (t < SHOWN[1])
     c = PARAMETERS.controller
-    middle = np.array([c.kf, c.ki, c.kd])  # type: ignore[union-attr]
+    middle = np.array([c.kf, c.ki, c.kd])
     gains = np.column_stack([record[f"adapted{i}"] for i in (1, 2, 3)])[inside] / middle
     return Data(slot(record, *SHOWN), gains, tuned, fixed, turned)
 
@@ -96,11 +102,11 @@ def check(data: Data) -> Sequence[Claim]:
 def _environment(data: Data) -> Claim:
     found = {"foam into\nrubber": data.turned, **{n: data.tuned[n] for n in _SURFACES}}
     return Claim(
-        id="FUK.ENVIRONMENT",
+        id="self-tuning-robust.environment",
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the environment's dynamics.",
         thesis="robust, by their simulations and experiments",
-        measured=f"foam turned into rubber: {told(data.turned)}; {_told(found)}",
+        measured=f"foam turned into rubber: {described(data.turned)}; {_told(found)}",
         tolerance=f"on foam, on rubber and after foam turned into rubber, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(_follow(f) for f in found.values())),
         note=(
@@ -117,7 +123,7 @@ def _configuration(data: Data) -> Claim:
     found = {n: data.tuned[n] for n in _POSES}
     reach = spread([100 * f.saturated for f in data.tuned["wall at\n0.40 m"]], "%", 2)
     return Claim(
-        id="FUK.CONFIGURATION",
+        id="self-tuning-robust.configuration",
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the arm's configuration.",
         thesis="robust, by their simulations and experiments",
@@ -137,7 +143,7 @@ def _network(data: Data) -> Claim:
     shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
     good = {n: sum(s <= BETTER for s in v) for n, v in shares.items()}
     return Claim(
-        id="FUK.NETWORK",
+        id="self-tuning-robust.tuning",
         source="fig. 2.5; ours",
         claim=(
             "It is the tuning that makes it so: with the gains of the start left alone the force follows "
@@ -207,7 +213,7 @@ def _worlds() -> dict[str, Experiment]:
 
 
 def _turned(seed: int) -> Record:
-    return run_with(PARAMETERS, seed, [Turn(TURN, other_surface(UNDER))])
+    return run_with(PARAMETERS, seed, [Disturbance(TURN, other_surface(UNDER))])
 
 
 def _follow(found: Sequence[Tracking]) -> bool:

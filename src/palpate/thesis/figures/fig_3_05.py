@@ -16,7 +16,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.rls import conditions, nearer
+from palpate.thesis.least_squares.press_runs import conditions, nearer
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def check(data: Data) -> Sequence[Claim]:
 def _agreement(data: Data) -> Claim:
     worst = max(data.varied, key=lambda name: data.varied[name])
     return Claim(
-        id="F3.5",
+        id="anti-alias-spectra",
         source="fig. 3.5, ch. 3",
         claim="With and without the 190 Hz filter the force signal's spectra are almost the same below 120 Hz.",
         thesis="almost the same",
@@ -156,7 +156,7 @@ def _folding(data: Data) -> Claim:
     folds, past = _peak(data, "960 Hz"), _peak(data, "960 Hz, filtered")
     loss = 20.0 * np.log10(past[1] / folds[1])
     return Claim(
-        id="F3.5.fold",
+        id="anti-alias-spectra.aliasing",
         source="fig. 3.5, ch. 3",
         claim="Noise around 480 Hz may alias, being so near half the sampling rate.",
         thesis="480 Hz",

@@ -94,7 +94,7 @@ def check(data: Data) -> Sequence[Claim]:
 
 def _designed(data: Data) -> Claim:
     return Claim(
-        id="F3.7",
+        id="anti-alias-components",
         source="fig. 3.7, ch. 3",
         claim="The component values give the 190 Hz that the filter was designed for.",
         thesis="190 Hz",
@@ -112,7 +112,7 @@ def _designed(data: Data) -> Claim:
 def _half_power(data: Data) -> Claim:
     low, high = data.cutoffs
     return Claim(
-        id="F3.7.cutoff",
+        id="anti-alias-components.cutoff",
         source="fig. 3.7, ch. 3",
         claim="The filter cuts off at 190 Hz.",
         thesis="190 Hz",

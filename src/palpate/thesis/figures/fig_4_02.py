@@ -13,9 +13,9 @@ from palpate.bench import changed, load
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
-from palpate.thesis import rls
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.rls_drawing import titled
+from palpate.thesis.least_squares import press_runs
+from palpate.thesis.least_squares.panels import titled
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -32,8 +32,8 @@ CAPTION = (
     "switch, by threshold; the thesis chose 5 N because of the noise, its listing has 0.8 N."
 )
 PARAMETERS = {
-    "foam": rls.nearer(changed(load("foam-hybrid"), {"run.press": 4.0})),
-    "rubber": rls.nearer(changed(load("rubber-hybrid"), {"run.press": 4.0})),
+    "foam": press_runs.nearer(changed(load("foam-hybrid"), {"run.press": 4.0})),
+    "rubber": press_runs.nearer(changed(load("rubber-hybrid"), {"run.press": 4.0})),
 }
 THRESHOLDS = (0.8, 1.2, 1.6, 2.0, 3.0, 5.0)
 CHOSEN = 5.0
@@ -69,12 +69,12 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """One run a seed on each surface; thresholds and conditions varied on foam."""
-    few = list(runs.seeds)[: rls.SWEPT_SEEDS]
+    few = list(runs.seeds)[: press_runs.SWEPT_SEEDS]
     foam = PARAMETERS["foam"]
     thresholds = {
         f: changed(foam, {"approach.switch": f, "run.press": 0.5, "run.duration": 20.0}) for f in THRESHOLDS
     }
-    varied = {name: [(e, s) for s in few] for name, e in rls.conditions(foam).items()}
+    varied = {name: [(e, s) for s in few] for name, e in press_runs.conditions(foam).items()}
     return Data(
         shown={name: _around(runs.one(e)) for name, e in PARAMETERS.items()},
         switches={name: runs.over_seeds(e, _switch) for name, e in PARAMETERS.items()},
@@ -113,7 +113,7 @@ def _clean(data: Data) -> Claim:
     fails = [name for name, some in data.varied.items() if 2 * sum(s.clean for s in some) <= len(some)]
     foam, rubber = data.switches["foam"], data.switches["rubber"]
     return Claim(
-        id="F4.2",
+        id="switch-at-5N",
         source="fig. 4.2, ch. 4",
         claim="When the force reaches 5 N control is switched from position to hybrid, and the force goes on to 20 N.",
         thesis="switch at 5 N",
@@ -129,8 +129,8 @@ def _clean(data: Data) -> Claim:
         note=(
             "The figure is lost and the text gives no number but the 5 N; the threshold is ours. Friction of joint 2 "
             "decides how the last newtons are reached: without the integral gain some 2 N would stay. "
-            f"{rls.told(fails, len(data.varied))} With the wall at 0.40 m joint 2's limit of 2.5 N m holds the force "
-            f"at {rls.median([s.last for s in data.varied['wall at 0.40 m']]):.1f} N."
+            f"{press_runs.where_it_fails(fails, len(data.varied))} With the wall at 0.40 m joint 2's limit of 2.5 N m "
+            f"holds the force at {press_runs.median([s.last for s in data.varied['wall at 0.40 m']]):.1f} N."
         ),
     )
 
@@ -145,7 +145,7 @@ def _threshold(data: Data) -> Claim:
     enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
     chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
     return Claim(
-        id="F4.2.threshold",
+        id="switch-at-5N.threshold",
         source="ch. 4",
         claim="With noise of almost ±2 N contact is not evident at low force; 5 N is a proper threshold.",
         thesis="5 N",

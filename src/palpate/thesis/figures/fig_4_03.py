@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
-from palpate.bench.summary import losses
+from palpate.bench.metrics.summary import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.force_loop import ForceLoop
-from palpate.thesis.force_panels import across, panels
-from palpate.thesis.force_tracking import ENOUGH, VARIED_SEEDS, since_contact
+from palpate.thesis.conditions import ENOUGH, SHORT, VARIED_SEEDS, rougher
+from palpate.thesis.force_control.loop import ForceLoop
+from palpate.thesis.force_control.panels import across, panels
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import SHORT, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -95,7 +95,7 @@ def check(data: Data) -> Sequence[Claim]:
 def _linear(data: Data) -> Claim:
     told = ", ".join(f"{data.limits[case] / 1e3:.3g}" for case in STUDY)
     return Claim(
-        id="HYB-STABLE",
+        id="force-loop-stable",
         source="fig. 4.3; the numbers are from our feasibility study",
         claim=(
             "The linear force loop is stable up to a surface stiffness that grows with damping and with "
@@ -128,7 +128,7 @@ def _whole(data: Data) -> Claim:
     n = len(next(iter(data.below.values())))
     friction = ", ".join(f"{min(v):.2g} to {max(v):.2g}" for v in data.rough.values())
     return Claim(
-        id="HYB-STABLE.BENCH",
+        id="force-loop-stable.whole-arm",
         source="fig. 4.3; ours",
         claim=(
             "The whole arm, with hardly any friction, is unstable where the linear loop of one direction is."
@@ -158,7 +158,7 @@ def _whole(data: Data) -> Claim:
 def _slow(data: Data) -> Claim:
     slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
     return Claim(
-        id="HYB-LAG",
+        id="low-pass-destabilises",
         source="sec. 4.4",
         claim="A low-pass with a low cut-off makes the system unstable by its lag.",
         thesis="the lag of a low cut-off destabilises the loop",

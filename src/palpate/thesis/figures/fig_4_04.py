@@ -53,7 +53,7 @@ def check(data: Data) -> Sequence[Claim]:
     middle = float(np.median(data.half_range))
     return [
         Claim(
-            id="F4.4",
+            id="force-noise",
             source="fig. 4.4, ch. 4",
             claim="The force signal carries noise of about ±2 N.",
             thesis="±2 N",

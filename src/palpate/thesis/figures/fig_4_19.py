@@ -10,14 +10,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.decoupling import COUPLED, JUMP, JUMPS, PRINTED, Pair, as_printed, pair_of, pressed
-from palpate.thesis.force_panels import across, dots_panel, panels
-from palpate.thesis.force_tracking import ENOUGH, SHARE, VARIED_SEEDS, since_contact, stops_holding
+from palpate.thesis.conditions import (
+    ENOUGH,
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    VARIED_SEEDS,
+    friction_and_pose,
+    rougher,
+    stops_holding,
+)
+from palpate.thesis.force_control.decoupling import (
+    COUPLED,
+    JUMP,
+    JUMPS,
+    PRINTED,
+    Pair,
+    as_printed,
+    pair_of,
+    pressed,
+)
+from palpate.thesis.force_control.panels import across, dots_panel, panels
+from palpate.thesis.force_control.tracking import since_contact
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import RELAXING_FOAM, RUBBER_SURFACE, SHORT, friction_and_pose, rougher
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,7 +113,7 @@ def check(data: Data) -> Sequence[Claim]:
 
 def _as_printed(data: Data, same: Mapping[str, Any]) -> Claim:
     return Claim(
-        id="DEC",
+        id="decoupled-control",
         claim="With the identified K_e, (4.19)-(4.21) as printed decouple the position and the force loop.",
         measured=(
             f"contact lost {spread([p.decoupled.lost for p in data.printed], 'times')}, the angle strays by "
@@ -119,7 +138,7 @@ def _as_printed(data: Data, same: Mapping[str, Any]) -> Claim:
 def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
     free = data.varied["hardly any\nfriction"]
     return Claim(
-        id="DEC.ANGLE",
+        id="decoupled-control.angle",
         claim="Corrected, a step of force no longer turns the end-effector.",
         measured=(
             f"{spread([100 * p.angle for p in data.nominal], '%', 2)} of the angle's stray under (4.13), "
@@ -146,7 +165,7 @@ def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
 def _side(data: Data, same: Mapping[str, Any]) -> Claim:
     free = data.varied["hardly any\nfriction"]
     return Claim(
-        id="DEC.Y",
+        id="decoupled-control.y",
         claim="Corrected, a step of force no longer moves the tip along the surface.",
         measured=(
             f"{spread([100 * p.side for p in data.nominal], '%', 2)} of the stray of y under (4.13), which "
@@ -170,7 +189,7 @@ def _side(data: Data, same: Mapping[str, Any]) -> Claim:
 def _force(data: Data, same: Mapping[str, Any]) -> Claim:
     free = data.varied["hardly any\nfriction"]
     return Claim(
-        id="DEC.FORCE",
+        id="decoupled-control.force",
         claim="Corrected, a jump of the desired y leaves the force alone.",
         measured=(
             f"the force strays by {spread([100 * p.decoupled.force for p in data.nominal], '%', 2)}, under "

@@ -11,9 +11,9 @@ import numpy as np
 
 from palpate.bench import Experiment, changed
 from palpate.report import style
-from palpate.thesis import rls, rls_drawing, rls_later
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.rls import Found
+from palpate.thesis.least_squares import panels, press_runs, steady_state
+from palpate.thesis.least_squares.press_runs import Found
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -34,12 +34,12 @@ NEAR = 0.06
 
 
 def _plain(damping: float) -> Experiment:
-    return changed(rls.PLAIN, {"surface.damping": damping, "surface.mass": 0.05})
+    return changed(press_runs.PLAIN, {"surface.damping": damping, "surface.mass": 0.05})
 
 
 def _relaxing(branch: float, time: float, damping: float) -> Experiment:
     return changed(
-        rls.RELAXING,
+        press_runs.RELAXING,
         {"surface.branch_stiffness": branch, "surface.branch_time": time, "surface.damping": damping},
     )
 
@@ -66,7 +66,7 @@ SHOWS: dict[str, Callable[[Found], bool]] = {
 class Data:
     """The press of figure 6.2 from raw signals, and what each foam shows."""
 
-    later: rls_later.Data
+    later: steady_state.Data
     foams: dict[str, Found]
 
     @property
@@ -79,8 +79,8 @@ def run(runs: Runs) -> Data:
     """One press a seed on both foams; one on each of the others."""
     cases = [(e, runs.seeds[0]) for e in PARAMETERS.values()]
     return Data(
-        later=rls_later.run(runs, rls.FOAMS, vary=1),
-        foams=dict(zip(PARAMETERS, runs.over(cases, rls.found), strict=True)),
+        later=steady_state.run(runs, press_runs.FOAMS, vary=1),
+        foams=dict(zip(PARAMETERS, runs.over(cases, press_runs.found), strict=True)),
     )
 
 
@@ -96,9 +96,9 @@ def _share(data: Data, *what: str) -> str:
 
 
 def _inertia(data: Data) -> Claim:
-    return rls_later.found_claim(
+    return steady_state.found_claim(
         data.later,
-        ("RLS-S3.M", SOURCE, "From raw signals M_e is negative.", "negative"),
+        ("least-squares-raw-signals.M", SOURCE, "From raw signals M_e is negative.", "negative"),
         lambda f: f.M_raw,
         lambda f: f.M_raw < 0.0,
         "kg",
@@ -109,9 +109,9 @@ def _inertia(data: Data) -> Claim:
 
 
 def _damping(data: Data) -> Claim:
-    return rls_later.found_claim(
+    return steady_state.found_claim(
         data.later,
-        ("RLS-S3.B", SOURCE, "From raw signals B_e is negative.", "negative"),
+        ("least-squares-raw-signals.B", SOURCE, "From raw signals B_e is negative.", "negative"),
         lambda f: f.B_raw,
         lambda f: f.B_raw < 0.0,
         "N s/m",
@@ -124,9 +124,9 @@ def _damping(data: Data) -> Claim:
 
 
 def _stiffness(data: Data) -> Claim:
-    return rls_later.found_claim(
+    return steady_state.found_claim(
         data.later,
-        ("RLS-S3.K", SOURCE, "From raw signals K_e is still right.", "almost f/x"),
+        ("least-squares-raw-signals.K", SOURCE, "From raw signals K_e is still right.", "almost f/x"),
         lambda f: 100.0 * f.apart_raw,
         lambda f: abs(f.apart_raw) < NEAR,
         "%",
@@ -143,7 +143,7 @@ def _together(data: Data) -> Claim:
     lacking = [what for what, shown in zip(SHOWS, data.table[best], strict=True) if not shown]
     lack = f"; the best lacks {', '.join(lacking)}" if lacking else ""
     return Claim(
-        id="RLS-S.together",
+        id="least-squares-one-foam",
         source="fig. 6.1 to 6.3, sec. 6.1",
         claim="One and the same foam shows all that figures 6.1 to 6.3 do.",
         thesis="one foam",
@@ -162,19 +162,21 @@ def _together(data: Data) -> Claim:
 
 def plot(data: Data) -> Figure:
     """The six panels from raw signals; the signs over all foams, and what each foam shows."""
-    drawing, axes = rls_drawing.grid(5)
+    drawing, axes = panels.grid(5)
     shown = data.later.shown
-    rls_drawing.six(axes, shown, "raw", (0.0, rls.FIRST))
+    panels.six(axes, shown, "raw", (0.0, press_runs.FIRST))
     ratios = [
         1e-3
-        * rls_drawing.calm(p, "force_sampled", rls.FIRST)
-        / rls_drawing.calm(p, "displacement", rls.FIRST)
+        * panels.calm(p, "force_sampled", press_runs.FIRST)
+        / panels.calm(p, "displacement", press_runs.FIRST)
         for p in shown.values()
     ]
-    rls_drawing.calm_limits(axes[4], *ratios)
-    for axis, (key, (_, scale)) in zip(axes[1:6:2], rls_drawing.PARAMETERS.items(), strict=True):
-        curves = [scale * p[f"{key}_raw"][rls.between(p, 0.1, rls.FIRST)] for p in shown.values()]
-        rls_drawing.calm_limits(axis, np.zeros(1), *curves)
+    panels.calm_limits(axes[4], *ratios)
+    for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):
+        curves = [
+            scale * p[f"{key}_raw"][press_runs.between(p, 0.1, press_runs.FIRST)] for p in shown.values()
+        ]
+        panels.calm_limits(axis, np.zeros(1), *curves)
         axis.axhline(0.0, color=style.GREY, linewidth=0.9)
     for axis in axes[6:]:
         axis.remove()
@@ -184,7 +186,7 @@ def plot(data: Data) -> Figure:
 
 
 def _signs(axis: Axes, data: Data) -> None:
-    rls_drawing.titled(axis, "g", "Raw signals: signs on all foams")
+    panels.titled(axis, "g", "Raw signals: signs on all foams")
     for label, names, color in (
         ("without memory", [n for n in data.foams if n.startswith("B ")], style.BLUE),
         ("relaxing", [n for n in data.foams if not n.startswith("B ")], style.ORANGE),
@@ -205,7 +207,7 @@ def _signs(axis: Axes, data: Data) -> None:
 
 
 def _table(axis: Axes, data: Data) -> None:
-    rls_drawing.titled(axis, "h", "What each foam shows")
+    panels.titled(axis, "h", "What each foam shows")
     table = np.array(list(data.table.values()), dtype=float)
     axis.imshow(table, aspect="auto", cmap="Blues", vmin=-0.15, vmax=1.25)
     axis.set_xticks(range(len(SHOWS)), list(SHOWS), rotation=40, ha="right", fontsize=7)

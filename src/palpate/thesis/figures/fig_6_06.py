@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.report import style
-from palpate.thesis import probing, rls_drawing
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.probing import STARTS, Answer, Choice, Press
-from palpate.thesis.probing_claims import ENOUGH
-from palpate.thesis.rls import Array
+from palpate.thesis.least_squares import panels
+from palpate.thesis.least_squares.press_runs import Array
+from palpate.thesis.neural_identifier import network
+from palpate.thesis.neural_identifier.claims import ENOUGH
+from palpate.thesis.neural_identifier.network import STARTS, Answer, Choice, Press
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ CAPTION = (
     "The same press on foam learned at several rates. The thesis: a smaller rate takes more time (it "
     "settled on 1e-4), and one that is too large may never converge."
 )
-PARAMETERS = probing.FOAM
+PARAMETERS = network.FOAM
 RATES = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 SHOWN = {1e-6: style.GREEN, 1e-5: style.VIOLET, 1e-4: style.BLUE, 1e-2: style.RED}
 SMALLER = (1e-4, 3e-5, 1e-5, 3e-6)
@@ -49,12 +50,12 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """One press a seed, learned at every rate and several amplitudes; conditions with two noise seeds each."""
-    some = probing.presses(runs, PARAMETERS, "foam")
-    curves = {rate: probing.learned(some[0], Choice(rate=rate), 0)[1] for rate in SHOWN}
+    some = network.presses(runs, PARAMETERS, "foam")
+    curves = {rate: network.learned(some[0], Choice(rate=rate), 0)[1] for rate in SHOWN}
     found = {a: _by_rate(runs, some, a, RATES) for a in (Choice().amplitude, *OTHERS)}
-    conditions = probing.varied_presses(runs, PARAMETERS, "foam")
+    conditions = network.varied_presses(runs, PARAMETERS, "foam")
     varied = {
-        name: {rate: probing.answers(runs, few, Choice(rate=rate), STARTS[:FEW]) for rate in SMALLER}
+        name: {rate: network.answers(runs, few, Choice(rate=rate), STARTS[:FEW]) for rate in SMALLER}
         for name, few in conditions.items()
     }
     return Data(some[0], curves, found, varied)
@@ -64,7 +65,7 @@ def _by_rate(
     runs: Runs, some: Sequence[Press], amplitude: float, rates: Sequence[float]
 ) -> dict[float, list[Answer]]:
     choices = [Choice(amplitude, rate=rate) for rate in rates]
-    return {choice.rate: found for choice, found in probing.swept(runs, some, choices).items()}
+    return {choice.rate: found for choice, found in network.swept(runs, some, choices).items()}
 
 
 def check(data: Data) -> Sequence[Claim]:
@@ -83,13 +84,13 @@ def _slower(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
     )
     nearest = min(found, key=lambda rate: abs(float(np.median([a.error_gone for a in found[rate]])) - 0.6))
     return Claim(
-        id="NN-ETA.slower",
+        id="network-learning-rate.slower",
         source="fig. 6.6, sec. 6.2",
         claim="A smaller learning rate takes longer.",
         thesis="in words",
         measured="error of the output gone at " + "; ".join(times),
         tolerance=(
-            f"in 9 of 10 runs the error of the output (mean over 50 ms within {probing.GONE:g} N) is gone "
+            f"in 9 of 10 runs the error of the output (mean over 50 ms within {network.GONE:g} N) is gone "
             "later at each of the rates 1e-4, 3e-5, 1e-5 and 3e-6 than at the one before"
         ),
         verdict=decided(_enough(ordered(found))),
@@ -113,7 +114,7 @@ def _too_large(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
     )
     largest = found[RATES[-1]]
     return Claim(
-        id="NN-ETA.too-large",
+        id="network-learning-rate.too-large",
         source="sec. 6.2",
         claim="There are learning rates so large that the network never settles.",
         thesis="in words",
@@ -165,22 +166,22 @@ PANELS = {
 
 def plot(data: Data) -> Figure:
     """Output of the network and K by probing along one press; time until the error is gone over the rate."""
-    drawing, axes = rls_drawing.grid(2)
+    drawing, axes = panels.grid(2)
     _curves(axes, data)
     for axis, (letter, (title, label)) in zip(axes, PANELS.items(), strict=True):
-        rls_drawing.titled(axis, letter, title)
+        panels.titled(axis, letter, title)
         axis.set_ylabel(label)
     colors = (style.BLUE, style.GREEN, style.ORANGE)
     for (amplitude, by_rate), color in zip(data.found.items(), colors, strict=True):
         _times(axes[3], by_rate, f"{amplitude:g} N", color)
-    axes[3].axhline(probing.PRESS, color=style.INK, linewidth=0.6)
+    axes[3].axhline(network.PRESS, color=style.INK, linewidth=0.6)
     axes[3].set(xscale="log", yscale="log", xlabel="learning rate; cross: not within the 4 s")
     axes[3].legend(fontsize=7, frameon=False, title="output amplitude", title_fontsize=7, loc="lower left")
     return drawing
 
 
 def _curves(axes: list[Axes], data: Data) -> None:
-    t = np.arange(len(data.press.force)) * probing.TICK
+    t = np.arange(len(data.press.force)) * network.TICK
     axes[0].plot(t, data.press.force, color=style.INK, linewidth=0.6, alpha=0.5, label="measured")
     for rate, color in SHOWN.items():
         curve = data.curves[rate]
@@ -189,7 +190,7 @@ def _curves(axes: list[Axes], data: Data) -> None:
         axes[2].plot(t, curve[:, 3], color=color, linewidth=0.8)
     axes[1].axhline(1e-3 * data.press.ratio, color=style.ORANGE, linewidth=1.0, linestyle=":")
     for axis, limits in zip(axes[:3], ((-2.0, 42.0), (0.0, 21.0), (-25.0, 25.0)), strict=True):
-        axis.set(xlim=(0.0, probing.PRESS), ylim=limits, xlabel="time since 5 N [s]")
+        axis.set(xlim=(0.0, network.PRESS), ylim=limits, xlabel="time since 5 N [s]")
     axes[0].legend(fontsize=7, frameon=False, ncols=2, loc="upper right", bbox_to_anchor=(1.0, 0.92))
 
 
@@ -202,4 +203,4 @@ def _times(axis: Axes, by_rate: Mapping[float, Sequence[Answer]], label: str, co
     axis.plot(
         rates[:, 0], np.where(np.isfinite(middle), middle, np.nan), color=color, linewidth=1.1, label=label
     )
-    axis.plot(rates[~done], np.full(int((~done).sum()), 1.4 * probing.PRESS), "x", color=color, markersize=4)
+    axis.plot(rates[~done], np.full(int((~done).sum()), 1.4 * network.PRESS), "x", color=color, markersize=4)

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.report import style
-from palpate.thesis import probing, probing_claims, probing_figure, probing_notes, rls_drawing
 from palpate.thesis.claims import Claim
-from palpate.thesis.probing import AMPLITUDES, WEIGHTS, Choice
-from palpate.thesis.rls import Array
+from palpate.thesis.least_squares import panels
+from palpate.thesis.least_squares.press_runs import Array
+from palpate.thesis.neural_identifier import claims, figure, network, notes
+from palpate.thesis.neural_identifier.network import AMPLITUDES, WEIGHTS, Choice
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ CAPTION = (
     "0.6 s. Left as chosen, and with what comes nearest to the 0.6 s; right: the time by output amplitude and initial "
     "weights, which the thesis does not give (shaded: what counts as about 0.6 s)."
 )
-PARAMETERS = probing.FOAM
+PARAMETERS = network.FOAM
 NEAR = Choice(amplitude=25.0, weights=0.01)
 """An amplitude just above the force and weights as small as those in the listing of the controller."""
 
@@ -35,36 +36,36 @@ NEAR = Choice(amplitude=25.0, weights=0.01)
 class Data:
     """What the figure shows: the answers of figure 6.7, and the error of a network that learns slowly."""
 
-    shown: probing_figure.Data
+    shown: figure.Data
     near: Array  # error of the network that learns slowly [N]
 
 
 def run(runs: Runs) -> Data:
     """As figure 6.7."""
-    shown = probing_figure.run(runs, PARAMETERS, "foam")
-    return Data(shown, probing.learned(shown.press, NEAR, 0)[1][:, 3])
+    shown = figure.run(runs, PARAMETERS, "foam")
+    return Data(shown, network.learned(shown.press, NEAR, 0)[1][:, 3])
 
 
 def check(data: Data) -> Sequence[Claim]:
     """When the error is almost zero."""
-    return probing_claims.claims(data.shown.grounds, (probing_claims.ERROR,), "NN-S", "fig. 6.8, sec. 6.2")
+    return claims.claims(data.shown.grounds, (claims.ERROR,), "network-foam", "fig. 6.8, sec. 6.2")
 
 
 def plot(data: Data) -> Figure:
     """The error along a press, and when it is gone."""
-    drawing, axes = rls_drawing.grid(2)
+    drawing, axes = panels.grid(2)
     for axis, error, letter, title in (
         (axes[0], data.shown.curves[0][:, 3], "a", "Error as chosen: amplitude 40 N, weights to 0.5"),
         (axes[2], data.near, "b", f"Error with amplitude {NEAR.amplitude:g} N, weights to {NEAR.weights:g}"),
     ):
-        axis.plot(np.arange(len(error)) * probing.TICK, error, color=style.BLUE, linewidth=0.7)
-        axis.axhspan(-probing.GONE, probing.GONE, color=style.GREEN, alpha=0.15, linewidth=0)
+        axis.plot(np.arange(len(error)) * network.TICK, error, color=style.BLUE, linewidth=0.7)
+        axis.axhspan(-network.GONE, network.GONE, color=style.GREEN, alpha=0.15, linewidth=0)
         axis.axvline(0.6, color=style.RED, linewidth=0.9, linestyle=":")
-        axis.set(xlim=(0.0, probing.PRESS), xlabel="time since 5 N [s]", ylabel="error [N]")
-        rls_drawing.titled(axis, letter, title)
+        axis.set(xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]", ylabel="error [N]")
+        panels.titled(axis, letter, title)
     for axis, thresholds, letter in ((axes[1], True, "c"), (axes[3], False, "d")):
         _times(axis, data, thresholds=thresholds)
-        rls_drawing.titled(
+        panels.titled(
             axis, letter, f"Time until gone; thresholds {'learn' if thresholds else 'stay at zero'}"
         )
     return drawing
@@ -77,7 +78,7 @@ def _times(axis: Axes, data: Data, *, thresholds: bool) -> None:
         found = [[a.error_gone for a in swept[Choice(a, weights, thresholds)]] for a in AMPLITUDES]
         middle = np.median(found, axis=1)
         axis.plot(AMPLITUDES, middle, "o-", color=color, markersize=3.5, linewidth=1.0, label=f"{weights:g}")
-    axis.axhspan(*probing_notes.TIME, color=style.RED, alpha=0.12, linewidth=0)
+    axis.axhspan(*notes.TIME, color=style.RED, alpha=0.12, linewidth=0)
     axis.set(xscale="log", yscale="log", xlabel="output amplitude [N]", ylabel="time [s]")
     axis.set_xticks(AMPLITUDES, [f"{a:g}" for a in AMPLITUDES], fontsize=7.5)
     axis.minorticks_off()

@@ -9,21 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.bench import changed
+from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import dots_panel, force_panel, panels
-from palpate.thesis.force_tracking import (
-    ENOUGH,
-    FOAM,
-    RUBBER,
-    SHARE,
-    VARIED_SEEDS,
-    Slot,
-    since_contact,
-    slot,
-    stops_holding,
-    variations,
-)
+from palpate.thesis.conditions import ENOUGH, VARIED_SEEDS, stops_holding
+from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, Slot, since_contact, slot, variations
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -76,7 +67,7 @@ def check(data: Data) -> Sequence[Claim]:
     """At both levels the force has to stay off by more than a tenth of what is asked for."""
     return [
         Claim(
-            id="HYB",
+            id="hybrid-alone-falls-short",
             source="fig. 6.10, sec. 6.3",
             claim="The hybrid controller alone (K_fp 0.25, no integral) cannot reach the force of the 10/20 N steps.",
             thesis="cannot reach the desired force",

@@ -7,17 +7,9 @@ from typing import TYPE_CHECKING
 
 from palpate.bench import changed
 from palpate.thesis.claims import Claim, decided
-from palpate.thesis.force_panels import tracked_figure
-from palpate.thesis.force_tracking import (
-    ENOUGH,
-    FOAM,
-    FOLLOWING,
-    Tracked,
-    Tracking,
-    stops_holding,
-    told,
-    tracked,
-)
+from palpate.thesis.conditions import ENOUGH, stops_holding
+from palpate.thesis.force_control.panels import tracked_figure
+from palpate.thesis.force_control.tracking import FOAM, FOLLOWING, Tracked, Tracking, described, tracked
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -43,11 +35,11 @@ def check(data: Tracked) -> Sequence[Claim]:
     """The force must not follow in the first ten seconds."""
     return [
         Claim(
-            id="NNC-SLOW.first",
+            id="neural-slow-rate.first",
             source="fig. 6.13, sec. 6.3",
             claim="With a learning rate of 1e-5 the force cannot follow at first.",
             thesis="cannot follow immediately",
-            measured=told(data.nominal),
+            measured=described(data.nominal),
             tolerance=f"in 9 of 10 runs it does not follow from 0 to 10 s; following: {FOLLOWING}",
             verdict=decided(sum(map(_late, data.nominal)) >= ENOUGH * len(data.nominal)),
             note=(

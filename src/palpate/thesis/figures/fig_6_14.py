@@ -10,28 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import changed
+from palpate.bench.metrics.following import LIMIT
+from palpate.bench.metrics.window import SETTLE, rms
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.conditions import RELAXING_FOAM
 from palpate.thesis.figures.fig_6_13 import SLOW
-from palpate.thesis.force_panels import force_panel, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.force_control.panels import force_panel, panels
+from palpate.thesis.force_control.tracking import (
     FOAM,
     FOLLOWS,
-    LIMIT,
-    SETTLE,
     Slot,
     Tracking,
+    described,
     following,
-    rms,
     since_contact,
     slot,
-    told,
     tracking,
 )
 from palpate.thesis.runs import Runs
-from palpate.thesis.worlds import RELAXING_FOAM
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -89,11 +88,11 @@ def check(data: Data) -> Sequence[Claim]:
     other = f"loses contact after {np.median(lost):.0f} s" if lost else "keeps contact"
     return [
         Claim(
-            id="NNC-SLOW.later",
+            id="neural-slow-rate.later",
             source="fig. 6.14, sec. 6.3",
             claim="After a few minutes the same slow controller follows.",
             thesis="follows after a few minutes",
-            measured=f"{told(data.nominal)}; in the first ten seconds {first}",
+            measured=f"{described(data.nominal)}; in the first ten seconds {first}",
             tolerance=f"{FOLLOWS}, from 180 to 190 s",
             verdict=decided(following(data.nominal)),
             note=(

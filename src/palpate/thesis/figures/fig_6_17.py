@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import changed
+from palpate.bench.metrics.following import LIMIT
 from palpate.records import Record
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_panels import following_panel, force_panel, panels
-from palpate.thesis.force_tracking import (
+from palpate.thesis.conditions import stops_holding
+from palpate.thesis.force_control.panels import following_panel, force_panel, panels
+from palpate.thesis.force_control.tracking import (
     FOLLOWS,
-    LIMIT,
     RUBBER,
     SINE,
     Tracked,
+    described,
     following,
     since_contact,
-    stops_holding,
-    told,
     tracked,
 )
 from palpate.thesis.runs import Runs
@@ -73,11 +73,11 @@ def check(data: Data) -> Sequence[Claim]:
     middle = float(np.median(data.adapted))
     return [
         Claim(
-            id="NNC-R2",
+            id="neural-rubber-sine",
             source="fig. 6.17, sec. 6.3",
             claim="On rubber it follows steps with 4 sin(πt) added, from the start.",
             thesis="follows well",
-            measured=f"{told(found.nominal)}; motor 2 at its limit {limited:.0f} % of the time",
+            measured=f"{described(found.nominal)}; motor 2 at its limit {limited:.0f} % of the time",
             tolerance=f"{FOLLOWS}, from 0 to 10 s",
             verdict=decided(following(found.nominal)),
             note=(
@@ -89,7 +89,7 @@ def check(data: Data) -> Sequence[Claim]:
             ),
         ),
         Claim(
-            id="NNC-R2.adapts",
+            id="neural-rubber-sine.adapts",
             source="fig. 6.17, sec. 6.3",
             claim="The controller adapts in almost 5 s.",
             thesis="almost 5 s",

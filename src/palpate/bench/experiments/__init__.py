@@ -1,0 +1,1 @@
+"""An experiment: a TOML file, its tables, and what is said when one is refused."""

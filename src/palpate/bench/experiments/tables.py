@@ -1,0 +1,241 @@
+"""An experiment: one TOML file with every number of a run, read and checked at the edge."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+
+import msgspec
+from msgspec import Meta
+
+from palpate.bench.experiments.error_messages import explained, not_finite
+from palpate.bench.experiments.toml_files import TomlFiles, decoded
+from palpate.controllers import ControllerTable, HybridController
+from palpate.environments import SurfaceTable
+from palpate.errors import InputError
+from palpate.signals.tables import (
+    NotNegative,
+    NotNegativeTriple,
+    Positive,
+    PositiveTriple,
+    Table,
+    Triple,
+    any_of,
+)
+
+if TYPE_CHECKING:
+    AnyController: TypeAlias = Any  # which fields it has depends on its kind
+    AnySurface: TypeAlias = Any
+else:
+    AnyController, AnySurface = any_of(ControllerTable), any_of(SurfaceTable)
+
+
+class Run(Table):
+    """How long it goes on, and how finely."""
+
+    press: Positive = 6.0
+    """Seconds of contact after which the run ends."""
+    duration: Annotated[float, Meta(gt=0, le=3600)] = 60.0
+    """Seconds after which it ends in any case."""
+    losses: Annotated[int, Meta(ge=0)] = 3
+    """Losses of contact after which it ends; 0 lets it go on."""
+    rate: Annotated[int, Meta(ge=100, le=20000)] = 1000
+    """Ticks a second."""
+    steps: Annotated[int, Meta(ge=1, le=1000)] = 20
+    """Steps of the physics between ticks."""
+
+
+class Robot(Table):
+    """The thesis' arm; its masses and lengths are those of appendix D."""
+
+    start: Triple = (0.454, 0.0, 0.0)
+    """Pose at the start: x [m], y [m], phi [rad]."""
+    elbow: Literal[1, -1] = 1
+    torque_limits: PositiveTriple = (16.0, 2.5, 0.6)
+    rotor_inertia: NotNegativeTriple = (0.084, 0.009, 2.8e-5)
+    """[kg m^2]; in the plant, not in the controller's model."""
+
+
+class Friction(Table):
+    """LuGre friction of the joints."""
+
+    coulomb: PositiveTriple = (3.0, 0.25, 0.03)
+    static: PositiveTriple = (3.6, 0.3, 0.036)
+    stribeck: PositiveTriple = (0.01, 0.01, 0.01)
+    bristle_stiffness: NotNegativeTriple = (15000.0, 1250.0, 150.0)
+    bristle_damping: NotNegativeTriple = (120.0, 11.0, 0.65)
+    viscous: NotNegativeTriple = (0.0, 0.0, 0.0)
+
+
+class Wall(Table):
+    """Where the surface is, and how the tip sticks to it."""
+
+    x: float = 0.465
+    side_stiffness: Positive = 5000.0
+    side_damping: NotNegative = 20.0
+    side_friction: NotNegative = 0.7
+
+
+class Encoders(Table):
+    """Of the joints: counts a turn."""
+
+    counts: PositiveTriple = (614400.0, 409600.0, 2000.0)
+
+
+class ForceSensor(Table):
+    """Its noise and its chain: low-pass [Hz], sampling [Hz], bits over a full scale [N]."""
+
+    noise: NotNegative = 0.6
+    """Standard deviation of a sample [N]."""
+    cutoff: Positive = 120.0
+    sampling: Annotated[int, Meta(ge=1)] = 480
+    phase: NotNegative = 0.0
+    """When its clock ticks first [s], less than a period of its sampling."""
+    bits: Annotated[int, Meta(ge=2, le=32)] = 12
+    full_scale: Positive = 200.0
+    analog_filter: bool = False
+    """The 190 Hz low-pass of fig. 3.6 between sensor and controller."""
+
+
+class Filters(Table):
+    """The controller's own low-passes [Hz]."""
+
+    motion: Positive = 35.0
+    """Of Cartesian velocity and acceleration, and of joint 3 [Hz]."""
+    force: Positive = 120.0
+
+
+class ApproachTable(Table):
+    """How the arm looks for the surface: a hold [s], then steps of x [m] each period [s]; the gains of the position."""
+
+    hold: NotNegative = 5.0
+    first: float = 0.456
+    step: float = 0.001
+    period: Positive = 1.0
+    switch: Positive = 5.0
+    """Force at which the contact controller takes over [N]."""
+    release: float = 0.0
+    """Force under which the contact is taken to be lost [N]."""
+    wait: NotNegative = 1.0
+    kp: NotNegative = 400.0
+    kv: NotNegative = 80.0
+
+
+class ChirpTable(Table):
+    """A sine [N] that sweeps from a low to a high frequency [Hz] in so many seconds of contact, once."""
+
+    low: Positive
+    high: Positive
+    seconds: Positive
+    amplitude: float
+    logarithmic: bool = False
+    """Its frequency grows by the same factor each second, not by the same difference."""
+
+
+class MultisineTable(Table):
+    """Sines side by side: frequencies [Hz], amplitudes [N], and phases at contact [rad]."""
+
+    frequencies: tuple[Positive, ...]
+    amplitudes: tuple[float, ...]
+    phases: tuple[float, ...]
+
+
+class DesiredForce(Table):
+    """Steps between two forces [N] each period [s], and a sine [N], [Hz] whose clock may restart [s]."""
+
+    first: float = 20.0
+    second: float | None = None
+    """Of every other interval; as the first when left out."""
+    period: Positive = 2.5
+    amplitude: float = 0.0
+    frequency: NotNegative = 0.5
+    restart: NotNegative = 0.0
+    chirp: ChirpTable | None = None
+    multisine: MultisineTable | None = None
+
+
+class Compensation(Table):
+    """Of friction, by Coulomb's law with a blend through zero; level zero leaves it out."""
+
+    level: NotNegativeTriple = (0.0, 0.0, 0.0)
+    blend: PositiveTriple = (0.002, 0.002, 0.002)
+
+
+class Identification(Table):
+    """The recursive least squares that watches."""
+
+    forgetting: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    initial: Triple = (0.0, 0.0, 2e5)
+    """M, B, K of the thesis' estimators at the start; the matched one starts from nothing."""
+    covariance: Positive = 1e10
+    """P(0) is this times the identity."""
+    touch: Positive = 2.0
+    """Filtered force from which the matched estimator listens [N]."""
+    cutoff: Positive = 35.0
+    """Of the matched estimator's state-variable filter [Hz]."""
+
+
+class Experiment(Table, kw_only=True):
+    """Every number of a run."""
+
+    title: str
+    about: str = ""
+    surface: AnySurface
+    run: Run = Run()
+    robot: Robot = Robot()
+    friction: Friction = Friction()
+    wall: Wall = Wall()
+    encoders: Encoders = Encoders()
+    force_sensor: ForceSensor = ForceSensor()
+    filters: Filters = Filters()
+    approach: ApproachTable = ApproachTable()
+    force: DesiredForce = DesiredForce()
+    controller: AnyController = HybridController()
+    compensation: Compensation = Compensation()
+    identification: Identification = Identification()
+
+
+FILES = TomlFiles("experiment", "an", "palpate.bench", "experiments")
+names, source = FILES.names, FILES.source
+
+
+def load(name: str) -> Experiment:
+    """An experiment by its name, or from a TOML file.
+
+    Raises:
+        InputError: no such experiment or file, TOML that does not parse, an unknown key, a value out of range.
+    """
+    return parse(source(name), name)
+
+
+def parse(text: str, where: str) -> Experiment:
+    """An experiment from TOML; `where` names the text in errors."""
+    return _converted(decoded(text, where), where)
+
+
+def changed(experiment: Experiment, changes: Mapping[str, Any]) -> Experiment:
+    """The experiment with other values: {"friction.coulomb": (6.0, 0.5, 0.06), "run.press": 20.0}.
+
+    Raises:
+        InputError: a key that does not exist, or a value out of range.
+    """
+    tables = msgspec.to_builtins(experiment)
+    for path, value in changes.items():
+        *outer, key = path.split(".")
+        table = tables
+        for name in outer:
+            if table.get(name) is None:
+                table[name] = {}
+            table = table[name]
+        table[key] = msgspec.to_builtins(value)
+    return _converted(tables, ", ".join(changes))
+
+
+def _converted(tables: dict[str, Any], where: str) -> Experiment:
+    bad = not_finite(tables)
+    if bad is not None:
+        raise InputError(f"{where}: {bad}")
+    try:
+        return msgspec.convert(tables, Experiment)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{where}: {explained(str(error), tables, Experiment)}") from error

@@ -1,0 +1,83 @@
+"""How well the force follows what is asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.bench.metrics.window import SETTLE, Look, Metric, Value, rms
+
+LIMIT = 1.5
+"""Largest RMS error of a force that follows [N]: 10 % of 15 N, which is what is asked for on average."""
+SHARE = 0.10
+"""Largest mean error in the last second of an interval, as a share of the desired force there."""
+
+
+def _mean_error(look: Look) -> Value:
+    return float(np.mean(look.error)) if len(look.error) else None
+
+
+def _std(look: Look) -> Value:
+    return float(np.std(look.error)) if len(look.error) else None
+
+
+def interval_error(look: Look) -> Value:
+    """The largest mean error in the last second of an interval, as a share of the desired force there."""
+    shares = [abs(float(np.mean(error))) / abs(float(np.mean(desired))) for error, desired in look.intervals]
+    return max(shares, default=None)
+
+
+def settled_rms(look: Look) -> Value:
+    """RMS error outside the first half second after each step [N]."""
+    return rms(look.after_steps) if len(look.after_steps) else None
+
+
+def _of_force(key: str) -> Metric:
+    unit, text = {
+        "settling_s": ("s", "time from the switch until the force stays within 5 % of the first one desired"),
+        "overshoot_N": ("N", "by how much the force exceeds the first one desired, before the next"),
+    }[key]
+    name = key.rpartition("_")[0]
+
+    def of(look: Look) -> Value:
+        force = look.summary["force"]
+        return None if force is None else force[key]
+
+    return Metric(name, unit, text, of)
+
+
+def _peak(look: Look) -> Value:
+    return float(np.max(look["force"])) if len(look.error) else None
+
+
+def _bandwidth(look: Look) -> Value:
+    """Slope of the controller's memory over the integral of the measured force error."""
+    t = look.record["t"][look.inside]
+    if len(t) < 3:
+        return None
+    error = look["force_desired"] - look["force_measured"]
+    integral = np.cumsum(error)[:-1] * (t[1] - t[0])
+    return float(np.polyfit(integral, look["memory_fx"][1:], 1)[0])
+
+
+FOLLOWING = (
+    Metric("force_rms", "N", "RMS of the true force's error, steps included", lambda look: rms(look.error)),
+    Metric("force_rms_settled", "N", f"the same without the first {SETTLE:g} s after each step", settled_rms),
+    Metric("force_error", "N", "mean error of the true force", _mean_error),
+    Metric("force_std", "N", "standard deviation of that error", _std),
+    Metric(
+        "interval_error",
+        "1",
+        "largest mean error in the last second of an interval between steps, as a share of the desired force",
+        interval_error,
+    ),
+    Metric("peak_force", "N", "largest true force", _peak),
+    _of_force("settling_s"),
+    _of_force("overshoot_N"),
+    Metric(
+        "integral_gain",
+        "1/s",
+        "slope of the controller's gathered force command over the integral of the force error",
+        _bandwidth,
+    ),
+)
+"""Metrics of the force in contact."""

@@ -1,0 +1,131 @@
+"""What the thesis claims of a run, as numbers and as yes or no."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from palpate.bench.metrics.following import LIMIT, SHARE, interval_error, settled_rms
+from palpate.bench.metrics.summary import losses
+from palpate.bench.metrics.surface import QUOTIENT, estimate
+from palpate.bench.metrics.window import Look, Metric, Value
+
+APART = 0.10
+"""How far two numbers for the stiffness may be apart, as a share, to be called the same."""
+QUIET = 0.02
+"""Largest standard deviation of the true force's error where it is at rest, as a share of the desired force."""
+YES_OR_NO = ("no", "yes")
+OUTCOMES = ("follows", "slow", "rings")
+
+
+def outcome(look: Look) -> Value:
+    """0 if the force follows; 1 if it is still on its way at the ends of intervals; 2 if it shakes too much."""
+    off, shaking = interval_error(look), settled_rms(look)
+    if off is None or shaking is None:
+        return None
+    if off > SHARE:
+        return 1.0
+    return 0.0 if shaking <= LIMIT else 2.0
+
+
+def _follows(look: Look) -> Value:
+    if not look.touched:
+        return None
+    if look.ended or losses(look.record):
+        return 0.0
+    found = outcome(look)
+    return None if found is None else float(found == 0.0)
+
+
+def _steady(look: Look) -> Value:
+    if not look.touched:
+        return None
+    error = look.error
+    if not len(error) or losses(look.record):
+        return 0.0
+    return float(np.std(error) <= QUIET * abs(np.mean(look["force_desired"])))
+
+
+def adaptation_time(look: Look) -> Value:
+    """From the first contact to the beginning of the first interval from which on none ends far off [s].
+
+    Far off is a mean error in the last second of more than 10 % of the desired force. None if one of the last two is:
+    steps go between two forces, and the lower one is held where the higher never is. None, too, if contact was lost.
+    The study's window does not count.
+    """
+    if not look.touched or losses(look.record) or look.ended:
+        return None
+    period = float(look.record.meta["experiment"]["force"]["period"])
+    far = [
+        abs(float(np.mean(error))) > SHARE * abs(float(np.mean(desired)))
+        for error, desired in Look(look.record).intervals
+    ]
+    if not far or any(far[-2:]):
+        return None
+    return period * (max((i for i, off in enumerate(far) if off), default=-1) + 1)
+
+
+def _negative(front: str, parameter: str) -> Callable[[Look], Value]:
+    value = estimate(front, parameter)
+
+    def of(look: Look) -> Value:
+        found = value(look)
+        return None if found is None else float(found < 0.0)
+
+    return of
+
+
+def _agrees(look: Look) -> Value:
+    K, quotient = estimate("thesis", "K")(look), estimate(QUOTIENT, "K")(look)
+    return None if K is None or not quotient else float(abs(K / quotient - 1.0) <= APART)
+
+
+CLAIMS = (
+    Metric(
+        "follows",
+        "1",
+        f"whether contact is kept, the RMS error outside the steps is at most {LIMIT:g} N, and no interval ends "
+        f"more than {100 * SHARE:.0f} % off",
+        _follows,
+        YES_OR_NO,
+    ),
+    Metric(
+        "outcome",
+        "1",
+        "follows; slow: still off where an interval ends; rings: not off there, but shaking",
+        outcome,
+        OUTCOMES,
+    ),
+    Metric(
+        "steady",
+        "1",
+        f"whether contact is kept and the force's standard deviation is at most {100 * QUIET:.0f} % of the desired one",
+        _steady,
+        YES_OR_NO,
+    ),
+    Metric(
+        "adaptation_time",
+        "s",
+        "from the first contact on until no interval between steps ends more than 10 % off any more",
+        adaptation_time,
+    ),
+    Metric(
+        "K_agrees",
+        "1",
+        f"whether K by the thesis' least squares is within {100 * APART:.0f} % of force over displacement",
+        _agrees,
+        YES_OR_NO,
+    ),
+    *(
+        Metric(
+            f"{parameter}_negative_{front}",
+            "1",
+            f"whether {parameter} comes out negative, {front} signals",
+            _negative(front, parameter),
+            YES_OR_NO,
+        )
+        for parameter, front in (("M", "thesis"), ("M", "raw"), ("B", "raw"), ("M", "matched"))
+    ),
+)
+"""Metrics that are claims of the thesis."""

@@ -1,0 +1,1 @@
+"""A force to ask for: its figure, its table, its files."""

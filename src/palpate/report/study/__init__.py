@@ -1,0 +1,1 @@
+"""How a study's figures and its page are drawn."""

@@ -1,0 +1,119 @@
+"""Panels that the figures of force control are put together from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from palpate.bench.metrics.following import LIMIT
+from palpate.report import style
+from palpate.thesis.force_control.tracking import Slot, Tracked, Tracking
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+T = TypeVar("T")
+PALE = "#a9c8e4"
+
+
+def panels(heights: Sequence[float], columns: int = 1, width: float = 9.0) -> tuple[Figure, list[list[Axes]]]:
+    """Rows of panels of these heights [inches], each with an x axis of its own."""
+    from matplotlib.figure import Figure
+
+    size = (width, sum(heights) + 0.45 * len(heights))
+    drawing = Figure(figsize=size, dpi=style.DPI, layout="constrained")
+    grid = drawing.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
+    for axis in grid.flat:
+        style.plain(axis)
+    return drawing, [list(row) for row in grid]
+
+
+def across(row: Sequence[Axes]) -> Axes:
+    """The first panel of a row, stretched over all of it; the others go."""
+    axis, *others = row
+    for other in others:
+        other.remove()
+    where = axis.get_subplotspec()
+    if where is not None:
+        axis.set_subplotspec(where.get_gridspec()[where.rowspan.start, :])
+    return axis
+
+
+def force_panel(axis: Axes, shown: Slot, title: str = "") -> None:
+    """Desired and measured force, the true one paler, and where a motor is at its limit."""
+    axis.plot(shown.t, shown.measured, color=style.BLUE, linewidth=0.7, label="measured")
+    axis.plot(shown.t, shown.true, color=PALE, linewidth=1.8, label="true")
+    axis.plot(shown.t, shown.desired, color=style.ORANGE, linewidth=1.4, label="desired")
+    limits(axis, shown)
+    axis.set(ylabel="force [N]", xlabel="time since contact [s]", xlim=(shown.t[0], shown.t[-1]))
+    axis.set_title(title, loc="left", fontsize=9.5)
+    style.legend(axis)
+
+
+def limits(axis: Axes, shown: Slot) -> None:
+    """A red bar at the lower edge where a motor is at its limit."""
+    if shown.limited.any():
+        axis.fill_between(
+            shown.t,
+            0.0,
+            0.035,
+            where=shown.limited > 0.0,
+            transform=axis.get_xaxis_transform(),
+            color=style.RED,
+            linewidth=0,
+            label="a motor at its limit",
+        )
+
+
+def dots_panel(
+    axis: Axes,
+    found: Mapping[str, Sequence[T]],
+    value: Callable[[T], float],
+    holds: Callable[[T], bool],
+    *,
+    limit: float | None,
+    label: str,
+    title: str = "",
+) -> None:
+    """A dot a run, by variation; red where what is claimed does not hold."""
+    for at, runs in enumerate(found.values()):
+        spot = at + np.linspace(-0.22, 0.22, max(2, len(runs)))[: len(runs)]
+        colors = [style.GREEN if holds(one) else style.RED for one in runs]
+        axis.scatter(spot, [value(one) for one in runs], c=colors, s=16, linewidths=0)
+    if limit is not None:
+        axis.axhline(limit, color=style.INK, linewidth=1, linestyle="--")
+    axis.set_xticks(range(len(found)), list(found), fontsize=8)
+    axis.set_xlim(-0.6, len(found) - 0.4)
+    axis.set_ylim(bottom=0.0)
+    axis.set_ylabel(label)
+    axis.grid(visible=False, axis="x")
+    axis.set_title(title, loc="left", fontsize=9.5)
+
+
+def following_panel(axis: Axes, found: Mapping[str, Sequence[Tracking]]) -> None:
+    """RMS error outside the steps, by variation."""
+    dots_panel(
+        axis,
+        found,
+        lambda one: one.settled,
+        lambda one: one.follows,
+        limit=LIMIT,
+        label="RMS error [N]",
+        title="outside the steps, each dot a run: green follows, red does not; dashed: the limit",
+    )
+
+
+def tracked_figure(data: Tracked) -> Figure:
+    """The slot of a force that is to be followed, and the runs."""
+    drawing, ((force,), (dots,)) = panels([3.2, 2.0])
+    force_panel(force, data.shown)
+    following_panel(dots, data.varied)
+    return drawing
+
+
+def legend_inside(axis: Axes, **options: object) -> None:
+    """The legend in a corner of the panel, where panels stand side by side."""
+    axis.legend(fontsize=8, frameon=True, framealpha=0.85, edgecolor="none", handlelength=1.4, **options)

@@ -1,0 +1,136 @@
+"""Measures the thesis, study by study; what is done is on disk at once, and an interrupted run goes on from there."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from palpate._jit import sources_stamp
+from palpate.errors import InputError
+from palpate.files import check_place, kept_folder, signed, write_json, write_text
+from palpate.report import style
+from palpate.report.page import png, render
+from palpate.thesis.claims import Claim, with_wholes
+from palpate.thesis.figure import Study
+from palpate.thesis.runs import Runs
+
+STATE = "thesis.json"
+
+
+@dataclass
+class Done:
+    """One study as it stands on disk."""
+
+    number: str
+    title: str
+    caption: str
+    claims: list[Claim]
+    seconds: float
+
+
+@dataclass
+class State:
+    """What the folder holds, and for which sources and seeds."""
+
+    stamp: str
+    wanted: list[str]
+    command: str
+    done: dict[str, Done] = field(default_factory=dict)
+
+
+def measure(
+    studies: Sequence[Study],
+    runs: Runs,
+    folder: Path,
+    *,
+    command: str,
+    force: bool = False,
+    started: Callable[[Study], None] = lambda _: None,
+    resumed: Callable[[int], None] = lambda _: None,
+) -> list[Done]:
+    """Runs the studies and writes claims.json, index.html and a figure each into the folder, after each study.
+
+    A folder that holds an unfinished measurement of the same sources, studies and seeds is gone on with; `resumed` is
+    told how many studies are done.
+
+    Raises:
+        InputError: the folder holds anything else, and `force` is off; another process is writing there.
+    """
+    with kept_folder(folder, STATE, force=force):
+        state = _state(studies, runs, folder, command)
+        _write_state(state, folder)  # from now on the folder is known for what it is
+        if state.done:
+            resumed(len(state.done))
+        for study in studies:
+            if study.NUMBER not in state.done:
+                started(study)
+                state.done[study.NUMBER] = _measured(study, runs, folder)
+                _write(state, folder)
+    return [state.done[number] for number in state.wanted]
+
+
+def _measured(study: Study, runs: Runs, folder: Path) -> Done:
+    begun = time.perf_counter()
+    data = study.run(runs)
+    claims = list(study.check(data))
+    style.save(study.plot(data), folder / f"{study.NUMBER}.png")
+    return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
+
+
+def _state(studies: Sequence[Study], runs: Runs, folder: Path, command: str) -> State:
+    wanted = [s.NUMBER for s in studies]
+    stamp = f"{sources_stamp(*sorted(Path(__file__).parent.rglob('*.py')))} seeds {list(runs.seeds)}"
+    if not (folder / STATE).exists():
+        return State(stamp, wanted, command)
+    old = _stored(folder)
+    if old is None:
+        raise InputError(f"{folder / STATE} is no measurement of the thesis; choose another --out")
+    if old.stamp != stamp or old.wanted != wanted or len(old.done) == len(wanted):
+        raise InputError(
+            f"{folder} holds a measurement already; choose another --out, or add --force to replace it"
+        )
+    return old
+
+
+def _stored(folder: Path) -> State | None:
+    check_place(folder / STATE)
+    try:
+        return msgspec.json.decode((folder / STATE).read_bytes(), type=State)
+    except (OSError, msgspec.DecodeError):
+        return None
+
+
+def _write(state: State, folder: Path) -> None:
+    """Everything that the folder says, each file whole or as it was."""
+    finished = [state.done[n] for n in state.wanted if n in state.done]
+    rows = with_wholes([claim for done in finished for claim in done.claims])
+    write_json(folder / "claims.json", [asdict(row) for row in rows])
+    write_text(folder / "index.html", index_page(state, finished, folder))
+    _write_state(state, folder)
+
+
+def _write_state(state: State, folder: Path) -> None:
+    write_json(folder / STATE, signed(asdict(state)))
+
+
+def index_page(state: State, done: Sequence[Done], folder: Path) -> str:
+    """The page as HTML, figures included; it opens without a network."""
+    claims = [claim for d in done for claim in d.claims]
+    return render(
+        "index.html",
+        "palpate.thesis",
+        title="The thesis, measured again",
+        done=done,
+        images={d.number: png(folder / f"{d.number}.png") for d in done},
+        verdicts=Counter(claim.verdict for claim in claims),
+        claims=with_wholes(claims),
+        figure={claim.id: d.number for d in done for claim in d.claims},
+        missing=[n for n in state.wanted if n not in state.done],
+        command=state.command,
+        seconds=sum(d.seconds for d in done),
+    )

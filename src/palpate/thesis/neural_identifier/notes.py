@@ -1,0 +1,127 @@
+"""Why the neural identifier answers as it does: a note for each part of the thesis' claims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identifiers.neural_settings import SETTINGS
+from palpate.thesis.neural_identifier.network import Answer, Choice
+
+TIME = (0.3, 0.9)
+"""What "about 0.6 s" allows: half of it more or less [s]."""
+
+
+@dataclass(frozen=True)
+class Grounds:
+    """What a claim is decided from, and what is said about it.
+
+    Args:
+        surface: "foam" or "rubber".
+        nominal: every start on the press of every noise seed.
+        swept: what the thesis does not give about the network.
+        varied: friction, pose, surface.
+        perfect: what K would come out as, over f/x, if the network knew the surface without error.
+        starts: how many there are for each noise seed in `nominal`, in order.
+    """
+
+    surface: str
+    nominal: Sequence[Answer]
+    swept: Mapping[Choice, Sequence[Answer]]
+    varied: Mapping[str, Sequence[Answer]]
+    perfect: float
+    starts: int
+
+
+def why(suffix: str, grounds: Grounds) -> str:
+    """Why a part of a claim came out as it did, in numbers of this measurement."""
+    notes = {"K": _why_stiffness, "B": _why_damping, "M": _why_mass, "error": _why_error}
+    return notes[suffix](grounds) if suffix in notes else _why_time(suffix, grounds)
+
+
+def _why_time(suffix: str, grounds: Grounds) -> str:
+    gone = float(np.median([a.error_gone for a in grounds.nominal]))
+    text = (
+        "How fast the network learns goes with the square of its output amplitude, which the thesis does "
+        f"not give; with the chosen one ({Choice().amplitude:g} N) the error of the output is gone after "
+        f"{gone:.2g} s."
+    )
+    if suffix == "time-K":
+        return text
+    times = [getattr(a, f"settled_{suffix[-1]}") for a in grounds.nominal]
+    early, late = sum(t < TIME[0] for t in times), sum(t > TIME[1] for t in times)
+    return (
+        f"{text} {suffix[-1]}_e is early in {early} and late in {late} of {len(times)} runs. That it "
+        "settles says only that learning has stopped moving it: in steady contact no sample tells what "
+        "the force would be if the tip moved."
+    )
+
+
+def _why_stiffness(grounds: Grounds) -> str:
+    x = SETTINGS[grounds.surface].values[0]
+    fixed = [float(np.median([a.over for a in s])) for c, s in grounds.swept.items() if not c.thresholds]
+    at_zero = float(np.median([a.at_zero for a in grounds.nominal]))
+    return (
+        "Displacement counts from where the force is 5 N already, so that even a network without any "
+        f"error would say {grounds.perfect:.2f} times f/x at the probe of {1e3 * x:g} mm. This one adds to "
+        "it: a threshold that learns takes up part of the force as a constant. With nothing pressed the "
+        f"network says {at_zero:.3g} N, and the probe divides that by its displacement. With thresholds "
+        f"fixed at zero the medians go from {min(fixed):.2f} to {max(fixed):.2f}: least where the "
+        "amplitude is so large and the weights so small that the network is a straight line through zero, "
+        f"which answers f/x wherever it is asked. {_by_surface(grounds)}The surface's stiffness was chosen "
+        "for the thesis' f/x."
+    )
+
+
+def _by_surface(grounds: Grounds) -> str:
+    """K on other laws of the surface."""
+    laws = [name for name in ("stiffening", "relaxing") if name in grounds.varied]
+    parts = [f"{np.median([a.over for a in grounds.varied[name]]):.2f} on a {name} one" for name in laws]
+    return f"The median is {' and '.join(parts)}. " if parts else ""
+
+
+def _why_damping(grounds: Grounds) -> str:
+    values = [a.B for a in grounds.nominal]
+    return (
+        f"B_e goes from {min(values):.3g} to {max(values):.3g} N s/m. {_by_start(values, grounds)} The tip "
+        "moves for a tenth of a second or less, and its error there can be removed through any of 21 "
+        "weights and thresholds: one push does not settle how the force is shared out between "
+        "displacement, velocity and the thresholds."
+    )
+
+
+def _why_mass(grounds: Grounds) -> str:
+    values = np.array([a.M for a in grounds.nominal])
+    by_start = values.reshape(-1, grounds.starts)
+    firm = int(np.sum(np.all(by_start > 0, axis=0) | np.all(by_start < 0, axis=0)))
+    return (
+        f"M_e is positive in {int(np.sum(values > 0))} of {values.size} runs; for {firm} of "
+        f"{grounds.starts} starts its sign is the same with every noise seed. {_by_start(values, grounds)} "
+        "It is no property of the surface, and a positive value says no more than a negative one would."
+    )
+
+
+def _by_start(values: Sequence[float] | NDArray[np.float64], grounds: Grounds) -> str:
+    part = share_of_starts(values, grounds.starts)
+    return f"Initial weights make {'over 99%' if part > 0.99 else f'{part:.0%}'} of its variance, noise the rest."
+
+
+def share_of_starts(values: Sequence[float] | NDArray[np.float64], starts: int) -> float:
+    """Which part of the variance lies between starts; the rest lies between noise seeds of one start."""
+    by_start = np.reshape(np.asarray(values, dtype=float), (-1, starts))
+    total = float(np.var(by_start))
+    return float(np.var(by_start.mean(axis=0))) / total if total > 0.0 else 0.0
+
+
+def _why_error(grounds: Grounds) -> str:
+    times = {c.amplitude: some for c, some in grounds.swept.items() if c == Choice(c.amplitude)}
+    told_ = ", ".join(f"{np.median([x.error_gone for x in s]):.2g} s at {a:g} N" for a, s in times.items())
+    return (
+        "The error does become almost zero; when, follows from the output amplitude and the initial "
+        f"weights, which the thesis does not give: {told_} (weights and thresholds as chosen). The loop "
+        "gain of learning goes with the amplitude's square, and an amplitude close to the force leaves "
+        "only the flat end of the sigmoid."
+    )

@@ -1,0 +1,90 @@
+"""The field's terms, and no private words, in the names of files and in public names."""
+
+import ast
+import re
+from itertools import pairwise
+
+PRIVATE = {
+    "air": "free_motion", "beforehand": "prior", "bordered": "four",
+    "checking": "consistency", "choosing": "selection", "doubt": "error_covariance",
+    "doubts": "plausibility", "evenly": "sample_faults", "explaining": "error_messages",
+    "front_ends": "matched_channels",
+    "held_out": "cross_validation", "identifying": "identify", "judging": "candidate", "knob": "nonlinear parameter",
+    "linearising": "linearise", "presenting": "summary", "preparing": "problem", "probing": "network", "pulled": "bias",
+    "refreshes": "sample_clock", "regain": "contact_loss", "running": "run_...", "said": "notes",
+    "sized": "any_size", "still": "equilibrium", "telling": "describe", "timebase": "sampling",
+    "told": "described, notes",
+    "trees": "flatten", "unbroken": "interrupts", "undone": "bias_correction",
+    "unloading": "payload, free_motion", "watching": "replay, change_detection", "watchman": "stop condition",
+    "worlds": "conditions",
+}  # fmt: skip
+"""A private word, and the field's for it (CONVENTIONS.md)."""
+WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+STILL = {
+    "src/palpate/analysis/linearising.py",
+    "src/palpate/cli/_one_log.py",
+    "src/palpate/cli/_options_file.py",
+    "src/palpate/contact_frame/air.py",
+    "src/palpate/contact_frame/air_inertia.py",
+    "src/palpate/contact_frame/identifying.py",
+    "src/palpate/contact_frame/telling.py",
+    "src/palpate/contact_frame/unloading.py",
+    "src/palpate/contact_frame/weighing.py",
+    "src/palpate/contact_frame/weighing_doubts.py",
+    "src/palpate/force/law.py",
+    "src/palpate/force/telling.py",
+    "src/palpate/force/worlds.py",
+    "src/palpate/identification/estimators/lag_uncertainty.py",
+    "src/palpate/identification/evenly.py",
+    "src/palpate/identification/models.py",
+    "src/palpate/identification/sample_clock.py",
+    "src/palpate/identifiers/kernels/contact_state.py",
+    "src/palpate/identifiers/kernels/error_covariance.py",
+    "src/palpate/identifiers/kernels/state_layout.py",
+    "src/palpate/live/player.py",
+    "src/palpate/logs/bags/reading.py",
+    "src/palpate/logs/doubts.py",
+    "src/palpate/report/identification/words.py",
+    "src/palpate/report/run/page.py",
+    "src/palpate/wires/lateness.py",
+    "src/palpate/wires/press.py",
+}
+"""Files whose names and public names are still to be changed; to be emptied, and to stay empty."""
+
+
+def words(name):
+    """The words of a name, and each two that stand together: ``front_ends`` is one term."""
+    single = [word.lower() for word in WORDS.findall(name)]
+    return {*single, *(f"{a}_{b}" for a, b in pairwise(single))}
+
+
+def public_names(tree):
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            yield node.name
+            if isinstance(node, ast.ClassDef):
+                yield from public_names(node)
+
+
+def private(path):
+    """The private words in the names of a file: its own, and the public ones in it."""
+    names = [*path.with_suffix("").parts[-1:], *public_names(ast.parse(path.read_text("utf-8")))]
+    return [f"{name}: say {PRIVATE[word]}" for name in names for word in sorted(words(name) & PRIVATE.keys())]
+
+
+def test_names_are_those_of_the_field(root):
+    found = {}
+    for path in sorted((root / "src" / "palpate").rglob("*.py")):
+        if private(path):
+            found[path.relative_to(root).as_posix()] = private(path)
+    assert found
+    fresh = [f"{path}: {', '.join(names)}" for path, names in found.items() if path not in STILL]
+    assert not fresh, "\n".join(fresh)
+    assert not STILL - found.keys(), "these say it in the field's terms now: take them off the list"
+
+
+def test_a_private_word_is_found_in_whatever_it_stands():
+    assert words("front_ends") >= {"front_ends", "front", "ends"}
+    assert words("Watchman") & PRIVATE.keys()
+    assert words("ContactTelling") & PRIVATE.keys()
+    assert not words("distilled") & PRIVATE.keys()
