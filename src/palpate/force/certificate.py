@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from palpate.errors import InputError
 from palpate.files import signed, write_json
-from palpate.force.arm import Table
+from palpate.force.arm import PositionLoop, Table
 from palpate.force.cells import Box, Prover
 from palpate.force.cover import Cell, covered
 from palpate.force.gains import Gains
@@ -27,8 +27,17 @@ SOFTEST = 1e-3
 """Of the cap: as far down as a held gain is proved by default."""
 EXACT_SHARE = 0.99
 """Of the exact interval of a held gain: as far up as it is proved by default."""
-SHARES = {"position": (0.05, 2.0), "torque": (0.1, 2.0)}
-"""g theta K_eff/alpha within which the adapting law is proved."""
+SHARES = {"position": ((0.05, 2.0, 0), (1e-4, 1.5, 1)), "torque": ((0.05, 2.0, 0),)}
+"""g theta K_eff/alpha within which the adapting law is proved, and ticks of jitter beyond what is asked.
+
+Down to next to nothing, Popov's and the circle criterion end at theta/(alpha times the sum of all lags), which is 2.0
+for the UR5e without jitter: hence two claims.
+"""
+MOST_JITTER = 10
+FADED = 0.01
+"""Share below which the gain of a claim counts as one that may fade."""
+GONE = 1e-4
+"""Of the cap: what is left of a surface that the tip has left, see `one_sided_claim`."""
 Finite = Annotated[float, Meta(ge=-1e300, le=1e300)]
 Number = Annotated[float, Meta(ge=0, le=1e300)]
 
@@ -54,16 +63,17 @@ class Claim(Table):
     `held`: with g held, every surface whose K + B/theta is within low ... high [N/m] and whose B/K is within
     least ... most [s] is pressed on stably. K and B may change within a cell from tick to tick. `adapting`: the same
     for every constant surface while g theta K_eff/alpha goes anywhere within the shares, from tick to tick; for a
-    position arm that holds for every stiffness, since only the product counts.
+    position arm that holds for every stiffness, since only the product counts. `one-sided`: as held, while K and B
+    together go anywhere within low ... high, from tick to tick, as where contact is lost and found again.
     """
 
-    kind: Literal["held", "adapting"]
+    kind: Literal["held", "adapting", "one-sided"]
     low: Number
     high: Number
     least: Number
     most: Number
     shares: tuple[Number, Number]
-    jitter: Annotated[int, Meta(ge=0, le=10)]
+    jitter: Annotated[int, Meta(ge=0, le=MOST_JITTER)]
     cells: tuple[ProvedCell, ...] = ()
 
     @property
@@ -77,7 +87,12 @@ class Claim(Table):
         loop = SampledLoop(gains.arm, self.jitter, own)
         unit = gains.alpha if self.kind == "adapting" else gains.gain
         ends = self.shares[0] * unit, self.shares[1] * unit
-        return Prover(loop, gains.theta, ends, self.jitter, relative=self.kind == "adapting")
+        younger = self.jitter + gains.arm.unsure_ticks
+        fading: Literal["", "gain", "surface"] = "surface" if self.kind == "one-sided" else ""
+        if self.kind == "adapting" and gains.arm.kind == "position" and self.shares[0] < FADED:
+            fading = "gain"
+        relative = self.kind == "adapting"
+        return Prover(loop, gains.theta, ends, younger, relative=relative, fading=fading)
 
 
 @dataclass(frozen=True)
@@ -100,12 +115,26 @@ class Verdict:
 
 
 class Certificate(Table):
-    """What is proved of a tuned loop."""
+    """What is proved of a tuned loop.
+
+    Args:
+        form: of the file.
+        gains: of the loop.
+        claims: each with the norms that prove it.
+        measured: the inner loop that the proof is of, where a log told it better than the gains' arm.
+        written_by: the mark of the file.
+    """
 
     form: Literal["palpate force certificate 1"]
     gains: Gains
     claims: tuple[Claim, ...]
+    measured: PositionLoop | None = None
     written_by: str = ""
+
+    @property
+    def proved_gains(self) -> Gains:
+        """The gains with the inner loop that the proof is of."""
+        return self.gains if self.measured is None else with_inner(self.gains, self.measured)
 
     @classmethod
     def load(cls, path: Path) -> Certificate:
@@ -127,7 +156,7 @@ class Certificate(Table):
 
     def save(self, path: Path) -> None:
         """Writes the file, whole or not at all."""
-        write_json(path, signed({k: v for k, v in msgspec.to_builtins(self).items() if v != ""}))
+        write_json(path, signed({k: v for k, v in msgspec.to_builtins(self).items() if v not in ("", None)}))
 
     def check_of(self, gains: Gains) -> None:
         """Refuses to speak of other gains.
@@ -156,7 +185,7 @@ class Certificate(Table):
         if not self.claims:
             return Verdict(False, np.inf, 0.0, 0, "it claims nothing")
         for claim in self.claims:
-            prover = claim.prover(self.gains)
+            prover = claim.prover(self.proved_gains)
             if not _tiled(claim):
                 return Verdict(False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap")
             for proved in claim.cells:
@@ -181,6 +210,10 @@ def _tiled(claim: Claim) -> bool:
     if not claim.cells:
         return False
     edges = np.array([[c.low, c.high, c.least, c.most] for c in claim.cells])
+    if claim.kind == "one-sided" and not (
+        (edges[:, 0] <= claim.low).all() and (edges[:, 1] >= claim.high).all()
+    ):
+        return False  # one norm for the surface and for what is left of it
     bounds = _cuts(edges[:, :2], claim.low, claim.high)
     times = _cuts(edges[:, 2:], claim.least, claim.most)
     for a, b in bounds:
@@ -198,6 +231,11 @@ def _cuts(ends: np.ndarray, low: float, high: float) -> list[tuple[float, float]
     return [(a, b) for a, b in pairwise(all_of.tolist())]
 
 
+def with_inner(gains: Gains, inner: PositionLoop) -> Gains:
+    """The gains with another inner loop, the law and its theta as they are."""
+    return msgspec.structs.replace(gains, arm=msgspec.structs.replace(gains.arm, inner=inner))
+
+
 def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None) -> Claim | None:
     """The claim with the cells that prove it; None if some of it cannot be proved.
 
@@ -208,7 +246,7 @@ def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None
     """
     prover = claim.prover(gains)
     cells: list[Cell] = []
-    for box in starts or _starts(claim.box):
+    for box in starts or ([claim.box] if claim.kind == "one-sided" else _starts(claim.box)):
         found, left = covered(prover, box)
         if left:
             return None
@@ -250,7 +288,9 @@ def held_claim(
     return Claim(kind="held", low=low, high=high, least=0.0, most=most, shares=(1.0, margin), jitter=jitter)
 
 
-def adapting_claim(gains: Gains, low: float, most: float, jitter: int = 0, margin: float = 1.0) -> Claim:
+def adapting_claims(
+    gains: Gains, low: float, most: float, jitter: int = 0, margin: float = 1.0
+) -> list[Claim]:
     """That the loop is stable whatever the estimator does within the shares.
 
     Args:
@@ -260,12 +300,31 @@ def adapting_claim(gains: Gains, low: float, most: float, jitter: int = 0, margi
         jitter: ticks.
         margin: factor that all gains may grow by.
     """
-    least, top = SHARES[gains.arm.kind]
     high = gains.seen_cap
     low = high if gains.arm.kind == "position" else low
-    return Claim(
-        kind="adapting", low=low, high=high, least=0.0, most=most, shares=(least, top * margin), jitter=jitter
-    )
+    return [
+        Claim(
+            kind="adapting", low=low, high=high, least=0.0, most=most, shares=(least, top * margin),
+            jitter=min(jitter + more, MOST_JITTER),
+        )
+        for least, top, more in SHARES[gains.arm.kind]
+    ]  # fmt: skip
+
+
+def one_sided_claim(gains: Gains, most: float, margin: float = 1.0) -> Claim:
+    """That a position arm's loop with K_u = cap is stable also where contact is lost and found again.
+
+    About the state of rest under F_d, a force max(K x + B xdot, 0) is k (K x~ + B xdot~) with k between 0 and 1: a
+    sector. It is F_d/(F_d + K gap) at least, over a gap to the surface.
+
+    Args:
+        gains: of the loop.
+        most: longest B/K [s].
+        margin: factor that all gains may grow by.
+    """
+    cap = gains.seen_cap
+    ends = (1.0, margin)
+    return Claim(kind="one-sided", low=GONE * cap, high=cap, least=0.0, most=most, shares=ends, jitter=0)
 
 
 def exact_interval(gains: Gains, damping_time: float = 0.0) -> tuple[float, float]:
@@ -277,8 +336,9 @@ def exact_interval(gains: Gains, damping_time: float = 0.0) -> tuple[float, floa
         return 0.0, gains.seen_cap
     cap = gains.seen_cap
     K = cap / (1.0 + damping_time / gains.theta)
-    most = ultimate_gain(SampledLoop(gains.arm), K, damping_time * K)  # g K at the boundary
-    return 0.0, cap * most / (gains.gain * K)
+    corners = gains.arm.inner.corners if isinstance(gains.arm.inner, PositionLoop) else []
+    most = min(ultimate_gain(SampledLoop(gains.arm, inner=c), K, damping_time * K) for c in corners)
+    return 0.0, cap * most / (gains.gain * K)  # `most` is g K at the boundary
 
 
 def certify(
@@ -287,7 +347,9 @@ def certify(
     damping_time: float | None = None,
     jitter: int = 1,
     margin: float = 1.0,
+    *,
     adapting: bool = True,
+    measured: PositionLoop | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Certificate:
     """Proves what can be proved of a tuned loop.
@@ -296,22 +358,27 @@ def certify(
         gains: of the loop.
         stiffness: of the surfaces, lowest and highest K + B/theta, their own [N/m]; by default from a thousandth of
             the cap to 99 % of what is stable at all.
-        damping_time: longest B/K [s]; theta by default for a position arm, 0 for a torque arm.
+        damping_time: longest B/K [s]; theta by default, 0 for the adapting law of a torque arm.
         jitter: ticks by which the age of a reading may change from tick to tick while the law adapts.
         margin: factor that all gains may grow by.
         adapting: prove the adapting law too.
+        measured: the inner loop as a log told it, instead of the arm's own.
         progress: told what is being proved.
 
     Returns:
         The claims that were proved; those that were not are left out.
     """
+    own_gains, gains = gains, gains if measured is None else with_inner(gains, measured)
     position = gains.arm.kind == "position"
-    most = damping_time if damping_time is not None else gains.theta if position else 0.0
+    most = gains.theta if damping_time is None else damping_time
     low, high = _felt(gains, stiffness, most, margin)
     wanted = [held_claim(gains, low, high, most, 0, margin)]
+    if position and gains.arm.unsure_ticks == 0:
+        wanted.append(one_sided_claim(gains, most, margin))
     if adapting:
         softest = max(low, SOFTEST * gains.seen_cap)
-        wanted.append(adapting_claim(gains, softest, most, jitter, margin))
+        own = most if position or damping_time is not None else 0.0
+        wanted += adapting_claims(gains, softest, own, jitter, margin)
     claims = []
     for claim in wanted:
         if progress is not None:
@@ -319,7 +386,7 @@ def certify(
         proved = proved_claim(gains, claim)
         if proved is not None:
             claims.append(proved)
-    return Certificate(form=FORM, gains=gains, claims=tuple(claims))
+    return Certificate(form=FORM, gains=own_gains, claims=tuple(claims), measured=measured)
 
 
 def _felt(
