@@ -143,7 +143,7 @@ class Arm(Table):
             )
         if self.delay_ticks > 100:
             raise InputError(
-                f"{self.title}: a delay of {self.longest_delay:g} s is {self.delay_ticks} ticks; at most 100 are taken: "
+                f"{self.title}: a delay of {self.longest_delay:g} s, {self.delay_ticks} ticks; at most 100 are taken: "
                 "run the force loop slower"
             )
 

@@ -10,7 +10,6 @@ is bounded by its second derivatives.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import product
 from typing import Literal
 
@@ -34,12 +33,16 @@ class Box:
         high: to [N/m].
         least: B/K from [s].
         most: to [s].
+        part: which part of what the inner loop may be.
+        loss: ticks by which the delay is shorter than the longest it may be.
     """
 
     low: float
     high: float
     least: float
     most: float
+    part: int = 0
+    loss: int = 0
 
     def corners(self, theta: float) -> list[tuple[float, float]]:
         """(K, B) of the corners; one where the box is a point in that direction."""
@@ -76,6 +79,8 @@ class Prover:
         kept: of the command's low-pass.
         relative: see `gains`.
         fading: what may come near to nothing within a cell, "gain" or "surface"; empty if neither does.
+        parts: into how many parts w^2 and 2 z w of an inner loop known to intervals are cut, each.
+        wider: factor of these parts, so that a norm that is searched leaves room for the curvature.
     """
 
     loop: SampledLoop
@@ -85,18 +90,28 @@ class Prover:
     kept: float = 0.0
     relative: bool = False
     fading: Literal["", "gain", "surface"] = ""
-    _known: dict[tuple[int, float, float], list[Array]] = field(default_factory=dict, compare=False)
+    parts: int = 1
+    wider: float = 1.0
+    _known: dict[tuple[float, ...], list[Array]] = field(default_factory=dict, compare=False)
 
     @property
     def exact(self) -> bool:
         """Whether the matrix is affine in all that may vary, so that corners tell everything."""
-        return self.loop.arm.kind == "position" and len(self.inner) == 1
-
-    @cached_property
-    def inner(self) -> list[tuple[float, float] | None]:
-        """Corners of what the inner loop may be; of a torque arm, its own."""
         inner = self.loop.arm.inner
-        return list(inner.corners) if isinstance(inner, PositionLoop) else [None]
+        return isinstance(inner, PositionLoop) and len(inner.corners) == 1
+
+    def inner(self, part: int) -> list[tuple[float, float] | None]:
+        """Corners of a part of what the inner loop may be; of a torque arm, its own."""
+        inner = self.loop.arm.inner
+        if not isinstance(inner, PositionLoop):
+            return [None]
+        if self.exact:
+            return [inner.squared]
+        corners = np.array(inner.corners)
+        size = np.ptp(corners, axis=0) / self.parts
+        middle = corners.min(axis=0) + (np.array(divmod(part, self.parts)) + 0.5) * size
+        signs = product((-0.5, 0.5), repeat=2)
+        return [tuple((middle + self.wider * np.array(sign) * size).tolist()) for sign in signs]
 
     def laws(self, box: Box) -> list[tuple[Law, int]]:
         """The extreme laws and readings within a box."""
@@ -105,10 +120,8 @@ class Prover:
             low, high = low * self._gain(box.high), high * self._gain(box.low)
         if self.fading == "gain":
             low, high = low / (1.0 + box.most / self.theta), high / (1.0 + box.least / self.theta)
-        return [
-            (Law(g, self.kept), loss)
-            for g, loss in product(dict.fromkeys((low, high)), range(self.younger + 1))
-        ]
+        losses = range(self.younger + 1) if self.relative else (box.loss,)
+        return [(Law(g, self.kept), loss) for g, loss in product(dict.fromkeys((low, high)), losses)]
 
     def corners(self, box: Box) -> list[tuple[float, float]]:
         """(K, B) of the corners; where the gain fades, of a fixed K, since g K alone counts and rest has to be one."""
@@ -127,30 +140,33 @@ class Prover:
         if self.relative:
             return [
                 loop.phi(K, B, law, loss)
-                for loop in self.loops
+                for loop in self.loops(box.part)
                 for K, B in self.corners(box)
                 for law, loss in laws
             ]
-        corners = [(i, K, B) for i in range(len(self.loops)) for K, B in self.corners(box)]
-        return [Phi for corner in corners for Phi in self._of(corner, laws)]
+        loops = self.loops(box.part)
+        return [
+            Phi
+            for i, loop in enumerate(loops)
+            for K, B in self.corners(box)
+            for Phi in self._of((box.part, i, box.loss, K, B), loop, laws)
+        ]
 
     def still(self, box: Box) -> Array:
         """The matrix without what fades: the command stands still."""
         if self.fading == "surface":
-            return self.loop.phi(0.0, 0.0, Law(self.gains[0], self.kept))
+            return self.loop.phi(0.0, 0.0, Law(self.gains[0], self.kept), box.loss)
         return self.loop.phi(box.high, 0.0, Law(0.0, self.kept))
 
-    def _of(self, corner: tuple[int, float, float], laws: list[tuple[Law, int]]) -> list[Array]:
+    def _of(self, key: tuple[float, ...], loop: SampledLoop, laws: list[tuple[Law, int]]) -> list[Array]:
         """Of one corner, which neighbouring cells share."""
-        if corner not in self._known:
-            which, K, B = corner
-            self._known[corner] = [self.loops[which].phi(K, B, law, loss) for law, loss in laws]
-        return self._known[corner]
+        if key not in self._known:
+            self._known[key] = [loop.phi(key[-2], key[-1], law, loss) for law, loss in laws]
+        return self._known[key]
 
-    @cached_property
-    def loops(self) -> list[SampledLoop]:
-        """One for each corner of what the inner loop may be."""
-        return [replace(self.loop, inner=corner) for corner in self.inner]
+    def loops(self, part: int) -> list[SampledLoop]:
+        """One for each corner of a part of what the inner loop may be."""
+        return [replace(self.loop, inner=corner) for corner in self.inner(part)]
 
     def contraction(self, box: Box, L: Array) -> tuple[float, float]:
         """A bound of |L^T Phi L^-T| within the box, and how far rounding may have moved it.
@@ -224,7 +240,7 @@ def curved(prover: Prover, box: Box) -> Array:
     from scipy.linalg import expm
 
     tick = prover.loop.arm.tick
-    rates = [_rates(loop, K, B) for loop in prover.loops for K, B in prover.corners(box)]
+    rates = [_rates(loop, K, B) for loop in prover.loops(box.part) for K, B in prover.corners(box)]
     size = np.abs(rates).max(axis=0)
     np.fill_diagonal(size, np.max([np.diag(A) for A in rates], axis=0))
     n = len(size)
@@ -241,7 +257,7 @@ def curved(prover: Prover, box: Box) -> Array:
 def _directions(prover: Prover, box: Box, rates: list[Array]) -> list[Array]:
     """How much A changes from one end of each parameter to the other, by element."""
     if prover.loop.arm.kind == "position":
-        square, rate = zip(*(corner for corner in prover.inner if corner is not None), strict=True)
+        square, rate = zip(*(corner for corner in prover.inner(box.part) if corner is not None), strict=True)
         unit = prover.loop.rate_unit
         first, second = np.zeros_like(rates[0]), np.zeros_like(rates[0])
         first[1, 0], second[1, 1] = (max(square) - min(square)) / unit, max(rate) - min(rate)

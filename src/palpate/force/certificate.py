@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import ceil
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -27,12 +28,17 @@ SOFTEST = 1e-3
 """Of the cap: as far down as a held gain is proved by default."""
 EXACT_SHARE = 0.99
 """Of the exact interval of a held gain: as far up as it is proved by default."""
-SHARES = {"position": ((0.05, 2.0, 0), (1e-4, 1.5, 1)), "torque": ((0.05, 2.0, 0),)}
-"""g theta K_eff/alpha within which the adapting law is proved, and ticks of jitter beyond what is asked.
+SHARES = {
+    "position": ((0.05, (2.0, 1.5, 1.2), 0), (1e-4, (1.5, 1.2), 1)),
+    "torque": ((0.05, (2.0, 1.5, 1.2), 0),),
+}
+"""g theta K_eff/alpha from and to which the adapting law is proved, the first upper end that can be; further jitter.
 
 Down to next to nothing, Popov's and the circle criterion end at theta/(alpha times the sum of all lags), which is 2.0
 for the UR5e without jitter: hence two claims.
 """
+PART = 0.06
+"""Relative width of w^2 and of 2 z w that one norm is asked to serve."""
 MOST_JITTER = 10
 FADED = 0.01
 """Share below which the gain of a claim counts as one that may fade."""
@@ -50,11 +56,15 @@ class ProvedCell(Table):
     least: Number
     most: Number
     norm: tuple[tuple[Finite, ...], ...]
+    part: Annotated[int, Meta(ge=0, le=10_000)] = 0
+    loss: Annotated[int, Meta(ge=0, le=100)] = 0
 
     @property
     def cell(self) -> Cell:
         """As `cover` has it."""
-        return Cell(Box(self.low, self.high, self.least, self.most), np.array(self.norm))
+        return Cell(
+            Box(self.low, self.high, self.least, self.most, self.part, self.loss), np.array(self.norm)
+        )
 
 
 class Claim(Table):
@@ -74,12 +84,17 @@ class Claim(Table):
     most: Number
     shares: tuple[Number, Number]
     jitter: Annotated[int, Meta(ge=0, le=MOST_JITTER)]
+    parts: Annotated[int, Meta(ge=1, le=100)] = 1
     cells: tuple[ProvedCell, ...] = ()
 
-    @property
-    def box(self) -> Box:
-        """Of the surfaces."""
-        return Box(self.low, self.high, self.least, self.most)
+    def boxes(self, gains: Gains) -> list[Box]:
+        """What its cells have to cover: the surfaces, for each part of the inner loop and each delay it may have."""
+        losses = range(gains.arm.unsure_ticks + 1) if self.kind != "adapting" else (0,)
+        return [
+            Box(self.low, self.high, self.least, self.most, part, loss)
+            for part in range(self.parts**2)
+            for loss in losses
+        ]
 
     def prover(self, gains: Gains) -> Prover:
         """What has to contract."""
@@ -92,7 +107,7 @@ class Claim(Table):
         if self.kind == "adapting" and gains.arm.kind == "position" and self.shares[0] < FADED:
             fading = "gain"
         relative = self.kind == "adapting"
-        return Prover(loop, gains.theta, ends, younger, relative=relative, fading=fading)
+        return Prover(loop, gains.theta, ends, younger, relative=relative, fading=fading, parts=self.parts)
 
 
 @dataclass(frozen=True)
@@ -186,7 +201,7 @@ class Certificate(Table):
             return Verdict(False, np.inf, 0.0, 0, "it claims nothing")
         for claim in self.claims:
             prover = claim.prover(self.proved_gains)
-            if not _tiled(claim):
+            if not all(_tiled(claim, box) for box in claim.boxes(self.proved_gains)):
                 return Verdict(False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap")
             for proved in claim.cells:
                 if np.shape(proved.norm) != (prover.loop.size, prover.loop.size):
@@ -205,11 +220,12 @@ def _contraction(prover: Prover, cell: Cell) -> tuple[float, float]:
         return np.inf, 0.0
 
 
-def _tiled(claim: Claim) -> bool:
-    """Whether the cells cover the claim's box: every rectangle between two neighbouring edges lies in a cell."""
-    if not claim.cells:
+def _tiled(claim: Claim, box: Box) -> bool:
+    """Whether the cells cover one of a claim's boxes: every rectangle between two neighbouring edges lies in a cell."""
+    own = [c for c in claim.cells if (c.part, c.loss) == (box.part, box.loss)]
+    if not own:
         return False
-    edges = np.array([[c.low, c.high, c.least, c.most] for c in claim.cells])
+    edges = np.array([[c.low, c.high, c.least, c.most] for c in own])
     if claim.kind == "one-sided" and not (
         (edges[:, 0] <= claim.low).all() and (edges[:, 1] >= claim.high).all()
     ):
@@ -217,8 +233,8 @@ def _tiled(claim: Claim) -> bool:
     bounds = _cuts(edges[:, :2], claim.low, claim.high)
     times = _cuts(edges[:, 2:], claim.least, claim.most)
     for a, b in bounds:
-        own = edges[(edges[:, 0] <= a) & (edges[:, 1] >= b)]
-        if not all(((own[:, 2] <= s) & (own[:, 3] >= t)).any() for s, t in times):
+        across = edges[(edges[:, 0] <= a) & (edges[:, 1] >= b)]
+        if not all(((across[:, 2] <= s) & (across[:, 3] >= t)).any() for s, t in times):
             return False
     return True
 
@@ -246,15 +262,16 @@ def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None
     """
     prover = claim.prover(gains)
     cells: list[Cell] = []
-    for box in starts or ([claim.box] if claim.kind == "one-sided" else _starts(claim.box)):
-        found, left = covered(prover, box)
+    whole = claim.boxes(gains)
+    for start in starts or (whole if prover.fading else [s for box in whole for s in _starts(box)]):
+        found, left = covered(prover, start)
         if left:
             return None
         cells += found
     proved = tuple(
         ProvedCell(
             low=c.box.low, high=c.box.high, least=c.box.least, most=c.box.most,
-            norm=tuple(tuple(map(float, row)) for row in c.L),
+            norm=tuple(tuple(map(float, row)) for row in c.L), part=c.box.part, loss=c.box.loss,
         )
         for c in cells
     )  # fmt: skip
@@ -269,7 +286,7 @@ def _starts(box: Box) -> list[Box]:
     edges.append(box.low)
     if box.low == box.high:
         return [box]
-    return [Box(a, b, box.least, box.most) for b, a in pairwise(edges)]
+    return [replace(box, low=a, high=b) for b, a in pairwise(edges)]
 
 
 def held_claim(
@@ -290,8 +307,8 @@ def held_claim(
 
 def adapting_claims(
     gains: Gains, low: float, most: float, jitter: int = 0, margin: float = 1.0
-) -> list[Claim]:
-    """That the loop is stable whatever the estimator does within the shares.
+) -> list[list[Claim]]:
+    """That the loop is stable whatever the estimator does; of each list, the first that can be proved.
 
     Args:
         gains: of the loop.
@@ -303,11 +320,14 @@ def adapting_claims(
     high = gains.seen_cap
     low = high if gains.arm.kind == "position" else low
     return [
-        Claim(
-            kind="adapting", low=low, high=high, least=0.0, most=most, shares=(least, top * margin),
-            jitter=min(jitter + more, MOST_JITTER),
-        )
-        for least, top, more in SHARES[gains.arm.kind]
+        [
+            Claim(
+                kind="adapting", low=low, high=high, least=0.0, most=most, shares=(least, top * margin),
+                jitter=min(jitter + more, MOST_JITTER),
+            )
+            for top in tops
+        ]
+        for least, tops, more in SHARES[gains.arm.kind]
     ]  # fmt: skip
 
 
@@ -372,21 +392,42 @@ def certify(
     position = gains.arm.kind == "position"
     most = gains.theta if damping_time is None else damping_time
     low, high = _felt(gains, stiffness, most, margin)
-    wanted = [held_claim(gains, low, high, most, 0, margin)]
-    if position and gains.arm.unsure_ticks == 0:
-        wanted.append(one_sided_claim(gains, most, margin))
+    wanted = [[held_claim(gains, low, high, most, 0, margin)]]
+    if position:
+        wanted.append([one_sided_claim(gains, most, margin)])
     if adapting:
         softest = max(low, SOFTEST * gains.seen_cap)
         own = most if position or damping_time is not None else 0.0
         wanted += adapting_claims(gains, softest, own, jitter, margin)
-    claims = []
-    for claim in wanted:
+    parts = _parts(gains)
+    if parts > 0:  # an inner loop known to intervals: what spans all surfaces in one norm, and no more
+        wanted = [wanted[1], *(tries[1:] for tries in wanted[3:])]
+        wanted = [[msgspec.structs.replace(c, parts=parts) for c in tries] for tries in wanted]
+    claims = (_first_proved(gains, tries, progress) for tries in wanted)
+    proved = tuple(claim for claim in claims if claim is not None)
+    return Certificate(form=FORM, gains=own_gains, claims=proved, measured=measured)
+
+
+def _parts(gains: Gains) -> int:
+    """Into how many parts what the inner loop may be is cut each way; 0 where it is known."""
+    inner = gains.arm.inner
+    if not isinstance(inner, PositionLoop) or (len(inner.corners) == 1 and gains.arm.unsure_ticks == 0):
+        return 0
+    corners = np.array(inner.corners)
+    widest = float((np.ptp(corners, axis=0) / corners.mean(axis=0)).max())
+    return max(ceil(widest / PART), 1)
+
+
+def _first_proved(
+    gains: Gains, tries: Sequence[Claim], progress: Callable[[str], None] | None
+) -> Claim | None:
+    for claim in tries:
         if progress is not None:
-            progress(f"the {claim.kind} law")
-        proved = proved_claim(gains, claim)
-        if proved is not None:
-            claims.append(proved)
-    return Certificate(form=FORM, gains=own_gains, claims=tuple(claims), measured=measured)
+            progress(f"the {claim.kind} law, gains of {claim.shares[0]:g} to {claim.shares[1]:g}")
+        found = proved_claim(gains, claim)
+        if found is not None:
+            return found
+    return None
 
 
 def _felt(

@@ -29,7 +29,8 @@ class Cell:
 
 def proved_cell(prover: Prover, box: Box) -> Cell | None:
     """The box with a norm that proves it; None if none was found."""
-    corners = prover.matrices(box)
+    roomy = prover if prover.exact else replace(prover, wider=ROOM, _known={})
+    corners = roomy.matrices(box)
     if max(map(radius, corners)) >= 1.0:
         return None
     if prover.fading:
@@ -45,14 +46,16 @@ def proved_cell(prover: Prover, box: Box) -> Cell | None:
     return Cell(box, L) if L is not None and Cell(box, L).proved(prover) else None
 
 
+ROOM = 1.3
+"""By which an inner loop's box is widened while a norm is searched."""
 CUTS, FEWER = 24, 5
-"""After which a piece is given up; where something fades, each costs a search, and helps little."""
+"""After which a piece is given up; fewer where each costs a long search and helps little."""
 
 
 def covered(prover: Prover, box: Box) -> tuple[list[Cell], list[Box]]:
     """Cells that prove the box; and, where it cannot be proved, the first piece that is not after so many cuts."""
     cells: list[Cell] = []
-    waiting = [(box, FEWER if prover.fading else CUTS)]
+    waiting = [(box, FEWER if prover.fading or box.low == box.high else CUTS)]
     while waiting:
         here, cuts = waiting.pop()
         cell = proved_cell(prover, here)
@@ -86,7 +89,7 @@ def _middle(prover: Prover, box: Box) -> Array:
     bound, time = box.middle(prover.theta)
     K = bound / (1.0 + time / prover.theta)
     laws = prover.laws(box)
-    matrices = [loop.phi(K, time * K, law, loss) for loop in prover.loops for law, loss in laws]
+    matrices = [loop.phi(K, time * K, law, loss) for loop in prover.loops(box.part) for law, loss in laws]
     return np.asarray(sum(matrices) / len(matrices))
 
 

@@ -38,6 +38,10 @@ class Parameter:
         """Half of the interval."""
         return 0.5 * (self.high - self.low)
 
+    def to_json(self) -> dict[str, object]:
+        """As plain JSON values."""
+        return {"value": self.value, "ci95": [self.low, self.high]}
+
 
 @dataclass(frozen=True)
 class InnerLoop:
@@ -48,7 +52,7 @@ class InnerLoop:
         damping: z.
         delay: [s].
         gain: of the position measured over the one commanded; 1 where units and axes agree.
-        explained: share of the tracking error (command - position) that the model explains.
+        explained: share that the model explains of how the position lags the command.
         rate: rows a second [Hz].
     """
 
@@ -58,6 +62,17 @@ class InnerLoop:
     gain: Parameter
     explained: float
     rate: float
+
+    def to_json(self) -> dict[str, object]:
+        """As plain JSON values."""
+        return {
+            "bandwidth_hz": self.bandwidth.to_json(),
+            "damping": self.damping.to_json(),
+            "delay_s": self.delay.to_json(),
+            "gain": self.gain.to_json(),
+            "explained": self.explained,
+            "rate_hz": self.rate,
+        }
 
     def of(self, arm: Arm, source: str) -> Arm:
         """The arm with this inner loop instead of its own.
@@ -116,7 +131,7 @@ def identify_inner_loop(time: Array, command: Array, position: Array, where: str
         Parameter(z, z / grow[1], z * grow[1]),
         Parameter(late, max(late - quantile * float(std[2]), 0.0), late + quantile * float(std[2])),
         Parameter(gain, gain - quantile * gain_std, gain + quantile * gain_std),
-        1.0 - float(np.mean(_residual(log_, p) ** 2) / np.mean(log_.error**2)),
+        1.0 - float(np.mean(_residual(log_, p) ** 2) / gain**2 / np.mean(log_.behind**2)),
         1.0 / log_.tick,
     )
     _check(found, where)
@@ -126,9 +141,9 @@ def identify_inner_loop(time: Array, command: Array, position: Array, where: str
 def _check(found: InnerLoop, where: str) -> None:
     if found.explained < 0.5:
         raise InputError(
-            f"{where}: a second-order inner loop explains {100.0 * max(found.explained, 0.0):.0f} % of how the position "
-            "lags the command, so it is none; check that both columns are of one axis, in free motion and below the "
-            "speed limit"
+            f"{where}: a second-order inner loop explains {100.0 * max(found.explained, 0.0):.0f} % of how the "
+            "position lags the command, so it is none; check that both columns are of one axis, in free motion and "
+            "below the speed limit"
         )
     if abs(found.gain.value - 1.0) > TOLERANCE:
         raise InputError(
@@ -147,8 +162,8 @@ def _check(found: InnerLoop, where: str) -> None:
     ]
     if wide:
         raise InputError(
-            f"{where}: its motion does not tell {', '.join(wide)} to {100.0 * TOLERANCE:.0f} %; record steps, or a sweep "
-            f"up to {2.0 * found.bandwidth.value:.2g} Hz and more, in free motion, for longer"
+            f"{where}: its motion does not tell {', '.join(wide)} to {100.0 * TOLERANCE:.0f} %; record steps, or a "
+            f"sweep up to {2.0 * found.bandwidth.value:.2g} Hz and more, in free motion, for longer"
         )
 
 
@@ -165,8 +180,7 @@ class _Log:
             raise InputError(f"{where}: a row has no number; leave it out (--start, --end), or fill the gap")
         if len(t) < FEWEST:
             raise InputError(f"{where}: {len(t)} rows are too few; record at least {FEWEST}")
-        steps = np.diff(t)
-        tick = float(np.median(steps))
+        tick = float(t[-1] - t[0]) / (len(t) - 1)
         if not tick > 0.0 or np.abs(t - t[0] - tick * np.arange(len(t))).max() > 0.5 * tick:
             raise InputError(
                 f"{where}: rows are not evenly spaced in time; record every tick, or give --rate"
@@ -182,9 +196,11 @@ class _Log:
         return cls(tick, u - u[0], x - u[0])
 
     @property
-    def error(self) -> Array:
-        """What the position lags behind [m]."""
-        return self.command - self.position
+    def behind(self) -> Array:
+        """What the position lags behind, offset and gain apart [m]."""
+        columns = np.column_stack([self.command, np.ones(len(self.command))])
+        fit = np.linalg.lstsq(columns, self.position, rcond=None)[0]
+        return np.asarray((columns @ fit - self.position) / (fit[0] if fit[0] > 0.0 else 1.0))
 
     def cut(self, parts: int) -> list[_Log]:
         """Parts of one length."""
@@ -219,7 +235,7 @@ def _fitted(log_: _Log, start: Array | None = None) -> Array:
 def _start(log_: _Log, hertz: float, z: float) -> Array:
     """A start of this bandwidth, late by what is left of the lag that a straight line through the rates tells."""
     rate = np.gradient(log_.command, log_.tick)
-    whole = max(float(rate @ log_.error / max(float(rate @ rate), 1e-300)), 0.0)
+    whole = max(float(rate @ log_.behind / max(float(rate @ rate), 1e-300)), 0.0)
     return np.array([log(2.0 * pi * hertz), log(z), max(whole - z / (pi * hertz), 0.0)])
 
 

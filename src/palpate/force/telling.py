@@ -28,8 +28,8 @@ def sentence(claim: Claim, gains_kind: str) -> str:
         )
     if claim.kind == "one-sided":
         return (
-            f"with the gain held at K_u = cap: every surface up to {claim.high:.4g} N/m (K + B/theta, felt), {times}, also "
-            f"where contact is lost and found again at ticks, over gaps of up to F_d/({claim.low:.3g} N/m)"
+            f"with the gain held at K_u = cap: every surface up to {claim.high:.4g} N/m (K + B/theta, felt), {times}, "
+            f"also where contact is lost and found again at ticks, over gaps of up to F_d/({claim.low:.3g} N/m)"
         )
     which = (
         "every constant stiffness"

@@ -60,7 +60,7 @@ class Tuning:
     @property
     def proved(self) -> bool:
         """Whether anything is."""
-        return any(c.kind == "held" for c in self.certificate.claims)
+        return any(c.kind != "adapting" for c in self.certificate.claims)
 
     @property
     def overshoot(self) -> float:
@@ -79,7 +79,7 @@ class Tuning:
     def surface_stiffness(self, kind: str) -> tuple[float, float] | None:
         """The proved interval of K + B/theta of the surface itself for a kind of claim [N/m]."""
         for claim in self.certificate.claims:
-            if claim.kind == kind:
+            if claim.kind == kind or (kind == "held" and claim.kind == "one-sided"):
                 return self._own(claim.low, claim.high)
         return None
 
@@ -97,7 +97,7 @@ class Tuning:
     def to_json(self) -> dict[str, Any]:
         """As `palpate tune --json` prints it."""
         gains, arm = self.gains, self.gains.arm
-        held = next((c for c in self.certificate.claims if c.kind == "held"), None)
+        held = next((c for c in self.certificate.claims if c.kind != "adapting"), None)
         adapting = next((c for c in self.certificate.claims if c.kind == "adapting"), None)
         known = self.known
         return {
