@@ -16,6 +16,14 @@ from palpate.signals.low_pass import LowPass
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
 T = TypeVar("T")
+_REMEDIES = {
+    "bandwidth": "measure it with palpate tune --loop-from LOG",
+    "damping": "measure it with palpate tune --loop-from LOG, or take D of a torque arm",
+    "delay": "measure it with palpate tune --loop-from LOG; without it there is no lag to tune for",
+    "stiffness": "press the tip on something rigid and run palpate identify on it: that is the arm's own",
+    "mass": "take the tip's, 1/(n^T J M^-1 J^T n), from the arm's model",
+    "noise": "record the sensor in the air: it is the readings' standard deviation",
+}
 _LARGEST = 1 << 16
 """Bytes of an arm's file."""
 
@@ -254,11 +262,17 @@ def from_toml(text: str, where: str, kind: type[T]) -> T:
         _check_finite(tables, "")
         return msgspec.convert(tables, kind)
     except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise InputError(f"{where}: {error}{_remedy(str(error))}") from None
     except msgspec.DecodeError as error:
         raise InputError(f"{where}: not TOML: {error}") from None
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def _remedy(error: str) -> str:
+    """What to do about a number that is missing."""
+    name = error.partition("missing required field `")[2].partition("`")[0]
+    return f"; {_REMEDIES[name]}" if name in _REMEDIES else ""
 
 
 def _check_finite(value: object, path: str) -> None:

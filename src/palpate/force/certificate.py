@@ -98,7 +98,7 @@ class Claim(Table):
 
     def prover(self, gains: Gains) -> Prover:
         """What has to contract."""
-        own = gains.seen_cap if gains.arm.kind == "position" else None
+        own = gains.seen_cap if gains.arm.kind == "position" else _between(gains)
         loop = SampledLoop(gains.arm, self.jitter, own)
         unit = gains.alpha if self.kind == "adapting" else gains.gain
         ends = self.shares[0] * unit, self.shares[1] * unit
@@ -442,3 +442,8 @@ def _felt(
     ends = [exact_interval(gains, t)[1] for t in np.linspace(0.0, most, 9).tolist()]
     share = 1.0 if gains.arm.kind == "torque" else EXACT_SHARE / margin
     return SOFTEST * cap, float(share * min(ends))
+
+
+def _between(gains: Gains) -> float:
+    """A unit of stiffness for a torque arm, in which neither its spring nor a soft surface is out of size [N/m]."""
+    return float(np.sqrt(gains.arm.series * min(gains.cap, gains.arm.series)))

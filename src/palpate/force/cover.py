@@ -48,6 +48,8 @@ def proved_cell(prover: Prover, box: Box) -> Cell | None:
 
 ROOM = 1.3
 """By which an inner loop's box is widened while a norm is searched."""
+MOST = 2000
+"""Cells after which a piece is given up: a certificate of more is not checked in a second."""
 CUTS, FEWER = 24, 5
 """After which a piece is given up; fewer where each costs a long search and helps little."""
 
@@ -61,7 +63,7 @@ def covered(prover: Prover, box: Box) -> tuple[list[Cell], list[Box]]:
         cell = proved_cell(prover, here)
         if cell is not None:
             cells.append(cell)
-        elif cuts == 0:
+        elif cuts == 0 or len(cells) == MOST:
             return cells, [here]
         else:
             waiting.extend((half, cuts - 1) for half in _halves(prover, here))
