@@ -36,6 +36,7 @@ def report(kind: str, colour: float, told: argparse.Namespace) -> None:
     for i in track(range(told.logs), f"{kind}, colour {colour:g}", transient=True):
         rng = np.random.default_rng([told.seed, i])
         true = np.exp(rng.uniform(np.log([3.0, 0.5, 0.002]), np.log([20.0, 1.5, 0.03])))
+        true[2] = TICK / FINE * round(true[2] * FINE / TICK)
         t, command, position = log(rng, kind, colour, told.seconds, *true)
         try:
             found = identify_inner_loop(t, command, position)

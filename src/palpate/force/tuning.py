@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf, isfinite
 from typing import Any
 
@@ -14,6 +15,7 @@ from palpate.force.arm import Arm, TorqueLoop
 from palpate.force.certificate import FORM, Certificate, certify, exact_interval
 from palpate.force.gains import Gains, approach_speed
 from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
+from palpate.force.peak import peak_bound
 from palpate.force.steps import Margins, Step, margins, step_of
 
 RIGID = 1e9
@@ -78,6 +80,11 @@ class Tuning:
             peak = max(peak, gains.approach * float(np.sqrt(gains.cap * gains.arm.inner.mass)))
         return peak
 
+    @cached_property
+    def peak_bound(self) -> float | None:
+        """Bound of the first peak [N] while K_u is not below the stiffness; None for a torque arm."""
+        return peak_bound(self.gains)
+
     def surface_stiffness(self, kind: str) -> tuple[float, float] | None:
         """The proved interval of K + B/theta of the surface itself for a kind of claim [N/m]."""
         for claim in self.certificate.claims:
@@ -118,6 +125,7 @@ class Tuning:
             },
             "approach_speed_m_s": gains.approach,
             "peak_N": self.peak,
+            "peak_bound_N": self.peak_bound,
             "settling_s": _number(max(step.settling for step in self.steps)),
             "overshoot": self.overshoot,
             "margins": {
