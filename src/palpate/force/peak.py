@@ -25,8 +25,8 @@ def peak_bound(gains: Gains, share: float = 1.0, lags: float = LAGS) -> float | 
 
     Until the reading reaches F_d, the law moves the command by T s alpha/(theta K_eff) (F_d - F_m) a tick, s between 0
     and a largest share as the estimator likes. The largest sum of such steps, over all s, is a linear program: steps d,
-    0 <= d_k <= share a (F_d - sum_j G_(k-j) d_j), where G is the reading's answer to a step of the command; the speed at
-    which the tip arrives is in it too. Thereafter the command only goes back, so that the force never exceeds this
+    0 <= d_k <= share a (F_d - sum_j G_(k-j) d_j), where G is the reading's answer to a step of the command; the tip's
+    speed at the touch is in it too. Thereafter the command only goes back, so that the force never exceeds this
     sum times the inner loop's own overshoot. A surface without damping, no noise; the touch may fall between ticks.
 
     Args:
