@@ -270,7 +270,7 @@ LOOP = ("--time", "t", "--command", "target:mm", "--position", "actual:mm")
 
 
 def write_loop(path, kind):
-    t, command, position = loop_log(0, kind=kind)
+    t, command, position = loop_log(0, kind=kind, noise={"steps": 1e-6, "slow": 1e-4}[kind])
     table = np.column_stack([t, 1e3 * command, 1e3 * position])
     np.savetxt(path, table, delimiter=",", header="t,target,actual", comments="")
 

@@ -22,6 +22,10 @@ RIGID = 1e9
 """What is stiffer is said to be this stiff [N/m]."""
 
 
+_OF_IDENTIFY = " (to palpate identify, whose --json palpate tune takes)"
+"""Behind what an identification asks for."""
+
+
 @dataclass(frozen=True)
 class Known:
     """What is known of the surface.
@@ -210,7 +214,7 @@ def _warned(warnings: object) -> tuple[tuple[str, str], ...]:
     """What an identification warns of, as far as it is in words."""
     given = warnings if isinstance(warnings, list) else []
     return tuple(
-        (w["code"], w["text"])
+        (w["code"], w["text"] + (_OF_IDENTIFY if "--" in w["text"] else ""))
         for w in given
         if isinstance(w, Mapping) and isinstance(w.get("code"), str) and isinstance(w.get("text"), str)
     )
@@ -268,7 +272,14 @@ def tune(
     found = Tuning(gains, known, nothing, steps, at, tuple(_warnings(arm, known, at.gain)))
     _check_peak(found, peak)
     _check_surface_speed(gains, surface_speed)
-    return replace(found, certificate=certify(gains, adapting=prove_adapting))
+    found = replace(found, certificate=certify(gains, adapting=prove_adapting))
+    if not found.proved and isinstance(arm.inner, PositionLoop) and arm.inner.bandwidth_interval is not None:
+        text = (
+            "nothing is proved for all that the inner loop may be: record more steps or a wider sweep, so that its "
+            "intervals are narrower"
+        )
+        found = replace(found, warnings=(*found.warnings, ("inner-loop-wide", text)))
+    return found
 
 
 def _check(force: float, known: Known | None, cap: float | None) -> None:
