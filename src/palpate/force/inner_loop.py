@@ -172,6 +172,7 @@ class _Log:
     tick: float
     command: Array
     position: Array
+    before: Array  # commands before the first row
 
     @classmethod
     def of(cls, time: Array, command: Array, position: Array, where: str) -> _Log:
@@ -193,7 +194,7 @@ class _Log:
             raise InputError(
                 f"{where}: the position does not move; check the columns, and that the arm was on"
             )
-        return cls(tick, u - u[0], x - u[0])
+        return cls(tick, u - u[0], x - u[0], np.zeros(1))
 
     @property
     def behind(self) -> Array:
@@ -207,7 +208,10 @@ class _Log:
         n = len(self.command) // parts
         return [
             replace(
-                self, command=self.command[i * n : (i + 1) * n], position=self.position[i * n : (i + 1) * n]
+                self,
+                command=self.command[i * n : (i + 1) * n],
+                position=self.position[i * n : (i + 1) * n],
+                before=np.append(self.before, self.command[: i * n]),
             )
             for i in range(parts)
         ]
@@ -225,7 +229,7 @@ def _fitted(log_: _Log, start: Array | None = None) -> Array:
     found = [
         least_squares(
             lambda p: _residual(log_, p), np.clip(s, np.array(low) + 1e-9, np.array(high) - 1e-9),
-            bounds=(low, high), x_scale=scale, diff_step=1e-5, max_nfev=60,
+            bounds=(low, high), x_scale=scale, diff_step=1e-5, max_nfev=60, gtol=None,
         )
         for s in starts
     ]  # fmt: skip
@@ -260,8 +264,10 @@ def _columns(log_: _Log, p: Array) -> Array:
     second = _numerator(E, later)
     n = len(log_.command)
     shift = int(whole)
-    u = np.concatenate([np.zeros(min(shift, n)), log_.command[: max(n - shift, 0)]])
-    older = np.concatenate([[0.0], u[:-1]])
+    lacking = max(shift + 1 - len(log_.before), 0)
+    known = np.concatenate([np.full(lacking, log_.before[0]), log_.before, log_.command])
+    end = len(known) - shift
+    u, older = known[end - n : end], known[end - n - 1 : end - 1]
     answer = lfilter(second, denominator, u) + lfilter(first, denominator, older)
     kick = np.zeros(n)
     kick[0] = 1.0

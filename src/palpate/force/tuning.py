@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.force.arm import Arm, TorqueLoop
+from palpate.force.arm import Arm, PositionLoop, TorqueLoop
 from palpate.force.certificate import FORM, Certificate, certify, exact_interval
 from palpate.force.gains import Gains, approach_speed
 from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
