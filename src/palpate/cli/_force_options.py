@@ -119,6 +119,8 @@ class ColumnOptions:
         Column of the force in the log of a press, as force_mN:mN.
     command
         Column of the commanded position in the log of --loop-from, as target_mm:mm.
+    payload
+        Of a log of a press: what palpate payload wrote of the tool on the sensor, whose mass is taken out of M.
     """
 
     time: str | None = None
@@ -126,6 +128,7 @@ class ColumnOptions:
     position: str | None = None
     log_force: str | None = None
     command: str | None = None
+    payload: Path | None = None
 
     @property
     def of_press(self) -> LogOptions:

@@ -17,6 +17,7 @@ from palpate.cli._force_options import (
     one_thread,
 )
 from palpate.cli._log_options import LogOptions
+from palpate.cli._program import command
 from palpate.cli._terminal import console, place, print_json
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
@@ -87,7 +88,7 @@ def tune(
     told = tuned(
         one,
         press.desired,
-        _known(found, surface.stiffness, columns.of_press),
+        _known(found, surface.stiffness, columns.of_press, columns.payload),
         cap=surface.cap,
         peak=press.highest,
         surface_speed=surface.surface_speed,
@@ -98,7 +99,9 @@ def tune(
     return 0 if told.proved else 1
 
 
-def _known(found: Path | None, stiffness: str | None, source: LogOptions) -> Known | None:
+def _known(
+    found: Path | None, stiffness: str | None, source: LogOptions, payload: Path | None
+) -> Known | None:
     from palpate.excitation.quantities import spread
     from palpate.force import Known, known_from
 
@@ -113,7 +116,7 @@ def _known(found: Path | None, stiffness: str | None, source: LogOptions) -> Kno
         return Known((low, high))
     if found.suffix.lower() == ".json":
         return known_from(_object(found), str(found))
-    return known_from(_identified(found, source), str(found))
+    return known_from(_identified(found, source, payload), str(found))
 
 
 def _object(path: Path) -> dict[str, Any]:
@@ -134,9 +137,10 @@ def _object(path: Path) -> dict[str, Any]:
     return value
 
 
-def _identified(log: Path, source: LogOptions) -> dict[str, Any]:
-    from palpate import identify
+def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str, Any]:
+    from palpate.cli._arm_options import ArmOptions as PayloadOptions
     from palpate.cli._log_options import read
+    from palpate.contact_frame import identify_contact
     from palpate.logs.own_runs import is_run, measured_by
 
     record = read(log, source, samples=False)
@@ -145,7 +149,8 @@ def _identified(log: Path, source: LogOptions) -> dict[str, Any]:
             f"{log}: tune takes a log of one axis; run palpate identify --json on it and give that"
         )
     known: dict[str, Any] = measured_by(log) if source.plain and is_run(log) else {}
-    return identify(record, **known).to_json()
+    found, _ = identify_contact(record, None, PayloadOptions(payload=payload).arm(), **known)
+    return found.to_json()
 
 
 def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
@@ -154,7 +159,7 @@ def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     if page is not None:
         from palpate.report.force_page import write_page
 
-        write_page(told, page)
+        write_page(told, page, command())
     return [path for path in (out, page) if path is not None]
 
 
