@@ -121,7 +121,7 @@ def identify_inner_loop(time: Array, command: Array, position: Array, where: str
     log_ = _Log.of(time, command, position, where)
     p = _fitted(log_)
     halves = [_fitted(part, p) for part in log_.cut(2)]
-    std = np.maximum(_deviations(log_, p), 0.5 * np.abs(halves[0] - halves[1]))
+    std = np.maximum(_deviations(log_, p), 0.5 * np.abs(halves[0] - halves[1])).tolist()
     quantile = float(student.ppf(0.975, BLOCKS - 1))
     w, z, late = exp(p[0]), exp(p[1]), float(p[2])
     grow = [exp(min(quantile * s, 50.0)) for s in std[:2]]
