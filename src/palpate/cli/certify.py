@@ -2,38 +2,92 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
+from palpate.cli._force_options import FLAG, NUMBER, ColumnOptions, OutputOptions, inner_loop, one_thread
 from palpate.cli._terminal import console, print_json, print_lines
-from palpate.cli.tune import _one_thread
 from palpate.errors import InputError
-from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.force import Certificate
     from palpate.force.certificate import Verdict
 
-_FLAG = Parameter(negative=())
-_NUMBER = Parameter(allow_leading_hyphen=True)
+
+@Parameter(name="*", group=Group("What is to be proved", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class ProofOptions:
+    """Of which surfaces, gains and delays.
+
+    Parameters
+    ----------
+    stiffness
+        Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of what is stable if not
+        given.
+    damping_time
+        Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0).
+    jitter
+        Ticks by which the age of a reading may change from tick to tick while the law adapts.
+    margin
+        Factor that the gains may grow by.
+    held_only
+        Leave out the proof of the adapting law.
+    loop_from
+        A log of commanded and measured position in free motion: the proof is of the inner loop that it shows.
+    """
+
+    stiffness: Annotated[str | None, NUMBER] = None
+    damping_time: Annotated[str | None, NUMBER] = None
+    jitter: Annotated[int, NUMBER] = 1
+    margin: Annotated[float, NUMBER] = 1.0
+    held_only: Annotated[bool, FLAG] = False
+    loop_from: Path | None = None
+
+    def check(self) -> None:
+        """Finds numbers out of range."""
+        if not 0 <= self.jitter <= 10:
+            raise InputError(f"--jitter must be from 0 to 10 ticks, got {self.jitter}")
+        if not 1.0 <= self.margin <= 10.0:
+            raise InputError(f"--margin must be from 1 to 10, got {self.margin:g}")
+
+    @property
+    def surfaces(self) -> tuple[float, float] | None:
+        """K + B/theta [N/m]."""
+        from palpate.excitation.quantities import spread
+
+        if self.stiffness is None:
+            return None
+        low, high = spread("--stiffness", self.stiffness, "stiffness")
+        if not 0.0 < low < high:
+            raise InputError(
+                f"--stiffness must be an interval above 0 N/m with its lower end first, got {self.stiffness!r}"
+            )
+        return low, high
+
+    @property
+    def longest(self) -> float | None:
+        """B/K [s]."""
+        from palpate.excitation.quantities import spread
+
+        if self.damping_time is None:
+            return None
+        low, high = spread("--damping-time", self.damping_time, "time")
+        if not 0.0 == low <= high:
+            raise InputError(f"--damping-time must be 0:T in seconds, got {self.damping_time!r}")
+        return high
 
 
-# More than seven arguments: each is a flag of the command.
 def certify(
     gains: Path | None = None,
     /,
     *,
-    stiffness: Annotated[str | None, _NUMBER] = None,
-    damping_time: Annotated[str | None, _NUMBER] = None,
-    jitter: Annotated[int, _NUMBER] = 1,
-    margin: Annotated[float, _NUMBER] = 1.0,
-    held_only: Annotated[bool, _FLAG] = False,
-    out: Path | None = None,
-    replace: Annotated[bool, _FLAG] = False,
+    proof: ProofOptions | None = None,
+    columns: ColumnOptions | None = None,
+    output: OutputOptions | None = None,
     check: Path | None = None,
-    json: Annotated[bool, _FLAG] = False,
 ) -> int:
     """Prove where a tuned force loop is stable, or check such a proof.
 
@@ -48,82 +102,48 @@ def certify(
     ----------
     gains
         What palpate tune wrote.
-    stiffness
-        Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of what is stable if not
-        given.
-    damping_time
-        Range of B/K, 0:T in s; up to theta for a position arm, 0 for a torque arm if not given.
-    jitter
-        Ticks by which the age of a reading may change from tick to tick while the law adapts.
-    margin
-        Factor that the gains may grow by.
-    held_only
-        Leave out the proof of the adapting law, which takes a torque arm a minute.
-    out
-        Where to write the certificate, a JSON file.
-    replace
-        Replace what stands at --out.
     check
         A certificate to check.
-    json
-        Print one JSON object and nothing else.
     """
-    _one_thread()
+    one_thread()
+    proof, output = proof or ProofOptions(), output or OutputOptions()
     if check is not None:
-        return _checked(check, gains, json)
+        return _checked(check, gains, output.json)
     if gains is None:
         raise InputError("certify what? Give the gains that palpate tune wrote, or --check CERTIFICATE")
-    if out is not None:
-        check_place(out, "--out")
-        if out.suffix.lower() != ".json":
-            raise InputError(f"{out}: a certificate is a .json file; name it so")
-        if out.exists() and not replace:
-            raise InputError(f"{out} exists; choose another place, or add --replace")
-    if not 0 <= jitter <= 10:
-        raise InputError(f"--jitter must be from 0 to 10 ticks, got {jitter}")
-    if not 1.0 <= margin <= 10.0:
-        raise InputError(f"--margin must be from 1 to 10, got {margin:g}")
-    return _made(gains, stiffness, damping_time, jitter, margin, held_only, out, json)
+    output.check(".json")
+    proof.check()
+    return _made(gains, proof, columns or ColumnOptions(), output)
 
 
-# More than seven arguments: the flags of the command.
-def _made(
-    path: Path,
-    stiffness: str | None,
-    damping_time: str | None,
-    jitter: int,
-    margin: float,
-    held_only: bool,
-    out: Path | None,
-    json: bool,
-) -> int:
-    from palpate.excitation.quantities import spread
+def _made(path: Path, asked: ProofOptions, columns: ColumnOptions, output: OutputOptions) -> int:
     from palpate.force import certify as proved
     from palpate.force import load_gains
+    from palpate.force.arm import PositionLoop
 
     gains = load_gains(path)
-    surfaces = None if stiffness is None else spread("--stiffness", stiffness, "stiffness")
-    if surfaces is not None and not 0.0 < surfaces[0] < surfaces[1]:
-        raise InputError(
-            f"--stiffness must be an interval above 0 N/m with its lower end first, got {stiffness!r}"
-        )
-    time = None if damping_time is None else spread("--damping-time", damping_time, "time")
-    if time is not None and not 0.0 == time[0] <= time[1]:
-        raise InputError(f"--damping-time must be 0:T in seconds, got {damping_time!r}")
+    surfaces, longest = asked.surfaces, asked.longest
+    measured = None
+    if asked.loop_from is not None:
+        arm = inner_loop(asked.loop_from, columns).of(gains.arm, asked.loop_from.name)
+        measured = arm.inner if isinstance(arm.inner, PositionLoop) else None
     with console(stderr=True).status("proving") as status:
         made = proved(
             gains,
             surfaces,
-            None if time is None else time[1],
-            jitter,
-            margin,
-            adapting=not held_only,
+            longest,
+            asked.jitter,
+            asked.margin,
+            adapting=not asked.held_only,
+            measured=measured,
             progress=lambda what: status.update(f"proving {what}"),
         )
-    if out is not None and made.claims:
-        made.save(out)
-    _print(made, made.check(), json)
-    return 0 if len(made.claims) == (1 if held_only else 2) else 1
+    if output.out is not None and made.claims:
+        made.save(output.out)
+    _print(made, made.check(), output.json)
+    kinds = {claim.kind for claim in made.claims}
+    wanted = {"one-sided" if measured is not None else "held"} | (set() if asked.held_only else {"adapting"})
+    return 0 if wanted <= kinds else 1
 
 
 def _checked(path: Path, gains: Path | None, json: bool) -> int:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-import os
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
+from palpate.cli._force_options import (
+    ArmOptions,
+    ColumnOptions,
+    OutputOptions,
+    PressOptions,
+    SurfaceOptions,
+    one_thread,
+)
 from palpate.cli._log_options import LogOptions
 from palpate.cli._program import command
 from palpate.cli._terminal import console, place, print_json
@@ -16,32 +24,35 @@ from palpate.files import check_place, write_text
 
 if TYPE_CHECKING:
     from palpate.force import Known, Tuning
+    from palpate.force.inner_loop import InnerLoop
 
-_FLAG = Parameter(negative=())
-_NUMBER = Parameter(allow_leading_hyphen=True)
 _LARGEST = 1 << 26
 
 
-# More than seven arguments: each is a flag of the command.
+@Parameter(name="*", group=Group("What is written", sort_key=6))
+@dataclass(frozen=True, kw_only=True)
+class PageOptions:
+    """The page.
+
+    Parameters
+    ----------
+    report
+        Where to write a page with everything, an HTML file.
+    """
+
+    report: Path | None = None
+
+
 def tune(
     found: Path | None = None,
     /,
     *,
-    arm: str,
-    force: Annotated[str, _NUMBER],
-    stiffness: Annotated[str | None, _NUMBER] = None,
-    stiffness_cap: Annotated[str | None, _NUMBER] = None,
-    peak: Annotated[str | None, _NUMBER] = None,
-    surface_speed: Annotated[float | None, _NUMBER] = None,
-    out: Path | None = None,
-    replace: Annotated[bool, _FLAG] = False,
-    report: Path | None = None,
-    json: Annotated[bool, _FLAG] = False,
-    time: str | None = None,
-    rate: float | None = None,
-    position: str | None = None,
-    log_force: str | None = None,
-    payload: Path | None = None,
+    arm: ArmOptions,
+    press: PressOptions,
+    surface: SurfaceOptions | None = None,
+    columns: ColumnOptions | None = None,
+    output: OutputOptions | None = None,
+    page: PageOptions | None = None,
 ) -> int:
     """Tune a force loop for an arm, and prove where it is stable.
 
@@ -53,6 +64,10 @@ def tune(
 
     palpate tune --stiffness 1e2:1e6 --arm fr3 --force 10 --out gains.toml
 
+    The arm's inner loop and delay from a log of commanded and measured position, in free motion:
+
+    palpate tune found.json --arm ur5e --force 20 --loop-from sweep.csv --time t --command target_x --position actual_x
+
     The gains are for palpate.force.ForceLoop, which adapts to any surface below the cap. Exit code 1 says that
     nothing could be proved.
 
@@ -60,72 +75,28 @@ def tune(
     ----------
     found
         What palpate identify --json printed, as a .json file; or a log.
-    arm
-        ur5e, fr3, panda, iiwa14, or a TOML file.
-    force
-        Desired force, the smallest that will be asked for, N.
-    stiffness
-        Range of the surface's stiffness, LOW:HIGH in N/m or LOW:HIGH:UNIT, without a log.
-    stiffness_cap
-        Stiffest surface that there may be, N/m.
-    peak
-        Highest force allowed at the touch, N.
-    surface_speed
-        Of a surface that moves by itself, m/s.
-    out
-        Where to write the gains, a TOML file.
-    replace
-        Replace what stands at --out.
-    report
-        Where to write a page with everything, an HTML file.
-    json
-        Print one JSON object and nothing else.
-    time
-        Of a log: its column of the time, as for palpate identify.
-    rate
-        Of a log without a time: rows per second.
-    position
-        Of a log: its column of the position, as position_mm:mm.
-    log_force
-        Of a log: its column of the force, as force_mN:mN.
-    payload
-        Of a log: what palpate payload wrote of the tool on the sensor, whose mass is taken out of M.
     """
-    _one_thread()
-    if report is not None:
-        check_place(report, "--report", ending=".html")
-    if out is not None:
-        _check_out(out, replace)
-    from palpate.excitation.quantities import quantity
-    from palpate.force import load_arm
+    one_thread()
+    surface, columns = surface or SurfaceOptions(), columns or ColumnOptions()
+    output, page = output or OutputOptions(), page or PageOptions()
+    output.check(".toml")
+    if page.report is not None:
+        check_place(page.report, "--report", ending=".html")
     from palpate.force import tune as tuned
 
-    one = load_arm(arm)
+    one, inner = arm.named(columns)
     told = tuned(
         one,
-        quantity("--force", force, "force"),
-        _known(
-            found, stiffness, LogOptions(time=time, rate=rate, position=position, force=log_force), payload
-        ),
-        cap=None if stiffness_cap is None else quantity("--stiffness-cap", stiffness_cap, "stiffness"),
-        peak=None if peak is None else quantity("--peak", peak, "force"),
-        surface_speed=surface_speed,
-        prove_adapting=one.kind == "position",
+        press.desired,
+        _known(found, surface.stiffness, columns.of_press, columns.payload),
+        cap=surface.cap,
+        peak=press.highest,
+        surface_speed=surface.surface_speed,
+        prove_adapting=one.kind == "position" and inner is None,
     )
-    _write(told, out, report)
-    _print(told, [p for p in (out, report) if p is not None], json)
+    written = _written(told, output.out, page.report)
+    _print(told, inner, written, output.json)
     return 0 if told.proved else 1
-
-
-def _one_thread() -> None:
-    """A proof is made of many small matrices: NumPy's threads would cost ten times what they bring."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-def _check_out(out: Path, replace: bool) -> None:
-    check_place(out, "--out", ending=".toml")
-    if out.exists() and not replace:
-        raise InputError(f"{out} exists; choose another place, or add --replace")
 
 
 def _known(
@@ -167,7 +138,7 @@ def _object(path: Path) -> dict[str, Any]:
 
 
 def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str, Any]:
-    from palpate.cli._arm_options import ArmOptions
+    from palpate.cli._arm_options import ArmOptions as PayloadOptions
     from palpate.cli._log_options import read
     from palpate.contact_frame import identify_contact
     from palpate.logs.own_runs import is_run, measured_by
@@ -178,22 +149,23 @@ def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str
             f"{log}: tune takes a log of one axis; run palpate identify --json on it and give that"
         )
     known: dict[str, Any] = measured_by(log) if source.plain and is_run(log) else {}
-    found, _ = identify_contact(record, None, ArmOptions(payload=payload).arm(), **known)
+    found, _ = identify_contact(record, None, PayloadOptions(payload=payload).arm(), **known)
     return found.to_json()
 
 
-def _write(told: Tuning, out: Path | None, page: Path | None) -> None:
+def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     if out is not None:
         write_text(out, told.gains.to_toml())
     if page is not None:
         from palpate.report.force_page import write_page
 
         write_page(told, page, command())
+    return [path for path in (out, page) if path is not None]
 
 
-def _print(told: Tuning, written: list[Path], json: bool) -> None:
+def _print(told: Tuning, inner: InnerLoop | None, written: list[Path], json: bool) -> None:
     if json:
-        print_json(told.to_json())
+        print_json(told.to_json() | {"inner_loop": None if inner is None else inner.to_json()})
         return
     from palpate.report.force_table import show
 

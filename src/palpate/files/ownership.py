@@ -18,7 +18,7 @@ MADE = f"# Made by {SIGNATURE}"
 FORCE = ("time_s", "force_desired_N")
 """The columns of a desired force in a CSV file, which takes no comment."""
 
-_KINDS = {".png": "PNG", ".html": "HTML file", ".toml": "TOML file"}
+_KINDS = {".json": "JSON file", ".png": "PNG", ".html": "HTML file", ".toml": "TOML file"}
 _HEAD, _FOOT = 4096, 1 << 20
 _FEET = {
     b"PAR1": b"\x18\x07palpate\x18",  # a key and its value, as Thrift writes them

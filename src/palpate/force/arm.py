@@ -16,6 +16,14 @@ from palpate.signals.low_pass import LowPass
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
 T = TypeVar("T")
+_REMEDIES = {
+    "bandwidth": "measure it with palpate tune --loop-from LOG",
+    "damping": "measure it with palpate tune --loop-from LOG, or take D of a torque arm",
+    "delay": "measure it with palpate tune --loop-from LOG; without it there is no lag to tune for",
+    "stiffness": "press the tip on something rigid and run palpate identify on it: that is the arm's own",
+    "mass": "take the tip's, 1/(n^T J M^-1 J^T n), from the arm's model",
+    "noise": "record the sensor in the air: it is the readings' standard deviation",
+}
 _LARGEST = 1 << 16
 """Bytes of an arm's file."""
 
@@ -24,8 +32,17 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """A table of an arm's file: its keys and no others."""
 
 
-class PositionLoop(Table, tag="position", tag_field="kind"):
-    """A tip that follows a commanded position as w^2/(s^2 + 2 z w s + w^2), late by a delay."""
+Interval = tuple[NotNegative, NotNegative]
+
+
+class PositionLoop(Table, tag="position", tag_field="kind", omit_defaults=True):
+    """A tip that follows a commanded position as w^2/(s^2 + 2 z w s + w^2), late by a delay.
+
+    An interval says how well a number is known; theta and the certificate are of everything in it.
+
+    Raises:
+        InputError: an interval without its number in it.
+    """
 
     bandwidth: Positive
     """w/2 pi [Hz]."""
@@ -35,6 +52,45 @@ class PositionLoop(Table, tag="position", tag_field="kind"):
     """Between sending a command and the arm's loop having it [s]."""
     stiffness: Positive
     """Of the arm itself, between what its encoders see and the surface [N/m]."""
+    bandwidth_interval: Interval | None = None
+    damping_interval: Interval | None = None
+    delay_interval: Interval | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("bandwidth", "damping", "delay"):
+            value, ends = getattr(self, name), getattr(self, f"{name}_interval")
+            if ends is not None and not ends[0] <= value <= ends[1]:
+                raise InputError(
+                    f"{name}_interval must be an interval around {name} = {value:g}, got {ends[0]:g} to {ends[1]:g}"
+                )
+            if ends is not None and name != "delay" and not ends[0] > 0.0:
+                raise InputError(f"{name}_interval must be above 0, got {ends[0]:g} to {ends[1]:g}")
+
+    @property
+    def squared(self) -> tuple[float, float]:
+        """w^2 [1/s^2] and 2 z w [1/s], in which the equation of motion is linear."""
+        own = 2.0 * math.pi * self.bandwidth
+        return own**2, 2.0 * self.damping * own
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """Those of a box of w^2 and 2 z w that holds everything within the intervals; one where there are none."""
+        w = self.bandwidth_interval or (self.bandwidth, self.bandwidth)
+        z = self.damping_interval or (self.damping, self.damping)
+        if w[0] == w[1] and z[0] == z[1]:
+            return [self.squared]
+        own = [2.0 * math.pi * f for f in w]
+        return [(a**2, 2.0 * d) for a in own for d in (z[0] * own[0], z[1] * own[1])]
+
+    @property
+    def longest_delay(self) -> float:
+        """The upper end of what the delay may be [s]."""
+        return self.delay if self.delay_interval is None else self.delay_interval[1]
+
+    @property
+    def shortest_delay(self) -> float:
+        """The lower end of it [s]."""
+        return self.delay if self.delay_interval is None else self.delay_interval[0]
 
 
 class TorqueLoop(Table, tag="torque", tag_field="kind"):
@@ -95,7 +151,7 @@ class Arm(Table):
             )
         if self.delay_ticks > 100:
             raise InputError(
-                f"{self.title}: a delay of {self.inner.delay:g} s is {self.delay_ticks} ticks; at most 100 are taken: "
+                f"{self.title}: a delay of {self.longest_delay:g} s, {self.delay_ticks} ticks; at most 100 are taken: "
                 "run the force loop slower"
             )
 
@@ -117,7 +173,19 @@ class Arm(Table):
     @property
     def delay_ticks(self) -> int:
         """The inner loop's delay in whole ticks, rounded up."""
-        return _ticks(self.inner.delay * self.rate)
+        return _ticks(self.longest_delay * self.rate)
+
+    @property
+    def longest_delay(self) -> float:
+        """The inner loop's delay, at most [s]."""
+        return self.inner.longest_delay if isinstance(self.inner, PositionLoop) else self.inner.delay
+
+    @property
+    def unsure_ticks(self) -> int:
+        """Whole ticks by which the delay may be shorter than `delay_ticks`."""
+        if not isinstance(self.inner, PositionLoop) or self.inner.delay_interval is None:
+            return 0
+        return self.delay_ticks - math.floor(self.inner.shortest_delay * self.rate + 1e-9)
 
     @property
     def sensor_ticks(self) -> int:
@@ -194,11 +262,17 @@ def from_toml(text: str, where: str, kind: type[T]) -> T:
         _check_finite(tables, "")
         return msgspec.convert(tables, kind)
     except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise InputError(f"{where}: {error}{_remedy(str(error))}") from None
     except msgspec.DecodeError as error:
         raise InputError(f"{where}: not TOML: {error}") from None
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def _remedy(error: str) -> str:
+    """What to do about a number that is missing."""
+    name = error.partition("missing required field `")[2].partition("`")[0]
+    return f"; {_REMEDIES[name]}" if name in _REMEDIES else ""
 
 
 def _check_finite(value: object, path: str) -> None:

@@ -2,18 +2,21 @@
 
 A surface is (K, B). A cell is what lies between two lines K + B/theta and two damping times B/K: a quadrilateral. For a
 position arm the loop's matrix is affine in (K, B), in the gain and in which reading is used, so that what contracts at
-the corners contracts everywhere between, also if it changes from tick to tick. For a torque arm it is a matrix
-exponential of what is affine: the distance from the corners' hull is bounded by its second derivative.
+the corners contracts everywhere between, also if it changes from tick to tick. For a torque arm, and in what is not
+known of a position arm's inner loop, it is a matrix exponential of what is affine: the distance from the corners' hull
+is bounded by its second derivatives.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.force.arm import PositionLoop
 from palpate.force.sampled_loop import Law, SampledLoop
 
 Array = NDArray[np.float64]
@@ -30,12 +33,16 @@ class Box:
         high: to [N/m].
         least: B/K from [s].
         most: to [s].
+        part: which part of what the inner loop may be.
+        loss: ticks by which the delay is shorter than the longest it may be.
     """
 
     low: float
     high: float
     least: float
     most: float
+    part: int = 0
+    loss: int = 0
 
     def corners(self, theta: float) -> list[tuple[float, float]]:
         """(K, B) of the corners; one where the box is a point in that direction."""
@@ -46,13 +53,18 @@ class Box:
             for t in times
         ]
 
-    def halves(self, theta: float) -> tuple[Box, Box]:
-        """The box cut across its longer side: bounds by their ratio, damping times against theta."""
-        if np.log(self.high / self.low) >= np.log((self.most + theta) / (self.least + theta)):
-            middle = float(np.sqrt(self.low * self.high))
-            return Box(self.low, middle, self.least, self.most), Box(middle, self.high, self.least, self.most)
-        middle = float(np.sqrt((self.most + theta) * (self.least + theta)) - theta)
-        return Box(self.low, self.high, self.least, middle), Box(self.low, self.high, middle, self.most)
+    def halves(self, theta: float, damping: bool) -> tuple[Box, Box]:
+        """The box cut across its damping times, or across its bounds: each at the mean of its logarithm."""
+        if damping:
+            middle = float(np.sqrt((self.most + theta) * (self.least + theta)) - theta)
+            return replace(self, most=middle), replace(self, least=middle)
+        middle = float(np.sqrt(self.low * self.high))
+        return replace(self, high=middle), replace(self, low=middle)
+
+    def middle(self, theta: float) -> tuple[float, float]:
+        """K + B/theta and B/K in the middle of the box."""
+        time = float(np.sqrt((self.least + theta) * (self.most + theta)) - theta)
+        return float(np.sqrt(self.low * self.high)), time
 
 
 @dataclass(frozen=True)
@@ -60,102 +72,211 @@ class Prover:
     """The loops that have to contract in every cell.
 
     Args:
-        loop: the sampled loop; with `jitter`, of the oldest reading.
+        loop: the sampled loop, of the oldest reading.
         theta: of the law [s].
         gains: g of a tick may be anything between these two [m/(s N)]; if `relative`, g theta K_eff(K + B/theta) may.
-        jitter: ticks by which a reading may be younger, from tick to tick.
+        younger: ticks by which a reading may be younger, from tick to tick.
         kept: of the command's low-pass.
         relative: see `gains`.
+        fading: what may come near to nothing within a cell, "gain" or "surface"; empty if neither does.
+        parts: into how many parts w^2 and 2 z w of an inner loop known to intervals are cut, each.
+        wider: factor of these parts, so that a norm that is searched leaves room for the curvature.
     """
 
     loop: SampledLoop
     theta: float
     gains: tuple[float, float]
-    jitter: int = 0
+    younger: int = 0
     kept: float = 0.0
     relative: bool = False
+    fading: Literal["", "gain", "surface"] = ""
+    parts: int = 1
+    wider: float = 1.0
+    _known: dict[tuple[float, ...], list[Array]] = field(default_factory=dict, compare=False)
 
     @property
-    def affine(self) -> bool:
-        """Whether the matrix is affine in (K, B), so that corners tell everything."""
-        return self.loop.arm.kind == "position"
+    def exact(self) -> bool:
+        """Whether the matrix is affine in all that may vary, so that corners tell everything."""
+        inner = self.loop.arm.inner
+        return isinstance(inner, PositionLoop) and len(inner.corners) == 1
+
+    def inner(self, part: int) -> list[tuple[float, float] | None]:
+        """Corners of a part of what the inner loop may be; of a torque arm, its own."""
+        inner = self.loop.arm.inner
+        if not isinstance(inner, PositionLoop):
+            return [None]
+        if self.exact:
+            return [inner.squared]
+        corners = np.array(inner.corners)
+        size = np.ptp(corners, axis=0) / self.parts
+        middle = corners.min(axis=0) + (np.array(divmod(part, self.parts)) + 0.5) * size
+        signs = product((-0.5, 0.5), repeat=2)
+        return [tuple((middle + self.wider * np.array(sign) * size).tolist()) for sign in signs]
 
     def laws(self, box: Box) -> list[tuple[Law, int]]:
         """The extreme laws and readings within a box."""
         low, high = self.gains
         if self.relative:
             low, high = low * self._gain(box.high), high * self._gain(box.low)
-        return [
-            (Law(g, self.kept), loss)
-            for g, loss in product(dict.fromkeys((low, high)), range(self.jitter + 1))
-        ]
+        if self.fading == "gain":
+            low, high = low / (1.0 + box.most / self.theta), high / (1.0 + box.least / self.theta)
+        losses = range(self.younger + 1) if self.relative else (box.loss,)
+        return [(Law(g, self.kept), loss) for g, loss in product(dict.fromkeys((low, high)), losses)]
+
+    def corners(self, box: Box) -> list[tuple[float, float]]:
+        """(K, B) of the corners; where the gain fades, of a fixed K, since g K alone counts and rest has to be one."""
+        if self.fading == "gain":
+            return [(box.high, t * box.high) for t in dict.fromkeys((box.least, box.most))]
+        return box.corners(self.theta)
 
     def _gain(self, bound: float) -> float:
         """1/(theta K_eff) for a bound [N/m] as the law has it [m/(s N)]."""
-        series = 0.0 if self.affine else 1.0 / self.loop.arm.series
+        series = 0.0 if self.loop.arm.kind == "position" else 1.0 / self.loop.arm.series
         return (series + 1.0 / bound) / self.theta
 
     def matrices(self, box: Box) -> list[Array]:
         """Of all corners, shape (size, size) each."""
         laws = self.laws(box)
-        return [self.loop.phi(K, B, law, loss) for K, B in box.corners(self.theta) for law, loss in laws]
+        if self.relative:
+            return [
+                loop.phi(K, B, law, loss)
+                for loop in self.loops(box.part)
+                for K, B in self.corners(box)
+                for law, loss in laws
+            ]
+        loops = self.loops(box.part)
+        return [
+            Phi
+            for i, loop in enumerate(loops)
+            for K, B in self.corners(box)
+            for Phi in self._of((box.part, i, box.loss, K, B), loop, laws)
+        ]
+
+    def still(self, box: Box) -> Array:
+        """The matrix without what fades: the command stands still."""
+        if self.fading == "surface":
+            return self.loop.phi(0.0, 0.0, Law(self.gains[0], self.kept), box.loss)
+        return self.loop.phi(box.high, 0.0, Law(0.0, self.kept))
+
+    def _of(self, key: tuple[float, ...], loop: SampledLoop, laws: list[tuple[Law, int]]) -> list[Array]:
+        """Of one corner, which neighbouring cells share."""
+        if key not in self._known:
+            self._known[key] = [loop.phi(key[-2], key[-1], law, loss) for law, loss in laws]
+        return self._known[key]
+
+    def loops(self, part: int) -> list[SampledLoop]:
+        """One for each corner of a part of what the inner loop may be."""
+        return [replace(self.loop, inner=corner) for corner in self.inner(part)]
 
     def contraction(self, box: Box, L: Array) -> tuple[float, float]:
-        """The largest norm |L^T Phi L^-T| within the box, and how far rounding may have moved it.
+        """A bound of |L^T Phi L^-T| within the box, and how far rounding may have moved it.
 
         Both are upper bounds; the box is proved if their sum is below 1.
         """
-        back = np.linalg.inv(L.T)
+        back = np.asarray(np.linalg.inv(L.T))
         condition = float(np.linalg.norm(L) * np.linalg.norm(back))
-        worst, size = 0.0, 0.0
-        for Phi in self.matrices(box):
-            worst = max(worst, float(np.linalg.norm(L.T @ Phi @ back, 2)))
-            size = max(size, float(np.linalg.norm(Phi)))
-        n = len(L)
-        return worst + self.curvature(box, L, np.asarray(back)), 16.0 * n * EPS * condition * size
+        matrices = self.matrices(box)
+        turned = np.array([L.T @ Phi @ back for Phi in matrices])
+        size = max(float(np.linalg.norm(Phi)) for Phi in matrices)
+        worst = float(np.linalg.norm(turned, 2, axis=(1, 2)).max())
+        if not self.exact:
+            worst = _with_rest(turned, self._rest(box, L, back), worst)
+        return worst, 16.0 * len(L) * EPS * condition * size
 
-    def curvature(self, box: Box, L: Array, back: Array) -> float:
-        """How far within the box the matrix may lie from its corners' hull, in the norm of L; 0 where it is affine.
-
-        E(p) = exp(T A(p)) with A affine: |E''[d, d]| <= T^2 |A[d]|^2 exp(T mu), mu the largest logarithmic norm; a
-        function lies within half of that, d from corner to corner, of the hull of its corners.
-        """
-        loop = self.loop
-        if self.affine:
-            return 0.0
-        tick = loop.arm.tick
-        rates = [self._rates(K, B) for K, B in box.corners(self.theta)]
-        p = len(rates[0]) - 1
-        W = self._weight(L, p)
-        inverse = np.linalg.inv(W)
-        turned = [W @ A @ inverse for A in rates]
-        mu = max(float(np.linalg.eigvalsh(0.5 * (A + A.T))[-1]) for A in turned)
-        across = max(float(np.linalg.norm(a - b, 2)) for a in turned for b in turned)
-        outside = float(np.linalg.norm(L.T[:, :p] @ inverse[:p], 2))
-        feeding = max(
-            float(np.linalg.norm(W @ self._fed(law, loss) @ back, 2)) for law, loss in self.laws(box)
-        )
-        return 0.5 * tick**2 * across**2 * float(np.exp(tick * max(mu, 0.0))) * outside * feeding
-
-    def _rates(self, K: float, B: float) -> Array:
-        A, b = self.loop.rates(K, B)
-        M = np.zeros((len(b) + 1, len(b) + 1))
-        M[:-1, :-1], M[:-1, -1] = A, b
-        return M
+    def _rest(self, box: Box, L: Array, back: Array) -> Array:
+        """R with |L^T D x| <= |R L^T x| for D the distance of any matrix of the box from its corners' hull."""
+        bound = curved(self, box)
+        p = len(bound)
+        columns = np.flatnonzero(bound.any(axis=0))
+        sizes = np.linalg.norm(np.abs(L.T[:, :p]) @ bound[:, columns], axis=0) * np.sqrt(len(columns))
+        fed = [self._fed(law, loss)[columns] for law, loss in self.laws(box)]
+        return np.array([sizes[:, None] * (f @ back) for f in fed])
 
     def _fed(self, law: Law, loss: int) -> Array:
-        """From the state to z and the held input, shape (p + 1, size): what the exponential acts on."""
+        """From the state to z and the held input, shape (p + 1, size): what the exponential acts on.
+
+        For a position arm z's first number is counted from the held input: at rest it is nothing.
+        """
         p = len(self.loop.rates(1.0, 0.0)[1])
         into = np.zeros(p)
         into[0] = 1.0
         Phi = self.loop.assembled(np.zeros((p, p)), into, np.zeros(p), law, loss)
-        return np.vstack([np.eye(p, self.loop.size), Phi[:1]])
+        fed = np.vstack([np.eye(p, self.loop.size), Phi[:1]])
+        if self.loop.arm.kind == "position":
+            fed[0] -= fed[p]
+        return fed
 
-    @staticmethod
-    def _weight(L: Array, p: int) -> Array:
-        """A norm for z and the held input, in which the exponential is bounded: that of L on z."""
-        P = L @ L.T
-        W = np.zeros((p + 1, p + 1))
-        W[:p, :p] = np.linalg.cholesky(P[:p, :p]).T
-        W[p, p] = float(np.sqrt(np.trace(P[:p, :p]) / p))
-        return W
+
+def _with_rest(turned: Array, rests: Array, alone: float) -> float:
+    """A bound of |T x| + |R x| over |x|, by (1 + h) T^T T + (1 + 1/h) R^T R; of the best h tried.
+
+    Args:
+        turned: T, shape (m, n, n).
+        rests: R, shape (r, k, n).
+        alone: the largest norm of a T.
+    """
+    rest = float(np.linalg.norm(rests, 2, axis=(1, 2)).max())
+    if rest == 0.0:
+        return alone
+    best, room = alone + rest, max(1.0 - alone**2, 1e-300)
+    if best < 1.0:
+        return best
+    wide = rests.reshape(-1, rests.shape[2])  # all of them at once bound each of them
+    for h in (0.75 * room, 0.5 * room, 0.25 * room, 0.1 * room):
+        below = np.sqrt(1.0 + 1.0 / h) * wide
+        both = [np.vstack([np.sqrt(1.0 + h) * T, below]) for T in turned]
+        best = min(best, max(float(np.linalg.norm(M, 2)) for M in both))
+    return best
+
+
+def curved(prover: Prover, box: Box) -> Array:
+    """How far E = exp(T A) may lie from the multilinear function through its corners, by element, shape (p, p + 1).
+
+    The parameters are K + B/theta and 1/(1 + B/(K theta)) for a torque arm, w^2 and 2 z w for a position arm: A is
+    affine in each alone, so that the distance is at most sum of h^2/8 |E''|, and |E''| at most twice the last block of
+    the exponential of [[M, |D|, 0], [0, M, |D|], [0, 0, M]], where M has the largest sizes of A's elements, and on its
+    diagonal their largest values: |exp(t A)| <= exp(t M), since |1 + t a/n| = 1 + t a/n for all large n.
+    """
+    from scipy.linalg import expm
+
+    tick = prover.loop.arm.tick
+    rates = [_rates(loop, K, B) for loop in prover.loops(box.part) for K, B in prover.corners(box)]
+    size = np.abs(rates).max(axis=0)
+    np.fill_diagonal(size, np.max([np.diag(A) for A in rates], axis=0))
+    n = len(size)
+    bound = np.zeros((n, n))
+    for D in _directions(prover, box, rates):
+        both = np.zeros((3 * n, 3 * n))
+        for i in range(3):
+            both[i * n : (i + 1) * n, i * n : (i + 1) * n] = size
+        both[:n, n : 2 * n] = both[n : 2 * n, 2 * n :] = D
+        bound += 0.25 * (1.0 + 1e-9) * expm(tick * both)[:n, 2 * n :]
+    return bound[: n - 1]
+
+
+def _directions(prover: Prover, box: Box, rates: list[Array]) -> list[Array]:
+    """How much A changes from one end of each parameter to the other, by element."""
+    if prover.loop.arm.kind == "position":
+        square, rate = zip(*(corner for corner in prover.inner(box.part) if corner is not None), strict=True)
+        unit = prover.loop.rate_unit
+        first, second = np.zeros_like(rates[0]), np.zeros_like(rates[0])
+        first[1, 0], second[1, 1] = (max(square) - min(square)) / unit, max(rate) - min(rate)
+        return [first, second]
+    theta, loop = prover.theta, prover.loop
+    none = _rates(loop, 0.0, 0.0)
+    K, B = np.abs(_rates(loop, 1.0, 0.0) - none), np.abs(_rates(loop, 0.0, 1.0) - none)
+    share = [1.0 / (1.0 + t / theta) for t in (box.most, box.least)]
+    along = (box.high - box.low) * np.maximum(
+        share[0] * K + theta * (1.0 - share[0]) * B, share[1] * K + theta * (1.0 - share[1]) * B
+    )
+    return [along, (share[1] - share[0]) * box.high * (K + theta * B)]
+
+
+def _rates(loop: SampledLoop, K: float, B: float) -> Array:
+    """d/dt of z and the held input; for a position arm, z's first number counted from the input."""
+    A, b = loop.rates(K, B)
+    M = np.zeros((len(b) + 1, len(b) + 1))
+    M[:-1, :-1], M[:-1, -1] = A, b
+    if loop.arm.kind == "position":
+        M[:-1, -1] += A[:, 0]
+    return M

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.force.boundary import radius
 from palpate.force.cells import Box, Prover
-from palpate.force.lyapunov import common, single
+from palpate.force.lyapunov import common, common_beside, single
 
 Array = NDArray[np.float64]
 
@@ -29,39 +29,72 @@ class Cell:
 
 def proved_cell(prover: Prover, box: Box) -> Cell | None:
     """The box with a norm that proves it; None if none was found."""
-    corners = prover.matrices(box)
+    roomy = prover if prover.exact else replace(prover, wider=ROOM, _known={})
+    corners = roomy.matrices(box)
     if max(map(radius, corners)) >= 1.0:
         return None
+    if prover.fading:
+        L = common_beside(corners, prover.still(box))
+        return Cell(box, L) if L is not None and Cell(box, L).proved(prover) else None
     middle = _middle(prover, box)
-    if not prover.affine or len(corners) == 1:
-        L = single(middle)
-        if L is not None and Cell(box, L).proved(prover):
-            return Cell(box, L)
-        if not prover.affine and len(prover.laws(box)) == 1:
-            return None
+    L = single(middle)
+    if L is not None and Cell(box, L).proved(prover):
+        return Cell(box, L)
+    if len(corners) == 1 or _hopeless(prover, box):
+        return None
     L = common(corners, middle)
     return Cell(box, L) if L is not None and Cell(box, L).proved(prover) else None
 
 
-def covered(prover: Prover, box: Box, depth: int = 14) -> tuple[list[Cell], list[Box]]:
+ROOM = 1.3
+"""By which an inner loop's box is widened while a norm is searched."""
+MOST = 2000
+"""Cells after which a piece is given up: a certificate of more is not checked in a second."""
+CUTS, FEWER = 24, 5
+"""After which a piece is given up; fewer where each costs a long search and helps little."""
+
+
+def covered(prover: Prover, box: Box) -> tuple[list[Cell], list[Box]]:
     """Cells that prove the box; and, where it cannot be proved, the first piece that is not after so many cuts."""
     cells: list[Cell] = []
-    waiting = [(box, depth)]
+    waiting = [(box, FEWER if prover.fading or box.low == box.high else CUTS)]
     while waiting:
         here, cuts = waiting.pop()
         cell = proved_cell(prover, here)
         if cell is not None:
             cells.append(cell)
-        elif cuts == 0:
+        elif cuts == 0 or len(cells) == MOST:
             return cells, [here]
         else:
-            waiting.extend((half, cuts - 1) for half in here.halves(prover.theta))
+            waiting.extend((half, cuts - 1) for half in _halves(prover, here))
     return cells, []
 
 
+def _halves(prover: Prover, box: Box) -> tuple[Box, Box]:
+    """The box cut across what makes more of a difference, in a norm of its middle."""
+    L = single(_middle(prover, box))
+    if box.least == box.most or box.low == box.high or L is None or prover.fading:
+        return box.halves(prover.theta, damping=box.low == box.high or prover.fading == "surface")
+    back = np.linalg.inv(L.T)
+    bound, time = box.middle(prover.theta)
+    across = [replace(box, least=time, most=time), replace(box, low=bound, high=bound)]
+    spans = [prover.matrices(thin) for thin in across]  # the two ends of each, all laws beside each other
+    n = len(prover.laws(box))
+    differences = [
+        max(float(np.linalg.norm(L.T @ (a - b) @ back, 2)) for a, b in zip(M[:n], M[n:], strict=False))
+        for M in spans
+    ]
+    return box.halves(prover.theta, damping=differences[1] > differences[0])
+
+
 def _middle(prover: Prover, box: Box) -> Array:
-    bound = float(np.sqrt(box.low * box.high))
-    time = float(np.sqrt((box.least + prover.theta) * (box.most + prover.theta)) - prover.theta)
+    bound, time = box.middle(prover.theta)
     K = bound / (1.0 + time / prover.theta)
-    matrices = [prover.loop.phi(K, time * K, law, loss) for law, loss in prover.laws(box)]
+    laws = prover.laws(box)
+    matrices = [loop.phi(K, time * K, law, loss) for loop in prover.loops(box.part) for law, loss in laws]
     return np.asarray(sum(matrices) / len(matrices))
+
+
+def _hopeless(prover: Prover, box: Box) -> bool:
+    """Whether to cut a torque arm's cell rather than to search a norm of it: that costs more than it brings."""
+    return prover.loop.arm.kind == "torque" and len(prover.laws(box)) == 1

@@ -181,4 +181,8 @@ def _toml(table: dict[str, Any], path: str = "") -> str:
 
 
 def _value(value: Any) -> str:
-    return msgspec.json.encode(value).decode() if isinstance(value, str) else repr(value)
+    return (
+        msgspec.json.encode(value).decode()
+        if isinstance(value, str)
+        else repr(list(value) if isinstance(value, tuple) else value)
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -39,12 +40,14 @@ def ultimate_gain(loop: SampledLoop, stiffness: float, damping: float = 0.0, kep
 def lag_of(arm: Arm) -> float:
     """theta [s]: a pure delay pi/(2 theta) of the same ultimate gain, on the surface where that is lowest.
 
+    An inner loop that is known to intervals counts as the slowest of what it may be.
+
     The sum of all lags would be longer for some arms and shorter for others; what the gain may be is decided by the
     ultimate gain alone. For a position arm that is one number; for a torque arm it depends on the stiffness.
     """
     loop = SampledLoop(arm)
-    if arm.kind == "position":
-        return pi / 2.0 / ultimate_gain(loop, arm.series)
+    if isinstance(arm.inner, PositionLoop):
+        return pi / 2.0 / min(ultimate_gain(replace(loop, inner=c), arm.series) for c in arm.inner.corners)
     stiffnesses = np.geomspace(SOFTEST, arm.limits.stiffness, _POINTS)
     return pi / 2.0 / min(ultimate_gain(loop, float(k)) for k in stiffnesses)
 

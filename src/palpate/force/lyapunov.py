@@ -56,9 +56,39 @@ def common(matrices: Sequence[Array], near: Array) -> Array | None:
     return start @ _chol(P)
 
 
-def _interior(matrices: Sequence[Array]) -> Array | None:
+def common_beside(matrices: Sequence[Array], still: Array) -> Array | None:
+    """The same where all of these come near to a matrix that keeps one combination of the state for ever.
+
+    With a gain, or a stiffness, of next to nothing the integrator stands still: P - Phi^T P Phi has to vanish in its
+    direction r, so that P r is the left eigenvector l. P is then a block for all that l leaves out, and one number.
+
+    Args:
+        matrices: each of shape (n, n).
+        still: with one eigenvalue 1, all others inside the unit circle, shape (n, n).
+    """
+    U, _, Vt = np.linalg.svd(still - np.eye(len(still)))
+    left, right = U[:, -1], Vt[-1]
+    S = np.column_stack([U[:, :-1], right / (left @ right)])
+    into = np.asarray(np.linalg.inv(S))
+    start = single((into @ still @ S)[:-1, :-1])
+    if start is None:
+        return None
+    T = np.eye(len(S))
+    T[:-1, :-1] = start.T
+    back = np.asarray(np.linalg.inv(T))
+    inside = [T @ into @ Phi @ S @ back for Phi in matrices]
+    apart = max(inside, key=lambda M: float(np.linalg.norm(M[:-1, -1])))
+    T[-1, -1] = np.sqrt(np.linalg.norm(apart[:-1, -1]) / max(float(np.linalg.norm(apart[-1, :-1])), 1e-300))
+    back = np.asarray(np.linalg.inv(T))
+    inside = [T @ into @ Phi @ S @ back for Phi in matrices]
+    n = len(S)
+    P = _interior(inside, np.array([D for D in _symmetric(n) if not D[:-1, -1].any()]))
+    return None if P is None else (T @ into).T @ _chol(P)
+
+
+def _interior(matrices: Sequence[Array], basis: Array | None = None) -> Array | None:
     n = len(matrices[0])
-    basis = _symmetric(n)  # (m, n, n)
+    basis = _symmetric(n) if basis is None else basis  # (m, n, n)
     m = len(basis)
     flat = basis.reshape(m, -1)
     images = [flat - (Phi.T @ basis @ Phi).reshape(m, -1) for Phi in matrices]

@@ -43,11 +43,13 @@ class SampledLoop:
         arm: what moves.
         extra: ticks of delay beyond the arm's own.
         unit: k0 [N/m]; the series stiffness if left out. Near the surface's own, all numbers are of one size.
+        inner: w^2 [1/s^2] and 2 z w [1/s] of a position arm's inner loop; the arm's own if left out.
     """
 
     arm: Arm
     extra: int = 0
     unit: float | None = None
+    inner: tuple[float, float] | None = None
 
     def later(self, ticks: int) -> SampledLoop:
         """The same loop with so many more ticks of delay."""
@@ -74,9 +76,16 @@ class SampledLoop:
     @property
     def lines(self) -> tuple[int, int]:
         """How many readings and how many commands, or torques beside a command, are kept."""
-        delay = self.arm.delay_ticks
-        commands = max(delay, 1) if self.arm.kind == "position" else delay + 1
-        return self.arm.sensor_ticks + self.extra, commands
+        commands = max(self.delay, 1) if self.arm.kind == "position" else self.delay + 1
+        return self.arm.sensor_ticks + self.arm.unsure_ticks + self.extra, commands
+
+    @property
+    def delay(self) -> int:
+        """Ticks from a command to the inner loop.
+
+        What the arm's delay may be shorter by is counted with the readings' age: delays in one loop commute.
+        """
+        return self.arm.delay_ticks - self.arm.unsure_ticks
 
     @property
     def size(self) -> int:
@@ -91,8 +100,8 @@ class SampledLoop:
         inner = self.arm.inner
         A[0, 1] = w
         if isinstance(inner, PositionLoop):
-            own = 2.0 * pi * inner.bandwidth
-            A[1, 0], A[1, 1], b[1] = -(own**2) / w, -2.0 * inner.damping * own, own**2 / w
+            square, rate = inner.squared if self.inner is None else self.inner
+            A[1, 0], A[1, 1], b[1] = -square / w, -rate, square / w
         else:
             A[1, 0], A[1, 1] = -stiffness / inner.mass / w, -damping / inner.mass
             b[1] = self.force_unit / inner.mass / w  # the held torque is counted in k0 too
@@ -131,7 +140,7 @@ class SampledLoop:
         """
         tick, inner = self.arm.tick, self.arm.inner
         p = len(e)
-        readings, delay = self.lines[0], self.arm.delay_ticks
+        readings, delay = self.lines[0], self.delay
         filtered, command = p + readings, p + readings + 1  # y, then x_c and those on their way
         Phi = np.zeros((self.size, self.size))
         # The readings: z's is read at this tick, joins the line, and comes out `readings` ticks later.
@@ -165,7 +174,7 @@ class SampledLoop:
         The line after x_c then holds torques, not commands.
         """
         p = len(e)
-        readings, delay = self.lines[0], self.arm.delay_ticks
+        readings, delay = self.lines[0], self.delay
         command = p + readings + 1
         Phi[:p, :p] = E
         Phi[:p, command + delay] += e

@@ -8,13 +8,12 @@ from typing import Any
 from palpate.force.certificate import Certificate, Claim, Verdict
 
 UNCOVERED = (
-    "the damping compensation tau while it adapts",
-    "g theta K_eff/alpha outside the shares given, as on a soft surface before the first estimate",
+    "the damping compensation tau while it adapts, the backstop, the feed-forward of dF_d/dt",
     "limits of speed and torque",
-    "loss of contact: the proofs are of the loop in contact",
-    "a sensor that samples between ticks otherwise than with a whole tick's jitter",
-    "the peak at the touch, which is a formula",
+    "contact lost while the gain changes, or within a tick; loss of contact of a torque arm",
+    "a reading taken between ticks: its age is counted in whole ticks",
     "the arm's own compliance between its encoders and the tip beside damping of the surface",
+    "a surface that curves, but by the range of its tangent stiffness",
 )
 
 
@@ -27,12 +26,17 @@ def sentence(claim: Claim, gains_kind: str) -> str:
             f"with the gain held at K_u = cap{factor}: every surface whose K + B/theta, as the measured position feels "
             f"it, is {claim.low:.4g} to {claim.high:.4g} N/m, {times}; K and B may change within a cell every tick"
         )
+    if claim.kind == "one-sided":
+        return (
+            f"with the gain held at K_u = cap: every surface up to {claim.high:.4g} N/m (K + B/theta, felt), {times}, "
+            f"also where contact is lost and found again at ticks, over gaps of up to F_d/({claim.low:.3g} N/m)"
+        )
     which = (
         "every constant stiffness"
         if gains_kind == "position"
         else f"every constant stiffness from {claim.low:.4g} to {claim.high:.4g} N/m"
     )
-    jitter = f", a reading's age changing by {claim.jitter} tick" if claim.jitter else ""
+    jitter = f", a reading's age changing by up to {claim.jitter} ticks" if claim.jitter else ""
     return (
         f"whatever the estimator does while g theta K_eff/alpha stays within {claim.shares[0]:g} to {claim.shares[1]:g}"
         f"{jitter}: {which}, {times}"

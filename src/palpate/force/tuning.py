@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf, isfinite
 from typing import Any
 
@@ -14,10 +15,15 @@ from palpate.force.arm import Arm, PositionLoop, TorqueLoop
 from palpate.force.certificate import FORM, Certificate, certify, exact_interval
 from palpate.force.gains import Gains, approach_speed
 from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
+from palpate.force.peak import peak_bound
 from palpate.force.steps import Margins, Step, margins, step_of
 
 RIGID = 1e9
 """What is stiffer is said to be this stiff [N/m]."""
+
+
+_OF_IDENTIFY = " (to palpate identify, whose --json palpate tune takes)"
+"""Behind what an identification asks for."""
 
 
 @dataclass(frozen=True)
@@ -29,12 +35,14 @@ class Known:
         damping: B, lowest and highest [N s/m].
         value: K itself [N/m]; None where only a range was given.
         source: where that comes from.
+        warnings: of the identification, code and text.
     """
 
     stiffness: tuple[float, float]
     damping: tuple[float, float] = (0.0, 0.0)
     value: float | None = None
     source: str = "told"
+    warnings: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,7 +68,7 @@ class Tuning:
     @property
     def proved(self) -> bool:
         """Whether anything is."""
-        return any(c.kind == "held" for c in self.certificate.claims)
+        return any(c.kind != "adapting" for c in self.certificate.claims)
 
     @property
     def overshoot(self) -> float:
@@ -76,10 +84,15 @@ class Tuning:
             peak = max(peak, gains.approach * float(np.sqrt(gains.cap * gains.arm.inner.mass)))
         return peak
 
+    @cached_property
+    def peak_bound(self) -> float | None:
+        """Bound of the first peak [N] while K_u is not below the stiffness; None for a torque arm."""
+        return peak_bound(self.gains)
+
     def surface_stiffness(self, kind: str) -> tuple[float, float] | None:
         """The proved interval of K + B/theta of the surface itself for a kind of claim [N/m]."""
         for claim in self.certificate.claims:
-            if claim.kind == kind:
+            if claim.kind == kind or (kind == "held" and claim.kind == "one-sided"):
                 return self._own(claim.low, claim.high)
         return None
 
@@ -97,7 +110,7 @@ class Tuning:
     def to_json(self) -> dict[str, Any]:
         """As `palpate tune --json` prints it."""
         gains, arm = self.gains, self.gains.arm
-        held = next((c for c in self.certificate.claims if c.kind == "held"), None)
+        held = next((c for c in self.certificate.claims if c.kind != "adapting"), None)
         adapting = next((c for c in self.certificate.claims if c.kind == "adapting"), None)
         known = self.known
         return {
@@ -116,6 +129,7 @@ class Tuning:
             },
             "approach_speed_m_s": gains.approach,
             "peak_N": self.peak,
+            "peak_bound_N": self.peak_bound,
             "settling_s": _number(max(step.settling for step in self.steps)),
             "overshoot": self.overshoot,
             "margins": {
@@ -192,6 +206,17 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
         (max(damping[0], 0.0), max(damping[1], 0.0)),
         float(value) if isinstance(value, int | float) and isfinite(value) else None,
         source,
+        _warned(found.get("warnings")),
+    )
+
+
+def _warned(warnings: object) -> tuple[tuple[str, str], ...]:
+    """What an identification warns of, as far as it is in words."""
+    given = warnings if isinstance(warnings, list) else []
+    return tuple(
+        (w["code"], w["text"] + (_OF_IDENTIFY if "--" in w["text"] else ""))
+        for w in given
+        if isinstance(w, Mapping) and isinstance(w.get("code"), str) and isinstance(w.get("text"), str)
     )
 
 
@@ -243,10 +268,18 @@ def tune(
     felt = arm.seen(soft) if arm.kind == "position" else soft
     steps = step_of(gains, felt), step_of(gains, gains.seen_cap)
     nothing = Certificate(form=FORM, gains=gains, claims=())
-    found = Tuning(gains, known, nothing, steps, margins(gains, gains.seen_cap), tuple(_warnings(arm, known)))
+    at = margins(gains, gains.seen_cap)
+    found = Tuning(gains, known, nothing, steps, at, tuple(_warnings(arm, known, at.gain)))
     _check_peak(found, peak)
     _check_surface_speed(gains, surface_speed)
-    return replace(found, certificate=certify(gains, adapting=prove_adapting))
+    found = replace(found, certificate=certify(gains, adapting=prove_adapting))
+    if not found.proved and isinstance(arm.inner, PositionLoop) and arm.inner.bandwidth_interval is not None:
+        text = (
+            "nothing is proved for all that the inner loop may be: record more steps or a wider sweep, so that its "
+            "intervals are narrower"
+        )
+        found = replace(found, warnings=(*found.warnings, ("inner-loop-wide", text)))
+    return found
 
 
 def _check(force: float, known: Known | None, cap: float | None) -> None:
@@ -273,21 +306,21 @@ def _cap(arm: Arm, known: Known | None, cap: float | None, theta: float) -> floa
     return needed if cap is None else cap
 
 
-def _warnings(arm: Arm, known: Known | None) -> list[tuple[str, str]]:
+def _warnings(arm: Arm, known: Known | None, margin: float) -> list[tuple[str, str]]:
     found = []
-    if known is not None and known.source != "told" and known.stiffness[1] > 3.0 * known.stiffness[0]:
+    if known is not None and known.source != "told" and known.stiffness[1] > margin * known.stiffness[0]:
         low, high = known.stiffness
         text = (
-            f"the estimate's interval of {low:.4g} to {high:.4g} N/m is as wide as the gain margin: "
-            "excite more (palpate excite), or leave it to the law"
+            f"the estimate's interval of {low:.4g} to {high:.4g} N/m is wider than the gain margin of {margin:.2g}: "
+            f"excite more (palpate excite --stiffness {low:.3g}:{high:.3g} says how), or leave it to the law"
         )
         found.append(("wide-estimate", text))
-    if isinstance(arm.inner, PositionLoop) and arm.delay_ticks > arm.inner.delay * arm.rate + 1e-6:
-        text = f"the delay of {1e3 * arm.inner.delay:g} ms is no whole number of ticks; {arm.delay_ticks} were taken"
+    if arm.delay_ticks > arm.longest_delay * arm.rate + 1e-6:
+        late = f"{1e3 * arm.longest_delay:.4g} ms"
+        text = f"the delay of {late} is no whole number of ticks; {arm.delay_ticks} were taken"
         found.append(("delay-rounded", text))
-    if arm.kind == "torque":
-        text = "for a torque arm stability is proved without damping of the surface (B = 0) unless certify is asked"
-        found.append(("no-damping-proved", text))
+    if known is not None:
+        found += known.warnings
     return found
 
 

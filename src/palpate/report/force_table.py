@@ -24,7 +24,7 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
         ("stiffest surface", f"{gains.cap:.4g} N/m (K + B/theta)"),
         ("gain on it", f"{1e3 * gains.gain:.4g} mm/s per N"),
         ("approach", f"at most {1e3 * gains.approach:.3g} mm/s"),
-        ("peak at touch", f"{told.peak:.4g} N to expect (no bound)"),
+        ("peak at touch", _peak(told)),
         ("settling", f"{slowest:.3g} s, stiffness known" if isfinite(slowest) else "-"),
         ("overshoot", f"{100 * told.overshoot:.2g} %, stiffness known"),
         (
@@ -38,6 +38,13 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
         found.append(("surface", f"{a:.4g} to {b:.4g} N/m ({told.known.source})"))
     found += [("proved", sentence(c, arm.kind)) for c in told.certificate.claims] or [("proved", "nothing")]
     return found
+
+
+def _peak(told: Tuning) -> str:
+    bound = told.peak_bound
+    if bound is None:
+        return f"{told.peak:.4g} N to expect (no bound)"
+    return f"{told.peak:.4g} N to expect; at most {bound:.4g} N while K_u >= K, without noise and damping"
 
 
 def show(told: Tuning, console: Console) -> None:
