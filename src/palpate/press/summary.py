@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.bench.sequence import CONTACT
 from palpate.bench.metrics.summary import WINDOW, force_figures, losses
+from palpate.bench.sequence import CONTACT
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.gains import Gains
