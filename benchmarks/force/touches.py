@@ -8,8 +8,9 @@ import msgspec
 import numpy as np
 
 from palpate.force.arm import load_arm
-from palpate.force.gains import Gains, approach_speed
+from palpate.force.gains import ALPHA, Gains, approach_speed
 from palpate.force.lag import lag_of, sum_of_lags
+from palpate.force.sensitivity import relief_of
 from palpate.force.worlds import pressed, surface, world_of
 
 SECONDS = 4.0
@@ -45,6 +46,7 @@ class Rig:
     def __init__(self, name: str):
         self.arm = load_arm(name)
         self.theta, self.added = lag_of(self.arm), sum_of_lags(self.arm)
+        self.relief = relief_of(self.arm, self.theta, ALPHA)
 
     def draw(self, rng, stiffness=(1e2, 1e6), noise=(0.05, 0.2)) -> Draw:
         """Stiffness, damping ratio and noise even in their logarithms; force and phase even."""
@@ -60,7 +62,7 @@ class Rig:
         cap, theta = cap or self.arm.limits.stiffness, theta or self.theta
         arm = msgspec.structs.replace(self.arm, sensor=msgspec.structs.replace(self.arm.sensor, noise=noise))
         return Gains(
-            arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale,
+            arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale, relief=self.relief,
             approach=approach_speed(arm, force, theta, cap),
         )  # fmt: skip
 

@@ -26,7 +26,7 @@ ALPHA = 0.42
 Measured by benchmarks/force/first_touches.py: 0.45 overshoots by 9 % on the stiffest surfaces, 0.36 is a
 quarter slower.
 """
-LAW = "cautious 1"
+LAW = "cautious 2"
 """Changes with the law; a certificate of another one is refused."""
 _TOUCH = 0.3
 """Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch."""
@@ -54,6 +54,8 @@ class Gains(Table):
     force_limit: Positive
     """Above which the tip withdraws [N]."""
     alpha: Annotated[float, Meta(gt=0, le=1)] = ALPHA
+    relief: Annotated[float, Meta(ge=0, le=0.3)] = 0.0
+    """rho: share of the lag that contact with a stiff surface takes away."""
     law: str = LAW
 
     def __post_init__(self) -> None:
@@ -89,12 +91,18 @@ class Gains(Table):
     @property
     def highest_gain(self) -> float:
         """g on the softest surface that the law heeds; `gain` is that on the stiffest [m/(s N)]."""
-        return self.alpha / self.theta * (self.compliance + 1.0 / self.floor)
+        return self.gain_at(self.floor)
 
     @property
     def gain(self) -> float:
         """g at K_u = cap [m/(s N)]."""
-        return self.alpha / self.theta * (self.compliance + 1.0 / self.seen_cap)
+        return self.gain_at(self.seen_cap)
+
+    def gain_at(self, bound: float) -> float:
+        """g for K_u = bound [m/(s N)]."""
+        felt = self.compliance * bound
+        lag = self.theta * (1.0 - self.relief * felt / (1.0 + felt))
+        return self.alpha / lag * (self.compliance + 1.0 / bound)
 
     @property
     def floor(self) -> float:
@@ -108,7 +116,7 @@ class Gains(Table):
         memory = _FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick
         E, e0, e1, c = followed(arm)
         numbers: dict[str, Any] = {
-            "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,
+            "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance, "relief": self.relief,
             "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed, "approach": self.approach,
             "noise": arm.sensor.noise, "memory": memory + 1.0 / arm.sensor.sampling,
             "period": max(1.0 / arm.sensor.sampling, arm.tick), "E": E, "e0": e0, "e1": e1, "c": c,
