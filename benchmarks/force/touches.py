@@ -32,7 +32,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Judged:
-    """Settling time [s] (NaN if not), overshoot, losses of contact, smallest K_u/K once a third of F_d was there."""
+    """Settling time [s] (NaN if not), overshoot, losses of contact, smallest K_eff(K_u)/K_eff(K) once a third of F_d was there."""
 
     settling: float
     overshoot: float
@@ -85,7 +85,8 @@ class Rig:
         lost = int(((force[firm:-1] > 0.0) & (force[firm + 1 :] <= 0.0)).sum())
         felt = draw.K if self.arm.kind == "torque" else self.arm.seen(draw.K)
         pressing = rows[force > draw.F / 3.0, 1]
-        least = float(pressing.min() / felt) if len(pressing) else np.nan
+        own = 1.0 / self.arm.series if self.arm.kind == "torque" else 0.0
+        least = float((own + 1.0 / felt) / (own + 1.0 / pressing.min())) if len(pressing) else np.nan
         return Judged(
             (last - start) / rate if settled else np.nan, float(force.max() / draw.F - 1.0), lost, least
         )

@@ -13,6 +13,7 @@ from force.gained import gains_of
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.certificate import FORM, Certificate
+from palpate.force.flat import BOUND
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def test_a_reading_that_is_none_holds_the_tip(loop, bad):
     assert loop.update(bad, 0.0) == 0.0
     assert "no number" in loop.trouble
     assert loop.update(5.0, bad) == 0.0
-    assert loop.state[:50] == before[:50]  # nothing was learned from it
+    assert loop.state[:BOUND] == before[:BOUND]  # nothing was learned from it
     loop.update(20.1, 1e-3)
     assert "missed" in loop.trouble
 
@@ -62,7 +63,7 @@ def test_readings_gone_for_longer_than_the_lag_start_it_anew(loop):
         loop.update(math.nan, math.nan)
     loop.update(0.01, 0.0)
     assert loop.phase == "air"
-    assert loop.state[50] == loop.gains.seen_cap
+    assert loop.state[BOUND] == loop.gains.seen_cap
     assert loop.noise == noise
 
 
@@ -120,7 +121,7 @@ def test_it_goes_on_where_it_was_saved(loop):
         assert again.update(force, position) == speed == other.update(force, position)
 
 
-@pytest.mark.parametrize("bad", [(), (1.0, 2.0), [math.nan] * 61, [9.0] * 61])
+@pytest.mark.parametrize("bad", [(), (1.0, 2.0), [math.nan] * 64, [9.0] * 61])
 def test_a_state_of_something_else_is_refused(loop, bad):
     before = loop.state
     with pytest.raises(InputError, match="state"):

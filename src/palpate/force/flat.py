@@ -105,3 +105,5 @@ def put_state(a, s):
 
 STATE = 61
 """Numbers of a state."""
+LAST, VARIANCE, TIDE, PHASE, SINCE, FOUND, STD, BOUND = 2, 6, 7, 18, 46, 48, 51, 54
+"""Where some of them are."""

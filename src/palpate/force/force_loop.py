@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from palpate._jit import kernel, law
 from palpate.errors import InputError
 from palpate.files import write_text
-from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
+from palpate.force.flat import BOUND, FOUND, LAST, PHASE, SINCE, STATE, STD, TIDE, VARIANCE, flattened, law_in, put_state, state_in
 from palpate.force.gains import Gains, load_gains
 from palpate.force.law import AIR, LEARNING, LOCKED
 
@@ -48,12 +48,10 @@ def safe_step(numbers, state, desired, force, position, missed):
     if state[_BLIND] > lag or missed > lag:  # too long to go on from what was known
         renewed(control, state)
     elif state[_BLIND] > 0.0 or missed > 0.0:
-        state[42] = (
-            0.0 if state[42] >= 0.0 else -1.0
-        )  # the low-pass has to forget the gap before anything is learned
+        state[SINCE] = 0.0  # the low-pass has to forget the gap before anything is learned
     trouble = LATE if missed > 0.0 or state[_BLIND] > 0.0 else FINE
     state[_BLIND] = 0.0
-    state[_UNCHANGED] = state[_UNCHANGED] + 1.0 if force == state[3] and state[0] > 0.0 else 0.0
+    state[_UNCHANGED] = state[_UNCHANGED] + 1.0 if force == state[LAST] and state[0] > 0.0 else 0.0
     speed, after = control.step(state_in(state), desired, force, position)
     put_state(state, after)
     if abs(force) >= 0.99 * control.full_scale:
@@ -69,9 +67,9 @@ def safe_step(numbers, state, desired, force, position, missed):
 @law
 def renewed(control, state):
     """In the air, knowing nothing but the sensor's noise."""
-    variance = state[6]
+    variance, tide = state[VARIANCE], state[TIDE]
     put_state(state, control.start())
-    state[6] = variance
+    state[VARIANCE], state[TIDE] = variance, tide
 
 
 _step = kernel(safe_step)
@@ -178,21 +176,21 @@ class ForceLoop:
     @property
     def estimate(self) -> SurfaceEstimate | None:
         """What is known of the surface; None in the air and until there is something."""
-        s, cap, theta = self._state, self._numbers[4], self.gains.theta
-        if s[15] == AIR or s[47] == 0.0:
+        s, cap, theta = self._state, self.gains.seen_cap, self.gains.theta
+        if s[PHASE] == AIR or s[STD] == 0.0:
             return None
         return SurfaceEstimate(
-            float(cap * s[44]),
-            float(cap * s[47]),
-            float(cap * theta * s[45]),
-            float(cap * theta * s[48]),
-            float(s[50]),
+            float(cap * s[FOUND]),
+            float(cap * s[STD]),
+            float(cap * theta * s[FOUND + 1]),
+            float(cap * theta * s[STD + 1]),
+            float(s[BOUND]),
         )
 
     @property
     def phase(self) -> str:
         """`air`, `learning` or `locked`."""
-        return PHASES[float(self._state[15])]
+        return PHASES[float(self._state[PHASE])]
 
     @property
     def trouble(self) -> str:
@@ -202,7 +200,7 @@ class ForceLoop:
     @property
     def noise(self) -> float:
         """Standard deviation of a force reading, as measured in the air [N]."""
-        return float(np.sqrt(self._state[6]))
+        return float(np.sqrt(self._state[VARIANCE]))
 
     @property
     def state(self) -> tuple[float, ...]:
@@ -212,7 +210,7 @@ class ForceLoop:
     @state.setter
     def state(self, numbers: Any) -> None:
         given = np.array(numbers, dtype=np.float64)
-        if given.shape != self._state.shape or not np.isfinite(given).all() or float(given[15]) not in PHASES:
+        if given.shape != self._state.shape or not np.isfinite(given).all() or float(given[PHASE]) not in PHASES:
             raise InputError(
                 f"a state is {len(self._state)} finite numbers from ForceLoop.state; give those back"
             )

@@ -28,7 +28,7 @@ quarter slower.
 """
 LAW = "cautious 2"
 """Changes with the law; a certificate of another one is refused."""
-_TOUCH = 0.3
+_TOUCH = 0.45
 """Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch."""
 _SLOWEST = 0.02
 """K_u below which the speed limit, not the gain, rules, as a share of alpha F_d/(theta v_max)."""
@@ -120,7 +120,7 @@ class Gains(Table):
             "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed, "approach": self.approach,
             "noise": arm.sensor.noise, "memory": memory + 1.0 / arm.sensor.sampling,
             "period": max(1.0 / arm.sensor.sampling, arm.tick), "E": E, "e0": e0, "e1": e1, "c": c,
-            "d": 0.0 if low_pass.sections else 1.0, "z": 2.0, "eps": 0.03, "full_scale": arm.sensor.full_scale,
+            "d": 0.0 if low_pass.sections else 1.0, "z": 1.5, "eps": 0.03, "full_scale": arm.sensor.full_scale,
             "force_limit": self.force_limit, "locking": 1.0, "bounding": 1.0, "backing": 1.0,
         }  # fmt: skip
         return Cautious(**numbers)
@@ -154,7 +154,7 @@ def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: floa
         cap: K_cap of the surface [N/m].
         alpha: gain in units of 1/theta.
     """
-    speed = min(arm.limits.speed, alpha * force / (theta * arm.seen(cap)))
+    speed = min(arm.limits.speed, 1.15 * alpha * force / (theta * arm.seen(cap)))
     if isinstance(arm.inner, TorqueLoop):
         speed = min(speed, _TOUCH * force / float(np.sqrt(cap * arm.inner.mass)))
     return speed

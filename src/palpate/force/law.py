@@ -115,7 +115,7 @@ class Cautious(NamedTuple):
             forward = (desired - before) / self.tick * (self.compliance + 1.0 / bound)
         firm = stage.firm * self.tick > self.theta or bound < 0.5 * self.cap
         limit = self.speed if stage.phase != AIR and firm else self.approach
-        speed = max(min(u + forward, limit), -self.speed)
+        speed = max(min(u + forward, limit), -self.speed) if stage.phase != AIR else self.approach
         return speed, CautiousState(
             state.ticks + 1.0, desired, watch, follow, stage, known, bound, backstop
         )
@@ -279,7 +279,9 @@ def begun(law, known, before, stage, w, f):
     sigma = sqrt(w.variance)
     slow, fast, since, origin, found, std = known
     if stage.phase == AIR and w.evidence <= 0.0:
-        slow, since, origin, found, std = fit_from(w.rest, sigma), 0.0, f.y, ZERO3, ZERO3
+        damped = Vec3(0.0, law.cap * law.theta / law.tick * (f.y - f.y0), 1.0)
+        slow = fit_from(w.rest, sigma).taking(damped, w.rest, 0.25 / (sigma * sigma), 1.0)
+        since, origin, found, std = 0.0, f.y, ZERO3, ZERO3
     if stage.firm == 0.0:
         x = law.cap * (f.y - 0.004 / law.tick * (f.y - f.y0) - origin)
         fast = fit_through(x, w.rest + 0.5 * sigma, sigma)
@@ -289,9 +291,9 @@ def begun(law, known, before, stage, w, f):
             back = (stage.firm + 0.004 / law.tick) * (f.y - f.y0)
             level = w.mean - w.rest
             fast = fit_through(law.cap * (f.y - back - origin), w.rest + 0.5 * sigma, sigma + level / readings)
-            slow, found, std = fast, ZERO3, ZERO3
+            slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
         elif stage.firm * law.tick >= law.memory:
-            slow, found, std = fast, ZERO3, ZERO3
+            slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
     if before.phase == LOCKED and stage.phase == LEARNING:
         slow = without_offset(slow, 0.25)
     return Learned(slow, fast, since, origin, found, std)
@@ -301,15 +303,18 @@ def begun(law, known, before, stage, w, f):
 def taken(law, known, state, stage, w, f, force):
     """What is known with this tick's reading."""
     since = known.since + 1.0
-    unsettled = since * law.tick < law.memory or 0.0 < stage.firm * law.tick < law.memory
-    if w.age > 0.0 or unsettled:
+    if w.age > 0.0 or since * law.tick < law.memory:
         return Learned(known.slow, known.fast, since, known.origin, known.found, known.std)
     rate = (f.y - f.y0) / law.tick
     phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
+    if state.bound >= law.cap and known.std.z > 0.0 and force - known.found @ phi > 4.0 * sqrt(w.variance):
+        return Learned(known.fast, known.fast, stage.firm, known.origin, ZERO3, ZERO3)  # refuted: it begins here
     moving = min(max(known.found.x, 0.0), 1.0) * law.cap * rate * law.tick
     noise = 2.0 * law.theta * w.tide / (w.gap * law.tick)
     weight = 1.0 / (noise + moving * moving / 12.0)
-    fast = known.fast.taking(phi, force, weight, 1.0 - law.tick / law.theta)
+    fast = known.fast
+    if stage.firm * law.tick >= law.memory:
+        fast = fast.taking(phi, force, weight, 1.0 - law.tick / law.theta)
     if stage.phase == LOCKED:
         return Learned(known.slow, fast, since, known.origin, known.found, known.std)
     keep = 1.0 if state.bound >= law.cap else 1.0 - law.tick / (6.0 * law.theta)
@@ -323,7 +328,7 @@ def bounded(law, bound, stage, w, known):
     """K_u at this tick."""
     if stage.phase == AIR:
         return law.cap
-    if known.since * law.tick < law.memory or 0.0 < stage.firm * law.tick < law.memory:
+    if min(known.since, stage.since) * law.tick < law.memory:
         return bound
     now = bound if stage.phase == LOCKED else from_slow(law, known)
     p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
