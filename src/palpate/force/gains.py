@@ -55,7 +55,7 @@ class Gains(Table):
     """Above which the tip withdraws [N]."""
     alpha: Annotated[float, Meta(gt=0, le=1)] = ALPHA
     relief: Annotated[float, Meta(ge=0, le=0.3)] = 0.0
-    """rho: share of the lag that contact with a stiff surface takes away."""
+    """rho: share of the lag that a torque arm does not have on a stiff surface, see `relief_of`."""
     law: str = LAW
 
     def __post_init__(self) -> None:
@@ -101,7 +101,7 @@ class Gains(Table):
     def gain_at(self, bound: float) -> float:
         """g for K_u = bound [m/(s N)]."""
         felt = self.compliance * bound
-        lag = self.theta * (1.0 - self.relief * felt / (1.0 + felt))
+        lag = self.theta * (1.0 - self.relief * (felt + 0.5) / (felt + 1.0))
         return self.alpha / lag * (self.compliance + 1.0 / bound)
 
     @property

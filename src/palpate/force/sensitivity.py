@@ -10,10 +10,10 @@ from palpate.force.arm import Arm
 from palpate.force.boundary import rank_one
 from palpate.force.sampled_loop import Law, SampledLoop
 
-PEAK = 1.56
-"""Of the sensitivity 1/(1 + L): a delay alone, alpha 0.42, comes to 1.55."""
+PEAK = 1.66
+"""Of the sensitivity 1/(1 + L): what alpha 0.48 comes to where all of the lag is delay."""
 MOST = 0.3
-"""Of the lag that contact may take away: g theta K_eff/alpha then stays below 1.43 of the 2 that the proof is of."""
+"""With it g theta K_eff/alpha is at most 1.43 where K_u is K, of the 2 that the proof of the adapting law is of."""
 _FREQUENCIES = 120
 _STIFFNESSES = 12
 
@@ -37,11 +37,11 @@ def sensitivity(loop: SampledLoop, gain: float, stiffness: float, damping: float
 
 
 def relief_of(arm: Arm, theta: float, alpha: float) -> float:
-    """rho: a surface of stiffness K makes the lag shorter by this share times K/(K + K_s).
+    """rho: on a surface of stiffness K the lag is shorter by this share times (K + K_s/2)/(K + K_s).
 
-    The stiffer the surface beside the arm's own spring, the shorter the inner loop's part of the lag. It is the
-    largest share that keeps the sensitivity below `PEAK` on every stiffness; 0 for a position arm, whose tip does
-    not feel the surface.
+    Most of a torque arm's lag is its spring and damper, K_s and D, not delay, and the stiffer the surface beside the
+    spring, the shorter it is. The largest share that keeps the sensitivity below `PEAK` on every stiffness; 0 for a
+    position arm, whose tip does not feel the surface.
 
     Args:
         arm: what moves.
@@ -51,8 +51,8 @@ def relief_of(arm: Arm, theta: float, alpha: float) -> float:
     if arm.kind == "position":
         return 0.0
     loop, found = SampledLoop(arm), MOST
-    for K in np.geomspace(0.1 * arm.series, arm.limits.stiffness, _STIFFNESSES).tolist():
-        part = K / (K + arm.series)
+    for K in np.geomspace(0.01 * arm.series, arm.limits.stiffness, _STIFFNESSES).tolist():
+        part = (K + 0.5 * arm.series) / (K + arm.series)
         unit = alpha / theta * (1.0 / arm.series + 1.0 / K)
         while found > 0.0 and sensitivity(loop, unit / (1.0 - found * part), K) > PEAK:
             found = max(found - 0.02, 0.0)
