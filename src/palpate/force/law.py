@@ -216,10 +216,12 @@ def watched(law, state, force):
     slow = w.slow + law.tick / (law.theta + law.tick) * (force - w.slow)
     evidence = evident(law, state, mean, slow, force)
     age, gap = (0.0, w.age + 1.0) if fresh else (w.age + 1.0, w.gap)
-    if state.stage.phase != AIR or evidence > 0.3 * CONTACT:
+    if state.stage.phase != AIR:
         return Watch(force, mean, slow, w.rest, w.variance, w.tide, evidence, age, gap)
-    rest = w.rest + law.tick / (min(state.ticks * law.tick, 1.0) + law.period) * (force - w.rest)
-    rest = max(min(rest, law.noise), -law.noise)
+    rest = w.rest
+    if evidence < 0.3 * CONTACT:
+        rest += law.tick / (min(state.ticks * law.tick, 1.0) + law.period) * (force - rest)
+        rest = max(min(rest, law.noise), -law.noise)
     off, drift = force - rest, slow - rest
     variance = w.variance + law.tick / 0.3 * (min(off * off, 9.0 * w.variance) - w.variance)
     tide = w.tide + law.tick * (min(drift * drift, 9.0 * w.tide) - w.tide)
