@@ -110,6 +110,22 @@ def test_it_never_asks_for_more_than_the_limit(loop):
     assert all(map(math.isfinite, loop.state))
 
 
+def test_a_motor_at_its_limit_is_told_and_the_command_does_not_wind_up(loop):
+    rng, x, x_c, K, most = np.random.default_rng(4), -2e-4, -2e-4, 2e4, 13.0
+    blocked = 0
+    for k in range(4000):
+        if k == 3000:
+            most = 100.0
+        force = max(K * x, 0.0) + 0.1 * rng.normal()
+        x_c += loop.gains.arm.tick * loop.update(float(force), float(x))
+        x = min(x_c, most / K)  # the motor cannot press harder
+        blocked += "cannot be reached" in loop.trouble
+    assert blocked > 500
+    assert x_c < 6.0 * 20.0 / K
+    assert loop.trouble == ""  # free again, it presses with what is asked
+    assert K * x == pytest.approx(20.0, rel=0.03)
+
+
 def test_it_goes_on_where_it_was_saved(loop):
     press(loop, 300)
     again, other = pickle.loads(pickle.dumps(loop)), ForceLoop(loop.gains)
@@ -121,7 +137,7 @@ def test_it_goes_on_where_it_was_saved(loop):
         assert again.update(force, position) == speed == other.update(force, position)
 
 
-@pytest.mark.parametrize("bad", [(), (1.0, 2.0), [math.nan] * 64, [9.0] * 61])
+@pytest.mark.parametrize("bad", [(), (1.0, 2.0), [math.nan] * 66, [9.0] * 61])
 def test_a_state_of_something_else_is_refused(loop, bad):
     before = loop.state
     with pytest.raises(InputError, match="state"):

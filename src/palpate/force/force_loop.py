@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PHASES = {AIR: "air", LEARNING: "learning", LOCKED: "locked"}
-FINE, BLIND, STALE, SATURATED, LIMITED, LATE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 TROUBLES = {
     FINE: "",
     BLIND: "a reading was no number: the tip was held",
@@ -31,9 +31,16 @@ TROUBLES = {
     SATURATED: "the force sensor is at the end of its scale: the tip withdrew",
     LIMITED: "the force is above its limit: the tip withdrew",
     LATE: "ticks were missed: nothing was learned from them",
+    UNREACHED: "the force asked for cannot be reached: the command went three times as far as that takes; a motor is at "
+    "its limit, or something blocks the tip: it was held",
 }
-# Behind the law's own state: ticks without a good reading, ticks since the reading changed, the trouble of this tick.
-_BLIND, _UNCHANGED, _TROUBLE = STATE, STATE + 1, STATE + 2
+FARTHEST = 3.0
+"""Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer."""
+NEAR = 0.05
+"""Of F_d: an error that counts, and a change of the force that starts the count anew."""
+# Behind the law's own state: ticks without a good reading, ticks since the reading changed, the trouble of this tick,
+# how far the command has gone in vain [N], and from which force.
+_BLIND, _UNCHANGED, _TROUBLE, _VAIN, _FROM, EXTRA = STATE, STATE + 1, STATE + 2, STATE + 3, STATE + 4, 5
 
 
 @law
@@ -60,8 +67,22 @@ def safe_step(numbers, state, desired, force, position, missed):
         trouble, speed = LIMITED, min(speed, -control.approach)
     elif state[_UNCHANGED] > max(lag, 5.0 * control.period / control.tick):
         trouble, speed = STALE, 0.0
+    elif in_vain(control, state, after, desired, speed) > FARTHEST * desired:
+        trouble, speed = UNREACHED, 0.0
     state[_TROUBLE] = trouble
     return speed
+
+
+@law
+def in_vain(control, state, after, desired, speed):
+    """What the command would have added to the force since that last came nearer to F_d [N]."""
+    stiffness = control.cap * max(after.known.found.x, 0.0)
+    low = after.watch.mean < (1.0 - NEAR) * desired and after.stage.phase != AIR
+    if not low or abs(after.watch.mean - state[_FROM]) > NEAR * desired:
+        state[_VAIN], state[_FROM] = 0.0, after.watch.mean
+    else:
+        state[_VAIN] += control.tick * speed * stiffness / (1.0 + control.compliance * stiffness)
+    return state[_VAIN]
 
 
 @law
@@ -122,7 +143,7 @@ class ForceLoop:
         self.gains, self.certificate = gains, certificate
         self._desired = gains.force
         self._numbers = flattened(gains.cautious())
-        self._state = np.zeros(STATE + 3)
+        self._state = np.zeros(STATE + EXTRA)
         self.reset()
         self._bind()
 
