@@ -45,7 +45,9 @@ def main() -> None:
     parser.add_argument("--controllers", nargs="+", default=CONTROLLERS)
     told = parser.parse_args()
     print(f"{len(surfaces())} surfaces, {told.seeds} seeds, friction x {told.friction:g}")
-    print("                 settled   p50    p95 [s]   most over   lost   rms [N]   not settled, a motor at its limit")
+    print(
+        "                 settled   p50    p95 [s]   most over   lost   rms [N]   not settled, a motor at its limit"
+    )
     for name in told.controllers:
         found = []
         for surface in track(surfaces().values(), name, transient=True):
@@ -62,7 +64,7 @@ def main() -> None:
 def judged(
     name: str, surface: dict[str, object], seed: int, friction: float
 ) -> tuple[float, float, float, float, float]:
-    """Settling [s], overshoot, losses of contact, rms error in the last second [N], share of it with a motor at its limit."""
+    """Settling [s], overshoot, losses of contact, rms error in the last second [N]; its share with a motor limited."""
     own = load(name)
     changes = {"surface": surface, "run.press": PRESS, "run.losses": 1}
     for key in ("coulomb", "static"):

@@ -32,7 +32,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Judged:
-    """Settling time [s] (NaN if not), overshoot, losses of contact, smallest K_eff(K_u)/K_eff(K) once a third of F_d was there."""
+    """Settling time [s] (NaN if not), overshoot, losses of contact, least K_eff(K_u)/K_eff(K) above F_d/3."""
 
     settling: float
     overshoot: float

@@ -92,8 +92,9 @@ def test_a_surface_that_begins_where_noise_looked_like_one_is_not_taken_for_soft
     # Noise of the air has raised the evidence when the tip meets 235 kN/m: what it had taken for a slope is refuted.
     desired = np.full(1200, 39.0)
     gains = gains_of("fr3", 39.0, noise=0.13)
+    world, stiff = world_of(gains.arm, noise=0.13), surface(2.35e5, 500.0)
     peaks = [
-        pressed(world_of(gains.arm, noise=0.13), surface(2.35e5, 500.0), gains.cautious(), gap, desired, seed)[:, 0].max()
+        pressed(world, stiff, gains.cautious(), gap, desired, seed)[:, 0].max()
         for seed in range(20) for gap in (1e-3, 4e-3)
     ]  # fmt: skip
     assert max(peaks) < 1.1 * 39.0
@@ -105,6 +106,17 @@ def test_evidence_of_a_contact_is_rare_in_the_air_whatever_the_noise():
     far = np.full(50_000, 20.0)
     rows = pressed(world_of(gains.arm, noise=0.13), surface(1e5), gains.cautious(), 10.0, far, 7)
     assert (rows[:, 1] > 0.999 * gains.seen_cap).all()
+
+
+@pytest.mark.parametrize("exponent", [1.5, 2.0])
+def test_a_surface_that_stiffens_is_one_whose_tangent_is_within_the_proof(exponent):
+    depth = 20.0 / 5e3
+    force = run(
+        "ur5e", 20.0 / depth**exponent, 10.0 / depth ** (exponent - 1.0), seconds=3.0, exponent=exponent
+    )
+    assert abs(force[-200:, 0].mean() - 20.0) < 0.3  # it settles, though not without overshoot
+    tangent = exponent * 5e3 * (force[-1, 0] / 20.0) ** (1.0 - 1.0 / exponent)
+    assert force[-200:, 1].min() > 0.5 * gains_of("ur5e").arm.seen(tangent)  # what the proof asks of K_u
 
 
 def test_a_stiffer_surface_in_mid_press_is_found_at_once():

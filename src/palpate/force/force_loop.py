@@ -13,7 +13,21 @@ from numpy.typing import NDArray
 from palpate._jit import kernel, law
 from palpate.errors import InputError
 from palpate.files import write_text
-from palpate.force.flat import BOUND, FOUND, LAST, PHASE, SINCE, STATE, STD, TIDE, VARIANCE, flattened, law_in, put_state, state_in
+from palpate.force.flat import (
+    BOUND,
+    FOUND,
+    LAST,
+    PHASE,
+    SINCE,
+    STATE,
+    STD,
+    TIDE,
+    VARIANCE,
+    flattened,
+    law_in,
+    put_state,
+    state_in,
+)
 from palpate.force.gains import Gains, load_gains
 from palpate.force.law import AIR, LEARNING, LOCKED
 
@@ -31,8 +45,8 @@ TROUBLES = {
     SATURATED: "the force sensor is at the end of its scale: the tip withdrew",
     LIMITED: "the force is above its limit: the tip withdrew",
     LATE: "ticks were missed: nothing was learned from them",
-    UNREACHED: "the force asked for cannot be reached: the command went three times as far as that takes; a motor is at "
-    "its limit, or something blocks the tip: it was held",
+    UNREACHED: "the force asked for cannot be reached: the command went three times as far as that takes; "
+    "a motor is at its limit, or something blocks the tip: it was held",
 }
 FARTHEST = 3.0
 """Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer."""
@@ -231,7 +245,11 @@ class ForceLoop:
     @state.setter
     def state(self, numbers: Any) -> None:
         given = np.array(numbers, dtype=np.float64)
-        if given.shape != self._state.shape or not np.isfinite(given).all() or float(given[PHASE]) not in PHASES:
+        if (
+            given.shape != self._state.shape
+            or not np.isfinite(given).all()
+            or float(given[PHASE]) not in PHASES
+        ):
             raise InputError(
                 f"a state is {len(self._state)} finite numbers from ForceLoop.state; give those back"
             )

@@ -29,7 +29,10 @@ quarter slower.
 LAW = "cautious 2"
 """Changes with the law; a certificate of another one is refused."""
 _TOUCH = 0.45
-"""Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch."""
+"""Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch; a damping ratio of 1 doubles it."""
+_BRISK = 1.15
+"""Of the speed that the law itself asks for at the cap; 1.3 overshoots by 7.6 % there, 1.6 by 13.6 %
+(benchmarks/force/first_touches.py)."""
 _SLOWEST = 0.02
 """K_u below which the speed limit, not the gain, rules, as a share of alpha F_d/(theta v_max)."""
 _FORGOTTEN = 5.0
@@ -116,8 +119,9 @@ class Gains(Table):
         memory = _FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick
         E, e0, e1, c = followed(arm)
         numbers: dict[str, Any] = {
-            "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance, "relief": self.relief,
-            "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed, "approach": self.approach,
+            "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,
+            "relief": self.relief, "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed,
+            "approach": self.approach,
             "noise": arm.sensor.noise, "memory": memory + 1.0 / arm.sensor.sampling,
             "period": max(1.0 / arm.sensor.sampling, arm.tick), "E": E, "e0": e0, "e1": e1, "c": c,
             "d": 0.0 if low_pass.sections else 1.0, "z": 1.5, "eps": 0.03, "full_scale": arm.sensor.full_scale,
@@ -145,7 +149,7 @@ def load_gains(path: Path) -> Gains:
 
 
 def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: float = ALPHA) -> float:
-    """Highest speed in the air [m/s]: what the law asks for with K_u = cap, and what the tip's mass allows.
+    """Highest speed in the air [m/s]: what a touch at K_u = cap bears, and what the tip's mass allows.
 
     Args:
         arm: what moves.
@@ -154,7 +158,7 @@ def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: floa
         cap: K_cap of the surface [N/m].
         alpha: gain in units of 1/theta.
     """
-    speed = min(arm.limits.speed, 1.15 * alpha * force / (theta * arm.seen(cap)))
+    speed = min(arm.limits.speed, _BRISK * alpha * force / (theta * arm.seen(cap)))
     if isinstance(arm.inner, TorqueLoop):
         speed = min(speed, _TOUCH * force / float(np.sqrt(cap * arm.inner.mass)))
     return speed

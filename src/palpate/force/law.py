@@ -116,9 +116,7 @@ class Cautious(NamedTuple):
         firm = stage.firm * self.tick > self.theta or bound < 0.5 * self.cap
         limit = self.speed if stage.phase != AIR and firm else self.approach
         speed = max(min(u + forward, limit), -self.speed) if stage.phase != AIR else self.approach
-        return speed, CautiousState(
-            state.ticks + 1.0, desired, watch, follow, stage, known, bound, backstop
-        )
+        return speed, CautiousState(state.ticks + 1.0, desired, watch, follow, stage, known, bound, backstop)
 
     def told(self, state):
         """K_u [N/m]."""
@@ -292,7 +290,9 @@ def begun(law, known, before, stage, w, f):
             readings = stage.firm * law.tick / law.period + 1.0
             back = (stage.firm + 0.004 / law.tick) * (f.y - f.y0)
             level = w.mean - w.rest
-            fast = fit_through(law.cap * (f.y - back - origin), w.rest + 0.5 * sigma, sigma + level / readings)
+            fast = fit_through(
+                law.cap * (f.y - back - origin), w.rest + 0.5 * sigma, sigma + level / readings
+            )
             slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
         elif stage.firm * law.tick >= law.memory:
             slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
@@ -310,7 +310,9 @@ def taken(law, known, state, stage, w, f, force):
     rate = (f.y - f.y0) / law.tick
     phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
     if state.bound >= law.cap and known.std.z > 0.0 and force - known.found @ phi > 4.0 * sqrt(w.variance):
-        return Learned(known.fast, known.fast, stage.firm, known.origin, ZERO3, ZERO3)  # refuted: it begins here
+        return Learned(
+            known.fast, known.fast, stage.firm, known.origin, ZERO3, ZERO3
+        )  # refuted: it begins here
     moving = min(max(known.found.x, 0.0), 1.0) * law.cap * rate * law.tick
     noise = 2.0 * law.theta * w.tide / (w.gap * law.tick)
     weight = 1.0 / (noise + moving * moving / 12.0)

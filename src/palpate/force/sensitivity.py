@@ -32,7 +32,9 @@ def sensitivity(loop: SampledLoop, gain: float, stiffness: float, damping: float
         return inf
     b, c = rank_one(closed - start)
     z = np.exp(1j * np.geomspace(1e-3, 0.9 * np.pi, _FREQUENCIES))
-    inner = np.linalg.solve(z[:, None, None] * np.eye(loop.size) - start, b.astype(complex)[None, :, None])[..., 0]
+    inner = np.linalg.solve(z[:, None, None] * np.eye(loop.size) - start, b.astype(complex)[None, :, None])[
+        ..., 0
+    ]
     return float(np.abs(1.0 / (1.0 - inner @ c)).max())
 
 
