@@ -53,7 +53,7 @@ trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put t
 	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md
 
 leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
-	$(BIN)/python benchmarks/force/leaderboard.py --touches 200 --out docs/force-leaderboard.md
+	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean
