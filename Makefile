@@ -59,7 +59,7 @@ trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put t
 	$(BIN)/python benchmarks/identification/foreign/cases.py --markdown docs/trust.md || true
 
 leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
-	$(BIN)/python benchmarks/force/leaderboard.py --touches 200 --out docs/force-leaderboard.md
+	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean

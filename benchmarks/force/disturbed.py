@@ -35,6 +35,7 @@ def main() -> None:
         priors(rig, told)
         changes(rig, told.seed)
         sways(rig, told.seed)
+        curved(rig, told)
         hours(rig, told)
 
 
@@ -99,6 +100,32 @@ def sways(rig: Rig, seed: int) -> None:
             rms = float(np.sqrt(np.mean((force - 20.0) ** 2)))
             what = f"+-{1e3 * amplitude:g} mm, {hertz:g} Hz, {K / 1e3:g} kN/m"
             print(f"    {what:<28}{rms:8.3f} N{force.min():8.2f} N{(force <= 0.0).sum():8d}")
+
+
+def curved(rig: Rig, told: argparse.Namespace) -> None:
+    """Hunt and Crossley: f = K p^n + B p^(n-1) pdot; the cap is the tangent's at 1.2 F_d, and a hundred times that."""
+    print(
+        f"  surfaces that stiffen as p^n, {told.touches} touches each: settled, p99 settling, most over, lost"
+    )
+    for n in (1.5, 2.0):
+        for room in (1.0, 100.0):
+            found = []
+            for i in track(range(told.touches), f"p^{n:g}", transient=True):
+                draw = rig.draw(np.random.default_rng([told.seed, 7, i]), stiffness=(1e3, 1e5))
+                depth = draw.F / draw.K  # draw.K is the secant's stiffness at F_d
+                K, B = draw.F / depth**n, 0.3 * draw.B / depth ** (n - 1.0)
+                steepest = n * draw.K * 1.2 ** (1.0 - 1.0 / n) + 0.3 * draw.B / rig.theta * 1.2
+                gains = rig.gains(draw.F, draw.noise, min(room * steepest, rig.arm.limits.stiffness))
+                curve = Draw(K, B, draw.F, draw.noise, draw.phase, draw.zeta)
+                rows = rig.run(
+                    curve, gains.cautious(), [told.seed, 7, i], 8.0, approach=gains.approach, exponent=n
+                )
+                judged = rig.judge(draw, rows)
+                found.append((judged.settling, judged.overshoot, judged.lost))
+            settling, over, lost = np.array(found).T
+            done, late = np.isfinite(settling).sum(), np.nanpercentile(settling, 99)
+            what = f"p^{n:g}, cap x {room:g}"
+            print(f"    {what:<22}{done:>5}  {late:6.2f} s  {share(over.max()):>10}  {(lost > 0).sum()}")
 
 
 def hours(rig: Rig, told: argparse.Namespace) -> None:

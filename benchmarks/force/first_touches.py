@@ -57,7 +57,7 @@ def report(name: str, touches: int, noise: tuple[float, float], seed: int) -> No
     )
     print(f"  overshoot above 10 %                 {(over > 0.1).sum()} of {touches}")
     print(f"  contact lost                         {(lost > 0).sum()} of {touches}")
-    print(f"  smallest K_u/K                       {np.nanmin(least):.3f}")
+    print(f"  smallest K_eff(K_u)/K_eff             {np.nanmin(least):.3f}")
 
 
 if __name__ == "__main__":

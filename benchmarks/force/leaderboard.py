@@ -25,7 +25,7 @@ which is what this asks it to do without. Failed: not settled within 6 s, or mor
 Judge by the tails; by medians the point estimate looks as good as any."""
 SECONDS = 6.0
 OVER = 0.1
-HEAD = "| law | failed | unsettled | settling p99 [s] | overshoot p99 | most | contacts lost | error in an hour |"
+HEAD = "| law | failed | unsettled | settling p99 [s] | overshoot p99 | most | contacts lost | error in {seconds:g} s |"
 
 
 def main() -> None:
@@ -76,7 +76,7 @@ def table(name: str, told: argparse.Namespace) -> list[str]:
         shares = " | ".join(f"{100.0 * v:.1f} %" for v in (over, most, lost))
         first = f"| {law} | {100 * failed:.1f} % | {100 * unsettled:.1f} % | {told_late} |"
         body.append(f"{first} {shares} | {hour[law]:.2f} N |")
-    return [HEAD, "|---|---|---|---|---|---|---|---|", *body]
+    return [HEAD.format(seconds=told.seconds), "|---|---|---|---|---|---|---|---|", *body]
 
 
 def hours(rig: Rig, told: argparse.Namespace) -> dict[str, float]:

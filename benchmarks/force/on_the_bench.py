@@ -42,26 +42,29 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--friction", type=float, default=1.0)
+    parser.add_argument("--controllers", nargs="+", default=CONTROLLERS)
     told = parser.parse_args()
     print(f"{len(surfaces())} surfaces, {told.seeds} seeds, friction x {told.friction:g}")
-    print("                 settled   p50    p95 [s]   most over   lost   rms [N]")
-    for name in CONTROLLERS:
+    print(
+        "                 settled   p50    p95 [s]   most over   lost   rms [N]   not settled, a motor at its limit"
+    )
+    for name in told.controllers:
         found = []
         for surface in track(surfaces().values(), name, transient=True):
             found += [judged(name, surface, seed, told.friction) for seed in range(100, 100 + told.seeds)]
-        settling, over, lost, rms = np.array(found).T
+        settling, over, lost, rms, limited = np.array(found).T
         settled = np.isfinite(settling)
         middle, late = np.nanpercentile(settling, (50, 95)) if settled.any() else (np.nan, np.nan)
         print(
             f"{name:<16}{settled.sum():4d} of {len(found)}{middle:7.2f}{late:7.2f}{100 * over.max():11.1f} %"
-            f"{int((lost > 0).sum()):7d}{np.median(rms):9.3f}"
+            f"{int((lost > 0).sum()):7d}{np.nanmedian(rms):9.3f}{int((~settled & (limited > 0.9)).sum()):12d}"
         )
 
 
 def judged(
     name: str, surface: dict[str, object], seed: int, friction: float
-) -> tuple[float, float, float, float]:
-    """Settling [s], overshoot, losses of contact, rms error in the last second [N]."""
+) -> tuple[float, float, float, float, float]:
+    """Settling [s], overshoot, losses of contact, rms error in the last second [N]; its share with a motor limited."""
     own = load(name)
     changes = {"surface": surface, "run.press": PRESS, "run.losses": 1}
     for key in ("coulomb", "static"):
@@ -69,14 +72,15 @@ def judged(
     record = build(changed(own, changes)).run(60.0, seed=seed, press=PRESS)
     force = record["force"][record["phase"] == 1.0]
     if len(force) < 100:
-        return np.nan, 0.0, 1.0, np.nan
+        return np.nan, 0.0, 1.0, np.nan, 0.0
     smooth = np.convolve(force, np.full(10, 0.1), "valid")
     lost = float(record.meta["end"] == "lost contact" or (record["phase"] == 2.0).any())
     outside = np.flatnonzero(np.abs(smooth - 20.0) > 1.0)
     last = outside[-1] + 1 if len(outside) else 0
     settled = last < len(smooth) - 300 and not lost
     rms = float(np.sqrt(np.mean((force[-1000:] - 20.0) ** 2)))
-    return last * 1e-3 if settled else np.nan, float(smooth.max() / 20.0 - 1.0), lost, rms
+    held = [record[f"saturated{motor}"][record["phase"] == 1.0][-1000:].mean() for motor in (1, 2, 3)]
+    return last * 1e-3 if settled else np.nan, float(smooth.max() / 20.0 - 1.0), lost, rms, float(max(held))
 
 
 if __name__ == "__main__":

@@ -8,8 +8,9 @@ import msgspec
 import numpy as np
 
 from palpate.force.arm import load_arm
-from palpate.force.gains import Gains, approach_speed
+from palpate.force.gains import ALPHA, Gains, approach_speed
 from palpate.force.lag import lag_of, sum_of_lags
+from palpate.force.sensitivity import relief_of
 from palpate.force.worlds import pressed, surface, world_of
 
 SECONDS = 4.0
@@ -31,7 +32,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Judged:
-    """Settling time [s] (NaN if not), overshoot, losses of contact, smallest K_u/K once a third of F_d was there."""
+    """Settling time [s] (NaN if not), overshoot, losses of contact, least K_eff(K_u)/K_eff(K) above F_d/3."""
 
     settling: float
     overshoot: float
@@ -45,6 +46,7 @@ class Rig:
     def __init__(self, name: str):
         self.arm = load_arm(name)
         self.theta, self.added = lag_of(self.arm), sum_of_lags(self.arm)
+        self.relief = relief_of(self.arm, self.theta, ALPHA)
 
     def draw(self, rng, stiffness=(1e2, 1e6), noise=(0.05, 0.2)) -> Draw:
         """Stiffness, damping ratio and noise even in their logarithms; force and phase even."""
@@ -60,7 +62,7 @@ class Rig:
         cap, theta = cap or self.arm.limits.stiffness, theta or self.theta
         arm = msgspec.structs.replace(self.arm, sensor=msgspec.structs.replace(self.arm.sensor, noise=noise))
         return Gains(
-            arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale,
+            arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale, relief=self.relief,
             approach=approach_speed(arm, force, theta, cap),
         )  # fmt: skip
 
@@ -83,7 +85,8 @@ class Rig:
         lost = int(((force[firm:-1] > 0.0) & (force[firm + 1 :] <= 0.0)).sum())
         felt = draw.K if self.arm.kind == "torque" else self.arm.seen(draw.K)
         pressing = rows[force > draw.F / 3.0, 1]
-        least = float(pressing.min() / felt) if len(pressing) else np.nan
+        own = 1.0 / self.arm.series if self.arm.kind == "torque" else 0.0
+        least = float((own + 1.0 / felt) / (own + 1.0 / pressing.min())) if len(pressing) else np.nan
         return Judged(
             (last - start) / rate if settled else np.nan, float(force.max() / draw.F - 1.0), lost, least
         )

@@ -13,6 +13,7 @@ from force.gained import gains_of
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.certificate import FORM, Certificate
+from palpate.force.flat import BOUND
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def test_a_reading_that_is_none_holds_the_tip(loop, bad):
     assert loop.update(bad, 0.0) == 0.0
     assert "no number" in loop.trouble
     assert loop.update(5.0, bad) == 0.0
-    assert loop.state[:50] == before[:50]  # nothing was learned from it
+    assert loop.state[:BOUND] == before[:BOUND]  # nothing was learned from it
     loop.update(20.1, 1e-3)
     assert "missed" in loop.trouble
 
@@ -62,7 +63,7 @@ def test_readings_gone_for_longer_than_the_lag_start_it_anew(loop):
         loop.update(math.nan, math.nan)
     loop.update(0.01, 0.0)
     assert loop.phase == "air"
-    assert loop.state[50] == loop.gains.seen_cap
+    assert loop.state[BOUND] == loop.gains.seen_cap
     assert loop.noise == noise
 
 
@@ -109,6 +110,22 @@ def test_it_never_asks_for_more_than_the_limit(loop):
     assert all(map(math.isfinite, loop.state))
 
 
+def test_a_motor_at_its_limit_is_told_and_the_command_does_not_wind_up(loop):
+    rng, x, x_c, K, most = np.random.default_rng(4), -2e-4, -2e-4, 2e4, 13.0
+    blocked = 0
+    for k in range(4000):
+        if k == 3000:
+            most = 100.0
+        force = max(K * x, 0.0) + 0.1 * rng.normal()
+        x_c += loop.gains.arm.tick * loop.update(float(force), float(x))
+        x = min(x_c, most / K)  # the motor cannot press harder
+        blocked += "cannot be reached" in loop.trouble
+    assert blocked > 500
+    assert x_c < 6.0 * 20.0 / K
+    assert loop.trouble == ""  # free again, it presses with what is asked
+    assert K * x == pytest.approx(20.0, rel=0.03)
+
+
 def test_it_goes_on_where_it_was_saved(loop):
     press(loop, 300)
     again, other = pickle.loads(pickle.dumps(loop)), ForceLoop(loop.gains)
@@ -120,7 +137,7 @@ def test_it_goes_on_where_it_was_saved(loop):
         assert again.update(force, position) == speed == other.update(force, position)
 
 
-@pytest.mark.parametrize("bad", [(), (1.0, 2.0), [math.nan] * 61, [9.0] * 61])
+@pytest.mark.parametrize("bad", [(), (1.0, 2.0), [math.nan] * 66, [9.0] * 61])
 def test_a_state_of_something_else_is_refused(loop, bad):
     before = loop.state
     with pytest.raises(InputError, match="state"):

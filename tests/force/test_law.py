@@ -51,9 +51,9 @@ def test_the_bound_stays_above_the_stiffness():
     for seed in range(6):
         rows = run("ur5e", 5e3, 30.0, seed=seed)
         seen = gains_of("ur5e").arm.seen(5e3)
-        assert (
-            rows[rows[:, 0] > 5.0, 1].min() > 0.9 * seen
-        )  # two standard deviations: 2 % of estimates are below
+        # One and a half standard deviations, while the force is still low; the proof asks for half.
+        assert rows[rows[:, 0] > 5.0, 1].min() > 0.75 * seen
+        assert rows[-200:, 1].min() > seen
 
 
 def test_in_the_air_it_approaches_and_learns_nothing():
@@ -75,16 +75,48 @@ def test_a_tip_that_lies_on_the_surface_at_the_start_does_not_jump():
 
 
 def test_without_the_bound_it_is_worse():
-    gains = gains_of("ur5e", 10.0, noise=0.3)
-    world = world_of(gains.arm, noise=0.3)
+    gains = gains_of("ur5e", 10.0, noise=0.6)
+    world = world_of(gains.arm, noise=0.6)
     peaks = {}
     for bounding in (1.0, 0.0):
         control = gains.cautious()._replace(bounding=bounding)
         runs = [
-            pressed(world, surface(4e4), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(5)
+            pressed(world, surface(5e3), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(8)
         ]
         peaks[bounding] = max(runs)
-    assert peaks[1.0] < 11.5 < peaks[0.0]
+    assert peaks[1.0] < 11.0
+    assert peaks[0.0] > 11.5
+
+
+def test_a_surface_that_begins_where_noise_looked_like_one_is_not_taken_for_soft():
+    # Noise of the air has raised the evidence when the tip meets 235 kN/m: what it had taken for a slope is refuted.
+    desired = np.full(1200, 39.0)
+    gains = gains_of("fr3", 39.0, noise=0.13)
+    world, stiff = world_of(gains.arm, noise=0.13), surface(2.35e5, 500.0)
+    peaks = [
+        pressed(world, stiff, gains.cautious(), gap, desired, seed)[:, 0].max()
+        for seed in range(20) for gap in (1e-3, 4e-3)
+    ]  # fmt: skip
+    assert max(peaks) < 1.1 * 39.0
+
+
+def test_evidence_of_a_contact_is_rare_in_the_air_whatever_the_noise():
+    # A hundred seconds; the noise told is a third too small.
+    gains = gains_of("ur5e", noise=0.1)
+    far = np.full(50_000, 20.0)
+    rows = pressed(world_of(gains.arm, noise=0.13), surface(1e5), gains.cautious(), 10.0, far, 7)
+    assert (rows[:, 1] > 0.999 * gains.seen_cap).all()
+
+
+@pytest.mark.parametrize("exponent", [1.5, 2.0])
+def test_a_surface_that_stiffens_is_one_whose_tangent_is_within_the_proof(exponent):
+    depth = 20.0 / 5e3
+    force = run(
+        "ur5e", 20.0 / depth**exponent, 10.0 / depth ** (exponent - 1.0), seconds=3.0, exponent=exponent
+    )
+    assert abs(force[-200:, 0].mean() - 20.0) < 0.3  # it settles, though not without overshoot
+    tangent = exponent * 5e3 * (force[-1, 0] / 20.0) ** (1.0 - 1.0 / exponent)
+    assert force[-200:, 1].min() > 0.5 * gains_of("ur5e").arm.seen(tangent)  # what the proof asks of K_u
 
 
 def test_a_stiffer_surface_in_mid_press_is_found_at_once():

@@ -6,9 +6,10 @@ from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, clip
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.force.arm import Arm, Limits, TorqueLoop, load_arm
-from palpate.force.gains import Gains, approach_speed
+from palpate.force.gains import ALPHA, Gains, approach_speed
 from palpate.force.lag import lag_of
 from palpate.force.law import Cautious, CautiousState
+from palpate.force.sensitivity import relief_of
 from palpate.signals.parameters import triple
 from palpate.signals.tables import NotNegativeTriple, Positive, PositiveTriple
 
@@ -68,9 +69,9 @@ class CautiousPress(NamedTuple):
         return J_w.T @ pull + model.h, CautiousPressState(inner, x_c, touch, state.ticks + 1.0)
 
     def report(self, state):
-        """Nothing learned of force; K_u [N/m], phase, tau [s]."""
+        """Nothing learned of force; K_u [N/m], phase, evidence of a contact."""
         inner = state.inner
-        return Vec3(0.0, 0.0, 0.0), Vec3(inner.bound.stiffness, inner.stage.phase, inner.bound.tau)
+        return Vec3(0.0, 0.0, 0.0), Vec3(inner.bound, inner.stage.phase, inner.watch.evidence)
 
 
 class CautiousController(ControllerTable, tag="cautious"):
@@ -121,5 +122,5 @@ def gains_on_bench(tick, spring, damping, force, cap):
     theta = lag_of(arm)
     return Gains(
         arm=arm, force=float(force), theta=theta, cap=float(cap), force_limit=own.sensor.full_scale,
-        approach=approach_speed(arm, float(force), theta, float(cap)),
+        approach=approach_speed(arm, float(force), theta, float(cap)), relief=relief_of(arm, theta, ALPHA),
     )  # fmt: skip

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from palpate._jit import law
 from palpate._vector import Mat3, Vec3
-from palpate.force.law import Backstop, Bound, Cautious, CautiousState, Follow, Learned, Stage, Watch
+from palpate.force.law import Backstop, Cautious, CautiousState, Follow, Learned, Stage, Watch
 from palpate.force.regression import Fit
 
 
@@ -43,8 +43,8 @@ def matrix_in(a, i):
 def law_in(a):
     """The law's numbers from an array."""
     return Cautious(
-        a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], matrix_in(a, 11), vector_in(a, 20),
-        vector_in(a, 23), vector_in(a, 26), a[29], a[30], a[31], a[32], a[33], a[34], a[35], a[36],
+        a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], matrix_in(a, 12), vector_in(a, 21),
+        vector_in(a, 24), vector_in(a, 27), a[30], a[31], a[32], a[33], a[34], a[35], a[36], a[37],
     )  # fmt: skip
 
 
@@ -54,13 +54,12 @@ def state_in(a):
     return CautiousState(
         a[0],
         a[1],
-        a[2],
-        Watch(a[3], a[4], a[5], a[6], a[7]),
-        Follow(vector_in(a, 8), a[11], a[12], a[13], a[14]),
-        Stage(a[15], a[16], a[17]),
-        Learned(fit_in(a, 18), fit_in(a, 30), a[42], a[43], vector_in(a, 44), vector_in(a, 47)),
-        Bound(a[50], a[51]),
-        Backstop(a[52], a[53], a[54], a[55], a[56], a[57]),
+        Watch(a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10]),
+        Follow(vector_in(a, 11), a[14], a[15], a[16], a[17]),
+        Stage(a[18], a[19], a[20], a[21]),
+        Learned(fit_in(a, 22), fit_in(a, 34), a[46], a[47], vector_in(a, 48), vector_in(a, 51)),
+        a[54],
+        Backstop(a[55], a[56], a[57], a[58], a[59], a[60]),
     )
 
 
@@ -88,20 +87,23 @@ def put_fit(a, i, fit):
 @law
 def put_state(a, s):
     """The state into an array."""
-    a[0], a[1], a[2] = s.ticks, s.desired, s.smooth
+    a[0], a[1] = s.ticks, s.desired
     w, f, k, b = s.watch, s.follow, s.known, s.backstop
-    a[3], a[4], a[5], a[6], a[7] = w.last, w.mean, w.slow, w.variance, w.age
-    put_vector(a, 8, f.z)
-    a[11], a[12], a[13], a[14] = f.x, f.y, f.y0, f.origin
-    a[15], a[16], a[17] = s.stage.phase, s.stage.since, s.stage.quiet
-    put_fit(a, 18, k.slow)
-    put_fit(a, 30, k.fast)
-    a[42], a[43] = k.since, k.origin
-    put_vector(a, 44, k.found)
-    put_vector(a, 47, k.std)
-    a[50], a[51] = s.bound.stiffness, s.bound.tau
-    a[52], a[53], a[54], a[55], a[56], a[57] = b.care, b.sign, b.peak, b.before, b.swings, b.calm
+    a[2], a[3], a[4], a[5] = w.last, w.mean, w.slow, w.rest
+    a[6], a[7], a[8], a[9], a[10] = w.variance, w.tide, w.evidence, w.age, w.gap
+    put_vector(a, 11, f.z)
+    a[14], a[15], a[16], a[17] = f.x, f.y, f.y0, f.origin
+    a[18], a[19], a[20], a[21] = s.stage.phase, s.stage.since, s.stage.quiet, s.stage.firm
+    put_fit(a, 22, k.slow)
+    put_fit(a, 34, k.fast)
+    a[46], a[47] = k.since, k.origin
+    put_vector(a, 48, k.found)
+    put_vector(a, 51, k.std)
+    a[54] = s.bound
+    a[55], a[56], a[57], a[58], a[59], a[60] = b.care, b.sign, b.peak, b.before, b.swings, b.calm
 
 
-STATE = 58
+STATE = 61
 """Numbers of a state."""
+LAST, VARIANCE, TIDE, PHASE, SINCE, FOUND, STD, BOUND = 2, 6, 7, 18, 46, 48, 51, 54
+"""Where some of them are."""

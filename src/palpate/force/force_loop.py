@@ -13,7 +13,21 @@ from numpy.typing import NDArray
 from palpate._jit import kernel, law
 from palpate.errors import InputError
 from palpate.files import write_text
-from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
+from palpate.force.flat import (
+    BOUND,
+    FOUND,
+    LAST,
+    PHASE,
+    SINCE,
+    STATE,
+    STD,
+    TIDE,
+    VARIANCE,
+    flattened,
+    law_in,
+    put_state,
+    state_in,
+)
 from palpate.force.gains import Gains, load_gains
 from palpate.force.law import AIR, LEARNING, LOCKED
 
@@ -23,7 +37,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PHASES = {AIR: "air", LEARNING: "learning", LOCKED: "locked"}
-FINE, BLIND, STALE, SATURATED, LIMITED, LATE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
 TROUBLES = {
     FINE: "",
     BLIND: "a reading was no number: the tip was held",
@@ -31,9 +45,16 @@ TROUBLES = {
     SATURATED: "the force sensor is at the end of its scale: the tip withdrew",
     LIMITED: "the force is above its limit: the tip withdrew",
     LATE: "ticks were missed: nothing was learned from them",
+    UNREACHED: "the force asked for cannot be reached: the command went three times as far as that takes; "
+    "a motor is at its limit, or something blocks the tip: it was held",
 }
-# Behind the law's own state: ticks without a good reading, ticks since the reading changed, the trouble of this tick.
-_BLIND, _UNCHANGED, _TROUBLE = STATE, STATE + 1, STATE + 2
+FARTHEST = 3.0
+"""Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer."""
+NEAR = 0.05
+"""Of F_d: an error that counts, and a change of the force that starts the count anew."""
+# Behind the law's own state: ticks without a good reading, ticks since the reading changed, the trouble of this tick,
+# how far the command has gone in vain [N], and from which force.
+_BLIND, _UNCHANGED, _TROUBLE, _VAIN, _FROM, EXTRA = STATE, STATE + 1, STATE + 2, STATE + 3, STATE + 4, 5
 
 
 @law
@@ -48,12 +69,10 @@ def safe_step(numbers, state, desired, force, position, missed):
     if state[_BLIND] > lag or missed > lag:  # too long to go on from what was known
         renewed(control, state)
     elif state[_BLIND] > 0.0 or missed > 0.0:
-        state[42] = (
-            0.0 if state[42] >= 0.0 else -1.0
-        )  # the low-pass has to forget the gap before anything is learned
+        state[SINCE] = 0.0  # the low-pass has to forget the gap before anything is learned
     trouble = LATE if missed > 0.0 or state[_BLIND] > 0.0 else FINE
     state[_BLIND] = 0.0
-    state[_UNCHANGED] = state[_UNCHANGED] + 1.0 if force == state[3] and state[0] > 0.0 else 0.0
+    state[_UNCHANGED] = state[_UNCHANGED] + 1.0 if force == state[LAST] and state[0] > 0.0 else 0.0
     speed, after = control.step(state_in(state), desired, force, position)
     put_state(state, after)
     if abs(force) >= 0.99 * control.full_scale:
@@ -62,16 +81,30 @@ def safe_step(numbers, state, desired, force, position, missed):
         trouble, speed = LIMITED, min(speed, -control.approach)
     elif state[_UNCHANGED] > max(lag, 5.0 * control.period / control.tick):
         trouble, speed = STALE, 0.0
+    elif in_vain(control, state, after, desired, speed) > FARTHEST * desired:
+        trouble, speed = UNREACHED, 0.0
     state[_TROUBLE] = trouble
     return speed
 
 
 @law
+def in_vain(control, state, after, desired, speed):
+    """What the command would have added to the force since that last came nearer to F_d [N]."""
+    stiffness = control.cap * max(after.known.found.x, 0.0)
+    low = after.watch.mean < (1.0 - NEAR) * desired and after.stage.phase != AIR
+    if not low or abs(after.watch.mean - state[_FROM]) > NEAR * desired:
+        state[_VAIN], state[_FROM] = 0.0, after.watch.mean
+    else:
+        state[_VAIN] += control.tick * speed * stiffness / (1.0 + control.compliance * stiffness)
+    return state[_VAIN]
+
+
+@law
 def renewed(control, state):
     """In the air, knowing nothing but the sensor's noise."""
-    variance = state[6]
+    variance, tide = state[VARIANCE], state[TIDE]
     put_state(state, control.start())
-    state[6] = variance
+    state[VARIANCE], state[TIDE] = variance, tide
 
 
 _step = kernel(safe_step)
@@ -124,7 +157,7 @@ class ForceLoop:
         self.gains, self.certificate = gains, certificate
         self._desired = gains.force
         self._numbers = flattened(gains.cautious())
-        self._state = np.zeros(STATE + 3)
+        self._state = np.zeros(STATE + EXTRA)
         self.reset()
         self._bind()
 
@@ -178,21 +211,21 @@ class ForceLoop:
     @property
     def estimate(self) -> SurfaceEstimate | None:
         """What is known of the surface; None in the air and until there is something."""
-        s, cap, theta = self._state, self._numbers[4], self.gains.theta
-        if s[15] == AIR or s[47] == 0.0:
+        s, cap, theta = self._state, self.gains.seen_cap, self.gains.theta
+        if s[PHASE] == AIR or s[STD] == 0.0:
             return None
         return SurfaceEstimate(
-            float(cap * s[44]),
-            float(cap * s[47]),
-            float(cap * theta * s[45]),
-            float(cap * theta * s[48]),
-            float(s[50]),
+            float(cap * s[FOUND]),
+            float(cap * s[STD]),
+            float(cap * theta * s[FOUND + 1]),
+            float(cap * theta * s[STD + 1]),
+            float(s[BOUND]),
         )
 
     @property
     def phase(self) -> str:
         """`air`, `learning` or `locked`."""
-        return PHASES[float(self._state[15])]
+        return PHASES[float(self._state[PHASE])]
 
     @property
     def trouble(self) -> str:
@@ -202,7 +235,7 @@ class ForceLoop:
     @property
     def noise(self) -> float:
         """Standard deviation of a force reading, as measured in the air [N]."""
-        return float(np.sqrt(self._state[6]))
+        return float(np.sqrt(self._state[VARIANCE]))
 
     @property
     def state(self) -> tuple[float, ...]:
@@ -212,7 +245,11 @@ class ForceLoop:
     @state.setter
     def state(self, numbers: Any) -> None:
         given = np.array(numbers, dtype=np.float64)
-        if given.shape != self._state.shape or not np.isfinite(given).all() or float(given[15]) not in PHASES:
+        if (
+            given.shape != self._state.shape
+            or not np.isfinite(given).all()
+            or float(given[PHASE]) not in PHASES
+        ):
             raise InputError(
                 f"a state is {len(self._state)} finite numbers from ForceLoop.state; give those back"
             )

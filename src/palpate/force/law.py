@@ -1,23 +1,31 @@
 """The cautious law: presses with the gain that an upper bound of the stiffness allows, and learns that bound.
 
-    v = LP_tau(g (F_d - F_m)) + dF_d/dt / K_u,        x_cmd += T v
-    g = alpha (1 + tau/theta) / (theta K_eff(K_u))
-    K_u = (1 + eps)(K^ + B^/theta) + z sd
+    v = g (F_d - F_m) + dF_d/dt / K_u,        x_cmd += T v
+    g = alpha / (theta (1 - rho (K_u + K_s/2)/(K_u + K_s)) K_eff(K_u))
+    K_u = max of (1 + eps) K^ + z sd and 0.52 ((1 + eps)(K^ + B^/theta) + z sd)
 
-In the air K_u is the stiffest surface that there may be, so that approach and touch follow from the same law. It is
-written once, in operators: compiled in `ForceLoop`, in the simulator and on the bench, plain in a debugger.
+Damping is lead, so that a bound of the stiffness alone is enough until B/K is above 0.9 theta. In the air K_u is the
+stiffest surface that there may be, so that approach and touch follow from the same law. It is written once, in
+operators: compiled in `ForceLoop`, in the simulator and on the bench, plain in a debugger.
 """
 
 from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, sqrt
-from palpate.force.regression import AXIS_B, AXIS_K, BOTH, NOTHING, Fit, fit_from, without_offset
+from palpate.force.regression import AXIS_B, AXIS_K, BOTH, NOTHING, Fit, fit_from, fit_through, without_offset
 
 AIR, LEARNING, LOCKED = 0.0, 1.0, 2.0
 """Phases."""
-PLAIN = 3.0
+PLAIN = 2.5
 """Standard deviations above which a stiffness, or a damping, is a surface and not noise in the air."""
+CONTACT = 7.0
+"""Evidence of a contact, a cumulative sum: white noise in the air comes to it once in e^14/2 theta, some six hours."""
+DAMPED = 0.52
+"""Least share of K + B/theta that K_u has to be: above the half that the proof of the adapting law allows.
+
+With alpha 0.42 the sensitivity is then below 1.56 for every B/K, tests/force/test_sensitivity.py.
+"""
 STEP = 0.02
 """Relative change of the desired force in a tick above which it is a step, which the error follows."""
 
@@ -32,6 +40,7 @@ class Cautious(NamedTuple):
         alpha: gain in units of 1/theta.
         compliance: of the spring between commanded and measured position [m/N]; 0 where the measured position is
             the one before it.
+        relief: rho, see `relief_of`; 0 for a position arm.
         cap: largest K + B/theta that there may be, as the measured position feels it [N/m].
         floor: lowest K_u that is used [N/m].
         speed: the arm's limit [m/s].
@@ -55,6 +64,7 @@ class Cautious(NamedTuple):
     theta: float
     alpha: float
     compliance: float
+    relief: float
     cap: float
     floor: float
     speed: float
@@ -77,16 +87,15 @@ class Cautious(NamedTuple):
 
     def start(self):
         """In the air, knowing nothing."""
-        fit = Fit(NOTHING, ZERO3)
+        fit, variance = Fit(NOTHING, ZERO3), self.noise * self.noise
         return CautiousState(
             0.0,
             0.0,
-            0.0,
-            Watch(0.0, 0.0, 0.0, self.noise * self.noise, 0.0),
+            Watch(0.0, 0.0, 0.0, 0.0, variance, 0.5 * variance * self.period / self.theta, 0.0, 0.0, 0.0),
             Follow(ZERO3, 0.0, 0.0, 0.0, 0.0),
-            Stage(AIR, 0.0, 0.0),
-            Learned(fit, fit, -1.0, 0.0, ZERO3, ZERO3),
-            Bound(self.cap, 0.0),
+            Stage(AIR, 0.0, 0.0, 0.0),
+            Learned(fit, fit, 0.0, 0.0, ZERO3, ZERO3),
+            self.cap,
             Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         )
 
@@ -96,25 +105,22 @@ class Cautious(NamedTuple):
         watch = watched(self, state, force)
         follow = followed(self, state, position)
         stage = staged(self, state.stage, watch, desired, before, force)
-        known = begun(self, state.known, stage, watch, follow)
-        known = taken(self, known, stage, watch, follow, force)
+        known = begun(self, state.known, state.stage, stage, watch, follow)
+        known = taken(self, known, state, stage, watch, follow, force)
         bound = bounded(self, state.bound, stage, watch, known)
         backstop = guarded(self, state.backstop, stage, watch, desired, before)
         u = backstop.care * gain(self, bound) * (desired - force)
-        smooth = state.smooth + self.tick / (bound.tau + self.tick) * (u - state.smooth)
         forward = 0.0
         if stage.phase != AIR and abs(desired - before) <= STEP * abs(desired):
-            forward = (desired - before) / self.tick * (self.compliance + 1.0 / bound.stiffness)
-        touching = watch.mean > 0.3 * desired or bound.stiffness < 0.5 * self.cap
-        limit = self.speed if stage.phase != AIR and touching else self.approach
-        speed = max(min(smooth + forward, limit), -self.speed)
-        return speed, CautiousState(
-            state.ticks + 1.0, desired, smooth, watch, follow, stage, known, bound, backstop
-        )
+            forward = (desired - before) / self.tick * (self.compliance + 1.0 / bound)
+        firm = stage.firm * self.tick > self.theta or bound < 0.5 * self.cap
+        limit = self.speed if stage.phase != AIR and firm else self.approach
+        speed = max(min(u + forward, limit), -self.speed) if stage.phase != AIR else self.approach
+        return speed, CautiousState(state.ticks + 1.0, desired, watch, follow, stage, known, bound, backstop)
 
     def told(self, state):
         """K_u [N/m]."""
-        return state.bound.stiffness
+        return state.bound
 
 
 @part
@@ -124,8 +130,12 @@ class Watch(NamedTuple):
     last: float
     mean: float  # over 4 ms [N]
     slow: float  # over theta [N]
+    rest: float  # of readings in the air [N]
     variance: float  # of a reading [N^2]
+    tide: float  # of the mean over theta [N^2]
+    evidence: float  # of a contact
     age: float  # ticks since the last fresh reading; 0 if this one is
+    gap: float  # ticks between the last two
 
 
 @part
@@ -146,6 +156,7 @@ class Stage(NamedTuple):
     phase: float
     since: float  # ticks in it
     quiet: float  # ticks for which the error has been small
+    firm: float  # ticks for which the force has stood out of the noise
 
 
 @part
@@ -154,18 +165,10 @@ class Learned(NamedTuple):
 
     slow: Fit  # since the touch
     fast: Fit  # over theta
-    since: float  # ticks since it began
+    since: float  # ticks since the contact began
     origin: float  # of the position in both fits [m]
     found: Vec3  # K, B/theta in caps, offset [N]
     std: Vec3  # of K, B/theta and their sum, in caps
-
-
-@part
-class Bound(NamedTuple):
-    """What the gain follows from."""
-
-    stiffness: float  # K_u [N/m]
-    tau: float  # [s]
 
 
 @part
@@ -184,35 +187,58 @@ class Backstop(NamedTuple):
 class CautiousState(NamedTuple):
     ticks: float
     desired: float
-    smooth: float  # the command before its limits [m/s]
     watch: Watch
     follow: Follow
     stage: Stage
     known: Learned
-    bound: Bound
+    bound: float  # K_u [N/m]
     backstop: Backstop
 
 
 @law
 def gain(law, bound):
     """g [m/(s N)]."""
-    return law.alpha * (1.0 + bound.tau / law.theta) / law.theta * (law.compliance + 1.0 / bound.stiffness)
+    felt = law.compliance * bound
+    lag = law.theta * (1.0 - law.relief * (felt + 0.5) / (felt + 1.0))
+    return law.alpha / lag * (law.compliance + 1.0 / bound)
 
 
 @law
 def watched(law, state, force):
-    """This tick's reading."""
+    """This tick's reading, and what noise there is: in the air the force is at rest but for that."""
     w = state.watch
     if state.ticks < 1.0:
-        return Watch(force, force, force, w.variance, 0.0)
+        return Watch(force, force, 0.0, 0.0, w.variance, w.tide, 0.0, 0.0, law.period / law.tick)
     fresh = force != w.last or w.age * law.tick > 1.5 * law.period
     mean = w.mean + law.tick / (0.004 + law.tick) * (force - w.mean)
     slow = w.slow + law.tick / (law.theta + law.tick) * (force - w.slow)
-    variance = w.variance
-    if fresh and state.stage.phase == AIR and mean < 3.0 * sqrt(variance):
-        step = force - w.last
-        variance += law.period / 0.3 * (min(0.5 * step * step, 9.0 * variance) - variance)
-    return Watch(force, mean, slow, variance, 0.0 if fresh else w.age + 1.0)
+    evidence = evident(law, state, mean, slow, force)
+    age, gap = (0.0, w.age + 1.0) if fresh else (w.age + 1.0, w.gap)
+    if state.stage.phase != AIR:
+        return Watch(force, mean, slow, w.rest, w.variance, w.tide, evidence, age, gap)
+    rest = w.rest
+    if evidence < 0.3 * CONTACT:
+        rest += law.tick / (min(state.ticks * law.tick, 1.0) + law.period) * (force - rest)
+        rest = max(min(rest, law.noise), -law.noise)
+    off, drift = force - rest, slow - rest
+    variance = w.variance + law.tick / 0.3 * (min(off * off, 9.0 * w.variance) - w.variance)
+    tide = w.tide + law.tick * (min(drift * drift, 9.0 * w.tide) - w.tide)
+    return Watch(force, mean, slow, rest, variance, tide, evidence, age, gap)
+
+
+@law
+def evident(law, state, mean, slow, force):
+    """A cumulative sum (Page): it grows while the force is above the noise of its mean over theta, and falls below.
+
+    In contact what it has to be above is also a third of what it was: a loss shows within half of theta.
+    """
+    w, unit = state.watch, sqrt(2.0 * state.watch.tide)
+    sigma, above = sqrt(w.variance), force - w.rest
+    if state.stage.phase == AIR and above > 4.0 * sigma and mean - w.rest > 3.2 * sigma:
+        return CONTACT
+    least = unit if state.stage.phase == AIR else max(unit, 0.3 * slow)
+    step = max(min((above - least) / unit, 3.0 * sigma / unit), -2.0 * CONTACT)
+    return max(min(w.evidence + law.tick / law.theta * step, CONTACT), 0.0)
 
 
 @law
@@ -229,84 +255,108 @@ def followed(law, state, position):
 @law
 def staged(law, stage, w, desired, before, force):
     """Where in a press this tick is."""
-    sigma, since = sqrt(w.variance), stage.since + 1.0
+    since = stage.since + 1.0
+    firm = stage.firm + 1.0 if w.mean - w.rest > sqrt(w.variance) else 0.0
     if stage.phase == AIR:
-        few = 5.0 * sqrt(0.5 * law.period / law.theta)
-        touched = (force > 4.0 * sigma and w.mean > 3.2 * sigma) or w.slow > max(few, 0.5) * sigma
-        return Stage(LEARNING, 0.0, 0.0) if touched else Stage(AIR, since, 0.0)
-    if w.mean < 0.5 * sigma and w.slow < sigma and since * law.tick > law.theta:
-        return Stage(AIR, 0.0, 0.0)
+        return Stage(LEARNING, 0.0, 0.0, firm) if w.evidence >= CONTACT else Stage(AIR, since, 0.0, firm)
+    if w.evidence <= 0.0:
+        return Stage(AIR, 0.0, 0.0, 0.0)
     if stage.phase == LOCKED and abs(desired - before) > 0.2 * abs(before):
-        return Stage(LEARNING, 0.0, 0.0)
+        return Stage(LEARNING, 0.0, 0.0, firm)
     quiet = stage.quiet + 1.0 if abs(desired - w.mean) < 0.07 * abs(desired) else 0.0
     if stage.phase == LEARNING and quiet * law.tick > 3.0 * law.theta and law.locking > 0.0:
-        return Stage(LOCKED, 0.0, 0.0)
-    return Stage(stage.phase, since, quiet)
+        return Stage(LOCKED, 0.0, 0.0, firm)
+    return Stage(stage.phase, since, quiet, firm)
 
 
 @law
-def begun(law, known, stage, w, f):
-    """What is known as this stage begins: after a touch nothing, after a step a quarter of what was known."""
-    if stage.phase != LEARNING or stage.since > 0.0:
-        return known
-    if known.since < 0.0:
-        level = max(w.mean, sqrt(w.variance))
-        fit = fit_from(0.5 * level, 0.5 * level + sqrt(w.variance))
-        return Learned(fit, fit, 0.0, f.y, ZERO3, ZERO3)
-    return Learned(
-        without_offset(known.slow, 0.25), known.fast, known.since, known.origin, known.found, known.std
-    )
+def begun(law, known, before, stage, w, f):
+    """What is known as this stage begins: nothing until the force leaves the noise, a quarter after a step.
+
+    A contact begins where the evidence last was nothing, a stiff one where the force last was within the noise: there
+    it is at rest, but for the noise and for what comes between two readings.
+    """
+    sigma = sqrt(w.variance)
+    slow, fast, since, origin, found, std = known
+    if stage.phase == AIR and w.evidence <= 0.0:
+        damped = Vec3(0.0, law.cap * law.theta / law.tick * (f.y - f.y0), 1.0)
+        slow = fit_from(w.rest, sigma).taking(damped, w.rest, 0.25 / (sigma * sigma), 1.0)
+        since, origin, found, std = 0.0, f.y, ZERO3, ZERO3
+    if stage.firm == 0.0:
+        x = law.cap * (f.y - 0.004 / law.tick * (f.y - f.y0) - origin)
+        fast = fit_through(x, w.rest + 0.5 * sigma, sigma)
+    if before.phase == AIR and stage.phase == LEARNING:
+        if w.mean - w.rest > 3.2 * sigma and stage.firm * law.tick < law.memory:
+            readings = stage.firm * law.tick / law.period + 1.0
+            back = (stage.firm + 0.004 / law.tick) * (f.y - f.y0)
+            level = w.mean - w.rest
+            fast = fit_through(
+                law.cap * (f.y - back - origin), w.rest + 0.5 * sigma, sigma + level / readings
+            )
+            slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
+        elif stage.firm * law.tick >= law.memory:
+            slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
+    if before.phase == LOCKED and stage.phase == LEARNING:
+        slow = without_offset(slow, 0.25)
+    return Learned(slow, fast, since, origin, found, std)
 
 
 @law
-def taken(law, known, stage, w, f, force):
+def taken(law, known, state, stage, w, f, force):
     """What is known with this tick's reading."""
-    if stage.phase == AIR:
-        return Learned(known.slow, known.fast, -1.0, 0.0, ZERO3, ZERO3)
     since = known.since + 1.0
     if w.age > 0.0 or since * law.tick < law.memory:
         return Learned(known.slow, known.fast, since, known.origin, known.found, known.std)
     rate = (f.y - f.y0) / law.tick
     phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
+    if state.bound >= law.cap and known.std.z > 0.0 and force - known.found @ phi > 4.0 * sqrt(w.variance):
+        return Learned(
+            known.fast, known.fast, stage.firm, known.origin, ZERO3, ZERO3
+        )  # refuted: it begins here
     moving = min(max(known.found.x, 0.0), 1.0) * law.cap * rate * law.tick
-    weight = 1.0 / (w.variance + moving * moving / 12.0)
-    fast = known.fast.taking(phi, force, weight, 1.0 - law.tick / law.theta)
+    noise = 2.0 * law.theta * w.tide / (w.gap * law.tick)
+    weight = 1.0 / (noise + moving * moving / 12.0)
+    fast = known.fast
+    if stage.firm * law.tick >= law.memory:
+        fast = fast.taking(phi, force, weight, 1.0 - law.tick / law.theta)
     if stage.phase == LOCKED:
         return Learned(known.slow, fast, since, known.origin, known.found, known.std)
-    slow = known.slow.taking(phi, force, weight, 1.0 - law.tick / (6.0 * law.theta))
+    keep = 1.0 if state.bound >= law.cap else 1.0 - law.tick / (6.0 * law.theta)
+    slow = known.slow.taking(phi, force, weight, keep)
     std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
     return Learned(slow, fast, since, known.origin, slow.solved(), std)
 
 
 @law
 def bounded(law, bound, stage, w, known):
-    """K_u and tau at this tick."""
+    """K_u at this tick."""
     if stage.phase == AIR:
-        return Bound(law.cap, 0.0)
-    if known.since * law.tick < law.memory:
+        return law.cap
+    if min(known.since, stage.since) * law.tick < law.memory:
         return bound
-    now = bound if stage.phase == LOCKED else from_slow(law, w, known)
-    p, sd = known.fast.solved(), known.fast.std(BOTH)
-    total = p.x + p.y
-    if law.cap * (total - law.z * sd) > 1.3 * now.stiffness:
-        return Bound(min(law.cap * ((1.0 + law.eps) * total + law.z * sd), law.cap), 0.0)
+    now = bound if stage.phase == LOCKED else from_slow(law, known)
+    p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
+    sure, factor = (law.z, 1.3) if stage.phase == LOCKED else (1.0, 1.0)
+    if highest(law, p, -sure * alone, -sure * both) > factor * now:
+        return min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), law.cap)
     return now
 
 
 @law
-def from_slow(law, w, known):
+def from_slow(law, known):
     """K_u as all since the touch allows: never below the bound, and the cap unless a surface is plain to see."""
     p, sd = known.found, known.std
-    total, room = p.x + p.y, law.z * law.bounding
-    plain = total > PLAIN * sd.z or p.x > PLAIN * sd.x
-    if law.bounding > 0.0 and not (plain and w.slow > 0.5 * sqrt(w.variance)):
-        return Bound(law.cap, 0.0)
-    most = (1.0 + law.eps) * total + room * sd.z
-    if p.y < 0.0:
-        alone, error = known.slow.undamped()
-        most = max(most, (1.0 + law.eps) * alone + room * error)
-    least = (p.y - room * sd.y) / (p.x + room * sd.x) if p.x > 0.0 else 0.0
-    return Bound(min(max(law.cap * most, law.floor), law.cap), min(max(least, 0.0), 1.0) * law.theta)
+    room = law.z * law.bounding / (1.0 + law.eps)
+    plain = p.x + p.y > PLAIN * sd.z or p.x > PLAIN * sd.x
+    if law.bounding > 0.0 and not plain:
+        return law.cap
+    return min(max((1.0 + law.eps) * highest(law, p, room * sd.x, room * sd.z), law.floor), law.cap)
+
+
+@law
+def highest(law, p, alone, both):
+    """What K_u has to be for an estimate with room for K alone, and for K + B/theta [N/m]."""
+    return law.cap * max(p.x + alone, DAMPED * (p.x + p.y + both))
 
 
 @law

@@ -41,18 +41,19 @@ class Fit(NamedTuple):
         variance = direction @ solve(self.N, direction)
         return sqrt(variance) if variance > 0.0 else UNKNOWN  # also where rounding left no variance
 
-    def undamped(self):
-        """K where B is held at 0, and its standard deviation."""
-        a, b, c = self.N.r1.x, self.N.r1.z, self.N.r3.z
-        free = a - b * b / c
-        return (self.r.x - b * self.r.z / c) / free, sqrt(1.0 / max(free, 1e-300))
-
 
 @law
 def fit_from(offset, std):
     """What is known at a touch: nothing of K and B, and of the offset that it is this +- std [N]."""
     c = 1.0 / (std * std)
     return Fit(PRIOR + c * Mat3(ZERO3, ZERO3, AXIS_C), Vec3(0.0, 0.0, c * offset))
+
+
+@law
+def fit_through(x, force, std):
+    """What is known where the force at x, in units of the cap, is this +- std [N], and nothing else."""
+    phi, w = Vec3(x, 0.0, 1.0), 1.0 / (std * std)
+    return Fit(PRIOR + w * outer(phi, phi), (w * force) * phi)
 
 
 @law

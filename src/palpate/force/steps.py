@@ -68,7 +68,7 @@ def felt_surface(gains: Gains, bound: float, damping_time: float = 0.0) -> tuple
 
 def gain_at(gains: Gains, bound: float) -> float:
     """g for K_u = bound [m/(s N)]."""
-    return gains.alpha / gains.theta * (gains.compliance + 1.0 / bound)
+    return gains.gain_at(bound)
 
 
 def step_of(gains: Gains, bound: float, held: float | None = None) -> Step:

@@ -13,9 +13,10 @@ import numpy as np
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop
 from palpate.force.certificate import FORM, Certificate, certify, exact_interval
-from palpate.force.gains import Gains, approach_speed
+from palpate.force.gains import ALPHA, Gains, approach_speed
 from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
 from palpate.force.peak import peak_bound
+from palpate.force.sensitivity import relief_of
 from palpate.force.steps import Margins, Step, margins, step_of
 
 RIGID = 1e9
@@ -262,7 +263,7 @@ def tune(
     limit = arm.sensor.full_scale if peak is None else min(peak, arm.sensor.full_scale)
     gains = Gains(
         arm=arm, force=force, theta=theta, cap=stiffest, force_limit=limit,
-        approach=approach_speed(arm, force, theta, stiffest),
+        approach=approach_speed(arm, force, theta, stiffest), relief=relief_of(arm, theta, ALPHA),
     )  # fmt: skip
     soft = min(known.stiffness[0] if known else SOFTEST, stiffest)
     felt = arm.seen(soft) if arm.kind == "position" else soft
