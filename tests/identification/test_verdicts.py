@@ -99,7 +99,7 @@ def test_a_log_that_is_little_else_than_a_gap_does_not_fill_the_memory(leap):
     """A clock that is set while it records, or a night between two presses."""
     log = pressed()
     time = log["time"] + leap * (np.arange(len(log)) >= len(log) // 2)
-    with pytest.raises(InputError, match="leaps by 1.* s at row 1501.*--start and --end"):
+    with pytest.raises(InputError, match=r"leaps by 1.* s at row 1501.*--start and --end"):
         identify(record(time=time, position=log["position"], force=log["force"]), lag=0.0)
 
 
