@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,7 +27,7 @@ from samples import SAMPLES, SHARES
 ROOT = Path(__file__).resolve().parents[2]
 PAGE, STATE = ROOT / "docs" / "reliability.md", ROOT / "build" / "attack.json"
 BEGIN, END = "<!-- attack: begin -->", "<!-- attack: end -->"
-SLICE, FEW = 50, 8
+SLICE, FEW = 50, 4
 """Inputs, and kills, after which what was found is saved."""
 
 
@@ -59,24 +59,29 @@ class Part:
     find: Callable[[Path], object]
 
 
-def parts(inputs: int, kills: int, seconds: float) -> Iterator[Part]:
-    """All slices: of each kind a first one, then the others, so that an attack that is stopped has seen them all."""
+def parts(inputs: int, kills: int, seconds: float) -> list[Part]:
+    """All slices, each kind's spread evenly, so that an attack that is stopped has seen something of all."""
     from palpate.bench import names
 
     share = inputs / sum(SHARES.values())
-    each = {kind: -(-round(share * SHARES[kind]) // SLICE) for kind in SAMPLES}
-    last = max(*each.values(), -(-kills // FEW))
-    for number in range(last):
-        for kind in (kind for kind in SAMPLES if number < each[kind]):
-            seeds = range(number * SLICE, (number + 1) * SLICE)
-            yield Part("read", f"{kind} {seeds.start}", lambda folder, k=kind, s=seeds: attack(k, s, folder))
-        for experiment in names() if number == 0 else ():
-            yield Part("lasted", f"{experiment} {seconds:g}", lambda _, e=experiment: lasted(e, seconds))
-        count = min(FEW, kills - number * FEW)
-        for kind, violence in KINDS.items() if count > 0 else ():
-            yield Part(
-                "killed", f"{kind} {number}", lambda f, v=violence, c=count, n=number: _many(v, c, f, n)
-            )
+    kinds: list[list[Part]] = []
+    for kind in SAMPLES:
+        firsts = range(0, round(share * SHARES[kind]), SLICE)
+        seeds = [range(first, first + SLICE) for first in firsts]
+        kinds.append(
+            [Part("read", f"{kind} {s.start}", lambda f, k=kind, s=s: attack(k, s, f)) for s in seeds]
+        )
+    for kind, kill in KINDS.items():
+        counts = {first: min(FEW, kills - first) for first in range(0, kills, FEW)}
+        kinds.append(
+            [
+                Part("killed", f"{kind} {n}", lambda f, v=kill, c=c, n=n: _many(v, c, f, n))
+                for n, c in counts.items()
+            ]
+        )
+    kinds.append([Part("lasted", f"{e} {seconds:g}", lambda _, e=e: lasted(e, seconds)) for e in names()])
+    spread = [((i + 0.5) / len(own), part) for own in kinds for i, part in enumerate(own)]
+    return [part for _, part in sorted(spread, key=lambda placed: placed[0])]
 
 
 def _many(
@@ -194,7 +199,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=3600.0, help="simulated, of each experiment")
     parser.add_argument("--write", action="store_true", help="put the result into docs/reliability.md")
     asked = parser.parse_args()
-    found, wanted = gone_on(), list(parts(asked.inputs, asked.kills, asked.seconds))
+    found, wanted = gone_on(), parts(asked.inputs, asked.kills, asked.seconds)
     try:
         run(found, wanted)
     except KeyboardInterrupt:
