@@ -126,23 +126,37 @@ def _read(kind: str, path: Path) -> str:
 
             with journal.opened(path, HEAD()) as book:
                 list(book.rows())
+        elif kind == "gains":
+            _press(path)
         else:
-            return _read_log(path)
+            words = [["certify", "--check", str(path)]] if kind == "certificate" else _about(path)
+            return _read_by(words)
     except InputError as error:
         return "refused" if str(error).strip() else "silent: an error without a word"
     return "read"
 
 
-def _read_log(path: Path) -> str:
+def _press(path: Path) -> None:
+    """Some ticks of the force loop, whose speed stays within its limit."""
+    from palpate.force import ForceLoop
+
+    loop = ForceLoop.load(path)
+    for k in range(20):
+        assert abs(loop.update(0.5 * k, 1e-4 * k)) <= loop.gains.arm.limits.speed
+
+
+def _about(path: Path) -> list[list[str]]:
+    """What is asked about a log."""
+    columns = (f"--time={NAMES[0]}", f"--position={NAMES[1]}:mm", f"--force={NAMES[2]}:N")
+    return [["topics", str(path)], ["identify", str(path), *_columns(path, columns), "--end", "0", "--json"]]
+
+
+def _read_by(commands: list[list[str]]) -> str:
     """By the program, which turns whatever happens into a code and a line."""
     from palpate.cli import main
 
     codes = []
-    columns = (f"--time={NAMES[0]}", f"--position={NAMES[1]}:mm", f"--force={NAMES[2]}:N")
-    for words in (
-        ["topics", str(path)],
-        ["identify", str(path), *_columns(path, columns), "--end", "0", "--json"],
-    ):
+    for words in commands:
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             codes.append(main(words))
@@ -150,7 +164,7 @@ def _read_log(path: Path) -> str:
             return f"defect: {words[0]} ended with {codes[-1]}: {(err.getvalue().splitlines() or ['?'])[-2:]}"
         if any(ord(letter) < 32 and letter not in "\n\t" for letter in out.getvalue() + err.getvalue()):
             return f"defect: {words[0]} printed a control character"
-    return "read" if codes[0] == 0 else "refused"
+    return "refused" if codes[0] == 2 else "read"
 
 
 def _columns(path: Path, columns: tuple[str, ...]) -> tuple[str, ...]:
