@@ -71,6 +71,20 @@ def test_what_somebody_else_wrote_stays(tmp_path, name):
     assert names(tmp_path) == [name]
 
 
+@pytest.mark.parametrize("letters", [10, 3_000_000])
+def test_a_record_is_known_whatever_is_said_about_it(tmp_path, letters):
+    path = tmp_path / "a.parquet"
+    write_record(Record({"t": [0.0, 1.0]}, {"t": "s"}, {"about": "a" * letters}), path)
+    assert ours(path)
+
+
+@pytest.mark.parametrize("tail", [b"", b"PAR1", b"\xff\xff\xff\xffPAR1"])
+def test_the_beginning_of_a_table_is_nobodys(tmp_path, tail):
+    path = tmp_path / "a.parquet"
+    path.write_bytes(b"PAR1" + tail)
+    assert not ours(path)
+
+
 def test_a_table_of_somebody_else_stays(tmp_path):
     path = tmp_path / "a.parquet"
     polars.DataFrame({"palpate": [1.0]}).write_parquet(path, metadata={"about": "palpate"})
