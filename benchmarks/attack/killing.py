@@ -11,7 +11,9 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from reading import processor_time
@@ -25,6 +27,7 @@ JUST_DONE = 0.5
 def run_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     """`palpate run --force` over results, killed: the old ones or the new ones are there at the next start."""
     _experiment(folder)
+    _warm()
     begun = time.monotonic()
     _ran("run", "e.toml", "--seed", "1", "--out", "out", cwd=folder)
     told: Counter[str] = Counter()
@@ -44,6 +47,7 @@ def run_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
 def run_interrupted(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     """`palpate run`, Ctrl-C: code 130 and what was simulated, or nothing because nothing was yet."""
     _experiment(folder)
+    _warm()
     begun = time.monotonic()
     _ran("run", "e.toml", "--out", "whole", cwd=folder)
     told: Counter[str] = Counter()
@@ -62,6 +66,7 @@ def study_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     make(folder / f"study{ending}")
     text = (folder / "study.toml").read_text().replace("points = 3", "points = 60")
     (folder / "study.toml").write_text(text)
+    _warm()
     begun = time.monotonic()
     _ran("study", "study.toml", "--out", "whole", cwd=folder)
     took = time.monotonic() - begun
@@ -107,6 +112,14 @@ def _experiment(folder: Path) -> None:
 
     text = source("foam-hybrid").replace("press = 10.0", "press = 20.0")
     (folder / "e.toml").write_text(text, encoding="utf-8")
+
+
+@cache
+def _warm() -> None:
+    """Has the loop compiled, so that a moment within a run is not one within that."""
+    with TemporaryDirectory() as folder:
+        _experiment(Path(folder))
+        _ran("run", "e.toml", cwd=Path(folder))
 
 
 def _moments(count: int, seed: int, longest: float) -> list[float]:
