@@ -142,6 +142,7 @@ class Contact:
             variances = np.diag(estimate.covariance)
             finite = np.isfinite(estimate.theta).all() and np.isfinite(variances).all()
             found.good = found.good and bool(finite and (variances >= 0.0).all())
+            del x, f, copies  # a million samples as Python's floats are larger than all that is looked for
             before = memory() if million < 2 else before
         found.grown = memory() - before
         return found
