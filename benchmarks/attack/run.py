@@ -101,7 +101,7 @@ def sources() -> str:
 def gone_on() -> Found:
     """What was found before, if it was of the same sources."""
     try:
-        found = msgspec.json.decode(STATE.read_bytes(), type=Found)
+        found = msgspec.json.decode(STATE.read_bytes(), type=Found, dec_hook=lambda _, told: Counter(told))
     except (OSError, msgspec.DecodeError):
         return Found(sources())
     return found if found.of == sources() else Found(sources())
