@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench live attack trust leaderboard docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench live attack soak trust leaderboard docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -53,6 +53,9 @@ live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a se
 
 attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hour of each experiment; into docs/reliability.md
 	$(BIN)/python benchmarks/attack/run.py --write
+
+soak: .venv/dev.stamp ## feed each on-line estimator 5e7 samples, and put what it took into docs/reliability.md; ten minutes
+	$(BIN)/python benchmarks/online/soak.py --write
 
 trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
 	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md

@@ -1,6 +1,7 @@
 """A slice of `make attack`: some seconds of spoiled files, kills and long runs with every run of the tests."""
 
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -8,9 +9,10 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks" / "attack"))
 
 import killing
+import run
 from lasting import lasted
 from mutate import mutated
-from reading import attack
+from reading import Told, attack
 from samples import SAMPLES
 
 EACH = {"experiment": 100, "study": 100, "journal": 100, "CSV": 25, "MCAP": 10, "SQLite bag": 10}
@@ -32,6 +34,25 @@ def test_the_attack_sees_a_defect(tmp_path, monkeypatch):
     assert told.inputs == 2
     assert told.bad == 2
     assert all("died" in defect for defect in told.defects)
+
+
+def test_the_attack_goes_on_where_it_was_stopped(tmp_path, monkeypatch):
+    """What is found is kept slice by slice, and found again; what was found of other sources is not."""
+    monkeypatch.setattr(run, "STATE", tmp_path / "attack.json")
+    done = []
+    parts = [
+        run.Part("killed", "a 0", lambda _: done.append("a") or Counter(times=2)),
+        run.Part("read", "b 0", lambda _: done.append("b") or Told(Counter(read=3), 0.5, ["b 1: hung"])),
+    ]
+    run.run(run.gone_on(), parts[:1])
+    run.run(run.gone_on(), parts)
+    assert done == ["a", "b"]
+    found = run.gone_on()
+    assert found.killed["a 0"]["times"] == 2
+    assert found.read["b 0"].bad == 0
+    assert found.read["b 0"].defects == ["b 1: hung"]
+    monkeypatch.setattr(run, "sources", lambda: "others")
+    assert not run.gone_on().read
 
 
 def test_mutations_are_the_same_for_the_same_seed_and_differ():

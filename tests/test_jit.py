@@ -229,6 +229,19 @@ def test_a_user_kernel_goes_stale_with_its_own_file(workshop):
         assert workshop.run("own.py") == expected
 
 
+FULL = """
+import resource, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))
+"""
+
+
+def test_where_there_is_no_room_for_the_cache_every_process_compiles(workshop):
+    (workshop.user / "full.py").write_text(FULL + OWN.format(number=7.0))
+    for _ in range(2):
+        assert workshop.run("full.py") == (8.0, False)
+
+
 STRANGER = """
 from palpate._vector import Vec3
 from palpate.entry import entry

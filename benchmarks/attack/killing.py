@@ -11,19 +11,27 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
+from reading import processor_time
 from samples import SAMPLES
 
 PROGRAM = (sys.executable, "-m", "palpate")
+JUST_DONE = 0.5
+"""A command that ends well with so little of the processor's time after a Ctrl-C had only to end [s]."""
 
 
 def run_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     """`palpate run --force` over results, killed: the old ones or the new ones are there at the next start."""
     _experiment(folder)
+    _warm()
+    begun = time.monotonic()
     _ran("run", "e.toml", "--seed", "1", "--out", "out", cwd=folder)
     told: Counter[str] = Counter()
-    for chance in _moments(count, seed, 6.0):
+    for chance in _moments(count, seed, time.monotonic() - begun):
         _interrupted(
             signal.SIGKILL, chance, "run", "e.toml", "--seed", "2", "--out", "out", "--force", cwd=folder
         )
@@ -39,16 +47,15 @@ def run_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
 def run_interrupted(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     """`palpate run`, Ctrl-C: code 130 and what was simulated, or nothing because nothing was yet."""
     _experiment(folder)
+    _warm()
+    begun = time.monotonic()
+    _ran("run", "e.toml", "--out", "whole", cwd=folder)
     told: Counter[str] = Counter()
-    for number, chance in enumerate(_moments(count, seed, 6.0)):
+    for number, chance in enumerate(_moments(count, seed, time.monotonic() - begun)):
         out = folder / f"out{number}"
         child = _interrupted(signal.SIGINT, chance, "run", "e.toml", "--out", out.name, cwd=folder)
-        if child.returncode == -signal.SIGINT:
-            told["ended before Python had begun"] += 1
-        elif child.returncode in {0, 130}:
-            told[_results(out) if out.exists() else "nothing simulated yet"] += 1
-        else:
-            told[f"defect: code {child.returncode}"] += 1
+        told[_heard(child)] += 1
+        told[_results(out) if out.exists() else "nothing simulated yet"] += 1
         told[_strays(folder, out.name)] += 1
     return told
 
@@ -59,12 +66,16 @@ def study_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     make(folder / f"study{ending}")
     text = (folder / "study.toml").read_text().replace("points = 3", "points = 60")
     (folder / "study.toml").write_text(text)
+    _warm()
+    begun = time.monotonic()
     _ran("study", "study.toml", "--out", "whole", cwd=folder)
+    took = time.monotonic() - begun
     whole, told = (folder / "whole/results.parquet").read_bytes(), Counter[str]()
-    for number, chance in enumerate(_moments(count, seed, 5.0)):
+    for number, chance in enumerate(_moments(count, seed, took)):
         out = f"out{number // 4}"
         signal_ = signal.SIGINT if number % 2 else signal.SIGKILL
-        _interrupted(signal_, chance, "study", "study.toml", "--out", out, cwd=folder)
+        child = _interrupted(signal_, chance, "study", "study.toml", "--out", out, cwd=folder)
+        told["killed" if signal_ == signal.SIGKILL else _heard(child)] += 1
         if number % 4 == 3 or number == count - 1:
             done = _ran("study", "study.toml", "--out", out, cwd=folder)
             same = done.returncode == 0 and (folder / out / "results.parquet").read_bytes() == whole
@@ -103,6 +114,14 @@ def _experiment(folder: Path) -> None:
     (folder / "e.toml").write_text(text, encoding="utf-8")
 
 
+@cache
+def _warm() -> None:
+    """Has the loop compiled, so that a moment within a run is not one within that."""
+    with TemporaryDirectory() as folder:
+        _experiment(Path(folder))
+        _ran("run", "e.toml", cwd=Path(folder))
+
+
 def _moments(count: int, seed: int, longest: float) -> list[float]:
     chance = random.Random(seed)
     return [chance.uniform(0.0, longest) for _ in range(count)]
@@ -125,20 +144,44 @@ def _ran(*words: str, cwd: Path, largest: int | None = None) -> subprocess.Compl
     )
 
 
-def _interrupted(number: int, after: float, *words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+class Ended(NamedTuple):
+    """How a command ended, and how much of the processor's time after the signal [s]; None if that came too late."""
+
+    code: int
+    after: float | None
+
+
+def _interrupted(number: int, after: float, *words: str, cwd: Path) -> Ended:
     child = subprocess.Popen(
         [*PROGRAM, *words],
         cwd=cwd,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     time.sleep(after)
-    if child.poll() is None:
-        child.send_signal(number)
-    out, err = child.communicate(timeout=300)
-    return subprocess.CompletedProcess(words, child.returncode, out, err)
+    used = processor_time(child.pid)
+    sent = child.poll() is None
+    if not sent:
+        return Ended(child.returncode, None)
+    child.send_signal(number)
+    _, status, took = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    return Ended(child.returncode, took.ru_utime + took.ru_stime - used)
+
+
+def _heard(ended: Ended) -> str:
+    """Whether a Ctrl-C ended a command."""
+    match ended:
+        case Ended(0, None):
+            return "was done before"
+        case Ended(0, float(after)):
+            return "was just done" if after < JUST_DONE else f"defect: Ctrl-C was lost, {after:.1f} s went by"
+        case Ended(130, _):
+            return "ended with 130"
+        case Ended(code, _) if code == -signal.SIGINT:
+            return "ended before Python had begun"
+    return f"defect: code {ended.code}"
 
 
 def _results(folder: Path) -> str:

@@ -1,15 +1,20 @@
-"""Reads spoiled files in a child process with limits of time and memory, and tells what became of each."""
+"""Reads spoiled files in a child process with limits of time and memory, and tells what became of each.
+
+Time is that of the processor, which other programs on the machine do not change.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import json
+import os
 import resource
 import select
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -20,7 +25,11 @@ from mutate import mutated
 from samples import HEAD, NAMES, SAMPLES
 
 SECONDS, BYTES = 20.0, 4 << 30
-"""What one input may take of time, and a child of memory."""
+"""What one input may take of the processor's time, and a child of memory."""
+PATIENCE = 15.0
+"""Times as long an input may take by the clock: a machine may be busy, but who sleeps hangs as well."""
+IMPORTS = 60.0
+"""What a child may take before its first input [s]."""
 GOOD = ("read", "refused")
 
 
@@ -60,24 +69,41 @@ def _child(kind: str, seeds: range, folder: Path, seconds: float) -> Iterator[tu
     words = [sys.executable, __file__, kind, str(seeds.start), str(seeds.stop), str(folder)]
     child = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert child.stdout is not None
-    assert child.stderr is not None
-    at, begun, allowed = seeds.start, time.monotonic(), 60.0 + seconds  # the first waits for imports
+    at, allowed = seeds.start, IMPORTS + seconds
     try:
         while at < seeds.stop:
-            ready, _, _ = select.select([child.stdout], [], [], allowed)
+            begun = time.monotonic()
+            ready = _answers(child, allowed)
             line = child.stdout.readline() if ready else b""
-            took, begun, allowed = time.monotonic() - begun, time.monotonic(), seconds
             if not line:
                 child.kill()
                 why = f"killed by signal {-child.wait()}" if ready else f"more than {seconds:g} s"
-                yield at, f"{'died' if ready else 'hung'}: {why}", took
+                yield at, f"{'died' if ready else 'hung'}: {why}", time.monotonic() - begun
                 return
             outcome, took = json.loads(line)
             yield at, outcome, took
-            at += 1
+            at, allowed = at + 1, seconds
     finally:
         child.kill()
         child.communicate()
+
+
+def _answers(child: subprocess.Popen[bytes], seconds: float) -> bool:
+    """Whether a child says something, or ends, within so much time of its own."""
+    begun, used = time.monotonic(), processor_time(child.pid)
+    while not select.select([child.stdout], [], [], 0.5)[0]:
+        if processor_time(child.pid) - used > seconds or time.monotonic() - begun > PATIENCE * seconds:
+            return False
+    return True
+
+
+def processor_time(pid: int) -> float:
+    """The processor's time that a process and those it began took so far [s]."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    except OSError:  # it has ended
+        return 0.0
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def _read(kind: str, path: Path) -> str:
@@ -100,23 +126,37 @@ def _read(kind: str, path: Path) -> str:
 
             with journal.opened(path, HEAD()) as book:
                 list(book.rows())
+        elif kind == "gains":
+            _press(path)
         else:
-            return _read_log(path)
+            words = [["certify", "--check", str(path)]] if kind == "certificate" else _about(path)
+            return _read_by(words)
     except InputError as error:
         return "refused" if str(error).strip() else "silent: an error without a word"
     return "read"
 
 
-def _read_log(path: Path) -> str:
+def _press(path: Path) -> None:
+    """Some ticks of the force loop, whose speed stays within its limit."""
+    from palpate.force import ForceLoop
+
+    loop = ForceLoop.load(path)
+    for k in range(20):
+        assert abs(loop.update(0.5 * k, 1e-4 * k)) <= loop.gains.arm.limits.speed
+
+
+def _about(path: Path) -> list[list[str]]:
+    """What is asked about a log."""
+    columns = (f"--time={NAMES[0]}", f"--position={NAMES[1]}:mm", f"--force={NAMES[2]}:N")
+    return [["topics", str(path)], ["identify", str(path), *_columns(path, columns), "--end", "0", "--json"]]
+
+
+def _read_by(commands: list[list[str]]) -> str:
     """By the program, which turns whatever happens into a code and a line."""
     from palpate.cli import main
 
     codes = []
-    columns = (f"--time={NAMES[0]}", f"--position={NAMES[1]}:mm", f"--force={NAMES[2]}:N")
-    for words in (
-        ["topics", str(path)],
-        ["identify", str(path), *_columns(path, columns), "--end", "0", "--json"],
-    ):
+    for words in commands:
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             codes.append(main(words))
@@ -124,7 +164,7 @@ def _read_log(path: Path) -> str:
             return f"defect: {words[0]} ended with {codes[-1]}: {(err.getvalue().splitlines() or ['?'])[-2:]}"
         if any(ord(letter) < 32 and letter not in "\n\t" for letter in out.getvalue() + err.getvalue()):
             return f"defect: {words[0]} printed a control character"
-    return "read" if codes[0] == 0 else "refused"
+    return "refused" if codes[0] == 2 else "read"
 
 
 def _columns(path: Path, columns: tuple[str, ...]) -> tuple[str, ...]:
@@ -138,17 +178,23 @@ def _serve(kind: str, seeds: range, folder: Path) -> None:
     whole = folder / f"whole-{kind.replace(' ', '')}{ending}"
     if not whole.exists():
         make(whole)
-    data, told = whole.read_bytes(), sys.stdout
-    for seed in seeds:
-        path = folder / f"log{ending}"
-        path.write_bytes(mutated(data, seed))
-        begun = time.monotonic()
-        try:
-            outcome = _read(kind, path)
-        except BaseException as error:  # noqa: BLE001 - whatever it is, it is a finding
-            outcome = f"defect: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        told.write(json.dumps((outcome, time.monotonic() - begun)) + "\n")
-        told.flush()
+    data = whole.read_bytes()
+    with os.fdopen(os.dup(1), "w") as told, tempfile.TemporaryFile() as chatter:
+        for stream in (1, 2):
+            os.dup2(chatter.fileno(), stream)
+        for seed in seeds:
+            path = folder / f"log{ending}"
+            path.write_bytes(mutated(data, seed))
+            begun = sum(os.times()[:4])
+            try:
+                outcome = _read(kind, path)
+            except BaseException as error:  # noqa: BLE001 - whatever it is, it is a finding
+                outcome = f"defect: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
+            if size := os.fstat(chatter.fileno()).st_size:
+                outcome = f"defect: a library printed {os.pread(chatter.fileno(), 200, 0)!r}, {size} bytes"
+                chatter.truncate(0)
+            told.write(json.dumps((outcome, sum(os.times()[:4]) - begun)) + "\n")
+            told.flush()
 
 
 if __name__ == "__main__":

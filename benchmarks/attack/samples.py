@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -86,6 +88,26 @@ def journal(path: Path) -> None:
             )
 
 
+def gains(path: Path) -> None:
+    """A tuned force loop."""
+    _wrote(path, "tune", "--arm", "ur5e", "--force", "10", "--stiffness", "500:20000")
+
+
+def certificate(path: Path) -> None:
+    """A proof of where it is stable."""
+    of = path.with_name("gains.toml")
+    gains(of)
+    _wrote(path, "certify", str(of), "--held-only")
+
+
+def _wrote(path: Path, *words: str) -> None:
+    from palpate.cli import main
+
+    silent = io.StringIO()
+    with contextlib.redirect_stdout(silent), contextlib.redirect_stderr(silent):
+        assert main([*words, "--out", str(path)]) == 0
+
+
 def HEAD() -> object:
     """Of the journal."""
     from palpate.studies.journal import Head
@@ -104,5 +126,13 @@ SAMPLES: dict[str, tuple[str, Callable[[Path], None]]] = {
     "experiment": (".toml", experiment),
     "study": (".toml", study),
     "journal": (".jsonl", journal),
+    "gains": (".toml", gains),
+    "certificate": (".json", certificate),
 }
 """By kind: the ending of its name, and who makes it."""
+
+SHARES = {
+    "CSV": 12, "Parquet": 2, "record": 2, "MATLAB": 2, "ROS 1 bag": 4, "MCAP": 4, "SQLite bag": 4,
+    "experiment": 20, "study": 20, "journal": 20, "gains": 8, "certificate": 2,
+}  # fmt: skip
+"""Of the inputs of an attack: fewer of what takes long, such as formats that are read in a process of their own."""

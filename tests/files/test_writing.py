@@ -1,14 +1,17 @@
 """A file is there whole or not at all, and is never written over one that palpate did not write."""
 
 import os
+import resource
+import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 
 import polars
 import pytest
 
 from palpate.errors import InputError
-from palpate.files import MADE, check_place, ours, signed, whole, write_json, write_text
+from palpate.files import MADE, check_place, fresh_folder, ours, signed, whole, write_json, write_text
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.report import style
@@ -68,6 +71,20 @@ def test_what_somebody_else_wrote_stays(tmp_path, name):
     assert names(tmp_path) == [name]
 
 
+@pytest.mark.parametrize("letters", [10, 3_000_000])
+def test_a_record_is_known_whatever_is_said_about_it(tmp_path, letters):
+    path = tmp_path / "a.parquet"
+    write_record(Record({"t": [0.0, 1.0]}, {"t": "s"}, {"about": "a" * letters}), path)
+    assert ours(path)
+
+
+@pytest.mark.parametrize("tail", [b"", b"PAR1", b"\xff\xff\xff\xffPAR1"])
+def test_the_beginning_of_a_table_is_nobodys(tmp_path, tail):
+    path = tmp_path / "a.parquet"
+    path.write_bytes(b"PAR1" + tail)
+    assert not ours(path)
+
+
 def test_a_table_of_somebody_else_stays(tmp_path):
     path = tmp_path / "a.parquet"
     polars.DataFrame({"palpate": [1.0]}).write_parquet(path, metadata={"about": "palpate"})
@@ -105,6 +122,34 @@ def test_a_failure_leaves_what_was_there(tmp_path, error):
         raise error
     assert path.read_text() == f"{MADE} run.\n"
     assert names(tmp_path) == ["a.toml"]
+
+
+@contextmanager
+def no_room():
+    """The system lets no file grow beyond some bytes; what a full disk says, it says without a name as well."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+def test_what_does_not_fit_is_named_and_leaves_nothing(tmp_path):
+    path = tmp_path / "a.toml"
+    with no_room(), pytest.raises(OSError, match="too large") as caught:
+        write_text(path, f"{MADE} run.\n" + "#" * 1000)
+    assert caught.value.filename == str(path)
+    with (
+        no_room(),
+        pytest.raises(OSError, match="too large") as caught,
+        fresh_folder(tmp_path / "b", force=False) as new,
+    ):
+        write_text(new / "a.toml", f"{MADE} run.\n" + "#" * 1000)
+    assert caught.value.filename == str(tmp_path / "b" / "a.toml")
+    assert names(tmp_path) == []
 
 
 def test_a_file_without_a_mark_is_a_defect(tmp_path):

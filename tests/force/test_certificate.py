@@ -88,6 +88,12 @@ def test_what_is_not_stable_is_not_proved():
         lambda c: {"cells": (msgspec.structs.replace(c.cells[0], norm=c.cells[0].norm[:-1]), *c.cells[1:])},
         lambda c: {
             "cells": (
+                msgspec.structs.replace(c.cells[0], norm=(c.cells[0].norm[0][1:], *c.cells[0].norm[1:])),
+                *c.cells[1:],
+            )
+        },
+        lambda c: {
+            "cells": (
                 msgspec.structs.replace(c.cells[0], norm=tuple((0.0,) * len(r) for r in c.cells[0].norm)),
                 *c.cells[1:],
             )

@@ -94,6 +94,21 @@ def test_numbers_out_of_this_world_are_an_error_of_one_line(factor, channel):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("leap", [1e5, 1e9])
+def test_a_log_that_is_little_else_than_a_gap_does_not_fill_the_memory(leap):
+    """A clock that is set while it records, or a night between two presses."""
+    log = pressed()
+    time = log["time"] + leap * (np.arange(len(log)) >= len(log) // 2)
+    with pytest.raises(InputError, match=r"leaps by 1.* s at row 1501.*--start and --end"):
+        identify(record(time=time, position=log["position"], force=log["force"]), lag=0.0)
+
+
+def test_a_time_that_is_counted_in_another_unit_does_not_take_for_ever():
+    log = pressed()
+    with pytest.raises(InputError, match="rows a second, and no sensor is read so fast"):
+        identify(record(time=1e-6 * log["time"], position=log["position"], force=log["force"]))
+
+
 @pytest.mark.parametrize(
     "bad", [{"lag": np.nan}, {"lag": np.inf}, {"lag": 5.0}, {"lag_std": np.nan, "lag": 0.0}]
 )

@@ -21,6 +21,7 @@ from palpate.logs import read_log, read_record
 from palpate.logs.bags import Bag
 from palpate.logs.kinds import kind_of
 from palpate.logs.limits import Limits
+from palpate.logs.listing import list_log
 from palpate.logs.own_runs import measured_by
 
 T = np.arange(50) / 100
@@ -191,6 +192,22 @@ def test_instruments_of_ours_that_are_spoiled(tmp_path, instruments):
     polars.DataFrame({"t": T}).write_parquet(path, metadata={"palpate": about})
     with pytest.raises(InputError, match="its instruments is spoiled"):
         measured_by(path)
+
+
+@pytest.mark.parametrize("ask", ["identify", "topics"])
+def test_a_page_of_parquet_that_no_library_survives(tmp_path, capfd, ask):
+    """Polars aborts its process at the length in this page's header, after some lines on standard error."""
+    path = tmp_path / "r.parquet"
+    time = np.arange(200) * 1e-3
+    polars.DataFrame({"t": time, "x": time, "f": time}).write_parquet(path)
+    spoiled = bytearray(path.read_bytes())
+    spoiled[14] = 255
+    path.write_bytes(spoiled)
+    if ask == "identify":
+        refused(path, "cannot be read as Parquet .it is damaged.")
+    else:
+        assert "cannot be read as Parquet" in list_log(path).troubles[0]
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_parquet_of_few_bytes_and_many_rows(tmp_path):

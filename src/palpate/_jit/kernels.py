@@ -4,6 +4,7 @@ import functools
 import importlib
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from palpate._jit.inline_compiler import inside
@@ -95,7 +96,8 @@ def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
 
         def save_overload(self, sig: Any, data: Any) -> None:
             if stamp_of(function, sig) is not None:
-                super().save_overload(sig, data)
+                with suppress(OSError):  # where there is no room, every process compiles anew
+                    super().save_overload(sig, data)
 
     dispatcher = numba.njit(**OPTIONS)(function)
     try:

@@ -45,6 +45,10 @@ def fresh_folder(path: Path, *, force: bool) -> Iterator[Path]:
             yield draft
             _check_fresh(path, force)
             _take_place(draft, path)
+        except OSError as error:
+            if error.filename is not None:
+                error.filename = str(error.filename).replace(str(draft), str(path))
+            raise
         finally:
             shutil.rmtree(draft, ignore_errors=True)
 

@@ -19,7 +19,8 @@ FORCE = ("time_s", "force_desired_N")
 """The columns of a desired force in a CSV file, which takes no comment."""
 
 _KINDS = {".json": "JSON file", ".png": "PNG", ".html": "HTML file", ".toml": "TOML file"}
-_HEAD, _FOOT = 4096, 1 << 20
+_HEAD, _FOOT, _TAIL = 4096, 1 << 20, 8
+"""Bytes that are looked at; the last ones of a Parquet file say how long what stands before them is."""
 _FEET = {
     b"PAR1": b"\x18\x07palpate\x18",  # a key and its value, as Thrift writes them
     b"%PDF-": b"/Creator (palpate)",
@@ -51,7 +52,11 @@ def ours(path: Path) -> bool:
         foot = next((mark for kind, mark in _FEET.items() if head.startswith(kind)), None)
         if foot is None:
             return _MARKS.search(head) is not None
-        file.seek(max(0, path.stat().st_size - _FOOT))
+        size, length = path.stat().st_size, _FOOT
+        if head.startswith(b"PAR1"):
+            file.seek(max(size - _TAIL, 0))
+            length = int.from_bytes(file.read(4), "little") + _TAIL
+        file.seek(max(size - length, 0))
         return foot in file.read()
 
 

@@ -34,8 +34,10 @@ def whole(path: Path) -> Iterator[Path]:
             assert ours(draft), f"{path.name} was written without a mark of palpate"
             check_place(path)
             draft.replace(path)
-        except BaseException:
+        except BaseException as error:
             draft.unlink(missing_ok=True)
+            if isinstance(error, OSError) and error.filename in {None, str(draft)}:
+                error.filename = str(path)  # a full disk tells not even whose write it was
             raise
 
 

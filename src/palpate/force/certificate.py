@@ -204,7 +204,7 @@ class Certificate(Table):
             if not all(_tiled(claim, box) for box in claim.boxes(self.proved_gains)):
                 return Verdict(False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap")
             for proved in claim.cells:
-                if np.shape(proved.norm) != (prover.loop.size, prover.loop.size):
+                if [len(row) for row in proved.norm] != [prover.loop.size] * prover.loop.size:
                     return Verdict(False, np.inf, 0.0, count, "a norm is not of the loop's size")
                 size, moved = _contraction(prover, proved.cell)
                 worst, rounding, count = max(worst, size), max(rounding, moved), count + 1

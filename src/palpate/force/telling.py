@@ -8,7 +8,7 @@ from typing import Any
 from palpate.force.certificate import Certificate, Claim, Verdict
 
 UNCOVERED = (
-    "the damping compensation tau while it adapts, the backstop, the feed-forward of dF_d/dt",
+    "the backstop, the feed-forward of dF_d/dt",
     "limits of speed and torque",
     "contact lost while the gain changes, or within a tick; loss of contact of a torque arm",
     "a reading taken between ticks: its age is counted in whole ticks",

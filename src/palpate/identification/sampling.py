@@ -24,7 +24,11 @@ _MOST = 20_000_000
 """Even instants that a log is resampled at: each channel then takes 160 MB."""
 _JITTER = 0.05
 _GAP = 10.0
+_BRIDGED, _FEW = 10, 1_000_000
+"""Times as many samples an even grid may have as the log has rows; so many it may have in any case."""
 _SLOW = 50.0
+_FASTEST = 1e7
+"""Rows a second: faster no force is recorded, and a lag of some ms would be more rows than a log has."""
 _LONG_STEP = 0.5
 """Between two rows [s]: so slow a log is more likely one whose time is not in seconds."""
 
@@ -185,6 +189,10 @@ def _check(time: Array, position: Array, force: Array) -> None:
         row = int(back[0]) + 2
         text = f"time runs backwards at row {row} (from {time[row - 2]:.6g} to {time[row - 1]:.6g} s)"
         raise InputError(f"{text}; sort the log or cut it there with --start and --end")
+    if _rate(time) > _FASTEST:
+        raise InputError(
+            f"there are {_rate(time):.3g} rows a second, and no sensor is read so fast; is the unit of time right?"
+        )
     for name, values in (("position", position), ("force", force)):
         seen = values[np.isfinite(values)]
         if len(seen) < _FEWEST:
@@ -205,6 +213,7 @@ def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool
     middle = float(np.median(step))
     gaps = step > 3 * middle
     dt = float(step[~gaps].mean())
+    _check_leaps(time, step, dt)
     even = not gaps.any() and abs(time[-1] - time[0] - dt * len(step)) < dt
     even = even and float(np.abs(step - dt).max()) <= _JITTER * dt
     if not even:
@@ -213,6 +222,17 @@ def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool
             text += f"; {int(gaps.sum())} gaps longer than three steps"
         warnings.append(Warn(Code.IRREGULAR_TIME, text))
     return dt, even
+
+
+def _check_leaps(time: Array, step: Array, dt: float) -> None:
+    """Refuse a log that is little else than gaps: its even grid would fill the memory."""
+    samples = (time[-1] - time[0]) / dt
+    if samples > max(_BRIDGED * len(time), _FEW):
+        widest = int(np.argmax(step))
+        raise InputError(
+            f"the time leaps by {step[widest]:.6g} s at row {widest + 2}, and {len(time)} rows would become"
+            f" {samples:.3g} samples; cut the log there with --start and --end"
+        )
 
 
 def _usable(name: str, values: Array, dt: float, warnings: list[Warn]) -> Mask:

@@ -85,13 +85,13 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
             entries = [_of_topic(bag, name, fields[name]) for name in bag.topics]
             return Listing(entries, bag.troubles, from_topics(bag, fields))
     table = open_table(path, kind, delimiter, limits)
-    seen = _seen(table)
+    seen, unread = _seen(table)
     clock = clock_of(table, seen)
     entries = [_of_column(own, clock) for own in seen]
     entries += [Entry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
     proposal = for_a_run() if is_run(path) else from_columns(table, seen, delimiter)
     facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
-    return Listing(entries, [note["text"] for note in table.notes], proposal, facts)
+    return Listing(entries, unread + [note["text"] for note in table.notes], proposal, facts)
 
 
 def _fields(bag: Bag, name: str) -> tuple[str, ...]:
@@ -123,20 +123,21 @@ def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
     return " ".join(uses) + (f" (in {topic.parent})" if topic.parent else "")
 
 
-def _seen(table: Columns) -> list[Seen]:
-    """Every column's values and unit."""
+def _seen(table: Columns) -> tuple[list[Seen], list[str]]:
+    """Every column's values and unit; and why there are no values, where they cannot be read."""
     places = list(range(len(table.names)))
+    unread = []
     try:
         columns = table.glance(places)
-    except InputError:
-        columns = [np.empty(0) for _ in places]
+    except InputError as error:
+        columns, unread = [np.empty(0) for _ in places], [str(error)]
     found = []
     for place, values in zip(places, columns, strict=True):
         name = table.names[place]
         stated = table.stated.get(name, Stated(None))
         scaled = (values + stated.offset) * stated.scale
         found.append(Seen(place, name, scaled, stated.unit, name in table.clocks))
-    return found
+    return found, unread
 
 
 def _of_column(own: Seen, clock: Seen | None) -> Entry:

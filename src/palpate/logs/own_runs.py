@@ -10,7 +10,7 @@ import msgspec
 from palpate.errors import InputError
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.read import read_log
-from palpate.logs.store import stored_about
+from palpate.logs.tables.parquet import stored_about
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 

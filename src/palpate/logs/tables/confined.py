@@ -1,7 +1,7 @@
 """Readers of formats whose libraries a damaged file can crash, in a process of their own with limits.
 
-SciPy leaves the process by a segmentation fault at some MATLAB files, and a small file may unpack to any size. What the
-process answers is arrays and words, never objects.
+SciPy leaves the process by a segmentation fault at some MATLAB files, polars aborts it at some of Parquet, and a small
+file may unpack to any size. What the process answers is arrays and words, never objects.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from palpate.logs.limits import GB, Budget
 
 _OWN = 2 * GB
 """Address space of the interpreter and its libraries themselves [bytes]."""
-_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-"""Threads that NumPy would start take address space of their own."""
+_FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
+"""Threads that libraries would start, one for each core, take address space of their own."""
 _COPIES = 3
 """What is unpacked stands in memory packed, unpacked and as the answer."""
 _MOST = 2**60
@@ -32,14 +32,18 @@ _TOO_LARGE = 3
 """The exit code of the process where the file unpacks to more than it may."""
 
 
-def read_confined(reader: str, path: Path, what: str, budget: Budget) -> tuple[dict[str, NDArray[Any]], Any]:
+def read_confined(
+    reader: str, path: Path, what: str, budget: Budget, question: Any = None
+) -> tuple[dict[str, NDArray[Any]], Any]:
     """Read a file in a process of its own.
 
     Args:
-        reader: `matlab` or `spreadsheet`: a module of this folder with a function `unpack(path, size)`.
+        reader: `matlab`, `spreadsheet` or `parquet`: a module of this folder with a function
+            `unpack(path, size, question)`.
         path: of the file.
         what: to call its kind.
         budget: of the log.
+        question: what is to be read, as JSON has it; all of it when None.
 
     Returns:
         Arrays by name, and what else the reader says, as JSON has it.
@@ -53,7 +57,8 @@ def read_confined(reader: str, path: Path, what: str, budget: Budget) -> tuple[d
     try:
         done = subprocess.run(  # noqa: S603 - this interpreter, this module
             command,
-            env=os.environ | _ONE_THREAD,
+            input=json.dumps(question).encode(),
+            env=os.environ | _FEW_THREADS,
             capture_output=True,
             timeout=max(budget.seconds_left, 0.1),
             check=False,
@@ -100,7 +105,7 @@ def main(reader: str, path: str, size: str) -> int:
     _confine(int(size))
     unpack = import_module(f"palpate.logs.tables.{reader}").unpack
     try:
-        answer = _answer(*unpack(Path(path), int(size)))
+        answer = _answer(*unpack(Path(path), int(size), json.load(sys.stdin)))
         sys.stdout.buffer.write(answer)
         sys.stdout.buffer.flush()
     except MemoryError:

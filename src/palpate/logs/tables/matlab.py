@@ -107,7 +107,7 @@ def _export(name: str, kind: str) -> str:
     return f"only MATLAB itself reads; export it there with: {way.format(name)}"
 
 
-def unpack(path: Path, size: int) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """All columns of a file, the names and classes of its objects, and what is too wide for columns.
 
     Runs in a process of its own.

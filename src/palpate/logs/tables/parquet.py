@@ -1,25 +1,58 @@
-"""Columns of a Parquet file, fields of structs included."""
+"""Columns of a Parquet file, fields of structs included; polars reads them in a process of their own."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.logs.limits import Budget
-from palpate.logs.store import polars_says, stored_about
+from palpate.files import SIGNATURE
+from palpate.logs.limits import Budget, Limits
 from palpate.logs.tables.clock import seconds_of_cells
 from palpate.logs.tables.columns import Array, Stated, as_counts, finite_words, place_of
+from palpate.logs.tables.confined import read_confined
 from palpate.logs.tables.lines import NO_READING
 
 if TYPE_CHECKING:
     import polars
 
 _BYTES = 8
+_KEPT = 8
+"""Heads that are kept: several questions are asked about one log."""
+
+
+class About(msgspec.Struct, frozen=True):
+    """What palpate leaves in a Parquet file beside the columns.
+
+    Args:
+        units: the SI unit of each column.
+        meta: whatever else is known.
+    """
+
+    units: dict[str, str]
+    meta: dict[str, Any]
+
+
+class Head(msgspec.Struct, frozen=True, array_like=True):
+    """What a Parquet file says about itself.
+
+    Args:
+        rows: how many.
+        names: of the columns, in the file's order.
+        lists: columns that hold a list a row.
+        about: the text that palpate left in it; None where there is none.
+    """
+
+    rows: int
+    names: list[str]
+    lists: list[str]
+    about: str | None
 
 
 class Parquet:
@@ -34,19 +67,14 @@ class Parquet:
     """
 
     def __init__(self, path: Path, budget: Budget) -> None:
-        import polars
-
         self.path, self._budget = path, budget
-        about = stored_about(path)
-        with polars_says(path):
-            schema = polars.read_parquet_schema(path)
-            self._rows = polars.scan_parquet(path, glob=False).select(polars.len()).collect().item()
-        self._columns = dict(_leaves(schema))
-        self.names = list(self._columns)
-        self.stated = {name: Stated(symbol) for name, symbol in about.units.items()} if about else {}
-        self.left_out = {
-            name: "a list" for name, dtype in schema.items() if isinstance(dtype, polars.List | polars.Array)
-        }
+        self.about = stored_about(path, budget.limits)
+        found = head(path, budget.limits)
+        self._rows, self.names = found.rows, found.names
+        self.stated = (
+            {name: Stated(symbol) for name, symbol in self.about.units.items()} if self.about else {}
+        )
+        self.left_out = dict.fromkeys(found.lists, "a list")
         self.rate: float | None = None
         self.clocks: set[str] = set()
         self.notes: list[dict[str, Any]] = []
@@ -65,48 +93,127 @@ class Parquet:
         Raises:
             InputError: a cell that is not a finite number; its row and its text are named.
         """
-        frame = self._frame(places)
-        return [self._numbers(place, frame[str(place)], missing) for place in places]
+        columns, wrong = self._read(places, missing)
+        for i, row, text in wrong:
+            raise InputError(
+                f"{self.path}: column {self.names[places[i]]!r}, row {row + 1} holds {text!r}, which is no finite"
+                f" number; mend it, or say --missing {text} if it means that there is no reading"
+            )
+        return _finite(columns, finite_words(missing))
 
     def glance(self, places: Sequence[int]) -> list[Array]:
         """The same; NaN too where something else than a number stands."""
-        frame = self._frame(places)
-        return [self._numbers(place, frame[str(place)], (), strict=False) for place in places]
+        return _finite(self.raw(places))
+
+    def raw(self, places: Sequence[int]) -> list[Array]:
+        """The same; what is infinite is so."""
+        return self._read(places, ())[0]
 
     def counts(self, place: int) -> NDArray[np.int64] | None:
         """A column of whole numbers, exact; None if it holds others."""
-        column = self._frame([place])[str(place)]
-        return as_counts(column.to_numpy()) if column.dtype.is_integer() and not column.null_count() else None
+        found = self._asked([place], exact=True)[0]
+        return as_counts(found["counts"]) if found else None
 
-    def _frame(self, places: Sequence[int]) -> polars.DataFrame:
-        import polars
+    def _read(self, places: Sequence[int], missing: Sequence[str]) -> tuple[list[Array], Any]:
+        """Columns; and of each that has one, the first cell that holds something and yet no finite number."""
+        found, also = self._asked(places, missing)
+        self.clocks |= {self.names[places[i]] for i in also["clocks"]}
+        return list(found["numbers"]), also["wrong"]
 
-        self._budget.take(_BYTES * self._rows * len(set(places)))
-        picks = [self._columns[self.names[i]].alias(str(i)) for i in set(places)]
-        with polars_says(self.path):
-            return polars.scan_parquet(self.path, glob=False).select(picks).collect(engine="streaming")
+    def _asked(
+        self, places: Sequence[int], missing: Sequence[str] = (), *, exact: bool = False
+    ) -> tuple[dict[str, NDArray[Any]], Any]:
+        self._budget.check(_BYTES * self._rows * len(places))
+        question = {"places": list(places), "missing": list(missing), "exact": exact}
+        return read_confined("parquet", self.path, "Parquet", self._budget, question)
 
-    def _numbers(
-        self, place: int, cells: polars.Series, missing: Sequence[str], *, strict: bool = True
-    ) -> Array:
-        import polars
 
-        if cells.dtype.is_temporal():
-            self.clocks.add(self.names[place])
-            return seconds_of_cells(cells)
-        with polars_says(self.path):
-            values = cells.cast(polars.Float64, strict=False).to_numpy().astype(float, copy=True)
-        values[np.isin(values, finite_words(missing))] = np.nan
-        wrong = ~np.isfinite(values) & cells.is_not_null().to_numpy()
-        for row in np.flatnonzero(wrong) if strict else ():
-            text = str(cells[int(row)])
-            if text.strip().lower() not in NO_READING | {word.lower() for word in missing}:
-                raise InputError(
-                    f"{self.path}: column {self.names[place]!r}, row {row + 1} holds {text!r}, which is no finite"
-                    f" number; mend it, or say --missing {text} if it means that there is no reading"
-                )
-        values[wrong] = np.nan
-        return values
+def _finite(columns: list[Array], missing: Sequence[float] = ()) -> list[Array]:
+    for column in columns:
+        column[~np.isfinite(column) | np.isin(column, missing)] = np.nan
+    return columns
+
+
+def stored_about(path: Path, limits: Limits | None = None) -> About | None:
+    """Units and metadata that palpate left in a Parquet file; None where there are none.
+
+    Raises:
+        InputError: the file cannot be read as Parquet, or what palpate left in it was changed.
+    """
+    about = head(path, limits).about
+    try:
+        return msgspec.json.decode(about, type=About) if about else None
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise InputError(
+            f"{path} carries metadata of palpate that is spoiled ({error}); write the record again"
+        ) from None
+
+
+def head(path: Path, limits: Limits | None = None) -> Head:
+    """What a Parquet file says about itself.
+
+    Raises:
+        InputError: there is no such file, or it cannot be read as Parquet.
+    """
+    try:
+        state = path.stat()
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}; check the path") from None
+    return _head(path, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns), limits or Limits())
+
+
+@lru_cache(maxsize=_KEPT)
+def _head(path: Path, state: tuple[int, ...], limits: Limits) -> Head:
+    return msgspec.convert(read_confined("parquet", path, "Parquet", Budget(path, limits))[1], Head)
+
+
+def unpack(path: Path, size: int, question: Any) -> tuple[dict[str, NDArray[Any]], Any]:
+    """A file's head, some of its columns as numbers, or one as counts. Runs in a process of its own."""
+    import polars
+
+    rows = polars.scan_parquet(path, glob=False)
+    schema = rows.collect_schema()
+    leaves = list(_leaves(schema))
+    if question is None:
+        lists = [name for name, dtype in schema.items() if isinstance(dtype, polars.List | polars.Array)]
+        about = polars.read_parquet_metadata(path).get(SIGNATURE)
+        return {}, (rows.select(polars.len()).collect().item(), [name for name, _ in leaves], lists, about)
+    places = question["places"]
+    frame = rows.select(leaves[i][1].alias(str(i)) for i in sorted(set(places))).collect(engine="streaming")
+    if question["exact"]:
+        return _counts(frame[str(places[0])]), None
+    cells = [frame[str(i)] for i in places]
+    numbers = np.array([_numbers(own) for own in cells], float).reshape(len(cells), len(frame))
+    words = NO_READING | {word.lower() for word in question["missing"]}
+    wrong = [(i, *found) for i, own in enumerate(cells) if (found := _wrong(own, numbers[i], words))]
+    clocks = [i for i, own in enumerate(cells) if own.dtype.is_temporal()]
+    return {"numbers": numbers}, {"wrong": wrong, "clocks": clocks}
+
+
+def _numbers(cells: polars.Series) -> Array:
+    import polars
+
+    if cells.dtype.is_temporal():
+        return seconds_of_cells(cells)
+    numbers: Array = cells.cast(polars.Float64, strict=False).to_numpy()
+    return numbers
+
+
+def _wrong(cells: polars.Series, numbers: Array, words: set[str]) -> tuple[int, str] | None:
+    """The first cell that holds something and yet no finite number: its row, and its text."""
+    if cells.dtype.is_temporal():
+        return None
+    for row in np.flatnonzero(~np.isfinite(numbers) & cells.is_not_null().to_numpy()):
+        text = str(cells[int(row)])
+        if text.strip().lower() not in words:
+            return int(row), text
+    return None
+
+
+def _counts(cells: polars.Series) -> dict[str, NDArray[Any]]:
+    if not cells.dtype.is_integer() or cells.null_count():
+        return {}
+    return {"counts": cells.to_numpy()}
 
 
 def _leaves(schema: Mapping[str, Any]) -> Iterator[tuple[str, polars.Expr]]:

@@ -104,7 +104,7 @@ class Spreadsheet:
         return sheet.counts(own)
 
 
-def unpack(path: Path, size: int) -> tuple[dict[str, NDArray[Any]], None]:
+def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, NDArray[Any]], None]:
     """Each sheet as lines of text, its cells parted by tabs. Runs in a process of its own."""
     try:
         from python_calamine import CalamineWorkbook
