@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.least_squares import Noise, noise_of, quantile
 from palpate.identification.filters.state_variable import block_means, white_noise
+from palpate.identification.least_squares import Noise, noise_of, quantile
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]

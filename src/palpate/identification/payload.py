@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.air import Air
-from palpate.identification.estimators.least_squares import noise_of, quantile
 from palpate.identification.filters.position_noise import position_noise
 from palpate.identification.filters.state_variable import Chain
+from palpate.identification.least_squares import noise_of, quantile
 from palpate.identification.sampling import Channels
 
 Array = NDArray[np.float64]

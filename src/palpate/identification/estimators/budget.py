@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.by_octave import Solution, System, solve
-from palpate.identification.estimators.least_squares import inverse
+from palpate.identification.least_squares import inverse
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.least_squares import solved
 from palpate.identification.estimators.octaves import Octaves
+from palpate.identification.least_squares import solved
 
 Array = NDArray[np.float64]
 

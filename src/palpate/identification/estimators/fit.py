@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.lag_uncertainty import hidden, undone, with_lag
-from palpate.identification.estimators.least_squares import Noise, covariance, noise_of, quantile, solve
+from palpate.identification.least_squares import Noise, covariance, noise_of, quantile, solve
 from palpate.identification.models import Knob, Model, Motion
 from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
 

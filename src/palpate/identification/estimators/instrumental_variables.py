@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
-from palpate.identification.estimators.least_squares import covariance, noise_of, solve
 from palpate.identification.evenly import even_period
 from palpate.identification.filters.bandwidth import choose_cutoff
 from palpate.identification.filters.filter_bank import FilterBank
 from palpate.identification.filters.state_variable import Chain, low_pass_once
+from palpate.identification.least_squares import covariance, noise_of, solve
 from palpate.signals.types import Estimate
 
 Array = NDArray[np.float64]

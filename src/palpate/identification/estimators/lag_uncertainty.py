@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.errors_in_variables import Compensation, compensation, resting
-from palpate.identification.estimators.least_squares import Noise, covariance
+from palpate.identification.least_squares import Noise, covariance
 from palpate.identification.models import Model, Motion
 from palpate.identification.prior import Lag
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from palpate.errors import InputError
 from palpate.identification.estimators.fit import Fit, fit
 from palpate.identification.estimators.instrumental_variables import ORDERS, refined_instrumental
-from palpate.identification.estimators.least_squares import noise_of
 from palpate.identification.estimators.output_error import output_error
+from palpate.identification.least_squares import noise_of
 from palpate.identification.models import Model
 from palpate.identification.options import LEAST_SQUARES
 from palpate.identification.problem import Problem

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.estimators.least_squares import covariance, noise_of
 from palpate.identification.estimators.simulation import (
     COLUMNS,
     PARAMETERS,
@@ -25,6 +24,7 @@ from palpate.identification.estimators.simulation import (
     simulated,
 )
 from palpate.identification.evenly import even_period
+from palpate.identification.least_squares import covariance, noise_of
 from palpate.signals.types import Estimate
 
 Array = NDArray[np.float64]

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.least_squares import noise_of
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.evidence.work import way_out
 from palpate.identification.filters.state_variable import ORDER, Chain
+from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import Press, Relaxation, Tangent
