@@ -149,13 +149,13 @@ def _named(truth: Range) -> str:
 
 
 def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, ...]:
-    own = of_model(log.plan.surface, found.model)
+    own = of_model(log.plan.surface, found.model, _untold_arm(log))
     answers = []
     for name, p in found.parameters.items():
         if str(p.verdict) != "identified" or p.value is None or p.ci95 is None:
             continue
         if name in own:
-            truth, defined = (own[name], own[name]), True
+            truth, defined = own[name], True
         elif name in log.truth and (name == "M" or found.model != "hunt-crossley"):
             truth, defined = log.truth[name], name in log.defined
         else:
@@ -201,13 +201,18 @@ def _holds(interval: tuple[float, float], truth: Range) -> bool:
     return bool(interval[0] <= truth[1] and interval[1] >= truth[0])
 
 
+def _untold_arm(log: Log) -> float:
+    """Stiffness in series that the options do not tell [N/m]; infinite if there is none."""
+    return np.inf if "series_stiffness" in log.options else float(log.plan.recording.series)
+
+
 def working_truth(log: Log, source: str, frequency: float | None) -> Range | None:
     """The true stiffness at a working point [N/m], from the press without sensors; None where it has none.
 
     An arm in series that is not told may be in it or not, and so may the inertia of a payload.
     """
     dense, r = log.dense, log.plan.recording
-    arm = r.series if "series_stiffness" not in log.options else np.inf
+    arm = _untold_arm(log)
     if source == "octave" and frequency:
         surface = log.plan.surface
         own = dynamic_stiffness(surface, frequency, 0.0, 0.0) if surface.linear else None

@@ -147,13 +147,24 @@ def parameters(surface: Surface, dense: Dense, payload: float) -> tuple[dict[str
     return {"K": k, "B": b, "M": m}, frozenset(defined)
 
 
-def of_model(surface: Surface, model: str) -> dict[str, float]:
-    """Parameters that a model gives as its own where the surface is of its kind, by the names of the answer."""
+def of_model(surface: Surface, model: str, arm: float = np.inf) -> dict[str, Range]:
+    """What the parameters that a model gives as its own may be where the surface is of its kind, by their names.
+
+    A standard linear solid behind a spring k is one again: with Z = K + K1 s tau/(1 + s tau), the force k Z/(k + Z) has
+    the pole s = -(k + K)/(tau (k + K + K1)).
+
+    Args:
+        surface: what is pressed on.
+        model: name of the answer's.
+        arm: stiffness in series that nobody told of [N/m]; the number may be the surface's or that of both.
+    """
     if model == "standard-linear-solid" and len(surface.arms) == 1:
-        (stiffness, tau), *_ = surface.arms
-        return {"K": surface["K"], "K1": stiffness, "tau": tau}
+        (branch, tau), *_ = surface.arms
+        low, high = (z / (1 + z / arm) for z in (surface["K"], surface["K"] + branch))
+        slower = tau * (1 + branch / (surface["K"] + arm))
+        return {"K": (low, surface["K"]), "K1": (high - low, branch), "tau": (tau, slower)}
     if model == "hunt-crossley" and surface["C"]:
-        return {"K": surface["C"], "n": surface["n"], "B": surface["C"] * surface["D"]}
+        return {"K": (surface["C"],) * 2, "n": (surface["n"],) * 2, "B": (surface["C"] * surface["D"],) * 2}
     if surface["Fc"] and model.startswith("kelvin-voigt"):
-        return {"Fc": surface["Fc"]}
+        return {"Fc": (surface["Fc"],) * 2}
     return {}
