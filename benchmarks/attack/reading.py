@@ -182,6 +182,7 @@ def _serve(kind: str, seeds: range, folder: Path) -> None:
     with os.fdopen(os.dup(1), "w") as told, tempfile.TemporaryFile() as chatter:
         for stream in (1, 2):
             os.dup2(chatter.fileno(), stream)
+        assert _read(kind, whole) == "read", "what is not spoiled has to be read"
         for seed in seeds:
             path = folder / f"log{ending}"
             path.write_bytes(mutated(data, seed))

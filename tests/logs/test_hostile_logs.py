@@ -7,6 +7,8 @@ import contextlib
 import os
 import sqlite3
 import struct
+import subprocess
+import sys
 import zipfile
 import zlib
 
@@ -192,6 +194,17 @@ def test_instruments_of_ours_that_are_spoiled(tmp_path, instruments):
     polars.DataFrame({"t": T}).write_parquet(path, metadata={"palpate": about})
     with pytest.raises(InputError, match="its instruments is spoiled"):
         measured_by(path)
+
+
+def test_where_a_shell_allows_little_memory_logs_are_read_all_the_same(tmp_path):
+    """A process may not raise the limit that it was given, for those that it begins."""
+    polars.DataFrame({"t": T, "x": T, "f": T}).write_parquet(tmp_path / "log.parquet")
+    code = (
+        "import resource, sys\nresource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))\n"
+        "from palpate.logs import read_log\nprint(len(read_log(sys.argv[1], time='t', position='x', force='f')))"
+    )
+    words = [sys.executable, "-c", code, str(tmp_path / "log.parquet")]
+    assert subprocess.run(words, capture_output=True, check=True, text=True).stdout == "50\n"
 
 
 @pytest.mark.parametrize("ask", ["identify", "topics"])

@@ -93,7 +93,9 @@ def _confine(size: int) -> None:
         import resource
     except ImportError:  # not on Windows
         return
+    _, allowed = resource.getrlimit(resource.RLIMIT_AS)
     most = _OWN + _COPIES * size
+    most = most if allowed == resource.RLIM_INFINITY else min(most, allowed)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
