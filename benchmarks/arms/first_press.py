@@ -13,7 +13,7 @@ COLD, WARM = 12.0, 1.0
 """Budgets [s of the processor]."""
 PRESS = """
 import time
-from palpate.press.choosing import Question, prepared, surface_of
+from palpate.press.prepare import Question, prepared, surface_of
 wall, cpu = time.perf_counter(), time.process_time()
 prepared(Question(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
 print(time.perf_counter() - wall, time.process_time() - cpu)

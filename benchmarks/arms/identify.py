@@ -7,7 +7,7 @@ import argparse
 import re
 from pathlib import Path
 
-from palpate.press.choosing import Question, prepared, surface_of
+from palpate.press.prepare import Question, prepared, surface_of
 from palpate.press.summary import summarise
 from palpate.report.numbers import with_half
 from palpate.robots.serial.from_toml import names

@@ -286,7 +286,7 @@ WRONG = {
     "twice": (["./press.csv", *OWN], "is named twice; a log counts once"),
     "figure is a folder": ([*OWN, "--figure", "."], "is a folder; name a file with --figure"),
     "report is a folder": ([*OWN, "--report", ".."], "is a folder; name a file with --report"),
-    "figure kind": ([*OWN, "--figure", "a.pdf"], "PNG; name it a.png"),
+    "figure kind": ([*OWN, "--figure", "a.gif"], "name it a.png"),
     "figure folder": ([*OWN, "--figure", "none/a.png"], "no folder none"),
     "rate and time": ([*OWN, "--rate", "100"], "not both"),
     "empty cut": ([*OWN, "--start", "99"], "no row of"),

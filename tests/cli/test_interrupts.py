@@ -12,7 +12,7 @@ from cli.test_run import text_of
 from palpate.cli import main
 from palpate.cli._interrupts import noticed
 from palpate.logs import read_record
-from palpate.report import page as pages
+from palpate.report.run import page as pages
 
 PRELUDE = """
 import os, signal, sys, time
@@ -69,13 +69,13 @@ def test_results_that_are_being_written_are_written(tmp_path, monkeypatch):
     """It comes while the page is made: everything is there, and the code says that it came."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")
-    page = pages.page
+    page = pages.run_page
 
-    def interrupted(**words):
+    def interrupted(*words):
         os.kill(os.getpid(), signal.SIGINT)
-        return page(**words)
+        return page(*words)
 
-    monkeypatch.setattr(pages, "page", interrupted)
+    monkeypatch.setattr(pages, "run_page", interrupted)
     assert main(["run", "mine.toml", "--out", "results"]) == 130
     assert (tmp_path / "results" / "report.html").is_file()
     assert read_record(tmp_path / "results" / "record.parquet").meta["end"] == "done"
@@ -86,10 +86,10 @@ def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")
 
-    def full(**words):
+    def full(*words):
         raise error
 
-    monkeypatch.setattr(pages, "page", full)
+    monkeypatch.setattr(pages, "run_page", full)
     assert main(["run", "mine.toml", "--out", "results"]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1

@@ -55,9 +55,9 @@ def test_what_encoders_do_not_see_grows_until_they_see_it():
     """
 
     def apart(resolution, physics="own", nudge=0.0):
-        own = pressed("panda", "own", resolution=resolution, seconds=0.7)
+        own = pressed("panda", "own", resolution=resolution, seconds=2.0)
         return difference(
-            own, pressed("panda", physics, resolution=resolution, nudge=nudge, seconds=0.7)
+            own, pressed("panda", physics, resolution=resolution, nudge=nudge, seconds=2.0)
         ).max()
 
     coarse = 1e-5

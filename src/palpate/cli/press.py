@@ -19,13 +19,14 @@ from palpate.text import shown
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from palpate.press.choosing import Pressing
+    from palpate.press.prepare import Pressing
     from palpate.records import Record
 
 _FLAG = Parameter(negative=())
 _TEXT = Parameter(allow_leading_hyphen=True)
 
 
+# More than seven arguments: each is a flag of the command.
 def press(
     *,
     arm: str,
@@ -90,7 +91,7 @@ def press(
     from palpate.bench.ending import DONE, INTERRUPTED
     from palpate.cli._values import vector
     from palpate.excitation.quantities import quantity
-    from palpate.press.choosing import Question, prepared, surface_of
+    from palpate.press.prepare import Question, prepared, surface_of
 
     question = Question(
         arm=arm, force=quantity("--force", force, "force"), surface=surface_of(surface), site=site, mode=mode,

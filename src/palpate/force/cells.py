@@ -152,7 +152,7 @@ class Prover:
             for Phi in self._of((box.part, i, box.loss, K, B), loop, laws)
         ]
 
-    def still(self, box: Box) -> Array:
+    def equilibrium(self, box: Box) -> Array:
         """The matrix without what fades: the command stands still."""
         if self.fading == "surface":
             return self.loop.phi(0.0, 0.0, Law(self.gains[0], self.kept), box.loss)

@@ -361,6 +361,7 @@ def exact_interval(gains: Gains, damping_time: float = 0.0) -> tuple[float, floa
     return 0.0, cap * most / (gains.gain * K)  # `most` is g K at the boundary
 
 
+# More than seven arguments: each is a claim of the certificate, and may be left out.
 def certify(
     gains: Gains,
     stiffness: tuple[float, float] | None = None,

@@ -34,7 +34,7 @@ def proved_cell(prover: Prover, box: Box) -> Cell | None:
     if max(map(radius, corners)) >= 1.0:
         return None
     if prover.fading:
-        L = common_beside(corners, prover.still(box))
+        L = common_beside(corners, prover.equilibrium(box))
         return Cell(box, L) if L is not None and Cell(box, L).proved(prover) else None
     middle = _middle(prover, box)
     L = single(middle)

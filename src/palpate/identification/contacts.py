@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.air import Air, air_of
+from palpate.identification.free_motion import FreeMotion, free_motion_of
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
 from palpate.identification.options import NOTHING_SAID, Options
@@ -104,7 +104,7 @@ def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
 
 
 def find_contacts(
-    channels: Channels, chain: Chain, air: Air | None, options: Options = NOTHING_SAID
+    channels: Channels, chain: Chain, air: FreeMotion | None, options: Options = NOTHING_SAID
 ) -> Contacts:
     """Find the stretches in contact.
 
@@ -145,18 +145,18 @@ def _with_payload(found: Contacts, payload: Payload) -> Contacts:
     return replace(found, payload=own, warnings=(*found.warnings, Warn(Code.TOOL_INERTIA, own.text)))
 
 
-def _air(channels: Channels, chain: Chain, lag: float) -> Air | None:
+def _air(channels: Channels, chain: Chain, lag: float) -> FreeMotion | None:
     """Where the probe is in the air; by the force without an inertia, if it shows one there."""
     force, position = chain(channels.force), chain(channels.position)
     ends = _ends(_calm(force, channels.dt))
-    perhaps = air_of(channels.force, channels.position, ends, none=False)
+    perhaps = free_motion_of(channels.force, channels.position, ends, none=False)
     payload = payload_of(channels, chain, perhaps, lag, alone=True) if perhaps else None
     if payload is None:
-        return air_of(channels.force, channels.position, ends)
-    return air_of(force - payload.mass * chain(channels.position, 2, lag), position, ends)
+        return free_motion_of(channels.force, channels.position, ends)
+    return free_motion_of(force - payload.mass * chain(channels.position, 2, lag), position, ends)
 
 
-def _without_drift(channels: Channels, air: Air) -> Channels:
+def _without_drift(channels: Channels, air: FreeMotion) -> Channels:
     """The same with the force in the air level from one stay to the next."""
     rows: Array = np.arange(len(channels.force), dtype=np.float64)
     raw = channels.raw

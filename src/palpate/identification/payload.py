@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.air import Air
+from palpate.identification.free_motion import FreeMotion
 from palpate.identification.filters.position_noise import position_noise
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import noise_of, quantile
@@ -43,7 +43,7 @@ class Payload:
 
 
 def payload_of(
-    channels: Channels, chain: Chain, air: Air, lag: float, *, alone: bool = False
+    channels: Channels, chain: Chain, air: FreeMotion, lag: float, *, alone: bool = False
 ) -> Payload | None:
     """The mass that the force in the air tells, both channels as they count in the log; None if it tells none.
 

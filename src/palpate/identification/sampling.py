@@ -20,8 +20,6 @@ Mask = NDArray[np.bool_]
 _FEWEST = 20
 _LARGEST = 1e30
 """Of a reading in SI: further ones cannot be squared and summed without loss."""
-_MOST = 20_000_000
-"""Even instants that a log is resampled at: each channel then takes 160 MB."""
 _JITTER = 0.05
 _GAP = 10.0
 _BRIDGED, _FEW = 10, 1_000_000
@@ -116,26 +114,11 @@ def channels_of(record: Record) -> Channels:
         text = f"only {rate:.3g} fresh readings a second: behaviour faster than about {rate / 8:.2g} Hz is not seen"
         text += "; or is the time in ms? then say NAME:ms" if dt >= _LONG_STEP else ""
         warnings.append(Warn(Code.LOW_RATE, text))
-    grid = time if even else _grid(time, dt)
+    grid = time if even else np.arange(time[0], time[-1] + dt / 2, dt)
     x, f, valid = _common(grid, time, (position, use_x), (force, use_f), even)
     own_x, near_x = _bridge(grid, time[use_x], position[use_x])
     raw = Raw(float(time[0]), dt, own_x, _held(grid + dt / 4, time, force), near_x & valid)
     return Channels(float(time[0]), dt, x, f, valid, rate, raw, tuple(warnings))
-
-
-def _grid(time: Array, dt: float) -> Array:
-    """Even instants over the log.
-
-    Raises:
-        InputError: gaps so long that they would fill the machine's memory.
-    """
-    if (time[-1] - time[0]) / dt > max(_MOST, 2 * len(time)):
-        row = int(np.argmax(np.diff(time)))
-        raise InputError(
-            f"the time jumps by {time[row + 1] - time[row]:.4g} s at row {row + 2}, and usually goes by {dt:.4g} s:"
-            " cut the log there with --start and --end"
-        )
-    return np.arange(time[0], time[-1] + dt / 2, dt)
 
 
 def thinned(channels: Channels, size: int) -> Channels:
@@ -275,7 +258,7 @@ def _far_end(force: Array) -> list[float]:
 
 def _rate(time: Array) -> float:
     """Readings per second, long gaps left aside."""
-    step = np.diff(time)
+    step = np.diff(np.unique(time))
     usual = step[step <= 3 * np.median(step)]
     return float(1 / usual.mean())
 

@@ -178,7 +178,7 @@ def answered(cell, body, tip, touch):
 
 
 @law
-def told(sensor, share, touch, surface, force, depth, time, noise):
+def measured_by(sensor, share, touch, surface, force, depth, time, noise):
     """The touch after a step that is this share of a tick."""
     felt = max(force, 0.0)
     reading = sensed(sensor, touch.reading, felt, time, noise)
@@ -200,7 +200,7 @@ def tick(cell, body, touch, setpoint, k, noise):
         for i in range(len(body.q)):
             body.qd[i] += step * body.qdd[i]
             body.q[i] += step * body.qd[i]
-        touch = told(sensor, share, touch, surface, force, depth, (k * cell.steps + j + 1) * step, noise)
+        touch = measured_by(sensor, share, touch, surface, force, depth, (k * cell.steps + j + 1) * step, noise)
     return touch
 
 
@@ -209,7 +209,7 @@ def foreign(cell, body, touch, tip, setpoint, time, noise):
     """One step whose M, h and J another engine has filled in; that engine moves the arm."""
     driven(cell, body, setpoint)
     surface, force, depth = answered(cell, body, tip, touch)
-    return told(cell.sensor, 1.0 / cell.steps, touch, surface, force, depth, time, noise)
+    return measured_by(cell.sensor, 1.0 / cell.steps, touch, surface, force, depth, time, noise)
 
 
 compiled_tick = kernel(tick)

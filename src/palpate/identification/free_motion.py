@@ -36,7 +36,7 @@ _MIDDLE = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
-class Air:
+class FreeMotion:
     """A stretch of positions without a surface.
 
     Args:
@@ -67,7 +67,7 @@ class Air:
         return stays_in(self.way * position < self.way * self.limit)
 
 
-def air_of(force: Array, position: Array, ends: tuple[float, float], *, none: bool = True) -> Air | None:
+def free_motion_of(force: Array, position: Array, ends: tuple[float, float], *, none: bool = True) -> FreeMotion | None:
     """The air of a log; None if the force goes with the position at both ends of the position's range, or at neither.
 
     The slope of force over position, with its interval under coloured noise, is not above none (that of an inertia is
@@ -95,7 +95,7 @@ def air_of(force: Array, position: Array, ends: tuple[float, float], *, none: bo
     levels = np.array([float(np.median(force[a:b])) for a, b in stays])
     rest = float(np.median(np.concatenate([force[a:b] for a, b in stays])))
     noise = _noise(force, levels, stays)
-    return Air(
+    return FreeMotion(
         way, way * limit, rest, middle, levels, _differ(levels, stays, noise), float(np.sqrt(noise.variance))
     )
 
