@@ -64,7 +64,7 @@ def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folde
     assert sorted(p.name for p in (here / "rec").iterdir()) == ["press.json", "record.parquet"]
     assert main(["identify", "rec/record.parquet", "--json"]) in {0, 1}
     found = json.loads(capsys.readouterr().out)
-    assert found["parameters"]["K"]["value"] is not None
+    assert found["working_point"]["stiffness"]["value"] is not None
     # The arm's own 50 kN/m are in series. A late reading here and there moves the loop's estimate by some per cent.
     assert told["stiffness_N_per_m"][0] == pytest.approx(4000 / (1 + 4000 / 5e4), rel=0.1)
     assert "series-compliance" in {warn["code"] for warn in found["warnings"]}

@@ -78,7 +78,7 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
     record = read_record(here / "rec" / "record.parquet")
     assert len(record) == told["lateness"]["ticks"]
     assert main(["identify", "rec/record.parquet", "--json"]) in {0, 1}
-    assert json.loads(capsys.readouterr().out)["parameters"]["K"]["value"] is not None
+    assert json.loads(capsys.readouterr().out)["working_point"]["stiffness"]["value"] is not None
     # The arm's own 50 kN/m are in series. A late reading here and there moves the loop's estimate by some per cent.
     assert told["stiffness_N_per_m"][0] == pytest.approx(4000 / (1 + 4000 / 5e4), rel=0.1)
 
