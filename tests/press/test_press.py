@@ -11,8 +11,8 @@ import pytest
 from palpate import read_log
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.press.prepare import Question, arm_of, prepared, surface_of
 from palpate.press.pilots import Cautious
+from palpate.press.prepare import Question, arm_of, prepared, surface_of
 from palpate.press.pressing import Plan, press
 from palpate.press.protocol import Command
 from palpate.press.setting import cell_of, check_able

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.identification.free_motion import FreeMotion, free_motion_of
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
+from palpate.identification.free_motion import FreeMotion, free_motion_of
 from palpate.identification.options import NOTHING_SAID, Options
 from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned

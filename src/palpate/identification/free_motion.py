@@ -67,7 +67,9 @@ class FreeMotion:
         return stays_in(self.way * position < self.way * self.limit)
 
 
-def free_motion_of(force: Array, position: Array, ends: tuple[float, float], *, none: bool = True) -> FreeMotion | None:
+def free_motion_of(
+    force: Array, position: Array, ends: tuple[float, float], *, none: bool = True
+) -> FreeMotion | None:
     """The air of a log; None if the force goes with the position at both ends of the position's range, or at neither.
 
     The slope of force over position, with its interval under coloured noise, is not above none (that of an inertia is

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.free_motion import FreeMotion
 from palpate.identification.filters.position_noise import position_noise
 from palpate.identification.filters.state_variable import Chain
+from palpate.identification.free_motion import FreeMotion
 from palpate.identification.least_squares import noise_of, quantile
 from palpate.identification.sampling import Channels
 

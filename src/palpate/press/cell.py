@@ -200,7 +200,9 @@ def tick(cell, body, touch, setpoint, k, noise):
         for i in range(len(body.q)):
             body.qd[i] += step * body.qdd[i]
             body.q[i] += step * body.qd[i]
-        touch = measured_by(sensor, share, touch, surface, force, depth, (k * cell.steps + j + 1) * step, noise)
+        touch = measured_by(
+            sensor, share, touch, surface, force, depth, (k * cell.steps + j + 1) * step, noise
+        )
     return touch
 
 
