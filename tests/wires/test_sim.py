@@ -143,7 +143,7 @@ def test_losses_and_jitter_that_it_can_bear_are_counted(folder, here, capsys):
 
 def test_an_arm_that_dies_and_comes_again_is_lost_and_not_followed(folder, here, capsys):
     with arm(folder, "--gap", "0.05") as (process, address):
-        threading.Timer(1.5, process.kill).start()
+        threading.Timer(4.0, process.kill).start()
         code, told = press(capsys, folder, address, "--yes", "--record", "rec", "--hold", "10:s")
     assert code == 1
     assert "wire broke" in told["ended"] or "no reading" in told["ended"]

@@ -135,8 +135,8 @@ def of_unexplained(system: System, solution: Solution, sensor: Array) -> Spread:
     return Spread(HIDDEN_SHARE**2 * np.maximum(weight @ gain, 0.0))
 
 
-def white_level(level: Array, lines: Array) -> tuple[float, float]:
-    """Level of white noise, and the lines that it rests on: as many of the quietest octaves as differ by chance alone.
+def white_level(level: Array, lines: Array) -> float:
+    """Level of white noise: that of as many of the quietest octaves as differ by chance alone.
 
     Args:
         level: variance of a line in each octave, over that of white noise of variance 1.
@@ -155,15 +155,7 @@ def white_level(level: Array, lines: Array) -> tuple[float, float]:
         scale = 1 + float((1 / count).sum() - 1 / count.sum()) / (3 * max(last - 1, 1))
         if last == 1 or apart / scale <= float(chdtri(last - 1, 0.05)):
             break
-    return pooled, float(count.sum())
-
-
-def by_chance(lines: Array, count: float) -> Array:
-    """How far a level of some lines, shape (octaves,), may exceed the same level of `count` lines: F at 95 %."""
-    from scipy.special import fdtri
-
-    chance: Array = fdtri(np.maximum(lines, 1.0), max(count, 1.0), 0.95)
-    return np.where(lines > 0, chance, 1.0)
+    return pooled
 
 
 def half_widths(budget: Budget) -> Array:

@@ -294,12 +294,9 @@ class _Question:
         else:
             lines = rest.all_lines
             level = rest.total[:, 0, 0] / np.maximum(lines, 1.0)
-        white, count = causes.white_level(level / gain, lines)
-        sensor = white * gain
-        if rest is not None:  # it is the sensor's for sure, and a level above it may be chance
-            sensor = np.maximum(
-                sensor * causes.by_chance(worth(self.system), count), np.where(lines > 0, level, 0.0)
-            )
+        sensor = causes.white_level(level / gain, lines) * gain
+        if rest is not None:
+            sensor = np.maximum(sensor, np.where(lines > 0, level, 0.0))
         return np.minimum(sensor, solution.noise)
 
     def _rest(self, longest: int) -> Octaves | None:
