@@ -32,7 +32,7 @@ FORCES = {
     "slow noise": lfilter([0.3], [1, -0.95], white()),
     "a hum": white() + 0.3 * np.sin(2 * np.pi * 50 * TIME),
     "spikes": white()
-    + 20 * (np.arange(5000) % 991 == 1),  # not in step with the steps, whose speed they would follow
+    + 20 * (np.arange(5000) % 613 == 1),  # not in step with the steps, whose speed they would follow
 }
 
 

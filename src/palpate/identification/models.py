@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,8 +206,10 @@ CURVED_MASS = Model(
     "kelvin-voigt-mass", ("K", "B", "M", "K2", "K3", "offset"), _with_curve(_kelvin_voigt_mass)
 )
 
-_STILL = 0.05
-"""Share of the highest speeds below which the way is doubtful."""
+_TURNS = 6.0
+"""Deviations of the position's noise within which friction does not turn: nearly none is larger."""
+_SHORTEST = 1e-3
+"""Share of the position's range, where it has no noise."""
 
 NAMES = ("kelvin-voigt", "kelvin-voigt-mass", "standard-linear-solid", "hunt-crossley")
 
@@ -286,15 +289,12 @@ def with_friction(model: Model, way: Array) -> Model:
 
 
 def direction(motion: Motion) -> Array:
-    """Which way the probe moves: 1 into the surface, -1 out of it, less where it is nearly still. Shape (n,)."""
-    from scipy.signal import savgol_filter
+    """Which way friction holds the probe: 1 while it moves into the surface, -1 out of it, shape (n,).
 
-    dt, rate = motion.chain.dt, motion.chain.rate
-    window = min(2 * max(round(1 / (rate * dt)), 2) + 1, (len(motion.position) - 1) // 2 * 2 + 1)
-    speed = savgol_filter(motion.position, window, 2, deriv=1, delta=dt)
-    jitter = (
-        motion.noise.white * np.sqrt(12 / window**3) / dt
-    )  # of the slope of a line through that many readings
-    least = max(_STILL * float(np.percentile(np.abs(speed), 95)), 3 * float(jitter), 1e-300)
-    way: Array = np.tanh(speed / least)
-    return way
+    At rest it keeps what it has, and turns within a short way (an elastoplastic element; Dahl 1968 has it smooth): the
+    shortest that the position's noise and its encoder do not turn it within.
+    """
+    noise, position = motion.noise, motion.position
+    way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), 1e-300)
+    steps = (np.diff(position, prepend=position[:1]) / way).tolist()
+    return np.fromiter(accumulate(steps, lambda z, d: min(max(z + d, -1.0), 1.0)), np.float64, len(steps))
