@@ -38,7 +38,6 @@ class Motion:
     free: Array | None = None
     touched: Array | None = None
     _kept: dict[tuple[int, float], Array] = field(default_factory=dict)
-    _powers: dict[int, Array] = field(default_factory=dict)
 
     def moved(self, derivative: int, lag: float) -> Array:
         """Filtered position or a derivative of it at t - lag, shape (m,)."""
@@ -52,12 +51,6 @@ class Motion:
     def filtered(self, signal: Array, derivative: int, lag: float) -> Array:
         """Any raw signal through the same chain, at t - lag, shape (m,)."""
         return self.chain.read(signal, derivative, lag, self.rows)
-
-    def power(self, n: int, lag: float) -> Array:
-        """The position squared or cubed, filtered, at t - lag, shape (m,)."""
-        if n not in self._powers:
-            self._powers[n] = self.position * self.position * (self.position if n == 3 else 1.0)
-        return self.filtered(self._powers[n], 0, lag)
 
     @property
     def instants(self) -> Array:
@@ -82,11 +75,6 @@ class Motion:
         return np.ones(len(self.rows))
 
 
-def on_rows(motion: Motion, rows: NDArray[np.intp]) -> Motion:
-    """The same motion at other rows, shape (m,)."""
-    return replace(motion, rows=rows, _kept={})
-
-
 def from_surface(motion: Motion, inside: NDArray[np.bool_], surface: float) -> Motion:
     """The same motion counted from a surface: nothing is pressed before it is met.
 
@@ -98,7 +86,7 @@ def from_surface(motion: Motion, inside: NDArray[np.bool_], surface: float) -> M
     depth = motion.position - surface
     pressed = np.where(inside, depth, np.maximum(depth, 0.0))
     touched = (inside | (depth > 0)).astype(np.float64)
-    return replace(motion, position=pressed, free=depth - pressed, touched=touched, _kept={}, _powers={})
+    return replace(motion, position=pressed, free=depth - pressed, touched=touched, _kept={})
 
 
 def without_noise(motion: Motion) -> Motion:
@@ -167,17 +155,6 @@ def _kelvin_voigt_mass(motion: Motion, _knobs: dict[str, float], lag: float) -> 
     return [motion.moved(0, lag), motion.moved(1, lag), motion.moved(2, lag), motion.ones]
 
 
-def _with_curve(columns: Columns) -> Columns:
-    """The same with K2 x^2 + K3 x^3 beside K x, so that K is the slope at the origin."""
-
-    def curved(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
-        powers = [motion.power(n, lag) for n in (2, 3)]
-        own = columns(motion, knobs, lag)
-        return [*own[:-1], *powers, own[-1]]
-
-    return curved
-
-
 def _deep(motion: Motion, knobs: dict[str, float]) -> Array:
     """Penetration: the position beyond the surface, zero before it, shape (n,). A probe fixed to it is always in it."""
     return motion.position if motion.bonded else np.maximum(motion.position - knobs["x0"], 0.0)
@@ -201,10 +178,6 @@ def _hunt_crossley(motion: Motion, knobs: dict[str, float], lag: float) -> list[
 
 KELVIN_VOIGT = Model("kelvin-voigt", ("K", "B", "offset"), _kelvin_voigt)
 KELVIN_VOIGT_MASS = Model("kelvin-voigt-mass", ("K", "B", "M", "offset"), _kelvin_voigt_mass)
-CURVED = Model("kelvin-voigt", ("K", "B", "K2", "K3", "offset"), _with_curve(_kelvin_voigt))
-CURVED_MASS = Model(
-    "kelvin-voigt-mass", ("K", "B", "M", "K2", "K3", "offset"), _with_curve(_kelvin_voigt_mass)
-)
 
 _TURNS = 6.0
 """Deviations of the position's noise within which friction does not turn: nearly none is larger."""
@@ -236,22 +209,6 @@ def hunt_crossley(motion: Motion) -> Model:
     return Model("hunt-crossley", ("K", "B", "offset"), _hunt_crossley, (n, _touch(motion)), ("K", "B", "Fc"))
 
 
-def relaxing(model: Model, motion: Motion) -> Model:
-    """Hunt and Crossley's contact with a Maxwell branch beside its spring: f = K s + B s v + K1 y, s = d^n."""
-    tau = standard_linear_solid(motion).knobs[0]
-
-    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
-        own = model.columns(motion, knobs, lag)
-        stretched = _deep(motion, knobs) ** knobs["n"]
-        branch = (
-            stretched - stretched[0] - low_pass_once(stretched - stretched[0], knobs["tau"], motion.chain.dt)
-        )
-        return [*own[:2], motion.filtered(branch, 0, lag), *own[2:]]
-
-    linear = (*model.linear[:2], "K1", *model.linear[2:])
-    return replace(model, linear=linear, columns=columns, knobs=(*model.knobs, tau))
-
-
 def at_rest_before(model: Model) -> Model:
     """The same where the log shows what the force rests at before the touch, so that no offset is left to find.
 
@@ -273,19 +230,6 @@ def begun_before(model: Model) -> Model:
         return [*own[:-1], motion.filtered(np.exp(-since / knobs["tau"]), 0, lag), own[-1]]
 
     return replace(model, linear=(*model.linear[:-1], "y0", model.linear[-1]), columns=columns)
-
-
-def with_friction(model: Model, way: Array) -> Model:
-    """The same with Coulomb's friction Fc, which is against the motion: `way` of `direction`, in contact only."""
-    last = model.linear[-1:] if model.linear[-1] == "offset" else ()
-    count = len(model.linear) - len(last)
-
-    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
-        own = model.columns(motion, knobs, lag)
-        rubbing = way * (motion.position > knobs["x0"]) if "x0" in knobs else way
-        return [*own[:count], motion.filtered(rubbing, 0, lag), *own[count:]]
-
-    return replace(model, linear=(*model.linear[:count], "Fc", *last), columns=columns)
 
 
 def direction(motion: Motion) -> Array:
