@@ -1,6 +1,7 @@
 """`palpate live`: its first line is its address, and what is wrong is a line and exit code 2."""
 
 import json
+import os
 import re
 import signal
 import socket
@@ -22,9 +23,12 @@ ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/[\w-]{24}/")
 
 @contextmanager
 def running(*words, lines=1):
-    """The program, until the block ends; its first lines."""
+    """The program, until the block ends; its first lines, which it writes at once whatever the environment says."""
     command = [sys.executable, "-m", "palpate", "live", *map(str, words)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    env = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
+    ) as process:
         try:
             yield [process.stdout.readline().strip() for _ in range(lines)]
         finally:

@@ -21,8 +21,9 @@ STYLE = "yellow"
 
 
 def print_lines(*lines: str) -> None:
-    """Print lines as they are, however long, for a reader or for another program."""
+    """Print lines as they are, however long, for a reader or for another program, which may wait for them."""
     sys.stdout.write("".join(f"{shown(line)}\n" for line in lines))
+    sys.stdout.flush()
 
 
 def print_json(value: Any) -> None:
