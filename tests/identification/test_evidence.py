@@ -11,7 +11,7 @@ from identification.problems import problem
 from identification.synthetic_contacts import pressed, record
 from palpate.identification import Verdict, identify
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import press_of
+from palpate.identification.evidence.press import Stroke, press_of, slope_of
 from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness
 from palpate.identification.evidence.working_point import working_point
 from palpate.identification.options import Options
@@ -268,6 +268,37 @@ def test_the_press_is_the_headline_where_no_octave_is_known_well():
     point = working_point(asked, poor, Options.of(), "N/m")
     assert point.source == "press"
     assert point.stiffness.value == pytest.approx(5000, rel=0.02)
+
+
+def in_steps(k, b, tau=0.1, rest=1.0):
+    """Three advances that die out, 1 mm each, on a spring and a damper: the last one, and the whole way in."""
+    t = np.arange(0.0, 3 * (5 * tau + rest), DT)
+    since = np.mod(t, 5 * tau + rest)
+    depth = 1e-3 * (t // (5 * tau + rest) + 1 - np.exp(-since / tau))
+    speed = 1e-3 / tau * np.exp(-since / tau)
+    columns = depth, speed, k * depth + b * speed, t
+    last = (depth > 2e-3) & (since < 5 * tau)
+    return Stroke(*(own[last] for own in columns), Stroke(*columns))
+
+
+@pytest.mark.parametrize("damping", [0.0, 40.0])
+def test_the_rests_of_a_press_in_steps_tell_its_speed_from_its_depth(damping):
+    """Within one such advance the force has the slope k - b/tau: the interval reaches both, and no farther."""
+    slope = slope_of([in_steps(2000.0, damping)])
+    assert slope.stiffness + slope.half >= 2000.0 * (1 - 1e-9)
+    assert slope.stiffness - slope.half <= (2000.0 - damping / 0.1) * (1 + 1e-9)
+    assert slope.half == pytest.approx(damping / 0.1 / 2, rel=0.02, abs=1e-6)
+    assert slope.half**2 == pytest.approx(sum(part**2 for part in slope.budget.values()))
+
+
+def test_the_slope_is_of_the_last_rise():
+    """A shell that snaps through at a third of its force: its peak is not the upper part, however noisy it is."""
+    depth = np.linspace(0.0, 3e-3, 3000)
+    force = np.interp(depth, [0, 1e-3, 2e-3, 3e-3], [0.0, 4.2, 2.0, 10.0])
+    slope = slope_of([Stroke(depth, np.full(3000, 1e-3), force, np.arange(3000) * DT)])
+    assert slope.stiffness == pytest.approx(8000.0, rel=1e-6)
+    assert slope.force == pytest.approx(7.0, abs=0.1)
+    assert slope.depth == pytest.approx(2.625e-3, abs=2e-5)
 
 
 def test_several_presses_foretell_the_next():

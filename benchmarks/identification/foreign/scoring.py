@@ -211,18 +211,17 @@ def working_truth(log: Log, source: str, frequency: float | None) -> Range | Non
 
     An arm in series that is not told may be in it or not, and so may the inertia of a payload.
     """
-    dense, r = log.dense, log.plan.recording
-    arm = _untold_arm(log)
+    dense, surface, arm = log.dense, log.plan.surface, _untold_arm(log)
     if source == "octave" and frequency:
-        surface = log.plan.surface
-        own = dynamic_stiffness(surface, frequency, 0.0, 0.0) if surface.linear else None
-        own = octave_stiffness(dense, frequency) if own is None else own
+        own = octave_stiffness(dense, frequency)
+        if surface.linear:
+            own = (dynamic_stiffness(surface, frequency, 0.0, 0.0).real,) * 2
         if own is not None:
-            inertia = (2 * np.pi * frequency) ** 2 * r.payload
-            ends = [z.real - more for z in (own, own / (1 + own / arm)) for more in (0.0, inertia)]
+            inertia = (2 * np.pi * frequency) ** 2 * log.plan.recording.payload
+            ends = [z - more for k in own for z in (k, k / (1 + k / arm)) for more in (0.0, inertia)]
             return min(ends), max(ends)
-    slope = press_stiffness(dense)
-    return None if slope is None else tuple(sorted((slope, slope / (1 + slope / arm))))
+    slope = press_stiffness(surface, dense)
+    return None if slope is None else (slope[0] / (1 + slope[0] / arm), slope[1])
 
 
 def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:

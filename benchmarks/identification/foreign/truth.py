@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,20 +66,26 @@ def dynamic_stiffness(surface: Surface, frequency: float, depth: float, amplitud
     return complex((force[last] * wave).sum() / (x[last] * wave).sum())
 
 
-def octave_stiffness(dense: Dense, frequency: float) -> complex | None:
-    """Best linear approximation of force by depth in the octave about a frequency, over blocks in contact [N/m].
+def octave_stiffness(dense: Dense, frequency: float) -> Range | None:
+    """Lowest and highest best linear approximation of force by depth in the octave about a frequency [N/m], storage.
 
-    Hann blocks of four periods, half overlapping, shorter ones if none of them lies in contact; one regression over all
-    of them (Pintelon and Schoukens 2012, 3.4). None where no block does.
+    Hann blocks, half overlapping, that lie in contact; one regression over all of them (Pintelon and Schoukens 2012,
+    3.4). Blocks of two, four and eight periods that begin early or half a block later: on a surface that is not linear
+    each gives another number, and none of them is truer. None where no block lies in contact.
     """
     short = dense.thinned(max(60 * frequency, 50.0))
-    for periods in (4, 2):
+    found = []
+    for periods in (2, 4, 8):
         size = int(periods / (frequency * short.dt))
-        blocks = [slice(i, i + size) for i in range(0, len(short.depth) - size + 1, max(size // 2, 1))]
-        blocks = [block for block in blocks if short.contact[block].all()]
-        if blocks:
-            return _regressed(short, blocks, size, frequency)
-    return None
+        for begin in (0, size // 2):
+            blocks = [
+                slice(i, i + size) for i in range(begin, len(short.depth) - size + 1, max(size // 2, 1))
+            ]
+            blocks = [block for block in blocks if short.contact[block].all()]
+            own = _regressed(short, blocks, size, frequency) if blocks else None
+            if own is not None:
+                found.append(own.real)
+    return (min(found), max(found)) if found else None
 
 
 def _regressed(dense: Dense, blocks: list[slice], size: int, frequency: float) -> complex | None:
@@ -101,22 +106,37 @@ def _level(line: Array, values: Array) -> Array:
     return values - np.polyval(np.polyfit(line, values, 1), line)
 
 
-def press_stiffness(dense: Dense, low: float = 0.4) -> float | None:
-    """Slope of force over depth of the loading above `low` of the forces' range, a level for each stretch [N/m]."""
+def press_stiffness(surface: Surface, dense: Dense, low: float = 0.4, high: float = 0.95) -> Range | None:
+    """Lowest and highest slope of force over depth on the ways in, between two shares of their force [N/m].
+
+    A way in is a contact's first advance to its peak force. Two slopes are as true as each other: of the force as it
+    was, and of the force without what is no spring (damper, mass, friction), on the same way.
+    """
     short = dense.thinned(1000.0)
-    if not short.contact.any():
-        return None
-    bottom, top = np.percentile(short.force[short.contact], [0.5, 99.5])
-    speed = np.gradient(short.depth, short.dt)
-    moving = speed > 0.05 * np.percentile(np.abs(speed[short.contact]), 95)
-    inside = short.contact & moving & (short.force > bottom + low * (top - bottom))
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.view(np.int8), [0]])))
+    v = np.gradient(short.depth, short.dt)
+    slow = surface.scaled(B=0.0, D=0.0, M=0.0, Fc=0.0)
+    calm = touch(slow, short.depth, v, np.gradient(v, short.dt), short.dt).force
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], short.contact.view(np.int8), [0]])))
+    slopes = [_slope_in(short, force, edges, low, high) for force in (short.force, calm)]
+    told = [slope for slope in slopes if slope is not None]
+    return (min(told), max(told)) if told else None
+
+
+def _slope_in(dense: Dense, force: Array, edges: NDArray[np.intp], low: float, high: float) -> float | None:
+    """Of one force over the depth, a level for each way in that goes half as deep as the deepest."""
     xx = xf = 0.0
-    for begin, end in pairwise(edges):
-        if inside[begin : begin + 1].any() and end - begin >= 5:
-            x, f = short.depth[begin:end], short.force[begin:end]
-            xx += float(((x - x.mean()) ** 2).sum())
-            xf += float(((x - x.mean()) * (f - f.mean())).sum())
+    deepest = float(np.ptp(dense.depth[dense.contact])) if dense.contact.any() else 0.0
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        x, f = dense.depth[begin:end], force[begin:end]
+        top = int(np.argmax(f >= high * f.max())) + 1
+        x, f = x[:top], f[:top]
+        if len(x) < 5 or np.ptp(x) < 0.5 * deepest:
+            continue
+        below = np.flatnonzero(f < f[0] + low * (f[-1] - f[0]))
+        first = int(below[-1]) + 1 if len(below) else 0
+        x, f = x[first:], f[first:]
+        xx += float(((x - x.mean()) ** 2).sum())
+        xf += float(((x - x.mean()) * (f - f.mean())).sum())
     return xf / xx if xx > 0 else None
 
 

@@ -33,12 +33,17 @@ _SHOWN = 400
 
 @dataclass(frozen=True)
 class Stroke:
-    """One way in: depth [m], speed [m/s], force [N] and time [s], shape (n,)."""
+    """One way in: depth [m], speed [m/s], force [N] and time [s], shape (n,).
+
+    Args:
+        whole: the same with the rests before it, if the way in was made in steps.
+    """
 
     depth: Array
     speed: Array
     force: Array
     time: Array
+    whole: Stroke | None = None
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,7 @@ class Slope:
         rise: mean duration of a way in [s].
         each: slope of each way in [N/m].
         budget: half-width by cause [N/m]; their squares add up.
+        force, depth: where it is, the means of the upper part [N], [m].
     """
 
     stiffness: float
@@ -57,6 +63,8 @@ class Slope:
     rise: float
     each: tuple[float, ...]
     budget: dict[str, float]
+    force: float
+    depth: float
 
 
 def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[Stroke]:
@@ -79,8 +87,10 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
             continue
         begin = s.first + int(np.argmin(depth[s.first : top]))
         if top - begin >= _FEWEST:
-            begin, top = _one_way(depth, channels[1], begin, top, reach)
-            found.append(_sharpened(Stroke(*(own[begin:top] for own in channels)), motion.chain))
+            advance = slice(*_one_way(depth, channels[1], begin, top, reach))
+            whole = Stroke(*(own[begin:top] for own in channels))
+            stroke = Stroke(*(own[advance] for own in channels), whole)
+            found.append(_sharpened(stroke, motion.chain))
     return found
 
 
@@ -130,35 +140,42 @@ def _last(columns: Array, stroke: Stroke, least: float) -> float:
 def slope_of(strokes: list[Stroke]) -> Slope | None:
     """Slope in the upper part of the force; None without a way in that rises.
 
-    Half way between the slope as it is and the slope at rest, less what the force has of the speed. Its
-    interval has both, the scatter of each way in, the change of the slope over the range, and the variance between
-    ways in (a random effect, Student's t).
+    Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
+    the interval reaches both. Beyond them it has the scatter of each way in, the change of the slope over the range,
+    and the variance between ways in (a random effect, Student's t).
     """
-    slopes, variances, rises, changes, speeds = [], [], [], [], []
+    slopes, variances, rises, changes, speeds, levels = [], [], [], [], [], []
     for stroke in strokes:
-        low, high = np.percentile(stroke.force, [2, 98])
-        upper = stroke.force > low + UPPER * (high - low)
-        first = int(np.argmax(upper))
-        rows = np.arange(first, len(stroke.force))
+        rows = _upper(stroke.force)
         if len(rows) < _FEWEST or np.ptp(stroke.depth[rows]) <= 0:
             continue
         slope, variance, change = _line(stroke.depth[rows], stroke.force[rows])
-        at_rest = _at_rest(stroke, rows)
+        at_rest = _at_rest(stroke.whole or stroke)
         slopes.append((slope + at_rest) / 2)
         variances.append(variance)
         changes.append(change)
         speeds.append(abs(slope - at_rest) / 2)
         rises.append(float(stroke.time[-1] - stroke.time[0]))
+        levels.append((stroke.force[rows].mean(), stroke.depth[rows].mean()))
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
+    curvature, reach = float(np.mean(changes)), float(np.mean(speeds))
+    others = float(np.hypot(mean.half, curvature))
     causes = {
         "repetition" if len(slopes) > 1 else "noise": mean.half,
-        "curvature": float(np.mean(changes)),
-        "speed": float(np.mean(speeds)),
+        "curvature": curvature,
+        "speed": float(np.sqrt((others + reach) ** 2 - others**2)),
     }
-    half = float(np.sqrt(sum(part**2 for part in causes.values())))
-    return Slope(mean.value, half, float(np.mean(rises)), tuple(slopes), causes)
+    where = (float(own) for own in np.mean(levels, axis=0))
+    return Slope(mean.value, others + reach, float(np.mean(rises)), tuple(slopes), causes, *where)
+
+
+def _upper(force: Array) -> NDArray[np.intp]:
+    """Rows of a way in after the last that was below the share: a force may fall before it rises for good."""
+    low, high = np.percentile(force, [2, 98])
+    below = np.flatnonzero(force <= low + UPPER * (high - low))
+    return np.arange(int(below[-1]) + 1 if len(below) else 0, len(force))
 
 
 def _line(x: Array, f: Array) -> tuple[float, float, float]:
@@ -175,8 +192,13 @@ def _line(x: Array, f: Array) -> tuple[float, float, float]:
     return float(theta[1] / reach), float(variance[1] / reach**2), curve / reach
 
 
-def _at_rest(stroke: Stroke, rows: NDArray[np.intp]) -> float:
-    """Slope less what the force has of the speed on the way."""
+def _at_rest(stroke: Stroke) -> float:
+    """Slope of the upper part less what the force has of the speed.
+
+    Of the whole way in: within one advance that dies out the speed is the depth over again, and only rests between
+    advances tell the two apart.
+    """
+    rows = _upper(stroke.force)
     columns = np.column_stack([np.ones(len(rows)), stroke.depth[rows], stroke.speed[rows]])
     size = np.sqrt((columns**2).sum(axis=0))
     size[size == 0] = 1.0

@@ -41,6 +41,8 @@ def working_point(
         each = tuple(slope_without_series(own, 0.0, *series)[0] for own in slope.each)
         gain = half / slope.half if slope.half else 1.0
         slope = replace(slope, stiffness=value, half=half, each=each, budget=_scaled(slope.budget, gain))
+    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
+    depths = problem.motion.moved(0, lag)[inside]
     octave = _octave(spectrum, tolerance)
     if octave is None and slope is None:
         return None
@@ -51,13 +53,11 @@ def working_point(
     )
     if use_press and slope is not None:
         value, half, frequency, again = slope.stiffness, slope.half, 0.25 / slope.rise, _again(slope)
-        budget = slope.budget
+        budget, force, depth = slope.budget, slope.force, slope.depth
     else:
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
-        budget = octave.budget
-    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
-    force, depth = problem.force[inside], problem.motion.moved(0, lag)[inside]
+        budget, force, depth = octave.budget, float(problem.force[inside].mean()), float(depths.mean())
     rest = 0.0 if problem.counted else problem.contacts.resting
     contacts = problem.contacts
     stiffness = replace(_judged(value, half, tolerance, unit), budget=_largest(budget, half))
@@ -66,8 +66,8 @@ def working_point(
         stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
     return WorkingPoint(
         stiffness,
-        float(force.mean() - rest),
-        float(depth.mean()),
+        force - rest,
+        depth,
         float(frequency),
         "press" if use_press else "octave",
         again,
