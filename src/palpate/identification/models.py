@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
+from math import isqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -240,5 +241,22 @@ def direction(motion: Motion) -> Array:
     """
     noise, position = motion.noise, motion.position
     way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), 1e-300)
-    steps = (np.diff(position, prepend=position[:1]) / way).tolist()
-    return np.fromiter(accumulate(steps, lambda z, d: min(max(z + d, -1.0), 1.0)), np.float64, len(steps))
+    return _clipped_sum(np.diff(position, prepend=position[:1]) / way)
+
+
+def _clipped_sum(steps: Array) -> Array:
+    """z of every step, shape (n,), with z + step cut off at -1 and 1, from 0 on.
+
+    So many steps from any z end at z + a, cut off where the ways from -1 and from 1 end: stretches go side by side.
+    """
+    width = isqrt(len(steps)) + 1
+    table = np.concatenate([steps, np.zeros(width**2 - len(steps))]).reshape(width, width).T
+    along = np.cumsum(table, axis=0)
+    ends = np.empty((width, 2, width))
+    state = np.repeat([[-1.0], [1.0]], width, axis=1)
+    for i, step in enumerate(table):
+        state = np.minimum(np.maximum(state + step, -1.0, out=ends[i]), 1.0, out=ends[i])
+    last = zip(along[-1].tolist(), *ends[-1].tolist(), strict=True)
+    z = list(accumulate(last, lambda z, way: min(max(z + way[0], way[1]), way[2]), initial=0.0))
+    found: Array = np.minimum(np.maximum(np.array(z[:-1]) + along, ends[:, 0]), ends[:, 1])
+    return found.T.ravel()[: len(steps)]
