@@ -22,6 +22,8 @@ FAR = 0.25
 HALVES, SMALL = 3.0, 0.02
 """So is one that is off by more half-widths than this and by more than this share."""
 WORKING_POINT = "working point"
+_OF_POWER = ("hunt-crossley", "quasi-linear-viscoelastic")
+"""Models whose K is of a power of the depth, which no other surface has."""
 
 
 @dataclass(frozen=True)
@@ -149,14 +151,14 @@ def _named(truth: Range) -> str:
 
 
 def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, ...]:
-    own = of_model(log.plan.surface, found.model, _untold_arm(log))
+    own = of_model(log.plan.surface, found.model, _untold_arm(log), found.depth)
     answers = []
     for name, p in found.parameters.items():
         if str(p.verdict) != "identified" or p.value is None or p.ci95 is None:
             continue
         if name in own:
             truth, defined = own[name], True
-        elif name in log.truth and (name == "M" or found.model != "hunt-crossley"):
+        elif name in log.truth and (name == "M" or found.model not in _OF_POWER):
             truth, defined = log.truth[name], name in log.defined
         else:
             continue

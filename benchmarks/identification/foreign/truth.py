@@ -134,8 +134,9 @@ def parameters(surface: Surface, dense: Dense, payload: float) -> tuple[dict[str
     deep = np.linspace(0, float(np.percentile(dense.depth[contact], 99)), 60)[1:]
     slope = np.gradient(surface.static(deep), deep)
     slope = np.append(slope, surface.static(deep) / deep)
-    arm = sum(k for k, _ in surface.arms)
-    late = sum(k * tau for k, tau in surface.arms)
+    steep = surface["n"] * float(deep[-1]) ** (surface["n"] - 1) if surface["Q"] else 1.0
+    arm = steep * sum(k for k, _ in surface.arms)
+    late = steep * sum(k * tau for k, tau in surface.arms)
     plain = not any(surface[name] for name in ("K2", "K3", "C", "Kp")) and not surface.arms
     k = (surface["K"],) * 2 if plain else (float(slope.min()), float(slope.max()) + arm)
     if surface["Kp"]:
@@ -147,7 +148,9 @@ def parameters(surface: Surface, dense: Dense, payload: float) -> tuple[dict[str
     return {"K": k, "B": b, "M": m}, frozenset(defined)
 
 
-def of_model(surface: Surface, model: str, arm: float = np.inf) -> dict[str, Range]:
+def of_model(
+    surface: Surface, model: str, arm: float = np.inf, depth: float | None = None
+) -> dict[str, Range]:
     """What the parameters that a model gives as its own may be where the surface is of its kind, by their names.
 
     A standard linear solid behind a spring k is one again: with Z = K + K1 s tau/(1 + s tau), the force k Z/(k + Z) has
@@ -157,13 +160,19 @@ def of_model(surface: Surface, model: str, arm: float = np.inf) -> dict[str, Ran
         surface: what is pressed on.
         model: name of the answer's.
         arm: stiffness in series that nobody told of [N/m]; the number may be the surface's or that of both.
+        depth: that the answer's stiffnesses belong to [m].
     """
-    if model == "standard-linear-solid" and len(surface.arms) == 1:
+    if model == "quasi-linear-viscoelastic" and surface["Q"]:
+        (branch, tau), *_ = surface.arms
+        steep = surface["n"] * (depth or 0.0) ** (surface["n"] - 1)
+        found = {"K": steep * surface["C"], "K1": steep * branch, "tau": tau, "n": surface["n"], "B": 0.0}
+        return {name: (value,) * 2 for name, value in found.items()}
+    if model == "standard-linear-solid" and len(surface.arms) == 1 and not surface["Q"]:
         (branch, tau), *_ = surface.arms
         low, high = (z / (1 + z / arm) for z in (surface["K"], surface["K"] + branch))
         slower = tau * (1 + branch / (surface["K"] + arm))
         return {"K": (low, surface["K"]), "K1": (high - low, branch), "tau": (tau, slower)}
-    if model == "hunt-crossley" and surface["C"]:
+    if model == "hunt-crossley" and surface["C"] and not surface.arms:
         return {"K": (surface["C"],) * 2, "n": (surface["n"],) * 2, "B": (surface["C"] * surface["D"],) * 2}
     if surface["Fc"] and model.startswith("kelvin-voigt"):
         return {"Fc": (surface["Fc"],) * 2}

@@ -165,7 +165,7 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     if contacts.payload is not None:
         force = force - contacts.payload.mass * chain(position, 2, lag.value)
     rows, spans = _rows(channels, chain, contacts)
-    origin = _origin(chain(position), rows, contacts)
+    origin = _origin(chain(position, 0, lag.value), rows, contacts)
     position = position - origin
     motion = Motion(chain, position, rows, contacts.bonded, _noise(position, rows, spans))
     touch = approach = None
