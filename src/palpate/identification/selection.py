@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.estimators.robust import Answer, answer, lag_open
 from palpate.identification.models import (
     KELVIN_VOIGT,
@@ -120,7 +121,7 @@ def _against(rich: Answer, plain: Answer, tolerance: float) -> str:
         known = half <= tolerance * abs(value) and (name != "n" or abs(value - 1) > half)
         if value <= 0 or not known:
             return f"the log does not tell its {name} ({value:.3g} +- {half:.2g})"
-    return ""
+    return unrecovered(rich)
 
 
 def _sensor_rms(found: Answer) -> float:

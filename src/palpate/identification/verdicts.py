@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.identification.estimators.fit import Fit, Prediction
+from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.estimators.robust import Answer
 from palpate.identification.evidence import stiffness_of
 from palpate.identification.prior import LAG, Lag
@@ -72,6 +73,8 @@ def verdicts(
         parameters = {name: _refused(p, _UNSIGNED) for name, p in parameters.items()}
     if found.fit.model.of_power and choice.problem.contacts.bonded:
         parameters = {name: _refused(p, _UNTOUCHED) for name, p in parameters.items()}
+    if reason := unrecovered(found):
+        parameters = {name: _refused(p, reason) for name, p in parameters.items()}
     return parameters, _warnings(parameters, found, lag, terms)
 
 
