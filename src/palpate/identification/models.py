@@ -209,8 +209,8 @@ def standard_linear_solid(motion: Motion) -> Model:
 def quasi_linear(motion: Motion) -> Model:
     """Tissue that stiffens and relaxes: f = K u + B u' + K1 y with u = D/n (d/D)^n, and y' + y/tau = u'.
 
-    The elastic force is a power of the depth, and a share of it relaxes. At the penetration D, the deepest of the log,
-    u' is d': K, B and K1 are what a straight spring, damper and branch have there.
+    The elastic force is a power of the depth, and a share of it relaxes. At the penetration D, near the deepest of the
+    log, u' is d': K, B and K1 are what a straight spring, damper and branch have there.
 
     Source: Y. C. Fung, Biomechanics: Mechanical Properties of Living Tissues, 1993, ch. 7, with one relaxation time.
     """
