@@ -48,7 +48,9 @@ def test_tissue_is_recognised_and_each_interval_holds(seed):
     truths = {"K": steep, "K1": SHARE * steep, "n": N, "tau": TAU}
     assert all(holds(found.parameters[name], truth) for name, truth in truths.items())
     assert found.parameters["K"].unit == found.parameters["K1"].unit == "N/m"
-    assert 2.5e-3 < found.to_json()["depth_m"] < 3e-3  # the deepest is 3 mm, counted from where the force is first seen
+    assert (
+        2.5e-3 < found.to_json()["depth_m"] < 3e-3
+    )  # the deepest is 3 mm, counted from where the force is first seen
     assert "at a penetration of" in found.parameters["K"].reason
 
 

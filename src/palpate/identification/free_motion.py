@@ -150,7 +150,8 @@ def _share(force: Array, position: Array, slopes: tuple[float, float], bound: fl
     an inertia is held against the steepest: it is in the force over the whole range, and takes from the contact's.
 
     Args:
-        force, position: shape (n,).
+        force: shape (n,).
+        position: shape (n,).
         slopes: of the contact, over all of it and the steepest [N/m].
         bound: as `_slope` has it.
         none: as `free_motion_of` has it.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from palpate.identification.estimators.robust import Answer
@@ -20,7 +22,7 @@ def unrecovered(found: Answer) -> str:
     stiffness, branch = found["K"], found["K1"]
     if stiffness <= 0 or branch <= 0:
         return ""
-    gaps = [after[0] - before[1] for before, after in zip(spans, spans[1:], strict=False)]
+    gaps = [after[0] - before[1] for before, after in pairwise(spans)]
     creep = found["tau"] * (1 + branch / stiffness)
     left = float(np.exp(-min(gaps) * found.problem.motion.chain.dt / creep))
     if left <= found.half_of("K1") / branch:
