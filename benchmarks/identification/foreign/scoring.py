@@ -22,8 +22,6 @@ FAR = 0.25
 HALVES, SMALL = 3.0, 0.02
 """So is one that is off by more half-widths than this and by more than this share."""
 WORKING_POINT = "working point"
-_OF_POWER = ("hunt-crossley", "quasi-linear-viscoelastic")
-"""Models whose K is of a power of the depth, which no other surface has."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +156,7 @@ def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, 
             continue
         if name in own:
             truth, defined = own[name], True
-        elif name in log.truth and (name == "M" or found.model not in _OF_POWER):
+        elif name in log.truth and (name == "M" or found.model != "hunt-crossley"):
             truth, defined = log.truth[name], name in log.defined
         else:
             continue

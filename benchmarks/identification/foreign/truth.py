@@ -162,11 +162,8 @@ def of_model(
         arm: stiffness in series that nobody told of [N/m]; the number may be the surface's or that of both.
         depth: that the answer's stiffnesses belong to [m].
     """
-    if model == "quasi-linear-viscoelastic" and surface["Q"]:
-        (branch, tau), *_ = surface.arms
-        steep = surface["n"] * (depth or 0.0) ** (surface["n"] - 1)
-        found = {"K": steep * surface["C"], "K1": steep * branch, "tau": tau, "n": surface["n"], "B": 0.0}
-        return {name: (value,) * 2 for name, value in found.items()}
+    if model == "quasi-linear-viscoelastic" and surface["Q"] and depth:
+        return _tissue(surface, arm, depth)
     if model == "standard-linear-solid" and len(surface.arms) == 1 and not surface["Q"]:
         (branch, tau), *_ = surface.arms
         low, high = (z / (1 + z / arm) for z in (surface["K"], surface["K"] + branch))
@@ -177,3 +174,17 @@ def of_model(
     if surface["Fc"] and model.startswith("kelvin-voigt"):
         return {"Fc": (surface["Fc"],) * 2}
     return {}
+
+
+def _tissue(surface: Surface, arm: float, depth: float) -> dict[str, Range]:
+    """The same of tissue at a depth [m], its branch as that of a standard linear solid of the tangents there.
+
+    Behind a spring k the exponent d ln F / d ln d of F = C s^n, d = s + F/k, falls towards 1.
+    """
+    (branch, tau), *_ = surface.arms
+    n = surface["n"]
+    steep = n * depth ** (n - 1)
+    own = Surface("standard-linear", {"K": steep * surface["C"]}, ((steep * branch, tau),))
+    give = steep * (surface["C"] + branch) / (n * arm)
+    bent = (1 + give) / (1 / n + give)
+    return {**of_model(own, "standard-linear-solid", arm), "n": (bent, n), "B": (0.0, 0.0)}
