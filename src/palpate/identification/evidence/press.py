@@ -26,6 +26,8 @@ _WIDE = 0.15
 _FULL = 0.95
 """Share of the force at which a way in is over: what is left of it is rounding off."""
 _FEWEST = 6
+_LINE = 4
+"""Readings that a slope with a bend and a noise of its own needs."""
 _STILL = 0.02
 """Share of the highest speed below which a probe rests: encoders and loops leave a per cent or so."""
 _SHOWN = 400
@@ -33,12 +35,16 @@ _SHOWN = 400
 
 @dataclass(frozen=True)
 class Stroke:
-    """One way in: depth [m], speed [m/s], force [N] and time [s], shape (n,)."""
+    """One way in: depth [m], speed [m/s], force [N] and time [s], shape (n,); depth and force as they were read.
+
+    What was read has an advance of its own, shape (2, k): behind a filter a way in is as long as the filter at least.
+    """
 
     depth: Array
     speed: Array
     force: Array
     time: Array
+    read: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -80,8 +86,25 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
         begin = s.first + int(np.argmin(depth[s.first : top]))
         if top - begin >= _FEWEST:
             begin, top = _one_way(depth, channels[1], begin, top, reach)
-            found.append(_sharpened(Stroke(*(own[begin:top] for own in channels)), motion.chain))
+            stroke = Stroke(*(own[begin:top] for own in channels))
+            found.append(replace(_sharpened(stroke, motion.chain), read=_as_read(problem, lag, stroke)))
     return found
+
+
+def _as_read(problem: Problem, lag: float, stroke: Stroke) -> Array | None:
+    """Depth [m] and force [N] of the same way in before any filter, shape (2, k); None where they are not known."""
+    chain, force = problem.motion.chain, problem.read
+    if force is None or not isinstance(chain, Chain):
+        return None
+    first, last = (int(np.clip(t / chain.dt, 0, len(force) - 1)) for t in stroke.time[[0, -1]])
+    at = np.arange(first, last + 1) - lag / chain.dt
+    depth: Array = np.interp(at, np.arange(len(force), dtype=np.float64), problem.motion.position)
+    top = int(np.argmax(depth)) + 1
+    begin, top = _one_way(depth, np.gradient(depth), int(np.argmin(depth[:top])), top, float(np.ptp(depth)))
+    steps = np.diff(depth[begin:top])
+    if np.count_nonzero(steps > _STILL * steps.max(initial=0.0)) < _LINE:
+        top = begin  # a jump between readings
+    return np.stack([depth, force[first : last + 1]])[:, begin:top]
 
 
 def _sharpened(stroke: Stroke, chain: object) -> Stroke:
@@ -131,10 +154,10 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
     """Slope in the upper part of the force; None without a way in that rises.
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed. Its
-    interval has both, the scatter of each way in, the change of the slope over the range, and the variance between
-    ways in (a random effect, Student's t).
+    interval has both, the scatter of each way in, the change of the slope over the range, what it differs by from the
+    slope of the channels as they were read, and the variance between ways in (a random effect, Student's t).
     """
-    slopes, variances, rises, changes, speeds = [], [], [], [], []
+    slopes, variances, rises, changes, speeds, filters = [], [], [], [], [], []
     for stroke in strokes:
         low, high = np.percentile(stroke.force, [2, 98])
         upper = stroke.force > low + UPPER * (high - low)
@@ -148,6 +171,7 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
         variances.append(variance)
         changes.append(change)
         speeds.append(abs(slope - at_rest) / 2)
+        filters.append(_by_filter(stroke, slope, variance))
         rises.append(float(stroke.time[-1] - stroke.time[0]))
     if not slopes:
         return None
@@ -156,9 +180,39 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
         "repetition" if len(slopes) > 1 else "noise": mean.half,
         "curvature": float(np.mean(changes)),
         "speed": float(np.mean(speeds)),
+        "filter": float(np.mean(filters)),
     }
     half = float(np.sqrt(sum(part**2 for part in causes.values())))
     return Slope(mean.value, half, float(np.mean(rises)), tuple(slopes), causes)
+
+
+def _by_filter(stroke: Stroke, slope: float, variance: float) -> float:
+    """By how much a slope contradicts that of the same way in before any filter [N/m]: beyond their 95 % interval.
+
+    All of it, if the way in has too few readings for a slope of its own: its shape is then the filter's.
+    """
+    if stroke.read is None:
+        return 0.0
+    depth, force = stroke.read
+    if len(depth) < _LINE:
+        return abs(slope)
+    low, high = np.percentile(force, [2, 98])
+    first = int(np.argmax(force > low + UPPER * (high - low)))
+    depth, force = depth[first:], force[first:]
+    if len(depth) < _LINE or np.ptp(depth) <= 0:
+        return abs(slope)
+    own, doubt, _ = _line(depth, force)
+    return max(abs(own - slope) - 1.96 * float(np.sqrt(variance + doubt)), 0.0)
+
+
+def unseen(problem: Problem) -> float:
+    """Share of the position's range in which no reading was taken, over the rest of the range.
+
+    Where a log jumps over it, the touch may lie in it.
+    """
+    position = np.sort(problem.motion.position[problem.in_contact])
+    gap = max(float(np.diff(position).max(initial=0.0)) - problem.motion.noise.count, 0.0)
+    return gap / max(float(np.ptp(position)) - gap, 1e-3 * gap, 1e-300)
 
 
 def _line(x: Array, f: Array) -> tuple[float, float, float]:

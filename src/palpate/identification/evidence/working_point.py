@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import Slope, slope_of, strokes_in
+from palpate.identification.evidence.press import Slope, slope_of, strokes_in, unseen
 from palpate.identification.in_series import slope_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
@@ -56,6 +56,9 @@ def working_point(
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
         budget = octave.budget
+    if problem.contacts.bonded and not options.bonded:  # nothing tells that the first reading is in contact
+        budget = {**budget, "unseen way": abs(value) * unseen(problem)}
+        half = float(np.hypot(half, budget["unseen way"]))
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     force, depth = problem.force[inside], problem.motion.moved(0, lag)[inside]
     rest = 0.0 if problem.counted else problem.contacts.resting
