@@ -15,7 +15,8 @@ Rows = NDArray[np.bool_]
 
 FLAT = 0.4
 """Slope in the air over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 % of
-its force has 0.44 there."""
+its force has 0.44 there. `benchmarks/identification/free_motion_constants.py` shows which values do as well, of this
+and of the constants below."""
 _SHARES = 0.5 ** (np.arange(2, 13) / 2)
 """Of the position's range that may lie in the air, from a half to a sixty-fourth."""
 _TWICE = 2.0
