@@ -5,21 +5,22 @@
 
 FOLDER holds lattice_probe/, mr_damper/, silverbox/ and skin_indentation/ as their authors published them; a log that is
 not there is left out, and said. With --pages the page of each is written there. There is no truth: the table shows what
-is said, and what limits it. The presses on skin are pooled last, whose scatter over their own intervals is chi2/dof.
+is said, and what limits it. Of the logs that hold the same press several times, each piece is then identified by
+itself: how the answers scatter over their own intervals is chi2/dof.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.identification import Identification, identify
+from palpate.identification import Identification, Parameter, identify
 from palpate.logs import read_log
 from palpate.report.identification.page import write_page
 from palpate.report.identification.source import Source, sha256_of
@@ -96,13 +97,71 @@ def lag(found: Identification) -> str:
     return f"{1e3 * found.lag.value:.3g} ± {1e3 * found.lag.bound:.2g} ms, {found.lag.kind}"
 
 
+@dataclass(frozen=True)
+class Repeats:
+    """Pieces of one log that are the same press once more.
+
+    Args:
+        log: which.
+        length: of a piece [s]; each begins where the one before ends, at the log's first row.
+        count: of pieces.
+    """
+
+    log: Measured
+    length: float
+    count: int
+
+    def found(self, folder: Path) -> list[Identification]:
+        """Each piece identified by itself; those without a working point are left out."""
+        every = []
+        for i in range(self.count):
+            span = {"start": i * self.length, "end": (i + 1) * self.length}
+            own = identify(read_log(folder / self.log.path, **self.log.columns, **span), **self.log.told)
+            every += [own] if own.working_point is not None else []
+        return every
+
+
+_ONE_CARD = {"bonded": True, "lag": 0.0}
+"""Force and position of the damper are read by one card at one instant."""
+REPEATS = (
+    Repeats(LOGS[0], 38.06, 9),
+    Repeats(replace(LOGS[1], told=_ONE_CARD), 3.0, 5),
+    Repeats(replace(LOGS[3], told=_ONE_CARD), 3.0, 5),
+)
+CHANCE = ("noise", "position noise", "blocks", "repetition")
+"""Causes that differ from press to press. The others (a lag, a curve, a model that is not the surface's) are the same
+in each, and are in the interval without making the answers scatter."""
+
+
 def chi2(found: Sequence[Identification]) -> str:
-    """Scatter of the working points of presses over what their own intervals make of it, over n - 1."""
-    points = [own.working_point.stiffness for own in found if own.working_point is not None]
+    """Scatter of the working points, and of the stiffnesses that are given, over their intervals: chi2 / dof.
+
+    First over the part of each interval that differs between repeats, which is about 1 if it is right; then over the
+    whole of it.
+    """
+    rows = [("working point", [own.working_point.stiffness for own in found if own.working_point])]
+    rows += [("K", [p for own in found if (p := own.parameters.get("K")) and p.verdict == "identified"])]
+    return "; ".join(_scatter(name, points) for name, points in rows if len(points) > 1)
+
+
+def _scatter(name: str, points: Sequence[Parameter]) -> str:
     value = np.array([p.value for p in points])
-    std = np.array([p.std for p in points])
+    whole = np.array([p.std for p in points])
+    chance = np.array(
+        [np.hypot.reduce([p.budget.get(cause, 0.0) for cause in CHANCE]) / 1.96 for p in points]
+    )
+    mean, between = float(value.mean()), float(np.std(value, ddof=1))
+    return (
+        f"{name} {mean:.4g} of {len(value)}, chi2/dof {_over(value, chance):.2g} over chance, {_over(value, whole):.2g}"
+        f" over all; scatter {between / abs(mean):.1%}, chance {np.sqrt(np.mean(chance**2)) / abs(mean):.1%},"
+        f" all {np.sqrt(np.mean(whole**2)) / abs(mean):.1%}"
+    )
+
+
+def _over(value: np.ndarray, std: np.ndarray) -> float:
+    """Chi2 / dof about the weighted mean."""
     mean = float((value / std**2).sum() / (1 / std**2).sum())
-    return f"{float(((value - mean) ** 2 / std**2).sum()) / max(len(value) - 1, 1):.2g} of {len(value)}"
+    return float(((value - mean) ** 2 / std**2).sum()) / (len(value) - 1)
 
 
 def main() -> None:
@@ -129,8 +188,12 @@ def main() -> None:
         if asked.pages:
             asked.pages.mkdir(exist_ok=True)
             write_page(found, asked.pages / f"{path.stem}.html", Source(str(path), sha256=sha256_of(path)))
+    print("\nrepeats, each piece of a log by itself:")
+    for own in REPEATS:
+        if (asked.folder / own.log.path).is_file():
+            print(f"  {Path(own.log.path).name}: {chi2(own.found(asked.folder))}", flush=True)
     if skin:
-        print(f"\nskin, chi2/dof of the working point over all presses, which differ in force: {chi2(skin)}")
+        print(f"  skin, presses of different force, not the same again: {chi2(skin)}")
 
 
 if __name__ == "__main__":

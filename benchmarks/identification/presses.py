@@ -10,7 +10,7 @@ import numpy as np
 from palpate.bench import build, load
 from palpate.bench.experiments.tables import changed
 from palpate.excitation.fisher_information import ForceChain, bound, phase_std
-from palpate.identification import identify
+from palpate.identification import Identification, identify
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 
@@ -23,6 +23,8 @@ CHIRP_START = (0.454, 0.0, 0.0208)
 """Start poses that bring the last link along the normal in contact: the wrist's coarse encoder (2000 counts) then moves
 the tip's position along the normal to second order only."""
 THESIS_START = (0.454, 0.0, 0.0)
+SETTLED = 10.0
+"""Time constants of a low-pass after which it has forgotten the touch."""
 
 
 @dataclass(frozen=True)
@@ -113,12 +115,11 @@ def trial(condition: Condition, seed: int) -> Trial:
     estimate, traces = found.estimate, found.traces
     if estimate is None or traces is None:
         raise RuntimeError(f"seed {seed}: nothing was found to identify ({found.codes})")
-    span = float(traces.fitted_time[0]), float(traces.fitted_time[-1])
     return Trial(
         truth | {"lag": lag},
         dict(zip(estimate.names, estimate.theta.tolist(), strict=True)),
         dict(zip(estimate.names, estimate.std.tolist(), strict=True)),
-        _bound(record, truth, low_pass, condition, span),
+        _bound(record, truth, low_pass, condition, _in_contact(found, low_pass)),
         {name: str(p.verdict) for name, p in found.parameters.items()},
         {name: p.ci95 for name, p in found.parameters.items() if p.ci95},
         found.codes,
@@ -132,6 +133,17 @@ def _mass(condition: Condition, truth: float, seed: int) -> tuple[float, float] 
     if condition.mass == "fixed":
         return truth, 0.0
     return float(np.random.default_rng([seed, 481]).normal(truth, truth / 2)), truth / 2
+
+
+def _in_contact(found: Identification, low_pass: LowPass) -> tuple[float, float]:
+    """First and last instant at which the sensor feels nothing but the contact [s]: what least squares is fitted to.
+
+    In the air the force does not follow the position, as the bound's model would have it.
+    """
+    assert found.traces is not None
+    touched, _ = found.contacts[0]
+    first, last = found.traces.fitted_time[[0, -1]]
+    return max(float(first), touched + SETTLED / low_pass.decay), float(last)
 
 
 def _bound(

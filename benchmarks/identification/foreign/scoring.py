@@ -149,7 +149,7 @@ def _named(truth: Range) -> str:
 
 
 def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, ...]:
-    own = of_model(log.plan.surface, found.model, _untold_arm(log))
+    own = of_model(log.plan.surface, found.model, _untold_arm(log), found.depth)
     answers = []
     for name, p in found.parameters.items():
         if str(p.verdict) != "identified" or p.value is None or p.ci95 is None:

@@ -1,12 +1,13 @@
 """What is pressed on: a sum of elements in parallel, of which a surface has some, and the contact with it.
 
-    F = M a + B v + K s + K2 s^2 + K3 s^3 + C s^n (1 + D v) + Fc z + Kp (s - s_p) + sum of arms
+    F = M a + B v + K s + K2 s^2 + K3 s^3 + C s^n (1 + D v) + Fc z + Kp (s - s_p) + sum of arms(s) or arms(s^n)
 
 s is how deep the surface is dented [m], v and a its rates. The elements and where they are from: Hunt and Crossley
 (1975) for C s^n (1 + D v); Dahl (1968), dz/ds = (1 - z sign v) / x_d, for the friction; linear hardening for the
-plastic part, which yields at Fy + H s_p; Maxwell's spring and dashpot in series for each arm. The contact is
-one-sided: the probe pushes and never pulls. Where it would have to pull it leaves, and the surface comes back by
-itself, as its own law with F = 0 says, until it meets the probe again.
+plastic part, which yields at Fy + H s_p; Maxwell's spring and dashpot in series for each arm, of the depth or, as in
+tissue that stiffens and relaxes (Q = 1; Fung 1993, quasi-linear), of its power. The contact is one-sided: the probe
+pushes and never pulls. Where it would have to pull it leaves, and the surface comes back by itself, as its own law with
+F = 0 says, until it meets the probe again.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-ELEMENTS = ("M", "B", "K", "K2", "K3", "C", "n", "D", "Fc", "x_d", "Kp", "Fy", "H")
+ELEMENTS = ("M", "B", "K", "K2", "K3", "C", "n", "D", "Fc", "x_d", "Kp", "Fy", "H", "Q")
+_ELEMENTS = len(ELEMENTS)
 ARMS = 4
 _BOUNCE = 2e-3
 """Half-sine of this length [s] in which the momentum of a surface's mass is handed over when the probe meets it."""
@@ -33,7 +35,7 @@ class Surface:
     Args:
         name: its kind.
         elements: of ELEMENTS, those that it has, in SI units.
-        arms: stiffness [N/m] and time [s] of each Maxwell arm.
+        arms: stiffness [N/m, of a power N/m^n] and time [s] of each Maxwell arm.
         glued: whether the probe is fixed to it, so that it may pull.
     """
 
@@ -47,7 +49,7 @@ class Surface:
 
     @property
     def numbers(self) -> Array:
-        """What the compiled law takes: the elements, then the arms, shape (13 + 2 ARMS,)."""
+        """What the compiled law takes: the elements, then the arms, shape (14 + 2 ARMS,)."""
         own = [self[name] for name in ELEMENTS]
         arms = [*self.arms, *[(0.0, 1.0)] * (ARMS - len(self.arms))]
         return np.array([*own, *np.ravel(arms)])
@@ -90,7 +92,7 @@ class Touched:
 @njit(cache=True)
 def _law(p, q, s0, s, v, dt, q_new):
     """Force of all elements but the mass when the surface goes from s0 to s; their new state goes to q_new."""
-    _, b, k, k2, k3, c, n, d, fc, x_d, kp, fy, h = p[:13]
+    _, b, k, k2, k3, c, n, d, fc, x_d, kp, fy, h, quasi = p[:_ELEMENTS]
     force = b * v + s * (k + s * (k2 + s * k3))
     ds = s - s0
     if c > 0.0 and s > 0.0:
@@ -104,12 +106,13 @@ def _law(p, q, s0, s, v, dt, q_new):
         if kp * (s - q[1]) > fy + h * q[1]:
             q_new[1] = (kp * s - fy) / (kp + h)
         force += kp * (s - q_new[1])
+    du = max(s, 0.0) ** n - max(s0, 0.0) ** n if quasi > 0.0 else ds
     for i in range(ARMS):
-        stiffness = p[13 + 2 * i]
+        stiffness = p[_ELEMENTS + 2 * i]
         if stiffness > 0.0:
-            tau = p[14 + 2 * i]
+            tau = p[_ELEMENTS + 1 + 2 * i]
             fade = np.exp(-dt / tau)
-            q_new[2 + i] = q[2 + i] * fade + stiffness * (ds / dt) * tau * (1.0 - fade)
+            q_new[2 + i] = q[2 + i] * fade + stiffness * (du / dt) * tau * (1.0 - fade)
             force += q_new[2 + i]
     return force
 
@@ -305,6 +308,13 @@ def _plastic(name: str, k: float, b: float, rng: np.random.Generator) -> Surface
     )
 
 
+def _tissue(name: str, k: float, b: float, rng: np.random.Generator) -> Surface:
+    n, depth = rng.uniform(1.3, 2.0), 3e-3
+    own = k * depth ** (1 - n)
+    arm = own * rng.uniform(0.3, 1.5), float(np.exp(rng.uniform(np.log(0.03), np.log(1.0))))
+    return Surface(name, {"C": own, "n": n, "Q": 1.0}, (arm,))
+
+
 _MAKERS = {
     "kelvin-voigt": _kelvin_voigt,
     "mass": _with_mass,
@@ -315,5 +325,6 @@ _MAKERS = {
     "falling": _falling,
     "friction": _friction,
     "plastic": _plastic,
+    "tissue": _tissue,
 }
 SURFACES = tuple(_MAKERS)

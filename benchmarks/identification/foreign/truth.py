@@ -154,8 +154,9 @@ def parameters(surface: Surface, dense: Dense, payload: float) -> tuple[dict[str
     deep = np.linspace(0, float(np.percentile(dense.depth[contact], 99)), 60)[1:]
     slope = np.gradient(surface.static(deep), deep)
     slope = np.append(slope, surface.static(deep) / deep)
-    arm = sum(k for k, _ in surface.arms)
-    late = sum(k * tau for k, tau in surface.arms)
+    steep = surface["n"] * float(deep[-1]) ** (surface["n"] - 1) if surface["Q"] else 1.0
+    arm = steep * sum(k for k, _ in surface.arms)
+    late = steep * sum(k * tau for k, tau in surface.arms)
     plain = not any(surface[name] for name in ("K2", "K3", "C", "Kp")) and not surface.arms
     k = (surface["K"],) * 2 if plain else (float(slope.min()), float(slope.max()) + arm)
     if surface["Kp"]:
@@ -167,7 +168,9 @@ def parameters(surface: Surface, dense: Dense, payload: float) -> tuple[dict[str
     return {"K": k, "B": b, "M": m}, frozenset(defined)
 
 
-def of_model(surface: Surface, model: str, arm: float = np.inf) -> dict[str, Range]:
+def of_model(
+    surface: Surface, model: str, arm: float = np.inf, depth: float | None = None
+) -> dict[str, Range]:
     """What the parameters that a model gives as its own may be where the surface is of its kind, by their names.
 
     A standard linear solid behind a spring k is one again: with Z = K + K1 s tau/(1 + s tau), the force k Z/(k + Z) has
@@ -177,14 +180,31 @@ def of_model(surface: Surface, model: str, arm: float = np.inf) -> dict[str, Ran
         surface: what is pressed on.
         model: name of the answer's.
         arm: stiffness in series that nobody told of [N/m]; the number may be the surface's or that of both.
+        depth: that the answer's stiffnesses belong to [m].
     """
-    if model == "standard-linear-solid" and len(surface.arms) == 1:
+    if model == "quasi-linear-viscoelastic" and surface["Q"] and depth:
+        return _tissue(surface, arm, depth)
+    if model == "standard-linear-solid" and len(surface.arms) == 1 and not surface["Q"]:
         (branch, tau), *_ = surface.arms
         low, high = (z / (1 + z / arm) for z in (surface["K"], surface["K"] + branch))
         slower = tau * (1 + branch / (surface["K"] + arm))
         return {"K": (low, surface["K"]), "K1": (high - low, branch), "tau": (tau, slower)}
-    if model == "hunt-crossley" and surface["C"]:
+    if model == "hunt-crossley" and surface["C"] and not surface.arms:
         return {"K": (surface["C"],) * 2, "n": (surface["n"],) * 2, "B": (surface["C"] * surface["D"],) * 2}
     if surface["Fc"] and model.startswith("kelvin-voigt"):
         return {"Fc": (surface["Fc"],) * 2}
     return {}
+
+
+def _tissue(surface: Surface, arm: float, depth: float) -> dict[str, Range]:
+    """The same of tissue at a depth [m], its branch as that of a standard linear solid of the tangents there.
+
+    Behind a spring k the exponent d ln F / d ln d of F = C s^n, d = s + F/k, falls towards 1.
+    """
+    (branch, tau), *_ = surface.arms
+    n = surface["n"]
+    steep = n * depth ** (n - 1)
+    own = Surface("standard-linear", {"K": steep * surface["C"]}, ((steep * branch, tau),))
+    give = steep * (surface["C"] + branch) / (n * arm)
+    bent = (1 + give) / (1 / n + give)
+    return {**of_model(own, "standard-linear-solid", arm), "n": (bent, n), "B": (0.0, 0.0)}

@@ -33,7 +33,8 @@ class ModelOptions:
     Parameters
     ----------
     model
-        kelvin-voigt, kelvin-voigt-mass, standard-linear-solid or hunt-crossley; chosen if not given.
+        kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic; chosen if
+        not given.
     lag
         How much later the force is read than the position, SECONDS or SECONDS:STD, if it is calibrated.
     force_filter

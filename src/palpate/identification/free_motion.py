@@ -15,7 +15,8 @@ Rows = NDArray[np.bool_]
 
 FLAT = 0.4
 """Slope in the air over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 % of
-its force has 0.44 there."""
+its force has 0.44 there. `benchmarks/identification/free_motion_constants.py` shows which values do as well, of this
+and of the constants below."""
 _SHARES = 0.5 ** (np.arange(2, 13) / 2)
 """Of the position's range that may lie in the air, from a half to a sixty-fourth."""
 _TWICE = 2.0
@@ -84,10 +85,11 @@ def free_motion_of(
     size = max(len(force) // _MOST, 1)
     force, position = block_means(force, size), block_means(position, size)
     slope = _in_contact(force, position, ends)
+    steep = max(abs(slope), *(_steepest(force, way * position) for way in (1.0, -1.0)))
     found = [0.0, 0.0]
     for bound in (np.inf, _OUTLYING):
         if slope and not any(found):
-            found = [_share(force, way * position, way * slope, bound, none) for way in (1.0, -1.0)]
+            found = [_share(force, way * position, (way * slope, steep), bound, none) for way in (1.0, -1.0)]
     way = 1.0 if found[0] >= found[1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
         return None
@@ -134,11 +136,28 @@ def _limit(position: Array, share: float) -> float:
     return float(bottom + share * (top - bottom))
 
 
-def _share(force: Array, position: Array, slope: float, bound: float, none: bool) -> float:
+def _steepest(force: Array, position: Array) -> float:
+    """The largest slope at the lower end of a position's range that its interval leaves, of any share [N/m]."""
+    white = white_noise(position)
+    stays = [stays_in(position < _limit(position, share)) for share in _SHARES]
+    found = [_slope(force, position, own, white, np.inf) for own in stays if own]
+    return max((abs(own[0]) - own[1] for own in found if own is not None), default=0.0)
+
+
+def _share(force: Array, position: Array, slopes: tuple[float, float], bound: float, none: bool) -> float:
     """The largest share of the position's range, from its lower end, over which the force stays; 0 if over none.
 
-    Its slope is clearly below that of the contact there, or over the next larger share, which may hold a touch.
+    Its slope is clearly below that of the contact there, or over the next larger share, which may hold a touch. That of
+    an inertia is held against the steepest: it is in the force over the whole range, and takes from the contact's.
+
+    Args:
+        force: shape (n,).
+        position: shape (n,).
+        slopes: of the contact, over all of it and the steepest [N/m].
+        bound: as `_slope` has it.
+        none: as `free_motion_of` has it.
     """
+    slope, steep = slopes
     clear, white = False, white_noise(position)
     for share in _SHARES:
         stays = stays_in(position < _limit(position, share))
@@ -147,7 +166,8 @@ def _share(force: Array, position: Array, slope: float, bound: float, none: bool
             continue
         own, doubt = found[0] / slope, found[1] / abs(slope)
         before, clear = clear, own + doubt < FLAT
-        if (clear or before) and (-FLAT < own - doubt <= 0 or not (none or abs(own) >= FLAT)):
+        falls = (found[0] * np.sign(slope) - found[1]) / steep
+        if (clear or before) and (-FLAT < falls <= 0 or not (none or abs(found[0]) >= FLAT * steep)):
             return float(share)
     return 0.0
 

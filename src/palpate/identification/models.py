@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
+from math import isqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,6 +120,7 @@ class Model:
         columns: from a motion, the knobs and the force's lag [s] to the columns, each of shape (m,).
         knobs: what it is not linear in, scaled to the log at hand.
         positive: parameters that no passive surface has below zero.
+        depth: penetration that the stiffnesses and the damping belong to, where they grow with it [m]; None if not.
     """
 
     name: str
@@ -126,6 +128,7 @@ class Model:
     columns: Columns
     knobs: tuple[Knob, ...] = ()
     positive: tuple[str, ...] = ("K", "B", "M", "Fc")
+    depth: float | None = None
 
     @property
     def of_position(self) -> bool:
@@ -162,9 +165,13 @@ def _deep(motion: Motion, knobs: dict[str, float]) -> Array:
 
 def _standard_linear_solid(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
     """f = K x + B v + K1 y, where the spring K1 of the Maxwell branch is stretched by y: y' + y/tau = x'."""
-    d = _deep(motion, knobs)
-    branch = d - d[0] - low_pass_once(d - d[0], knobs["tau"], motion.chain.dt)
-    columns = [motion.filtered(d, k, lag) for k in (0, 1)]
+    return _relaxing(motion, _deep(motion, knobs), knobs["tau"], lag)
+
+
+def _relaxing(motion: Motion, u: Array, tau: float, lag: float) -> list[Array]:
+    """Columns of a spring, a damper and a Maxwell branch that are stretched by u, shape (n,)."""
+    branch = u - u[0] - low_pass_once(u - u[0], tau, motion.chain.dt)
+    columns = [motion.filtered(u, k, lag) for k in (0, 1)]
     return [*columns, motion.filtered(branch, 0, lag), motion.ones]
 
 
@@ -184,29 +191,64 @@ _TURNS = 6.0
 _SHORTEST = 1e-3
 """Share of the position's range, where it has no noise."""
 
-NAMES = ("kelvin-voigt", "kelvin-voigt-mass", "standard-linear-solid", "hunt-crossley")
+NAMES = (
+    "kelvin-voigt",
+    "kelvin-voigt-mass",
+    "standard-linear-solid",
+    "hunt-crossley",
+    "quasi-linear-viscoelastic",
+)
 
 
 def standard_linear_solid(motion: Motion) -> Model:
-    """The standard linear solid with a relaxation time that this log can show: between the filter's and the log's."""
+    """The standard linear solid."""
+    knobs = (_time(motion),) if motion.bonded else (_time(motion), _touch(motion))
+    return Model(NAMES[2], _RELAXING, _standard_linear_solid, knobs, _PASSIVE)
+
+
+def quasi_linear(motion: Motion) -> Model:
+    """Tissue that stiffens and relaxes: f = K u + B u' + K1 y with u = D/n (d/D)^n, and y' + y/tau = u'.
+
+    The elastic force is a power of the depth, and a share of it relaxes. At the penetration D, near the deepest of the
+    log, u' is d': K, B and K1 are what a straight spring, damper and branch have there.
+
+    Source: Y. C. Fung, Biomechanics: Mechanical Properties of Living Tissues, 1993, ch. 7, with one relaxation time.
+    """
+    deepest = float(motion.moved(0, 0.0).max())
+
+    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+        n = knobs["n"]
+        u = deepest / n * (np.maximum(motion.position - knobs["x0"], 0.0) / deepest) ** n
+        return _relaxing(motion, u, knobs["tau"], lag)
+
+    knobs = (_POWER, _time(motion), _touch(motion))
+    return Model(NAMES[4], _RELAXING, columns, knobs, _PASSIVE, deepest)
+
+
+_RELAXING = ("K", "B", "K1", "offset")
+_PASSIVE = ("K", "B", "K1", "Fc")
+_POWER = Knob("n", (1.5,), 0.5, 5.0, 1e-3)
+
+
+def _time(motion: Motion) -> Knob:
+    """A relaxation time that this log can show: between the filter's and the log's."""
     shortest, longest = 2 / motion.chain.rate, motion.duration
     starts = tuple(np.geomspace(3 * shortest, longest / 3, 4))
-    tau = Knob("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
-    knobs = (tau,) if motion.bonded else (tau, _touch(motion))
-    linear = ("K", "B", "K1", "offset")
-    return Model("standard-linear-solid", linear, _standard_linear_solid, knobs, ("K", "B", "K1", "Fc"))
+    return Knob("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
 
 
 def _touch(motion: Motion) -> Knob:
-    """Where the surface is, about the position at which the force was first seen."""
+    """Where the surface is, about the position at which the force was first seen, and on the way there at the least."""
     depth = float(np.max(motion.position)) or 1.0
-    return Knob("x0", (-0.02 * depth,), -1.0 * depth, 0.5 * depth, 1e-4 * depth)
+    least = min(-depth, float(np.min(motion.position)))
+    return Knob("x0", (-0.02 * depth,), least, 0.5 * depth, 1e-4 * depth)
 
 
 def hunt_crossley(motion: Motion) -> Model:
     """Hunt and Crossley's contact (1975): stiffness and damping both grow with d^n, so the force starts from zero."""
-    n = Knob("n", (1.5,), 0.5, 5.0, 1e-3)
-    return Model("hunt-crossley", ("K", "B", "offset"), _hunt_crossley, (n, _touch(motion)), ("K", "B", "Fc"))
+    return Model(
+        "hunt-crossley", ("K", "B", "offset"), _hunt_crossley, (_POWER, _touch(motion)), ("K", "B", "Fc")
+    )
 
 
 def at_rest_before(model: Model) -> Model:
@@ -240,5 +282,22 @@ def direction(motion: Motion) -> Array:
     """
     noise, position = motion.noise, motion.position
     way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), 1e-300)
-    steps = (np.diff(position, prepend=position[:1]) / way).tolist()
-    return np.fromiter(accumulate(steps, lambda z, d: min(max(z + d, -1.0), 1.0)), np.float64, len(steps))
+    return _clipped_sum(np.diff(position, prepend=position[:1]) / way)
+
+
+def _clipped_sum(steps: Array) -> Array:
+    """z of every step, shape (n,), with z + step cut off at -1 and 1, from 0 on.
+
+    So many steps from any z end at z + a, cut off where the ways from -1 and from 1 end: stretches go side by side.
+    """
+    width = isqrt(len(steps)) + 1
+    table = np.concatenate([steps, np.zeros(width**2 - len(steps))]).reshape(width, width).T
+    along = np.cumsum(table, axis=0)
+    ends = np.empty((width, 2, width))
+    state = np.repeat([[-1.0], [1.0]], width, axis=1)
+    for i, step in enumerate(table):
+        state = np.minimum(np.maximum(state + step, -1.0, out=ends[i]), 1.0, out=ends[i])
+    last = zip(along[-1].tolist(), *ends[-1].tolist(), strict=True)
+    z = list(accumulate(last, lambda z, way: min(max(z + way[0], way[1]), way[2]), initial=0.0))
+    found: Array = np.minimum(np.maximum(np.array(z[:-1]) + along, ends[:, 0]), ends[:, 1])
+    return found.T.ravel()[: len(steps)]

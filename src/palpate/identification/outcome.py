@@ -77,6 +77,7 @@ def outcome(
         dynamic_stiffness=spectrum,
         press=press,
         options=_plain_options(options),
+        depth=found.fit.model.depth,
     )
 
 

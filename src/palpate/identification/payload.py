@@ -18,6 +18,11 @@ Array = NDArray[np.float64]
 _SEEN = 10.0
 """Power of the acceleration over that of the position's noise in it, at least: the mass would be off by a tenth."""
 _FEWEST = 20
+"""Rows of a stay in the air that its own level is taken from."""
+_MOST = 0.5
+_OTHERS = 2.0
+"""Share of the force's power that the acceleration accounts for at least, and over that of speed or place: as measured
+by `benchmarks/identification/free_motion_constants.py`."""
 
 
 @dataclass(frozen=True)
@@ -86,4 +91,4 @@ def _of_inertia(force: Array, motion: Array, others: list[Array]) -> bool:
     by_motion, *by_others = (
         float(own @ force) ** 2 / max(float(own @ own) * whole, 1e-300) for own in (motion, *others)
     )
-    return by_motion > 0.5 and by_motion > 2 * max(by_others)
+    return by_motion > _MOST and by_motion > _OTHERS * max(by_others)

@@ -50,7 +50,8 @@ def identify(
 
     Args:
         record: with the columns `time` [s], `position` [m] and `force` [N], of shape (n,); NaN means no reading.
-        model: kelvin-voigt, kelvin-voigt-mass, standard-linear-solid or hunt-crossley; None to choose.
+        model: kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic;
+            None to choose.
         lag: how much later the force is read than the position [s], if it is calibrated.
         lag_std: standard deviation of that [s].
         tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.

@@ -79,6 +79,7 @@ class Problem:
         origin: position of the surface on the log's own scale [m].
         contacts: as found.
         counted: the force is counted from where it rests out of contact, and the rows begin before the touches.
+        read: the force before any filter, at the samples of the motion's position, shape (n,); None if it is another's.
     """
 
     motion: Motion
@@ -91,6 +92,7 @@ class Problem:
     origin: float
     contacts: Contacts
     counted: bool = False
+    read: Array | None = None
 
     @property
     def time(self) -> Array:
@@ -165,7 +167,7 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     if contacts.payload is not None:
         force = force - contacts.payload.mass * chain(position, 2, lag.value)
     rows, spans = _rows(channels, chain, contacts)
-    origin = _origin(chain(position), rows, contacts)
+    origin = _origin(chain(position, 0, lag.value), rows, contacts)
     position = position - origin
     motion = Motion(chain, position, rows, contacts.bonded, _noise(position, rows, spans))
     touch = approach = None
@@ -176,7 +178,8 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
         touch = touching(force, contacts.resting, rows, spans, begins, margin, usable)
         approach = touching(force, contacts.resting, rows, spans, begins, margin, usable, reach=1)
     free = _free(force, channels, chain, contacts)
-    return Problem(motion, force[rows], spans, lag, free, touch, approach, origin, contacts)
+    read = force_raw if contacts.payload is None else None
+    return Problem(motion, force[rows], spans, lag, free, touch, approach, origin, contacts, read=read)
 
 
 MOST_ROWS = 1 << 16

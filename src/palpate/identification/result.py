@@ -270,6 +270,7 @@ class Identification:
         dynamic_stiffness: by octave, lowest first.
         press: force over depth; None if the log does not show one.
         options: what was told, as plain values.
+        depth: penetration that K, B and K1 belong to, of a model in which they grow with it [m]; else None.
     """
 
     model: str
@@ -288,6 +289,7 @@ class Identification:
     dynamic_stiffness: tuple[DynamicStiffness, ...] = ()
     press: Press | None = field(default=None, repr=False)
     options: dict[str, Any] = field(default_factory=dict, repr=False)
+    depth: float | None = None
 
     @property
     def codes(self) -> tuple[str, ...]:
@@ -313,6 +315,7 @@ class Identification:
         """The plain values that `palpate identify --json` prints."""
         return {
             "model": self.model,
+            "depth_m": self.depth,
             "parameters": {name: p.to_json() for name, p in self.parameters.items()},
             "working_point": self.working_point.to_json() if self.working_point else None,
             "dynamic_stiffness": [octave.to_json() for octave in self.dynamic_stiffness],

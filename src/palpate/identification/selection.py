@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.estimators.robust import Answer, answer, lag_open
 from palpate.identification.models import (
     KELVIN_VOIGT,
@@ -16,6 +17,7 @@ from palpate.identification.models import (
     at_rest_before,
     begun_before,
     hunt_crossley,
+    quasi_linear,
     standard_linear_solid,
 )
 from palpate.identification.options import Options
@@ -24,7 +26,12 @@ from palpate.identification.result import Comparison
 
 THIRD = 1 / 3
 """Share of the force's amplitude in contact that a model may leave unexplained and still identify anything."""
-_ADDED = {"standard-linear-solid": ("K1", "tau"), "hunt-crossley": ("n",)}
+_ADDED = {
+    "standard-linear-solid": ("K1", "tau"),
+    "hunt-crossley": ("n",),
+    "quasi-linear-viscoelastic": ("n", "K1", "tau"),
+}
+_MAKERS = dict(zip(_ADDED, (standard_linear_solid, hunt_crossley, quasi_linear), strict=True))
 
 
 @dataclass(frozen=True)
@@ -80,7 +87,7 @@ def choose(problem: Problem, options: Options) -> Choice:
         if name is None and options.series_stiffness is None and plain.unexplained > _sensor_rms(plain):
             # A power of the depth needs the place of the surface, and looks like a lag that nobody has told.
             one_sided = problem.with_touches is not None and not lag_open(problem)
-            for make in (standard_linear_solid, *([hunt_crossley] if one_sided else [])):
+            for make in (standard_linear_solid, *([hunt_crossley, quasi_linear] if one_sided else [])):
                 rich, own = _one_sided(make, problem)
                 why = _against(rich, best, tolerance)
                 tried.append(_compared(rich, why))
@@ -89,8 +96,7 @@ def choose(problem: Problem, options: Options) -> Choice:
         return Choice(best, at, tuple(tried))
     if options.series_stiffness is not None:
         raise InputError(f"{name} behind a series stiffness is not offered: take --model kelvin-voigt-mass")
-    make = standard_linear_solid if name == "standard-linear-solid" else hunt_crossley
-    rich, own = _one_sided(make, problem)
+    rich, own = _one_sided(_MAKERS[name], problem)
     return Choice(rich, own, (_compared(rich, "asked for"),))
 
 
@@ -107,12 +113,15 @@ def _against(rich: Answer, plain: Answer, tolerance: float) -> str:
     """Why a richer model is not taken; empty if it is."""
     if (1 - rich.explained) > 0.5 * (1 - plain.explained):
         return "explains less than half of what the plainer model leaves"
+    for knob in rich.fit.model.knobs:
+        if not knob.low < rich.fit[knob.name] < knob.high:
+            return f"its {knob.name} lies beyond what the log can show"
     for name in ("K", *_ADDED[rich.fit.model.name]):
         value, half = rich[name], rich.half_of(name)
         known = half <= tolerance * abs(value) and (name != "n" or abs(value - 1) > half)
         if value <= 0 or not known:
             return f"the log does not tell its {name} ({value:.3g} +- {half:.2g})"
-    return ""
+    return unrecovered(rich)
 
 
 def _sensor_rms(found: Answer) -> float:

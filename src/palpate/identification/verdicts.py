@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.identification.estimators.fit import Fit, Prediction
+from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.estimators.robust import Answer
+from palpate.identification.evidence import stiffness_of
 from palpate.identification.prior import LAG, Lag
 from palpate.identification.result import Parameter, Verdict, WorkingPoint
 from palpate.identification.selection import Choice
@@ -62,13 +64,17 @@ def verdicts(
     lag = choice.problem.lag
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
     parameters = {name: _parameter(name, choice, holds, terms) for name in names}
-    if point is not None and {"K", "M"} <= set(found.names):
+    if point is not None and found.fit.model.knobs:
+        parameters = _showing(parameters, found, point)
+    elif point is not None and {"K", "M"} <= set(found.names):
         parameters = _agreeing(parameters, found, point)
     parameters = _of_lag(parameters, found, lag, terms)
     if not choice.problem.contacts.signed:
         parameters = {name: _refused(p, _UNSIGNED) for name, p in parameters.items()}
     if found.fit.model.of_power and choice.problem.contacts.bonded:
         parameters = {name: _refused(p, _UNTOUCHED) for name, p in parameters.items()}
+    if reason := unrecovered(found):
+        parameters = {name: _refused(p, reason) for name, p in parameters.items()}
     return parameters, _warnings(parameters, found, lag, terms)
 
 
@@ -104,11 +110,19 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
         reason = f"the model leaves {left:.0%} of the force's amplitude unexplained ({bounds})"
         return said(Verdict.REJECTED, reason, number=clear and name == "K")
     if half <= terms.tolerance * abs(value) and clear:
-        return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %)")
+        return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}")
     limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
     main = next(iter(budget), "noise")
     reason = f"{bounds}; {limit}. Most of it is {main}: {_REMEDY.get(main, _REMEDY['noise'])}"
     return said(Verdict.NOT_IDENTIFIABLE, reason, number=clear)
+
+
+def _at(found: Answer, name: str, terms: Terms) -> str:
+    """Which depth a parameter belongs to that grows with it."""
+    depth = found.fit.model.depth
+    if depth is None or name in _SHAPE:
+        return ""
+    return f", at a penetration of {_digits(depth)} {terms.position_unit}"
 
 
 _REMEDY = {
@@ -139,9 +153,27 @@ def _agreeing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoi
     shown = (own.ci95[1] - own.ci95[0]) / 2
     if abs(foretold - own.value) <= np.hypot(half, shown):
         return parameters
+    return _contradicted(parameters, foretold, own.value, point)
+
+
+def _showing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoint) -> dict[str, Parameter]:
+    """The same of a model that is not a sum of derivatives: its force is read as the log's own is, at the same rows."""
+    own, problem = point.stiffness, found.problem
+    if own.ci95 is None:
+        return parameters
+    foretold, shown = (stiffness_of(problem, force, point) for force in (found.fit.force, problem.force))
+    if foretold is None or shown is None or abs(foretold - shown) <= (own.ci95[1] - own.ci95[0]) / 2:
+        return parameters
+    return _contradicted(parameters, foretold, shown, point)
+
+
+def _contradicted(
+    parameters: dict[str, Parameter], foretold: float, shown: float, point: WorkingPoint
+) -> dict[str, Parameter]:
+    unit = point.stiffness.unit
     reason = (
-        f"the model's stiffness at {point.frequency_Hz:.3g} Hz is {_digits(foretold)} {own.unit}, the log's dynamic"
-        f" stiffness there {_digits(own.value)}"
+        f"the model's stiffness at {point.frequency_Hz:.3g} Hz is {_digits(foretold)} {unit}, the log's dynamic"
+        f" stiffness there {_digits(shown)}"
     )
     return {
         name: replace(p, verdict=Verdict.REJECTED, reason=reason) if p.verdict is Verdict.IDENTIFIED else p
@@ -239,10 +271,9 @@ def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:
         return "1"
     if name in ("K2", "K3"):
         return f"{terms.force_unit}/{terms.position_unit}^{name[1]}"
-    if fitted.model.name == "hunt-crossley":
-        n = fitted["n"]
-        power = f"{terms.position_unit}^{n + 1:.3g}" if name == "B" else f"{terms.position_unit}^{n:.3g}"
-        return f"{terms.force_unit} s/{power}" if name == "B" else f"{terms.force_unit}/{power}"
+    if fitted.model.of_power and fitted.model.depth is None:
+        n = fitted["n"] + (name == "B")
+        return f"{terms.force_unit}{' s' if name == 'B' else ''}/{terms.position_unit}^{n:.3g}"
     return units["K" if name == "K1" else name]
 
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
 from palpate.identification import in_series
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import press_of
+from palpate.identification.evidence.press import press_of, slope_of, strokes_in
 from palpate.identification.evidence.spectrum import dynamic_stiffness
 from palpate.identification.evidence.working_point import working_point
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, WorkingPoint
 
+Array = NDArray[np.float64]
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
 
 
@@ -35,3 +41,21 @@ def evidence_of(problem: Problem, options: Options, unit: str) -> Evidence:
         press = None if press is None else in_series.press_without_series(press, *series)
     point = working_point(whole, spectrum, options, unit)
     return spectrum, press, point
+
+
+def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
+    """What another force at the same rows would show for the stiffness at a working point [N/m]; None if nothing.
+
+    Args:
+        problem: of the log.
+        force: as a model foretells it, shape (m,).
+        point: an octave, or the press.
+    """
+    problem = replace(problem, force=force)
+    segments = segments_of(problem.motion.rows, problem.spans)
+    if point.source == "press":
+        slope = slope_of(strokes_in(problem, problem.lag.value, segments))
+        return None if slope is None else slope.stiffness
+    spectrum = dynamic_stiffness(problem, segments, problem.lag.value, problem.lag.std)
+    near = [own for own in spectrum if abs(np.log2(own.frequency / point.frequency_Hz)) < 0.5]
+    return near[0].storage if near else None

@@ -26,6 +26,8 @@ _WIDE = 0.15
 _FULL = 0.95
 """Share of the force at which a way in is over: what is left of it is rounding off."""
 _FEWEST = 6
+_LINE = 4
+"""Readings that a slope with a bend and a noise of its own needs."""
 _STILL = 0.02
 """Share of the highest speed below which a probe rests: encoders and loops leave a per cent or so."""
 _SHOWN = 400
@@ -37,6 +39,8 @@ class Stroke:
 
     Args:
         whole: the same with the rests before it, if the way in was made in steps.
+        read: depth and force as they were read, with an advance of their own, shape (2, k): behind a filter a way in is
+            as long as the filter at least.
     """
 
     depth: Array
@@ -44,6 +48,7 @@ class Stroke:
     force: Array
     time: Array
     whole: Stroke | None = None
+    read: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -90,8 +95,24 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
             advance = slice(*_one_way(depth, channels[1], begin, top, reach))
             whole = Stroke(*(own[begin:top] for own in channels))
             stroke = Stroke(*(own[advance] for own in channels), whole)
-            found.append(_sharpened(stroke, motion.chain))
+            found.append(replace(_sharpened(stroke, motion.chain), read=_as_read(problem, lag, stroke)))
     return found
+
+
+def _as_read(problem: Problem, lag: float, stroke: Stroke) -> Array | None:
+    """Depth [m] and force [N] of the same way in before any filter, shape (2, k); None where they are not known."""
+    chain, force = problem.motion.chain, problem.read
+    if force is None or not isinstance(chain, Chain):
+        return None
+    first, last = (int(np.clip(t / chain.dt, 0, len(force) - 1)) for t in stroke.time[[0, -1]])
+    at = np.arange(first, last + 1) - lag / chain.dt
+    depth: Array = np.interp(at, np.arange(len(force), dtype=np.float64), problem.motion.position)
+    top = int(np.argmax(depth)) + 1
+    begin, top = _one_way(depth, np.gradient(depth), int(np.argmin(depth[:top])), top, float(np.ptp(depth)))
+    steps = np.diff(depth[begin:top])
+    if np.count_nonzero(steps > _STILL * steps.max(initial=0.0)) < _LINE:
+        top = begin  # a jump between readings
+    return np.stack([depth, force[first : last + 1]])[:, begin:top]
 
 
 def _sharpened(stroke: Stroke, chain: object) -> Stroke:
@@ -142,9 +163,10 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
     the interval reaches both. Beyond them it has the scatter of each way in, the change of the slope over the range,
-    and the variance between ways in (a random effect, Student's t).
+    what it differs by from the slope of the channels as they were read, and the variance between ways in (a random
+    effect, Student's t).
     """
-    slopes, variances, rises, changes, speeds, levels = [], [], [], [], [], []
+    slopes, variances, rises, changes, speeds, filters, levels = [], [], [], [], [], [], []
     for stroke in strokes:
         rows = _upper(stroke.force)
         if len(rows) < _FEWEST or np.ptp(stroke.depth[rows]) <= 0:
@@ -155,16 +177,18 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
         variances.append(variance)
         changes.append(change)
         speeds.append(abs(slope - at_rest) / 2)
+        filters.append(_by_filter(stroke, slope, variance))
         rises.append(float(stroke.time[-1] - stroke.time[0]))
         levels.append((stroke.force[rows].mean(), stroke.depth[rows].mean()))
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
-    curvature, reach = float(np.mean(changes)), float(np.mean(speeds))
-    others = float(np.hypot(mean.half, curvature))
+    curvature, reach, by_filter = (float(np.mean(own)) for own in (changes, speeds, filters))
+    others = float(np.sqrt(mean.half**2 + curvature**2 + by_filter**2))
     causes = {
         "repetition" if len(slopes) > 1 else "noise": mean.half,
         "curvature": curvature,
+        "filter": by_filter,
         "speed": float(np.sqrt((others + reach) ** 2 - others**2)),
     }
     where = (float(own) for own in np.mean(levels, axis=0))
@@ -176,6 +200,34 @@ def _upper(force: Array) -> NDArray[np.intp]:
     low, high = np.percentile(force, [2, 98])
     below = np.flatnonzero(force <= low + UPPER * (high - low))
     return np.arange(int(below[-1]) + 1 if len(below) else 0, len(force))
+
+
+def _by_filter(stroke: Stroke, slope: float, variance: float) -> float:
+    """By how much a slope contradicts that of the same way in before any filter [N/m]: beyond their 95 % interval.
+
+    All of it, if the way in has too few readings for a slope of its own: its shape is then the filter's.
+    """
+    if stroke.read is None:
+        return 0.0
+    depth, force = stroke.read
+    if len(depth) < _LINE:
+        return abs(slope)
+    rows = _upper(force)
+    depth, force = depth[rows], force[rows]
+    if len(depth) < _LINE or np.ptp(depth) <= 0:
+        return abs(slope)
+    own, doubt, _ = _line(depth, force)
+    return max(abs(own - slope) - 1.96 * float(np.sqrt(variance + doubt)), 0.0)
+
+
+def unseen(problem: Problem) -> float:
+    """Share of the position's range in which no reading was taken, over the rest of the range.
+
+    Where a log jumps over it, the touch may lie in it.
+    """
+    position = np.sort(problem.motion.position[problem.in_contact])
+    gap = max(float(np.diff(position).max(initial=0.0)) - problem.motion.noise.count, 0.0)
+    return gap / max(float(np.ptp(position)) - gap, 1e-3 * gap, 1e-300)
 
 
 def _line(x: Array, f: Array) -> tuple[float, float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import Slope, slope_of, strokes_in
+from palpate.identification.evidence.press import Slope, slope_of, strokes_in, unseen
 from palpate.identification.in_series import slope_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
@@ -58,6 +58,9 @@ def working_point(
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
         budget, force, depth = octave.budget, float(problem.force[inside].mean()), float(depths.mean())
+    if problem.contacts.bonded and not options.bonded:  # nothing tells that the first reading is in contact
+        budget = {**budget, "unseen way": abs(value) * unseen(problem)}
+        half = float(np.hypot(half, budget["unseen way"]))
     rest = 0.0 if problem.counted else problem.contacts.resting
     contacts = problem.contacts
     stiffness = replace(_judged(value, half, tolerance, unit), budget=_largest(budget, half))
