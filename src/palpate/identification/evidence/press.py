@@ -221,13 +221,20 @@ def _by_filter(stroke: Stroke, slope: float, variance: float) -> float:
 
 
 def unseen(problem: Problem) -> float:
-    """Share of the position's range in which no reading was taken, over the rest of the range.
+    """How far a stiffness may be off, relative, because the touch lies in a jump of the position between readings.
 
-    Where a log jumps over it, the touch may lie in it.
+    Of the range g / (R - g), where no reading was taken in the part g of it; as far as the stiffness rests on the two
+    sides of the jump rather than on what moves on either: by the share of the position's variance between them.
     """
     position = np.sort(problem.motion.position[problem.in_contact])
-    gap = max(float(np.diff(position).max(initial=0.0)) - problem.motion.noise.count, 0.0)
-    return gap / max(float(np.ptp(position)) - gap, 1e-3 * gap, 1e-300)
+    gaps = np.diff(position)
+    if not gaps.any():
+        return 0.0
+    below, above = np.split(position, [int(np.argmax(gaps)) + 1])
+    gap = max(float(gaps.max()) - problem.motion.noise.count, 0.0)
+    apart = len(below) * len(above) * float(above.mean() - below.mean()) ** 2 / len(position) ** 2
+    rest = max(float(np.ptp(position)) - gap, 1e-3 * gap)
+    return apart / float(position.var()) * gap / rest if rest else 0.0
 
 
 def _line(x: Array, f: Array) -> tuple[float, float, float]:
