@@ -16,6 +16,8 @@ settings.register_profile("palpate", deadline=None, derandomize=True, print_blob
 settings.load_profile("palpate")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+# What is started here buffers its output as it does for a user: a reader of a pipe must get a line when it is due.
+os.environ.pop("PYTHONUNBUFFERED", None)
 
 # A shell that starts the tests in the background has Ctrl-C ignored, and whatever they start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
