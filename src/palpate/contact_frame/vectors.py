@@ -9,7 +9,10 @@ from palpate.errors import InputError
 
 Array = NDArray[np.float64]
 
+FEWEST = 20
+"""Rows for a mean that is said of a log: its standard deviation is then a fifth of a reading's, or less."""
 _UNIT = 0.1
+"""By which a quaternion's length is off at most where its four numbers are rounded to one digit."""
 
 
 def read_rows(vectors: Array) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from palpate.contact_frame.air_inertia import BLOCKS, air_inertia
 from palpate.contact_frame.declared import ContactFrame, Vector
 from palpate.contact_frame.payload import Payload
 from palpate.contact_frame.signals_in_base import Signals, signals_of
-from palpate.contact_frame.vectors import read_rows
+from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.contact_frame.weighing import Fitted, Poses, Told, fit_centre, fit_force, groups_of, poses_of
 from palpate.contact_frame.weighing_doubts import doubts_of, noise_of
 from palpate.errors import InputError
@@ -21,10 +21,15 @@ from palpate.records import Record
 Array = NDArray[np.float64]
 
 _FEWEST = 3
-_UPRIGHT = 0.5
+"""Orientations of three axes each: weight, bias and drift are nine numbers."""
+_UPRIGHT = 0.5**0.5
+"""Cosine of the angle to the vertical at which a base is as near to one on a wall as to one that stands or hangs."""
 _ROUNDS = 3
+"""What is left of the tool's acceleration after a round is the share by which its mass is still wrong: of ten per cent
+three rounds leave a thousandth."""
 _SMOOTH = 0.1
-"""Of the window by which an acceleration is read off the positions [s]: what is slower than some 6 Hz passes."""
+"""Of the window by which an acceleration is read off the positions [s]: what is slower than some 6 Hz passes, and no
+arm turns its tool faster."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +94,8 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
             "a tool is weighed by turning it, and this pose has no orientation; log one with it (--pose, --rotation)"
         )
     there = read_rows(signals.force)
-    if there.sum() < 20:
-        raise InputError(f"only {int(there.sum())} rows hold a force; at least 20 are needed")
+    if there.sum() < FEWEST:
+        raise InputError(f"only {int(there.sum())} rows hold a force; at least {FEWEST} are needed")
     still = signals
     for _ in range(_ROUNDS):  # what the tool's own acceleration does is taken off as far as it is known
         fit = _fit(still, there, tolerance)

@@ -18,13 +18,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.payload import GRAVITY
+from palpate.units import GRAVITY
 
 Array = NDArray[np.float64]
 
 APART = np.radians(30.0)
 """Orientations nearer than this are one group: what errs alike in them is not counted as many readings [rad]."""
 _SINGULAR = 1e-9
+"""Least eigenvalue of scaled equations: the square of 3e-5 rad, and no pose is read finer."""
 
 
 @dataclass(frozen=True)
