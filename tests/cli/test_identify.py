@@ -81,6 +81,7 @@ def test_light_presses_on_skin_claim_nothing(measured, capsys, load):
     assert all(p["verdict"] != "identified" for p in found["parameters"].values())
 
 
+@pytest.mark.long
 def test_silverbox(measured, capsys):
     columns = ("--time", "time_s", "--position", "position_V:1", "--force", "force_V:1")
     code, found = ask(capsys, measured / "silverbox/schroeder_80mV.csv", *columns)

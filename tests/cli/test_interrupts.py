@@ -12,6 +12,7 @@ from cli.test_run import text_of
 from palpate.cli import main
 from palpate.cli._interrupts import noticed
 from palpate.logs import read_record
+from palpate.report.run import figures
 from palpate.report.run import page as pages
 
 PRELUDE = """
@@ -89,7 +90,7 @@ def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeyp
     def full(*words):
         raise error
 
-    monkeypatch.setattr(pages, "run_page", full)
+    monkeypatch.setattr(figures, "draw", full)
     assert main(["run", "mine.toml", "--out", "results"]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1

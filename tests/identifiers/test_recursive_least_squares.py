@@ -186,6 +186,7 @@ def test_the_part_for_kernels_is_the_streaming_estimator():
     np.testing.assert_allclose(np.array(state.std()), streaming.estimate().std, rtol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n", SIZES)
 def test_a_million_samples_that_say_nothing_new_do_no_harm(n):
     """The textbook form loses symmetry and is not a number after 200,000 of them."""

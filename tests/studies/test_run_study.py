@@ -167,6 +167,7 @@ def test_records_are_not_kept_in_memory(tmp_path, monkeypatch):
     assert max(alive) <= 4
 
 
+@pytest.mark.long
 def test_memory_does_not_grow_with_the_number_of_runs(tmp_path):
     def peak(runs):
         source = text(f'"controller.ki" = {{ range = [1.0, 2.0], points = {runs} }}')
