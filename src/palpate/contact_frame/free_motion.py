@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.air import air_level
+from palpate.contact_frame.free_level import free_level
 from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.errors import InputError
 from palpate.identification.contacts import contacts_of
@@ -30,7 +30,11 @@ def contact_rows(time: Array, force: Array, place: Array) -> tuple[Rows, Rows]:
         place: of the point that touches [m], shape (n, 3), likewise.
     """
     position, strength = _along_axis(place), _along_axis(force)
-    columns = {"time": time, "position": position, "force": strength - (air_level(strength, position) or 0.0)}
+    columns = {
+        "time": time,
+        "position": position,
+        "force": strength - (free_level(strength, position) or 0.0),
+    }
     channels = channels_of(Record(columns, {"time": "s", "position": "m", "force": "N"}))
     channels, chain, contacts = contacts_of(channels)
     inside, free = np.zeros(len(time), bool), np.full(len(time), not contacts.bonded)

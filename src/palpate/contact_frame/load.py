@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.air_inertia import BLOCKS
+from palpate.contact_frame.free_inertia import BLOCKS
 
 if TYPE_CHECKING:
     from palpate.contact_frame.payload import Payload

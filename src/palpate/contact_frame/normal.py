@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.air_inertia import BLOCKS
+from palpate.contact_frame.free_inertia import BLOCKS
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]

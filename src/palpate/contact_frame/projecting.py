@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.air_inertia import CHANCE, air_inertia, wrong_sign
 from palpate.contact_frame.declared import ContactFrame
+from palpate.contact_frame.free_inertia import CHANCE, free_inertia, wrong_sign
 from palpate.contact_frame.lever import line_misses_tcp
 from palpate.contact_frame.load import load_of, turns
+from palpate.contact_frame.load_removal import Unloaded, in_range
 from palpate.contact_frame.normal import MATTERS, Normal, direction_of, scale_std
 from palpate.contact_frame.signals_in_base import Signals, signals_of
-from palpate.contact_frame.unloading import Unloaded, in_range
 from palpate.contact_frame.vectors import read_rows
 from palpate.errors import InputError
 from palpate.records import Record
@@ -146,7 +146,7 @@ def _inertia_in_air(
     payload = frame.payload
     centre = payload.centre if payload is not None and payload.centre is not None else (0.0, 0.0, 0.0)
     off = np.array(frame.wrench_at) + np.array(centre) - np.array(frame.tcp)
-    return air_inertia(signals.time, sign * freed.force, signals.place + signals.rotations @ off, freed.free)
+    return free_inertia(signals.time, sign * freed.force, signals.place + signals.rotations @ off, freed.free)
 
 
 def _doubts(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.air_inertia import CHANCE
+from palpate.contact_frame.free_inertia import CHANCE
 from palpate.contact_frame.vectors import FEWEST
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ _FLAT = 0.05
 """Of the slope beyond the bend: a spring whose force grows as the penetration to the third power shows 0.14."""
 
 
-def air_level(force: Array, position: Array) -> float | None:
+def free_level(force: Array, position: Array) -> float | None:
     """The force [N] of the flat side of a bend; None if there is no bend with one flat side.
 
     Args:

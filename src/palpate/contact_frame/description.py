@@ -15,7 +15,7 @@ _FAR = 0.01
 a lever arm that is told wrong is off by centimetres."""
 
 
-def told(meta: Mapping[str, Any]) -> list[str]:
+def described(meta: Mapping[str, Any]) -> list[str]:
     """Sentences for a user, from the metadata of a record along the normal."""
     lines = list(meta.get("facts", ()))
     about = meta.get("contact_frame")

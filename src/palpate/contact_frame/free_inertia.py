@@ -27,7 +27,7 @@ CHANCE = 1e-3
 """How probable a doubt may be by chance alone."""
 
 
-def air_inertia(time: Array, force: Array, place: Array, free: Rows) -> tuple[float, float] | None:
+def free_inertia(time: Array, force: Array, place: Array, free: Rows) -> tuple[float, float] | None:
     """The mass m of f = -m a, and its standard deviation [kg]; None where the log does not tell.
 
     Args:
