@@ -13,10 +13,10 @@ from palpate.identifiers.kernels.contact_state import (
     FIELDS,
     SAMPLE,
     TOUCHING,
+    decide_contact,
     found,
     learned,
     limited,
-    decide_contact,
     pending,
 )
 from palpate.identifiers.kernels.positions import (

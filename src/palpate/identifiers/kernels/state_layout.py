@@ -1,7 +1,7 @@
 """What is known of n parameters, as one flat array of numbers that a kernel changes in place.
 
-In this order: theta, root, left, passed, heard, white, added, six statistics, floor, even. See `ErrorCovariance`; floor is
-the inverse of each initial variance, even that of their sum, n times.
+In this order: theta, root, left, passed, heard, white, added, six statistics, floor, even. See `ErrorCovariance`; floor
+is the inverse of each initial variance, even that of their sum, n times.
 """
 
 import numpy as np
