@@ -2,12 +2,13 @@
 
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
+
+from palpate.cli import main
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -38,13 +39,13 @@ def measured() -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
-def program():
-    """Run `palpate` with the given words in a process of its own; returns the completed process."""
+@pytest.fixture
+def program(capsys):
+    """Run `palpate` with the given words, in this process; its exit code and what it printed."""
 
-    def run(*words: str, **options) -> subprocess.CompletedProcess:
-        command = [sys.executable, "-m", "palpate", *map(str, words)]
-        options = {"capture_output": True, "text": True, "timeout": 300, **options}
-        return subprocess.run(command, check=False, **options)
+    def run(*words: object) -> SimpleNamespace:
+        code = main(list(map(str, words)))
+        printed = capsys.readouterr()
+        return SimpleNamespace(returncode=code, stdout=printed.out, stderr=printed.err)
 
     return run

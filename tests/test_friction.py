@@ -73,6 +73,7 @@ def pulled(friction, inertia, spring, speed, seconds):
 DRY = ONE._replace(sigma2=0.0)
 
 
+@pytest.mark.long
 def test_pulled_slowly_through_a_soft_spring_it_sticks_and_slips():
     rates, pulls = pulled(DRY, inertia=0.1, spring=2.0, speed=2e-3, seconds=120.0)
     later = slice(len(rates) // 2, None)

@@ -236,6 +236,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))
 """
 
 
+@pytest.mark.long
 def test_where_there_is_no_room_for_the_cache_every_process_compiles(workshop):
     (workshop.user / "full.py").write_text(FULL + OWN.format(number=7.0))
     for _ in range(2):
@@ -282,6 +283,7 @@ def test_the_cache_can_be_read_where_a_users_part_is_not(workshop):
     assert workshop.run()[1]
 
 
+@pytest.mark.long
 def test_a_part_of_a_script_leaves_nothing_in_the_cache(workshop):
     """It would be another class at each run, and the cache would grow for ever."""
     workshop.run()

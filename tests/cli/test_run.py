@@ -251,15 +251,25 @@ def test_a_seed_is_a_whole_number_from_zero_on(mine, capsys, seed):
     nothing_but(mine.parent, "mine.toml")
 
 
-def test_results_are_not_written_over(mine, capsys):
-    assert main(["run", "mine.toml", "--out", "results"]) == 0
-    before = (mine.parent / "results" / "record.parquet").read_bytes()
+def test_results_are_not_written_over_and_figures_are_of_the_kinds_asked_for(mine, capsys):
+    results = mine.parent / "results"
+    assert main(["run", "mine.toml", "--out", "results", "--figures", "svg", "--figures", "pdf"]) == 0
+    names = {path.name for path in results.iterdir()}
+    assert {"force.svg", "force.pdf", "torque.svg"} <= names
+    assert not any(name.endswith(".png") for name in names)
+    before = (results / "record.parquet").read_bytes()
     capsys.readouterr()
     assert "--force" in refused(capsys, "mine.toml", "--seed", "9", "--out", "results")
-    assert (mine.parent / "results" / "record.parquet").read_bytes() == before
+    assert (results / "record.parquet").read_bytes() == before
     assert main(["run", "mine.toml", "--seed", "9", "--out", "results", "--force"]) == 0
-    assert (mine.parent / "results" / "record.parquet").read_bytes() != before
+    assert (results / "record.parquet").read_bytes() != before
+    nothing_but(results, *FILES)
     nothing_but(mine.parent, "mine.toml", "results")
+
+
+def test_figures_that_cannot_be_written_are_refused(mine, capsys):
+    assert "--figures must be of png, svg, pdf, got 'gif'" in refused(capsys, "mine.toml", "--figures", "gif")
+    assert "--dpi must be from" in refused(capsys, "mine.toml", "--dpi", "5")
 
 
 def test_force_does_not_replace_a_folder_that_is_not_its_own(mine, capsys):
@@ -339,17 +349,6 @@ def test_a_warm_run_compiles_nothing():
     for _ in range(2):
         ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "True"
-
-
-def test_figures_of_other_kinds(mine, capsys):
-    assert main(["run", "mine.toml", "--out", "results", "--figures", "svg", "--figures", "pdf"]) == 0
-    names = {path.name for path in (mine.parent / "results").iterdir()}
-    assert {"force.svg", "force.pdf", "torque.svg"} <= names
-    assert not any(name.endswith(".png") for name in names)
-    assert main(["run", "mine.toml", "--out", "results", "--force"]) == 0, "palpate knows its own again"
-    capsys.readouterr()
-    assert "--figures must be of png, svg, pdf, got 'gif'" in refused(capsys, "mine.toml", "--figures", "gif")
-    assert "--dpi must be from" in refused(capsys, "mine.toml", "--dpi", "5")
 
 
 def test_the_verdict_is_that_of_identify(mine, capsys):
