@@ -58,7 +58,7 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
 
 
 def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
-    words = (*ONE, "--precision", "1%", "--out", "excite.csv", "--duration", "4")
+    words = (*ONE, "--lag-std", "1:ms", "--precision", "1%", "--out", "excite.csv", "--duration", "4")
     assert main(["excite", *words, "--no-figure"]) == 1
     printed = capsys.readouterr().out
     assert "no; the best is K" in printed
