@@ -223,6 +223,7 @@ def test_the_cache_is_used_and_never_stale(workshop, changed, expected):
     assert workshop.run() == expected
 
 
+@pytest.mark.long
 def test_a_user_kernel_goes_stale_with_its_own_file(workshop):
     for number, expected in ((1.0, (2.0, False)), (1.0, (2.0, True)), (5.0, (6.0, False))):
         (workshop.user / "own.py").write_text(OWN.format(number=number))
@@ -271,6 +272,7 @@ print(entry(Here(3.0), 5.0), entry.from_cache)
 """
 
 
+@pytest.mark.long
 def test_the_cache_can_be_read_where_a_users_part_is_not(workshop):
     """What was compiled for a part of one project must not stand in the way of another."""
     workshop.run()

@@ -11,6 +11,7 @@ from palpate.errors import InputError
 ONE_DIRECTION = [(60.0, 1.0, 0.003, 12e3), (480.0, 0.25, 0.0015, 410e3)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("damping", "kf", "ki", "limit"), ONE_DIRECTION)
 def test_the_limits_are_those_of_one_direction_but_for_what_the_others_do(damping, kf, ki, limit):
     """The arm's joints share their inertia, and 20 N on a moving lever are a spring: up to a fifth."""

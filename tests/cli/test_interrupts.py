@@ -66,6 +66,7 @@ def test_within_noticed_nothing_is_raised_and_it_is_told():
         time.sleep(1.0)
 
 
+@pytest.mark.long
 def test_results_that_are_being_written_are_written(tmp_path, monkeypatch):
     """It comes while the page is made: everything is there, and the code says that it came."""
     monkeypatch.chdir(tmp_path)

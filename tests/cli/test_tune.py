@@ -94,6 +94,7 @@ def test_gains_certificate_and_check(capsys, elsewhere):
     assert "no certificate" in refused(capsys, "certify", "--check", "none.json")
 
 
+@pytest.mark.long
 def test_what_cannot_be_proved_is_exit_code_1(capsys, elsewhere):
     (elsewhere / "gains.toml").write_text(gains_of(cap=1e4).to_toml())
     assert (
@@ -116,6 +117,7 @@ def test_from_what_identify_printed(capsys, elsewhere):
     assert high > 5200.0
 
 
+@pytest.mark.long
 def test_the_working_point_goes_first_and_what_is_rough_is_said(capsys, elsewhere, root):
     """An estimate as wide as the margin, and a delay that is no whole number of ticks."""
     stiffness = {"value": 7000.0, "ci95": [6900.0, 7100.0], "prediction95": [1000.0, 9000.0], "unit": "N/m"}
@@ -129,6 +131,7 @@ def test_the_working_point_goes_first_and_what_is_rough_is_said(capsys, elsewher
     assert "11.3 ms is no whole number of ticks; 6 were taken" in rounded["text"]
 
 
+@pytest.mark.long
 def test_straight_from_a_log(capsys, root):
     log = root / "examples" / "data" / "press.csv"
     code, told = ask(
@@ -256,6 +259,7 @@ def write_loop(path, kind):
     np.savetxt(path, table, delimiter=",", header="t,target,actual", comments="")
 
 
+@pytest.mark.long
 def test_the_inner_loop_from_a_log_widens_what_is_proved(capsys, elsewhere):
     write_loop(elsewhere / "loop.csv", "steps")
     asked = ("--stiffness", "1e3:1e4", "--arm", "ur5e", "--force", "20")

@@ -74,7 +74,13 @@ def drawn(outcome):
     return found, page(found, SOURCE)
 
 
-@pytest.fixture(scope="module", params=OUTCOMES)
+OFTEN = ("identified", "not_identifiable", "no_contact", "volts")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=() if name in OFTEN else pytest.mark.long) for name in OUTCOMES],
+)
 def outcome(request):
     return drawn(request.param)
 
