@@ -27,7 +27,7 @@ def slide(friction, velocities, dt=DT):
     return np.array(torques), np.array(deflections)
 
 
-@pytest.mark.parametrize("v", [1e-4, 1e-3, 0.01, 0.03, 1.0, 40.0])
+@pytest.mark.parametrize("v", [pytest.param(1e-4, marks=pytest.mark.long), 1e-3, 0.01, 0.03, 1.0, 40.0])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_steady_sliding_follows_the_stribeck_curve(v, way):
     v *= way

@@ -29,6 +29,7 @@ def test_the_boundary_is_where_the_growth_is_one():
         assert on.stable == (share < 1.0)
 
 
+@pytest.mark.long
 def test_intervals_of_a_gain():
     ((low, high),) = stable_intervals(surface(5e4, 480.0, 1.0, 0.003), "controller.kf", 0.0, 10.0)
     assert low == 0.0

@@ -217,6 +217,7 @@ def test_the_method_is_that_of_the_library(shaken, capsys, method):
     assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
 
 
+@pytest.mark.long
 def test_another_method_is_said(shaken, capsys):
     words = ("--model", "kelvin-voigt-mass", "--method", "output-error", "--report", "a.html", "--no-figure")
     assert main(["identify", str(shaken), *OWN, *words]) == 0

@@ -273,6 +273,7 @@ def test_the_inner_loop_from_a_log_widens_what_is_proved(capsys, elsewhere):
     assert ForceLoop.load("gains.toml").gains.arm.inner.bandwidth_interval == (low, high)
 
 
+@pytest.mark.long
 def test_a_tuned_loop_is_certified_for_the_inner_loop_that_a_log_shows(capsys, elsewhere):
     write_loop(elsewhere / "loop.csv", "steps")
     (elsewhere / "gains.toml").write_text(gains_of(cap=1e4).to_toml())

@@ -63,6 +63,7 @@ def test_the_impedance_shares_the_depth_with_the_surface():
     assert summary["force"]["mean_N"] == pytest.approx(20.0 * 5000.0 / (5000.0 + 2000.0), rel=0.01)
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_numbers_and_another_others():
     one, again, other = (asked(seconds=0.3, seed=seed)[0] for seed in (1, 1, 2))
     assert np.array_equal(one["force"], again["force"])
