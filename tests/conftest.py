@@ -2,12 +2,13 @@
 
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
+
+from palpate.cli import main
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -16,6 +17,8 @@ settings.register_profile("palpate", deadline=None, derandomize=True, print_blob
 settings.load_profile("palpate")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+# What is started here buffers its output as it does for a user: a reader of a pipe must get a line when it is due.
+os.environ.pop("PYTHONUNBUFFERED", None)
 
 # A shell that starts the tests in the background has Ctrl-C ignored, and whatever they start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -36,13 +39,13 @@ def measured() -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
-def program():
-    """Run `palpate` with the given words in a process of its own; returns the completed process."""
+@pytest.fixture
+def program(capsys):
+    """Run `palpate` with the given words, in this process; its exit code and what it printed."""
 
-    def run(*words: str, **options) -> subprocess.CompletedProcess:
-        command = [sys.executable, "-m", "palpate", *map(str, words)]
-        options = {"capture_output": True, "text": True, "timeout": 300, **options}
-        return subprocess.run(command, check=False, **options)
+    def run(*words: object) -> SimpleNamespace:
+        code = main(list(map(str, words)))
+        printed = capsys.readouterr()
+        return SimpleNamespace(returncode=code, stdout=printed.out, stderr=printed.err)
 
     return run

@@ -19,7 +19,9 @@ EACH = {"experiment": 100, "study": 100, "journal": 100, "CSV": 25, "MCAP": 10, 
 """Of the kinds of which some tens take little time."""
 
 
-@pytest.mark.parametrize("kind", EACH)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=pytest.mark.long if k in {"CSV", "SQLite bag"} else ()) for k in EACH]
+)
 def test_a_spoiled_file_is_read_or_refused_in_one_line(kind, tmp_path):
     told = attack(kind, range(EACH[kind]), tmp_path)
     assert not told.defects

@@ -12,8 +12,8 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parent.parent / "examples"
 EXAMPLES = sorted(FOLDER.glob("[0-9]*.py"))
-LONG = ("05", "06", "13")
-"""They compile a loop of their own, or march through many."""
+LONG = ("01", "05", "06", "08", "09", "10", "11", "12", "13", "14", "15")
+"""They compile a loop of their own, march through many runs, design, or press at real time: seconds each."""
 
 
 def test_examples_are_numbered_without_gaps():

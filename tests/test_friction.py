@@ -27,7 +27,7 @@ def slide(friction, velocities, dt=DT):
     return np.array(torques), np.array(deflections)
 
 
-@pytest.mark.parametrize("v", [1e-4, 1e-3, 0.01, 0.03, 1.0, 40.0])
+@pytest.mark.parametrize("v", [pytest.param(1e-4, marks=pytest.mark.long), 1e-3, 0.01, 0.03, 1.0, 40.0])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_steady_sliding_follows_the_stribeck_curve(v, way):
     v *= way
@@ -73,6 +73,7 @@ def pulled(friction, inertia, spring, speed, seconds):
 DRY = ONE._replace(sigma2=0.0)
 
 
+@pytest.mark.long
 def test_pulled_slowly_through_a_soft_spring_it_sticks_and_slips():
     rates, pulls = pulled(DRY, inertia=0.1, spring=2.0, speed=2e-3, seconds=120.0)
     later = slice(len(rates) // 2, None)

@@ -223,6 +223,7 @@ def test_the_cache_is_used_and_never_stale(workshop, changed, expected):
     assert workshop.run() == expected
 
 
+@pytest.mark.long
 def test_a_user_kernel_goes_stale_with_its_own_file(workshop):
     for number, expected in ((1.0, (2.0, False)), (1.0, (2.0, True)), (5.0, (6.0, False))):
         (workshop.user / "own.py").write_text(OWN.format(number=number))
@@ -236,6 +237,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))
 """
 
 
+@pytest.mark.long
 def test_where_there_is_no_room_for_the_cache_every_process_compiles(workshop):
     (workshop.user / "full.py").write_text(FULL + OWN.format(number=7.0))
     for _ in range(2):
@@ -270,6 +272,7 @@ print(entry(Here(3.0), 5.0), entry.from_cache)
 """
 
 
+@pytest.mark.long
 def test_the_cache_can_be_read_where_a_users_part_is_not(workshop):
     """What was compiled for a part of one project must not stand in the way of another."""
     workshop.run()
@@ -282,6 +285,7 @@ def test_the_cache_can_be_read_where_a_users_part_is_not(workshop):
     assert workshop.run()[1]
 
 
+@pytest.mark.long
 def test_a_part_of_a_script_leaves_nothing_in_the_cache(workshop):
     """It would be another class at each run, and the cache would grow for ever."""
     workshop.run()

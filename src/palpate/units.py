@@ -17,7 +17,8 @@ class Unit:
     factor: float
 
 
-_STANDARD_GRAVITY = 9.80665
+GRAVITY = 9.80665
+"""Standard gravity [m/s^2]."""
 _POUND_FORCE = 4.4482216152605
 
 UNITS: dict[str, Unit] = {
@@ -38,10 +39,10 @@ UNITS: dict[str, Unit] = {
     "kN": Unit("force", "N", 1e3),
     "mN": Unit("force", "N", 1e-3),
     "uN": Unit("force", "N", 1e-6),
-    "gf": Unit("force", "N", _STANDARD_GRAVITY * 1e-3),
-    "g": Unit("force", "N", _STANDARD_GRAVITY * 1e-3),
-    "kgf": Unit("force", "N", _STANDARD_GRAVITY),
-    "kg": Unit("force", "N", _STANDARD_GRAVITY),
+    "gf": Unit("force", "N", GRAVITY * 1e-3),
+    "g": Unit("force", "N", GRAVITY * 1e-3),
+    "kgf": Unit("force", "N", GRAVITY),
+    "kg": Unit("force", "N", GRAVITY),
     "lbf": Unit("force", "N", _POUND_FORCE),
     "ozf": Unit("force", "N", _POUND_FORCE / 16),
     "rad": Unit("angle", "rad", 1.0),

@@ -11,6 +11,7 @@ from palpate.errors import InputError
 ONE_DIRECTION = [(60.0, 1.0, 0.003, 12e3), (480.0, 0.25, 0.0015, 410e3)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("damping", "kf", "ki", "limit"), ONE_DIRECTION)
 def test_the_limits_are_those_of_one_direction_but_for_what_the_others_do(damping, kf, ki, limit):
     """The arm's joints share their inertia, and 20 N on a moving lever are a spring: up to a fifth."""
@@ -28,6 +29,7 @@ def test_the_boundary_is_where_the_growth_is_one():
         assert on.stable == (share < 1.0)
 
 
+@pytest.mark.long
 def test_intervals_of_a_gain():
     ((low, high),) = stable_intervals(surface(5e4, 480.0, 1.0, 0.003), "controller.kf", 0.0, 10.0)
     assert low == 0.0

@@ -8,7 +8,7 @@ import pytest
 from analysis.one_direction import growth
 from analysis.worlds import decoupled, ringing, surface, tip_mass
 from palpate.analysis import growth_with, linearise, stable_stiffness
-from palpate.analysis.linearising import period_of
+from palpate.analysis.linear_model import period_of
 from palpate.bench import build, load
 from palpate.bench.experiments.tables import changed
 from palpate.errors import InputError

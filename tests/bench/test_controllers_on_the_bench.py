@@ -57,6 +57,7 @@ def test_pi_leaves_no_error(surface):
     assert without["force"][-1000:].mean() < 18.5
 
 
+@pytest.mark.long
 @surfaces
 def test_the_neural_controller_is_the_pi_of_its_own_gain(surface):
     """The gain that the network has at work is near 5 per second, and a PI of that gain errs as much."""

@@ -121,6 +121,7 @@ def test_the_thesis_front_end_finds_a_negative_mass(runs, name):
     np.testing.assert_allclose(thesis[:, 0], ratio, rtol=0.03)
 
 
+@pytest.mark.long
 def test_a_model_that_is_wrong_misses_its_interval(runs):
     """Foam that relaxes is no mass, damper and spring: M comes out negative by many standard deviations' worth."""
     run = runs("foam-viscoelastic")

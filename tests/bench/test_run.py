@@ -43,7 +43,13 @@ def kinds_of_loop():
     return list(found.values())
 
 
-@pytest.mark.parametrize("name", kinds_of_loop())
+FEW = ("foam-cautious", "foam-chirp", "foam-hybrid", "foam-impedance", "foam-neural", "foam-viscoelastic")
+"""Kinds of loop of which each test run asks; the others take as long and are `long`."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=() if n in FEW else pytest.mark.long) for n in kinds_of_loop()]
+)
 def test_compiled_and_stepped_runs_agree_to_the_bit(name):
     """Over the approach, the touch and the switch. Networks call exp, of which there are two in a process."""
     bench = build(quick(name))

@@ -12,6 +12,8 @@ from palpate.cli import main
 from palpate.logs.store import read_record
 
 SURFACES = ("--stiffness", "3:8:N/mm", "--damping", "100:300", "--mass", "0.1:0.3")
+ONE = ("--stiffness", "5000", "--damping", "200", "--mass", "0.2", "--force", "15", "--peak", "20")
+"""One surface, where nine are not what is tested."""
 ASKED = (*SURFACES, "--force", "15", "--peak", "20:N", "--precision", "K=10%,B=10%")
 
 
@@ -56,19 +58,7 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
 
 
 def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
-    words = (
-        *SURFACES,
-        "--force",
-        "15",
-        "--peak",
-        "20",
-        "--precision",
-        "1%",
-        "--out",
-        "excite.csv",
-        "--duration",
-        "4",
-    )
+    words = (*ONE, "--lag-std", "1:ms", "--precision", "1%", "--out", "excite.csv", "--duration", "4")
     assert main(["excite", *words, "--no-figure"]) == 1
     printed = capsys.readouterr().out
     assert "no; the best is K" in printed
@@ -145,12 +135,13 @@ def test_a_surface_without_a_mass(capsys):
 
 def test_a_robot_and_sensors_of_ones_own(capsys):
     own = ("--noise", "0.06", "--sampling", "1000", "--force-filter", "none", "--position-step", "0.1:um")
-    _, better = ask(capsys, *ASKED, *own, "--loop-bandwidth", "30", "--duration", "4")
-    _, usual = ask(capsys, *ASKED, "--duration", "4")
+    asked = (*ONE, "--duration", "4")
+    _, better = ask(capsys, *asked, *own, "--loop-bandwidth", "30")
+    _, usual = ask(capsys, *asked)
     assert better["reached"]["M"] < usual["reached"]["M"]
-    _, vague = ask(capsys, *ASKED, "--lag-std", "1:ms", "--duration", "4")
+    _, vague = ask(capsys, *asked, "--lag-std", "1:ms")
     assert vague["reached"]["M"] > usual["reached"]["M"]
-    _, heavy = ask(capsys, *ASKED, "--tip-mass", "100", "--tip-friction", "0", "--duration", "4")
+    _, heavy = ask(capsys, *asked, "--tip-mass", "100", "--tip-friction", "0")
     assert heavy["reached"]["M"] > usual["reached"]["M"]
 
 

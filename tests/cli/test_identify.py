@@ -81,6 +81,7 @@ def test_light_presses_on_skin_claim_nothing(measured, capsys, load):
     assert all(p["verdict"] != "identified" for p in found["parameters"].values())
 
 
+@pytest.mark.long
 def test_silverbox(measured, capsys):
     columns = ("--time", "time_s", "--position", "position_V:1", "--force", "force_V:1")
     code, found = ask(capsys, measured / "silverbox/schroeder_80mV.csv", *columns)
@@ -216,6 +217,7 @@ def test_the_method_is_that_of_the_library(shaken, capsys, method):
     assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
 
 
+@pytest.mark.long
 def test_another_method_is_said(shaken, capsys):
     words = ("--model", "kelvin-voigt-mass", "--method", "output-error", "--report", "a.html", "--no-figure")
     assert main(["identify", str(shaken), *OWN, *words]) == 0

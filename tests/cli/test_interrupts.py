@@ -12,6 +12,7 @@ from cli.test_run import text_of
 from palpate.cli import main
 from palpate.cli._interrupts import noticed
 from palpate.logs import read_record
+from palpate.report.run import figures
 from palpate.report.run import page as pages
 
 PRELUDE = """
@@ -65,6 +66,7 @@ def test_within_noticed_nothing_is_raised_and_it_is_told():
         time.sleep(1.0)
 
 
+@pytest.mark.long
 def test_results_that_are_being_written_are_written(tmp_path, monkeypatch):
     """It comes while the page is made: everything is there, and the code says that it came."""
     monkeypatch.chdir(tmp_path)
@@ -89,7 +91,7 @@ def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeyp
     def full(*words):
         raise error
 
-    monkeypatch.setattr(pages, "run_page", full)
+    monkeypatch.setattr(figures, "draw", full)
     assert main(["run", "mine.toml", "--out", "results"]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1

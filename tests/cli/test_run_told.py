@@ -19,6 +19,7 @@ def mine(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.long
 def test_a_reader_that_has_gone_loses_no_results(mine):
     reader, writer = os.pipe()
     os.close(reader)

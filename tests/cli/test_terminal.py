@@ -94,9 +94,10 @@ def test_a_log_with_a_hostile_name(tmp_path, capsys, monkeypatch):
 )
 def test_little_is_needed_of_the_environment(tmp_path, variables, encoding, told):
     """With nothing but the way to programs: letters that the encoding lacks, a home that cannot be written."""
-    surface = ("--stiffness", "3000", "--damping", "50", "--force", "15", "--peak", "20")
+    surface = ("--stiffness", "3000", "--damping", "50", "--force", "15", "--peak", "20", "--duration", "4")
+    drawn = "HOME" in variables
     ran = subprocess.run(
-        [sys.executable, "-m", "palpate", "excite", *surface],
+        [sys.executable, "-m", "palpate", "excite", *surface, *([] if drawn else ["--no-figure"])],
         env={"PATH": os.environ["PATH"], **variables},
         cwd=tmp_path,
         capture_output=True,
@@ -105,7 +106,7 @@ def test_little_is_needed_of_the_environment(tmp_path, variables, encoding, told
     assert ran.returncode == 0, ran.stderr
     assert ran.stderr == b""
     assert told in ran.stdout.decode(encoding)
-    assert (tmp_path / "excite.png").is_file()
+    assert (tmp_path / "excite.png").is_file() == drawn
 
 
 def test_streams_that_were_closed_are_nowhere(tmp_path):

@@ -94,6 +94,7 @@ def test_gains_certificate_and_check(capsys, elsewhere):
     assert "no certificate" in refused(capsys, "certify", "--check", "none.json")
 
 
+@pytest.mark.long
 def test_what_cannot_be_proved_is_exit_code_1(capsys, elsewhere):
     (elsewhere / "gains.toml").write_text(gains_of(cap=1e4).to_toml())
     assert (
@@ -103,9 +104,12 @@ def test_what_cannot_be_proved_is_exit_code_1(capsys, elsewhere):
 
 
 def test_from_what_identify_printed(capsys, elsewhere):
-    (elsewhere / "found.json").write_text(json.dumps(found()))
+    """With its warnings: an untared, saturated or wrongly signed sensor is found out there."""
+    warnings = [{"code": "saturated", "text": "the force stands at its end"}]
+    (elsewhere / "found.json").write_text(json.dumps(found(warnings=warnings)))
     code, told = ask(capsys, "found.json", "--arm", "ur5e", "--force", "20")
     assert code == 0
+    assert told["warnings"] == warnings
     assert told["estimate"]["stiffness"] == 5000.0
     assert told["gains"]["stiffness_cap"] == pytest.approx(5200.0 + 25.0 / told["theta_s"])
     low, high = told["proved"]["stiffness"]
@@ -113,35 +117,21 @@ def test_from_what_identify_printed(capsys, elsewhere):
     assert high > 5200.0
 
 
-def test_the_working_point_goes_first(capsys, elsewhere):
-    point = {
-        "stiffness": {
-            "value": 7000.0,
-            "ci95": [6900.0, 7100.0],
-            "prediction95": [6500.0, 7500.0],
-            "unit": "N/m",
-        }
-    }
-    (elsewhere / "found.json").write_text(json.dumps(found(working_point=point)))
-    told = ask(capsys, "found.json", "--arm", "ur5e", "--force", "20")[1]
-    assert told["estimate"]["stiffness_interval"] == [6500.0, 7500.0]
+@pytest.mark.long
+def test_the_working_point_goes_first_and_what_is_rough_is_said(capsys, elsewhere, root):
+    """An estimate as wide as the margin, and a delay that is no whole number of ticks."""
+    stiffness = {"value": 7000.0, "ci95": [6900.0, 7100.0], "prediction95": [1000.0, 9000.0], "unit": "N/m"}
+    (elsewhere / "found.json").write_text(json.dumps(found(working_point={"stiffness": stiffness})))
+    (elsewhere / "mine.toml").write_text(arm_text(root, "delay = 0.01", "delay = 0.0113"))
+    told = ask(capsys, "found.json", "--arm", "mine.toml", "--force", "20")[1]
+    assert told["estimate"]["stiffness_interval"] == [1000.0, 9000.0]
+    wide, rounded = told["warnings"]
+    assert wide["code"] == "wide-estimate"
+    assert "palpate excite --stiffness 1e+03:9e+03" in wide["text"]
+    assert "11.3 ms is no whole number of ticks; 6 were taken" in rounded["text"]
 
 
-def test_an_estimate_as_wide_as_the_margin_is_said(capsys, elsewhere):
-    (elsewhere / "found.json").write_text(json.dumps(found(half=4000.0)))
-    told = ask(capsys, "found.json", "--arm", "ur5e", "--force", "20")[1]
-    (warning,) = told["warnings"]
-    assert warning["code"] == "wide-estimate"
-    assert "palpate excite --stiffness 1e+03:9e+03" in warning["text"]
-
-
-def test_what_the_identification_warns_of_is_handed_on(capsys, elsewhere):
-    """An untared, saturated or wrongly signed sensor is found out there."""
-    warnings = [{"code": "saturated", "text": "the force stands at its end"}]
-    (elsewhere / "found.json").write_text(json.dumps(found(warnings=warnings)))
-    assert ask(capsys, "found.json", "--arm", "ur5e", "--force", "20")[1]["warnings"] == warnings
-
-
+@pytest.mark.long
 def test_straight_from_a_log(capsys, root):
     log = root / "examples" / "data" / "press.csv"
     code, told = ask(
@@ -260,12 +250,6 @@ def test_a_torque_arm_without_its_mass_says_how_to_get_it(capsys, elsewhere, roo
     )
 
 
-def test_a_delay_that_is_no_whole_number_of_ticks_is_rounded_up_and_said(capsys, elsewhere, root):
-    (elsewhere / "mine.toml").write_text(arm_text(root, "delay = 0.01", "delay = 0.0113"))
-    told = ask(capsys, "--stiffness", "1e3:1e4", "--arm", "mine.toml", "--force", "20")[1]
-    assert "11.3 ms is no whole number of ticks; 6 were taken" in told["warnings"][0]["text"]
-
-
 LOOP = ("--time", "t", "--command", "target:mm", "--position", "actual:mm")
 
 
@@ -275,6 +259,7 @@ def write_loop(path, kind):
     np.savetxt(path, table, delimiter=",", header="t,target,actual", comments="")
 
 
+@pytest.mark.long
 def test_the_inner_loop_from_a_log_widens_what_is_proved(capsys, elsewhere):
     write_loop(elsewhere / "loop.csv", "steps")
     asked = ("--stiffness", "1e3:1e4", "--arm", "ur5e", "--force", "20")
@@ -288,6 +273,7 @@ def test_the_inner_loop_from_a_log_widens_what_is_proved(capsys, elsewhere):
     assert ForceLoop.load("gains.toml").gains.arm.inner.bandwidth_interval == (low, high)
 
 
+@pytest.mark.long
 def test_a_tuned_loop_is_certified_for_the_inner_loop_that_a_log_shows(capsys, elsewhere):
     write_loop(elsewhere / "loop.csv", "steps")
     (elsewhere / "gains.toml").write_text(gains_of(cap=1e4).to_toml())

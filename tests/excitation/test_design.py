@@ -95,6 +95,7 @@ def test_its_power_lies_within_the_band():
     assert max(found.wave.frequencies) <= 25.0 + 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["multisine", "chirp"])
 def test_the_rate_of_change_keeps_to_its_budget(kind):
     limited = replace(QUESTION, kind=kind, budget=replace(LIMITS, rate=200.0), duration=10.0)
@@ -169,6 +170,7 @@ def infeasible():
     return design(replace(QUESTION, precision={"M": 0.1}, duration=4.0))
 
 
+@pytest.mark.long
 def test_what_would_help_is_said_and_true(infeasible):
     assert not infeasible.feasible
     found = remedies(infeasible)
@@ -181,6 +183,7 @@ def test_what_would_help_is_said_and_true(infeasible):
     assert any("lag" in remedy.change for remedy in found)
 
 
+@pytest.mark.long
 def test_time_is_a_remedy_where_it_is_one():
     found = design(replace(QUESTION, sensors=Sensors(ForceChain()), duration=4.0))
     longer = remedies(found)[0]

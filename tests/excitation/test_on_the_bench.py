@@ -17,6 +17,7 @@ FOAM = {"K": 5200.0, "B": 200.0, "M": 0.1}
 RUNS = 8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["multisine", "chirp"])
 def test_the_spread_over_seeds_is_the_predicted_one(kind):
     surfaces = SurfaceRange(*((value, value) for value in FOAM.values()))

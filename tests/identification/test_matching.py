@@ -12,7 +12,7 @@ from palpate.identification.estimators.fit import fit
 from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.prior import USUAL_LAG, USUAL_LAG_STD, Lag
-from palpate.identification.sample_clock import refreshes_of
+from palpate.identification.sample_clock import sample_clock_of
 from palpate.identification.sampling import channels_of
 from palpate.signals.low_pass import LowPass
 
@@ -28,7 +28,7 @@ CLOCK = DT / 12 / np.sqrt(12)
 
 def asked(record, lag=LAG, **said):
     """The problem, and the rows in which the sensor's readings are fresh."""
-    clock = refreshes_of(channels_of(record).raw.held_force)
+    clock = sample_clock_of(channels_of(record).raw.held_force)
     return problem(record, lag, force_filter=SENSOR, **said), clock
 
 

@@ -99,6 +99,7 @@ def test_a_model_is_tried_on_motion_it_has_not_seen():
     assert wrong > 0.05 * position.std()
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not SILVERBOX.exists(), reason="the measured data are not here")
 def test_silverbox_simulates_what_was_not_fitted():
     _, force, position = np.genfromtxt(SILVERBOX, delimiter=",", skip_header=1).T

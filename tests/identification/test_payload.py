@@ -43,6 +43,7 @@ def test_no_inertia_is_seen_where_there_is_none():
     assert "tool-inertia" not in identify(pressed()).codes
 
 
+@pytest.mark.long
 def test_one_frequency_in_contact_leaves_stiffness_and_mass_to_the_noise_of_the_position():
     """K - M w^2 is all that one frequency tells; what the position's noise tells beyond that is no mass."""
     x = 6e-3 * np.sin(2 * np.pi * 2 * TIME) - 2e-3

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.sample_clock import refreshes_of
+from palpate.identification.sample_clock import sample_clock_of
 
 STEP = 1 / 12
 """Of the grid that the instants of 480 samples a second fall on, between 1000 rows a second [rows]."""
@@ -46,7 +46,7 @@ def test_any_even_grid_is_recovered(period, phase, seed):
     # Where a sample comes out at the very instant of a row, rounding decides which row shows it.
     assume(np.abs(instants - np.round(instants)).min() > 1e-7)
     values = held(instants, noisy(seed, len(instants)), count)
-    found = refreshes_of(values)
+    found = sample_clock_of(values)
     inside = instants[instants > 0]
     wanted, rows = rows_of(inside), found.rows[found.instants > 0]
     # The first sample and the last may stand so near to the edge of their row that they count as out of the log.
@@ -65,7 +65,7 @@ def test_any_even_grid_is_recovered(period, phase, seed):
 def test_the_spread_holds_the_true_phase(phase, seed):
     """480 in 1000: within a twelfth of a row, wherever the clock stands, and no nearer."""
     instants = grid(25 / 12, phase * 25 / 12, 2000)
-    found = refreshes_of(held(instants, noisy(seed, len(instants)), 2000))
+    found = sample_clock_of(held(instants, noisy(seed, len(instants)), 2000))
     place = np.searchsorted(found.rows, rows_of(instants[5:-5]))
     error = found.instants[place] - instants[5:-5]
     assert found.spread == pytest.approx(STEP / np.sqrt(12), rel=1e-3)
@@ -79,7 +79,7 @@ def test_at_its_rate():
     for seed in range(40):
         phase = np.random.default_rng([seed, 1]).uniform(0, 25 / 12)
         instants = grid(25 / 12, phase, 500)
-        found = refreshes_of(held(instants, noisy(seed, len(instants)), 500))
+        found = sample_clock_of(held(instants, noisy(seed, len(instants)), 500))
         place = np.searchsorted(found.rows, rows_of(instants[5]))
         errors.append(found.instants[place] - instants[5])
         spreads.append(found.spread)
@@ -100,7 +100,7 @@ def test_samples_that_equal_the_one_before_are_there_all_the_same(period, phase,
     for k in np.flatnonzero(rng.uniform(size=len(samples)) < share):
         samples[k] = samples[k - 1]
     values = held(instants, samples, 2000)
-    found = refreshes_of(values)
+    found = sample_clock_of(values)
     place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
     np.testing.assert_array_equal(found.rows[place], rows_of(instants[3:-3]))
     np.testing.assert_array_equal(values[found.rows[place]], samples[3:-3])
@@ -113,7 +113,7 @@ def test_a_sensor_that_rests_for_long_is_followed_through():
     samples = noisy(3, len(instants))
     moving = (np.arange(len(samples)) // 60) % 2 == 0
     samples = np.where(moving, samples, np.repeat(samples[::60], 60)[: len(samples)])
-    found = refreshes_of(held(instants, samples, 3000))
+    found = sample_clock_of(held(instants, samples, 3000))
     place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
     assert np.abs(found.instants[place] - instants[3:-3]).max() <= STEP
 
@@ -123,7 +123,7 @@ def test_a_clock_that_is_off_by_parts_in_a_million_is_not_taken_for_the_nominal_
     """Over 20 s, 0.2 per mille is four rows; every sample is found, and far nearer than the row it shows in."""
     period = 25 / 12 * (1 + drift)
     instants = grid(period, 0.3, 20_000)
-    found = refreshes_of(held(instants, noisy(4, len(instants)), 20_000))
+    found = sample_clock_of(held(instants, noisy(4, len(instants)), 20_000))
     place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
     assert found.period == pytest.approx(period, abs=1e-6)
     # The rows that a drifting grid passes leave less than STEP open.
@@ -136,7 +136,7 @@ def test_a_clock_that_is_off_by_parts_in_a_million_is_not_taken_for_the_nominal_
 def test_a_clock_in_step_with_the_rows_but_for_a_few(nominal, slips):
     """A sample more or less every some seconds: near 2 rows, one kind looks nearly like the other."""
     instants = grid(nominal * (1 + slips / 20_000), 0.3, 20_000)
-    found = refreshes_of(held(instants, noisy(4, len(instants)), 20_000))
+    found = sample_clock_of(held(instants, noisy(4, len(instants)), 20_000))
     own = instants[3:-3]
     place = np.searchsorted(found.rows, rows_of(own))
     np.testing.assert_array_equal(found.rows[place], rows_of(own))
@@ -153,7 +153,7 @@ def test_a_clock_without_an_even_beat_leaves_each_sample_half_a_row_before_it_sh
     instants = np.cumsum(25 / 12 + rng.uniform(-0.6, 0.6, 900))
     samples = noisy(6, 900)
     values = held(np.r_[-1.0, instants], np.r_[0.0, samples], 1800)
-    found = refreshes_of(values)
+    found = sample_clock_of(values)
     own = np.intersect1d(found.rows, rows_of(instants), return_indices=True)
     assert len(own[0]) >= 860  # two samples within one row are one change
     error = found.instants[own[1]] - instants[own[2]]
@@ -171,7 +171,7 @@ def test_a_channel_as_fast_as_the_log_is_fresh_in_every_row(period, repeated):
     samples = noisy(7, len(instants))
     for k in np.flatnonzero(rng.uniform(size=len(samples)) < repeated):
         samples[k] = samples[k - 1]
-    found = refreshes_of(held(instants, samples, 500))
+    found = sample_clock_of(held(instants, samples, 500))
     np.testing.assert_array_equal(found.rows, np.arange(500))
     np.testing.assert_array_equal(found.instants, np.arange(500.0))
     assert (found.spread, found.period) == (0.0, 1.0)
@@ -182,14 +182,14 @@ def test_what_hardly_ever_changes_has_no_grid_of_its_own(changes, first):
     values = np.zeros(5000)
     for k in range(changes):
         values[first + 480 * k + 1 :] += 1.0
-    found = refreshes_of(values)
+    found = sample_clock_of(values)
     np.testing.assert_array_equal(found.rows, np.arange(5000))
 
 
 @pytest.mark.parametrize("period", [60.0, 100.3, 1000.7])
 def test_a_sensor_a_hundred_times_slower_than_the_log(period):
     instants = grid(period, 0.3, 20_000)
-    found = refreshes_of(held(instants, noisy(9, len(instants)), 20_000))
+    found = sample_clock_of(held(instants, noisy(9, len(instants)), 20_000))
     own = instants[instants > 0]
     place = np.searchsorted(found.rows, rows_of(own))
     assert np.abs(found.instants[place] - own).max() <= 0.5
@@ -201,7 +201,7 @@ def test_a_lone_change_long_before_all_others_does_not_hide_them():
     samples = noisy(10, len(instants))
     samples[: len(samples) * 9 // 10] = 0.0
     samples[3:] += 1.0
-    found = refreshes_of(held(instants, samples, 60_000))
+    found = sample_clock_of(held(instants, samples, 60_000))
     place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
     assert np.abs(found.instants[place] - instants[3:-3]).max() <= STEP
 
@@ -209,6 +209,6 @@ def test_a_lone_change_long_before_all_others_does_not_hide_them():
 def test_the_readings_alone_count_not_their_size():
     instants = grid(25 / 12, 0.7, 1000)
     values = held(instants, noisy(8, len(instants)), 1000)
-    one, other = refreshes_of(values), refreshes_of(-1e-3 * values + 50)
+    one, other = sample_clock_of(values), sample_clock_of(-1e-3 * values + 50)
     np.testing.assert_array_equal(one.instants, other.instants)
     np.testing.assert_array_equal(one.rows, other.rows)

@@ -10,7 +10,7 @@ from palpate.errors import InputError
 from palpate.identifiers import RecursiveLeastSquares
 from palpate.identifiers.forgetting import Directional, Exponential, SIFt
 from palpate.identifiers.kernels.dimension import Three
-from palpate.identifiers.kernels.error_covariance import Doubt, long_run_variance, unsure
+from palpate.identifiers.kernels.error_covariance import ErrorCovariance, long_run_variance, unsure
 from palpate.identifiers.kernels.least_squares import LeastSquares, learned, rls
 
 SIZES = [3, 4, 5]  # three and four parameters go by value, other numbers by array
@@ -158,10 +158,10 @@ vectors = st.tuples(finite, finite, finite)
 def test_vectors_and_arrays_agree_in_each_law(theta, phi, rows, y, keep):
     root = np.array(rows) + 3e3 * np.eye(3)
     by_hand = lambda A: Mat3(*(Vec3(*map(float, row)) for row in A))  # noqa: E731
-    doubt = Doubt(
+    doubt = ErrorCovariance(
         0.1 * root, 0.5 * root, root @ root.T, root @ root.T, np.array(phi), 5.0, 4.0, 3.0, 2.0, 1.0, 99.0
     )
-    same = Doubt(*map(by_hand, doubt[:4]), Vec3(*phi), *doubt[5:])
+    same = ErrorCovariance(*map(by_hand, doubt[:4]), Vec3(*phi), *doubt[5:])
     by_array = learned(np.array(theta), root, doubt, np.array(phi), y, keep, NumPy(3))
     by_value = learned(Vec3(*theta), by_hand(root), same, Vec3(*phi), y, keep, Three())
     for ours, theirs in zip(
@@ -186,6 +186,7 @@ def test_the_part_for_kernels_is_the_streaming_estimator():
     np.testing.assert_allclose(np.array(state.std()), streaming.estimate().std, rtol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n", SIZES)
 def test_a_million_samples_that_say_nothing_new_do_no_harm(n):
     """The textbook form loses symmetry and is not a number after 200,000 of them."""

@@ -2,6 +2,8 @@
 
 import threading
 
+import pytest
+
 from live.conftest import PATIENCE, near
 from palpate.analysis import linearise, margins
 from palpate.live.stability import Stability, answers
@@ -28,6 +30,7 @@ def test_what_has_no_state_of_rest_is_said():
     assert found[-1]["text"].startswith("Nothing is known of its stability")
 
 
+@pytest.mark.long
 def test_a_process_of_its_own_answers_and_ends():
     came = threading.Event()
     own = Stability(came.set)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.identification.sample_clock import refreshes_of
+from palpate.identification.sample_clock import sample_clock_of
 from palpate.identification.sampling import channels_of
 from palpate.logs.aligning import align
 from palpate.logs.stamps import Timed
@@ -77,7 +77,7 @@ def test_what_is_to_be_held_is_not_moved():
     assert (late >= 0).all()
     assert (late < 0.001).all()
     filled = column[rows][np.maximum(np.searchsorted(rows, np.arange(len(column)), side="right") - 1, 0)]
-    grid = refreshes_of(filled)
+    grid = sample_clock_of(filled)
     instants = table.time[0] + grid.instants * 0.001
     np.testing.assert_allclose(np.interp(instants[5:-5], sensor, sensor), instants[5:-5], atol=1e-12)
     nearest = np.abs(instants[5:-5, None] - sensor[None, :]).min(axis=1)

@@ -19,6 +19,7 @@ print(base)
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="ru_maxrss is in kB on Linux only")
 def test_memory_of_reading(tmp_path):
     path = tmp_path / "long.csv"

@@ -202,6 +202,7 @@ def test_frames_of_transforms(tmp_path):
     np.testing.assert_allclose(one["position"], MOVED[:, 0])
 
 
+@pytest.mark.long
 def test_ten_thousand_columns(tmp_path):
     """Each column used to be looked for in the file by itself."""
     path = tmp_path / "wide.csv"

@@ -79,7 +79,18 @@ def alone(page):
     return [code for code in blocks(ROOT, page, "python") if not re.search(r"\bread_\w+\(", code)]
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if page != "README.md" and alone(page)])
+LONG = ("docs/arms.md", "docs/force.md", "docs/analysis.md")
+"""They press, tune or prove for seconds."""
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.long if page in LONG else ())
+        for page in PAGES
+        if page != "README.md" and alone(page)
+    ],
+)
 def test_python_of_the_pages_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for code in alone(page):

@@ -47,6 +47,7 @@ def test_an_arm_of_positions_too():
     assert difference(own, other).max() < 1e-7
 
 
+@pytest.mark.long
 def test_what_encoders_do_not_see_grows_until_they_see_it():
     """Why presses on two engines drift apart where encoders are coarse: between two counts nobody holds the arm.
 

@@ -57,11 +57,13 @@ def test_controllers_of_three_directions_press_with_seven_joints(controller):
     assert summary["force"]["mean_N"] == pytest.approx(20.0, abs=0.5)
 
 
+@pytest.mark.long
 def test_the_impedance_shares_the_depth_with_the_surface():
     _, summary = asked(controller="impedance", seconds=2.5, probe=0.0)
     assert summary["force"]["mean_N"] == pytest.approx(20.0 * 5000.0 / (5000.0 + 2000.0), rel=0.01)
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_numbers_and_another_others():
     one, again, other = (asked(seconds=0.3, seed=seed)[0] for seed in (1, 1, 2))
     assert np.array_equal(one["force"], again["force"])

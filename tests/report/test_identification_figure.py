@@ -8,7 +8,7 @@ import pytest
 from palpate.files import check_place
 from palpate.report.identification.figure import draw, write_figure
 from palpate.report.identification.fit_panels import thinned
-from palpate.report.identification.words import said, sentence
+from palpate.report.identification.words import formatted, sentence
 from report.outcomes import OUTCOMES
 
 
@@ -69,7 +69,7 @@ def test_the_sentence_and_the_verdicts_stand_above_the_panels(found):
     assert "press.csv" in written
     assert sentence(found) in written
     for name, p in found.parameters.items():
-        assert f"{name} {said(p)}" in written
+        assert f"{name} {formatted(p)}" in written
     assert written.index(sentence(found)) < written.index("K ")
 
 

@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from functools import cache
 from html import unescape
 from html.parser import HTMLParser
 from xml.etree import ElementTree
@@ -66,14 +67,32 @@ class Reader(HTMLParser):
         return " ".join(" ".join(self.words).split())
 
 
-@pytest.fixture(scope="module", params=OUTCOMES)
-def found(request):
-    return OUTCOMES[request.param]()
+@cache
+def drawn(outcome):
+    """An outcome and its page, which takes a second."""
+    found = OUTCOMES[outcome]()
+    return found, page(found, SOURCE)
+
+
+OFTEN = ("identified", "not_identifiable", "no_contact", "volts")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=() if name in OFTEN else pytest.mark.long) for name in OUTCOMES],
+)
+def outcome(request):
+    return drawn(request.param)
 
 
 @pytest.fixture(scope="module")
-def html(found):
-    return page(found, SOURCE)
+def found(outcome):
+    return outcome[0]
+
+
+@pytest.fixture(scope="module")
+def html(outcome):
+    return outcome[1]
 
 
 @pytest.fixture(scope="module")
@@ -188,9 +207,9 @@ def test_it_is_read_aloud_too(read):
 
 
 def test_the_pictures_are_whole_and_have_a_dark_side_and_a_narrow_one(found, read):
-    drawn = list(pictures(read))
-    assert len(drawn) == 2 * (1 if not found.n else 5)
-    for drawing in drawn:
+    drawings = list(pictures(read))
+    assert len(drawings) == 2 * (1 if not found.n else 5)
+    for drawing in drawings:
         ElementTree.fromstring(drawing)
         assert "prefers-color-scheme:dark" in drawing
         for name in set(re.findall(r"var\((--c\d+)\)", drawing)):
@@ -207,12 +226,12 @@ def test_the_models_and_contacts_are_listed(found, read):
 
 
 def test_the_same_identification_gives_the_same_page():
-    found = OUTCOMES["not_identifiable"]()
-    assert page(found, SOURCE) == page(found, SOURCE)
+    found, once = drawn("not_identifiable")
+    assert page(found, SOURCE) == once
 
 
 def test_without_a_unit_none_is_shown():
-    text = Reader(page(OUTCOMES["volts"](), SOURCE)).text
+    text = Reader(drawn("volts")[1]).text
     for unit in ("[N]", "N/m", " kg", "[mm]"):
         assert unit not in text.split("The same as JSON")[0]
 

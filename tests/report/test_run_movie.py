@@ -18,6 +18,7 @@ def record():
     return build(quick("foam-hybrid")).run(1.5, press=0.3)
 
 
+@pytest.mark.long
 def test_a_film_has_a_frame_for_each_twentieth_of_a_second(record, tmp_path):
     from PIL import Image
 

@@ -47,6 +47,7 @@ def on(address, folder, **options):
     return (folder / "results.parquet").read_bytes()
 
 
+@pytest.mark.long
 def test_two_workers_make_the_table_that_threads_make_and_one_may_die(cluster, tmp_path, here, monkeypatch):
     monkeypatch.setattr(clusters, "UNIT", 0.02)  # more batches than two, so that the death falls among them
     assert on(cluster.address, tmp_path / "both") == here
@@ -62,6 +63,7 @@ def test_two_workers_make_the_table_that_threads_make_and_one_may_die(cluster, t
     assert cluster.workers[0].wait() != 0
 
 
+@pytest.mark.long
 def test_a_cluster_that_goes_away_loses_nothing(cluster, tmp_path, here, monkeypatch):
     monkeypatch.setattr(clusters, "UNIT", 0.02)
     folder, source = tmp_path / "out", MORE

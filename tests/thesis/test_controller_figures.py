@@ -226,6 +226,7 @@ def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():
     assert fig_4_03._quiet(runs.one(fig_4_03._press(case, stiffness, 1.0)))
 
 
+@pytest.mark.long
 def test_figures_draw_what_they_ran_and_check_it(tmp_path):
     """The cheapest study whole; the others go the same way in the program's own test."""
     data = fig_2_04.run(Runs((0, 1)))

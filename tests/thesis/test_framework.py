@@ -248,19 +248,16 @@ def cramped(folder: Path, most: int) -> subprocess.CompletedProcess:
     )
 
 
-def test_a_disk_that_is_full_is_one_line_and_can_be_gone_on_from(program, tmp_path):
-    one_line(cramped(tmp_path / "t", 2000))
-    assert not {"claims.json", "index.html", "3.7.png"} & names(tmp_path / "t")
-    assert program("thesis", "3.7", "--out", tmp_path / "t").returncode == 0
-
-
-def test_a_disk_that_is_full_leaves_no_half_page(program, tmp_path):
-    program("thesis", "3.7", "--out", tmp_path / "whole")
-    page = (tmp_path / "whole" / "index.html").stat().st_size
-    assert page > (tmp_path / "whole" / "3.7.png").stat().st_size
-    one_line(cramped(tmp_path / "t", page - 1000))
-    assert "3.7.png" in names(tmp_path / "t")
-    assert "index.html" not in names(tmp_path / "t")
+def test_a_disk_that_is_full_leaves_nothing_half_written_and_can_be_gone_on_from(program, tmp_path):
+    folder = tmp_path / "t"
+    one_line(cramped(folder, 2000))
+    assert not {"claims.json", "index.html", "3.7.png"} & names(folder)
+    assert program("thesis", "3.7", "--out", folder).returncode == 0
+    page = (folder / "index.html").stat().st_size
+    assert page > (folder / "3.7.png").stat().st_size
+    one_line(cramped(tmp_path / "again", page - 1000))
+    assert "3.7.png" in names(tmp_path / "again")
+    assert "index.html" not in names(tmp_path / "again")
 
 
 def test_every_study_offers_what_the_protocol_asks_for():

@@ -222,6 +222,7 @@ def test_each_study_says_what_it_shows_and_what_was_chosen(number):
     assert one.PARAMETERS
 
 
+@pytest.mark.long
 def test_a_figure_from_its_runs_to_its_file(tmp_path):
     from palpate.report import style
 

@@ -174,7 +174,7 @@ def test_a_sign_is_firm_when_no_noise_seed_turns_it():
     ("study", "ids", "panels"),
     [
         (fig_6_06, ["network-learning-rate.slower", "network-learning-rate.too-large"], 4),
-        (
+        pytest.param(
             first_seconds.FOAM,
             [
                 "network-foam.time-K",
@@ -185,9 +185,10 @@ def test_a_sign_is_firm_when_no_noise_seed_turns_it():
                 "network-foam.M",
             ],
             10,
+            marks=pytest.mark.long,
         ),
         (fig_6_08, ["network-foam.error"], 4),
-        (
+        pytest.param(
             first_seconds.RUBBER,
             [
                 "network-rubber.time-K",
@@ -198,8 +199,14 @@ def test_a_sign_is_firm_when_no_noise_seed_turns_it():
                 "network-rubber.M",
             ],
             10,
+            marks=pytest.mark.long,
         ),
-        (e4_probe, ["network-probe.K", "network-probe.M", "network-probe.outside", "network-probe.scale"], 8),
+        pytest.param(
+            e4_probe,
+            ["network-probe.K", "network-probe.M", "network-probe.outside", "network-probe.scale"],
+            8,
+            marks=pytest.mark.long,
+        ),
     ],
     ids=lambda value: getattr(value, "NUMBER", ""),
 )

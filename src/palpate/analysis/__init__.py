@@ -2,7 +2,7 @@
 
 from palpate.analysis.boundaries import stable_intervals, stable_stiffness
 from palpate.analysis.linear_loop import LinearLoop, Mode
-from palpate.analysis.linearising import linearise
+from palpate.analysis.linear_model import linearise
 from palpate.analysis.margins import Margins, growth_with, loop_gain, margins
 
 __all__ = [

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.analysis.linearising import linearise
+from palpate.analysis.linear_model import linearise
 from palpate.bench.experiments.tables import Experiment, changed
 from palpate.errors import InputError
 

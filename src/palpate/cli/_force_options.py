@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._flags import FLAG, SIGNED, check_new, in_si, in_si_if_given
 from palpate.cli._log_options import LogOptions
 from palpate.errors import InputError
-from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.force import Arm
     from palpate.force.inner_loop import InnerLoop
-
-FLAG = Parameter(negative=())
-NUMBER = Parameter(allow_leading_hyphen=True)
 
 
 @Parameter(name="*", group=Group("The arm", sort_key=1))
@@ -63,14 +60,14 @@ class SurfaceOptions:
         Of a surface that moves by itself, m/s.
     """
 
-    stiffness: Annotated[str | None, NUMBER] = None
-    stiffness_cap: Annotated[str | None, NUMBER] = None
-    surface_speed: Annotated[float | None, NUMBER] = None
+    stiffness: Annotated[str | None, SIGNED] = None
+    stiffness_cap: Annotated[str | None, SIGNED] = None
+    surface_speed: Annotated[float | None, SIGNED] = None
 
     @property
     def cap(self) -> float | None:
         """The stiffest [N/m]."""
-        return _one("--stiffness-cap", self.stiffness_cap, "stiffness")
+        return in_si_if_given("--stiffness-cap", self.stiffness_cap, "stiffness")
 
 
 @Parameter(name="*", group=Group("The press", sort_key=3))
@@ -86,20 +83,18 @@ class PressOptions:
         Highest force allowed at the touch, N.
     """
 
-    force: Annotated[str, NUMBER]
-    peak: Annotated[str | None, NUMBER] = None
+    force: Annotated[str, SIGNED]
+    peak: Annotated[str | None, SIGNED] = None
 
     @property
     def desired(self) -> float:
         """F_d [N]."""
-        from palpate.excitation.quantities import quantity
-
-        return quantity("--force", self.force, "force")
+        return in_si("--force", self.force, "force")
 
     @property
     def highest(self) -> float | None:
         """Force at the touch [N]."""
-        return _one("--peak", self.peak, "force")
+        return in_si_if_given("--peak", self.peak, "force")
 
 
 @Parameter(name="*", group=Group("What is in the logs", sort_key=4))
@@ -157,11 +152,7 @@ class OutputOptions:
 
     def check(self, ending: str) -> None:
         """Finds the place wrong before any work is done."""
-        if self.out is None:
-            return
-        check_place(self.out, "--out", ending=ending)
-        if self.out.exists() and not self.replace:
-            raise InputError(f"{self.out} exists; choose another place, or add --replace")
+        check_new(self.out, "--out", replace=self.replace, ending=ending)
 
 
 def one_thread() -> None:
@@ -192,9 +183,3 @@ def inner_loop(log: Path, columns: ColumnOptions) -> InnerLoop:
     given = {role: name for role, name in names.items() if name is not None}
     record = read_log(log, rate=columns.rate, **given)
     return identify_inner_loop(record["time"], record["command"], record["position"], where=str(log))
-
-
-def _one(flag: str, text: str | None, of: str) -> float | None:
-    from palpate.excitation.quantities import quantity
-
-    return None if text is None else quantity(flag, text, of)

@@ -74,7 +74,7 @@ def _row(log: Path, asked: OneLog) -> LogRow:
         found, source = asked.identified(log)
     except (PalpateError, OSError, MemoryError) as error:
         return LogRow(
-            Source(str(log), asked.told), None, " ".join((str(error) or type(error).__name__).split())
+            Source(str(log), asked.options), None, " ".join((str(error) or type(error).__name__).split())
         )
     return LogRow(source, _light(found))
 

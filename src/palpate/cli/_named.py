@@ -4,14 +4,56 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
+from cyclopts import Group, Parameter
+
+from palpate.cli._flags import FLAG
 from palpate.cli._terminal import print_lines
 from palpate.errors import InputError
 from palpate.text import shown
 
 if TYPE_CHECKING:
     from palpate.bench.experiments.toml_files import TomlFiles
+
+
+@Parameter(name="*", group=Group("What there is", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class KnownOptions:
+    """To look, and to run nothing.
+
+    Parameters
+    ----------
+    list_
+        List what can be named and stop.
+    print_
+        Print the file of the one named, to copy and edit, and stop.
+    """
+
+    list_: Annotated[bool, FLAG, Parameter(name="--list")] = False
+    print_: Annotated[bool, FLAG, Parameter(name="--print")] = False
+
+
+@Parameter(name="*", group=Group("What is written", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class FolderOptions:
+    """Where results go.
+
+    Parameters
+    ----------
+    out
+        Folder for results; when left out, one in runs/ with the name of what is run.
+    force
+        Replace the results that stand there already.
+    json
+        Print the summary as JSON and nothing else.
+    """
+
+    out: Path | None = None
+    force: Annotated[bool, FLAG] = False
+    json: Annotated[bool, FLAG] = False
 
 
 def listed(files: TomlFiles, title: Callable[[str], str]) -> None:

@@ -60,7 +60,7 @@ class OneLog:
 
     def identified_along(self, log: Path) -> tuple[Identification, Record, Source]:
         """The same, with the force and the position along the normal that it is of."""
-        from palpate.contact_frame import identify_contact, told
+        from palpate.contact_frame import described, identify_contact
         from palpate.report.identification.source import Source, sha256_of
 
         known = self.fitted.known(log, self.source)
@@ -80,7 +80,14 @@ class OneLog:
         return (
             found,
             along,
-            Source(str(log), self.told, sha256_of(log), command(), made=now, notes=tuple(told(along.meta))),
+            Source(
+                str(log),
+                self.options,
+                sha256_of(log),
+                command(),
+                made=now,
+                notes=tuple(described(along.meta)),
+            ),
         )
 
     def _between(self, known: dict[str, Any], samples: bool) -> Arm:
@@ -99,7 +106,7 @@ class OneLog:
         return replace(between, stiffness=robot_stiffness(pressed, wall.name))
 
     @property
-    def told(self) -> dict[str, Any]:
+    def options(self) -> dict[str, Any]:
         """What was said about logs, frame, arm and indenter, as plain values."""
         return {
             own.name: _plain(value)

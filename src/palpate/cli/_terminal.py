@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from palpate.cli._streams import flush
 from palpate.text import shown
 
 if TYPE_CHECKING:
@@ -21,9 +22,9 @@ STYLE = "yellow"
 
 
 def print_lines(*lines: str) -> None:
-    """Print lines as they are, however long, for a reader or for another program, which may wait for them."""
+    """Print lines as they are, however long, for a reader or for another program; at once, on a pipe too."""
     sys.stdout.write("".join(f"{shown(line)}\n" for line in lines))
-    sys.stdout.flush()
+    flush(sys.stdout)
 
 
 def print_json(value: Any) -> None:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._force_options import FLAG, NUMBER, ColumnOptions, OutputOptions, inner_loop, one_thread
+from palpate.cli._flags import FLAG, SIGNED
+from palpate.cli._force_options import ColumnOptions, OutputOptions, inner_loop, one_thread
 from palpate.cli._terminal import console, print_json, print_lines
 from palpate.errors import InputError
 
@@ -39,10 +40,10 @@ class ProofOptions:
         A log of commanded and measured position in free motion: the proof is of the inner loop that it shows.
     """
 
-    stiffness: Annotated[str | None, NUMBER] = None
-    damping_time: Annotated[str | None, NUMBER] = None
-    jitter: Annotated[int, NUMBER] = 1
-    margin: Annotated[float, NUMBER] = 1.0
+    stiffness: Annotated[str | None, SIGNED] = None
+    damping_time: Annotated[str | None, SIGNED] = None
+    jitter: Annotated[int, SIGNED] = 1
+    margin: Annotated[float, SIGNED] = 1.0
     held_only: Annotated[bool, FLAG] = False
     loop_from: Path | None = None
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._flags import FLAG, SIGNED, check_new, in_si, in_si_if_given
 from palpate.cli._terminal import console, place, print_json
 from palpate.errors import InputError
 from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.excitation import Budget, Design, ForceLoop, Question, Remedy, Sensors, SurfaceRange
-
-_FLAG = Parameter(negative=())
-_NUMBER = Parameter(allow_leading_hyphen=True)
 
 
 @Parameter(name="*", group=Group("The surfaces", sort_key=1))
@@ -34,9 +33,9 @@ class SurfaceOptions:
         Of the surfaces, kg; left out, they have none that matters.
     """
 
-    stiffness: Annotated[str, _NUMBER]
-    damping: Annotated[str, _NUMBER]
-    mass: Annotated[str | None, _NUMBER] = None
+    stiffness: Annotated[str, SIGNED]
+    damping: Annotated[str, SIGNED]
+    mass: Annotated[str | None, SIGNED] = None
 
     def range(self) -> SurfaceRange:
         """All of them."""
@@ -73,28 +72,26 @@ class BudgetOptions:
         How far the desired force may depart from its mean, N, if more than the force on the surface may.
     """
 
-    force: Annotated[str, _NUMBER]
-    peak: Annotated[str, _NUMBER]
-    least: Annotated[str, _NUMBER] = "2"
-    bandwidth: Annotated[str, _NUMBER] = "40"
-    lowest: Annotated[str, _NUMBER] = "0.5"
-    force_rate: Annotated[str | None, _NUMBER] = None
-    drive: Annotated[str | None, _NUMBER] = None
+    force: Annotated[str, SIGNED]
+    peak: Annotated[str, SIGNED]
+    least: Annotated[str, SIGNED] = "2"
+    bandwidth: Annotated[str, SIGNED] = "40"
+    lowest: Annotated[str, SIGNED] = "0.5"
+    force_rate: Annotated[str | None, SIGNED] = None
+    drive: Annotated[str | None, SIGNED] = None
 
     def budget(self) -> Budget:
         """The limits."""
         from palpate.excitation import Budget
 
         return Budget(
-            _quantity("--force", self.force, "force"),
-            _quantity("--peak", self.peak, "force"),
-            _quantity("--least", self.least, "force"),
-            _quantity("--lowest", self.lowest, "frequency"),
-            _quantity("--bandwidth", self.bandwidth, "frequency"),
-            float("inf")
-            if self.force_rate is None
-            else _quantity("--force-rate", self.force_rate, "force rate"),
-            None if self.drive is None else _quantity("--drive", self.drive, "force"),
+            in_si("--force", self.force, "force"),
+            in_si("--peak", self.peak, "force"),
+            in_si("--least", self.least, "force"),
+            in_si("--lowest", self.lowest, "frequency"),
+            in_si("--bandwidth", self.bandwidth, "frequency"),
+            inf if self.force_rate is None else in_si("--force-rate", self.force_rate, "force rate"),
+            in_si_if_given("--drive", self.drive, "force"),
         )
 
 
@@ -119,10 +116,10 @@ class GoalOptions:
         What a multisine makes small: the worst parameter, or D, A or E as the theory of experiments has them.
     """
 
-    precision: Annotated[str, _NUMBER] = "10%"
-    duration: Annotated[str | None, _NUMBER] = None
-    longest: Annotated[str, _NUMBER] = "60"
-    settle: Annotated[str, _NUMBER] = "1"
+    precision: Annotated[str, SIGNED] = "10%"
+    duration: Annotated[str | None, SIGNED] = None
+    longest: Annotated[str, SIGNED] = "60"
+    settle: Annotated[str, SIGNED] = "1"
     kind: str = "multisine"
     criterion: str = "worst"
 
@@ -148,12 +145,12 @@ class SensorOptions:
         Standard deviation of the calibrated lag between force and position, s.
     """
 
-    noise: Annotated[str, _NUMBER] = "0.6"
-    sampling: Annotated[int, _NUMBER] = 480
+    noise: Annotated[str, SIGNED] = "0.6"
+    sampling: Annotated[int, SIGNED] = 480
     force_filter: str = "butterworth3:120"
-    rate: Annotated[int, _NUMBER] = 1000
-    position_step: Annotated[str, _NUMBER] = "1.6:um"
-    lag_std: Annotated[str, _NUMBER] = "0"
+    rate: Annotated[int, SIGNED] = 1000
+    position_step: Annotated[str, SIGNED] = "1.6:um"
+    lag_std: Annotated[str, SIGNED] = "0"
 
     def sensors(self) -> Sensors:
         """The sensors."""
@@ -169,11 +166,11 @@ class SensorOptions:
         chain = ForceChain(
             LowPass.parse(self.force_filter),
             float(min(self.sampling, self.rate)),
-            _quantity("--noise", self.noise, "force"),
+            in_si("--noise", self.noise, "force"),
             open_phase,
         )
-        step = _quantity("--position-step", self.position_step, "length")
-        return Sensors(chain, step, float(self.rate), _quantity("--lag-std", self.lag_std, "time"))
+        step = in_si("--position-step", self.position_step, "length")
+        return Sensors(chain, step, float(self.rate), in_si("--lag-std", self.lag_std, "time"))
 
 
 @Parameter(name="*", group=Group("The robot", sort_key=5))
@@ -195,21 +192,19 @@ class LoopOptions:
         Of the force error, 1/s.
     """
 
-    loop_bandwidth: Annotated[str | None, _NUMBER] = None
-    tip_mass: Annotated[str | None, _NUMBER] = None
-    tip_friction: Annotated[str | None, _NUMBER] = None
-    gain: Annotated[float | None, _NUMBER] = None
-    integral: Annotated[float | None, _NUMBER] = None
+    loop_bandwidth: Annotated[str | None, SIGNED] = None
+    tip_mass: Annotated[str | None, SIGNED] = None
+    tip_friction: Annotated[str | None, SIGNED] = None
+    gain: Annotated[float | None, SIGNED] = None
+    integral: Annotated[float | None, SIGNED] = None
 
     def loop(self) -> ForceLoop:
         """The loop."""
         from palpate.excitation import HybridLoop, KnownBandwidth
 
         given = {
-            "tip_mass": None if self.tip_mass is None else _quantity("--tip-mass", self.tip_mass, "mass"),
-            "friction": None
-            if self.tip_friction is None
-            else _quantity("--tip-friction", self.tip_friction, "force"),
+            "tip_mass": in_si_if_given("--tip-mass", self.tip_mass, "mass"),
+            "friction": in_si_if_given("--tip-friction", self.tip_friction, "force"),
             "gain": self.gain,
             "integral": self.integral,
         }
@@ -221,7 +216,7 @@ class LoopOptions:
                 "--loop-bandwidth stands for the whole robot; leave out --tip-mass, --tip-friction, --gain, "
                 "--integral"
             )
-        return KnownBandwidth(_quantity("--loop-bandwidth", self.loop_bandwidth, "frequency"))
+        return KnownBandwidth(in_si("--loop-bandwidth", self.loop_bandwidth, "frequency"))
 
 
 @Parameter(name="*", group=Group("What is written", sort_key=6))
@@ -247,10 +242,10 @@ class OutputOptions:
 
     out: Path | None = None
     experiment: Path | None = None
-    replace: Annotated[bool, _FLAG] = False
+    replace: Annotated[bool, FLAG] = False
     figure: Path | None = None
-    no_figure: Annotated[bool, _FLAG] = False
-    json: Annotated[bool, _FLAG] = False
+    no_figure: Annotated[bool, FLAG] = False
+    json: Annotated[bool, FLAG] = False
 
 
 def excite(
@@ -286,17 +281,11 @@ def excite(
         robot.loop(),
         goal.kind,
         goal.criterion,
-        None if goal.duration is None else _quantity("--duration", goal.duration, "time"),
-        _quantity("--longest", goal.longest, "time"),
-        _quantity("--settle", goal.settle, "time"),
+        in_si_if_given("--duration", goal.duration, "time"),
+        in_si("--longest", goal.longest, "time"),
+        in_si("--settle", goal.settle, "time"),
     )
     return _answer(question, sensor.rate, output, picture)
-
-
-def _quantity(option: str, text: str, kind: str) -> float:
-    from palpate.excitation.quantities import quantity
-
-    return quantity(option, text, kind)
 
 
 def _picture(output: OutputOptions) -> Path | None:
@@ -313,12 +302,8 @@ def _check_places(output: OutputOptions) -> None:
 
     if output.out is not None:
         check_ending(output.out)
-        check_place(output.out, "--out")
-    if output.experiment is not None:
-        check_place(output.experiment, "--experiment", ending=".toml")
-    for path in filter(None, (output.out, output.experiment)):
-        if path.exists() and not output.replace:
-            raise InputError(f"{path} exists; choose another place, or add --replace")
+    check_new(output.out, "--out", replace=output.replace)
+    check_new(output.experiment, "--experiment", replace=output.replace, ending=".toml")
 
 
 def _answer(question: Question, rate: int, output: OutputOptions, picture: Path | None) -> int:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from palpate.cli._arm_options import ArmOptions, FrameOptions
+from palpate.cli._flags import FLAG, SIGNED
 from palpate.cli._indenter_options import IndenterOptions
 from palpate.cli._log_options import LogOptions
 from palpate.cli._one_log import OneLog, answered
@@ -21,8 +22,6 @@ from palpate.files import check_place
 if TYPE_CHECKING:
     from palpate.identification import Identification
     from palpate.report.identification.source import Source
-
-_FLAG = Parameter(negative=())
 
 
 @Parameter(name="*", group=Group("The model", sort_key=4))
@@ -54,7 +53,7 @@ class ModelOptions:
     """
 
     model: str | None = None
-    lag: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    lag: Annotated[str | None, SIGNED] = None
     force_filter: str | None = None
     mass: str | None = None
     tolerance: float = 0.25
@@ -103,9 +102,9 @@ class OutputOptions:
 
     figure: Path | None = None
     dpi: int | None = None
-    no_figure: Annotated[bool, _FLAG] = False
+    no_figure: Annotated[bool, FLAG] = False
     report: Path | None = None
-    json: Annotated[bool, _FLAG] = False
+    json: Annotated[bool, FLAG] = False
 
     def png(self, name: str) -> Path | None:
         """Where the figure goes; found wrong before any work is done."""

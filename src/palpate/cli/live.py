@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
 from palpate.cli._arm_options import ArmOptions, FrameOptions
+from palpate.cli._flags import FLAG, SIGNED
 from palpate.cli._indenter_options import IndenterOptions
 from palpate.cli._log_options import LogOptions
 from palpate.cli._terminal import print_lines, say
@@ -21,24 +23,75 @@ if TYPE_CHECKING:
     from palpate.live.player import Player
     from palpate.live.view import Source
 
-_FLAG = Parameter(negative=())
-_SHOWN = Group("What is shown", sort_key=0)
-_SERVED = Group("How it is served", sort_key=7)
 _DEFAULT = "foam-hybrid"
 
 
-# More than seven arguments: each is an option with a name of its own.
+@Parameter(name="*", group=Group("What is shown", sort_key=0))
+@dataclass(frozen=True, kw_only=True)
+class ShownOptions:
+    """A simulation, a log or a record.
+
+    Parameters
+    ----------
+    run
+        An experiment to simulate at real time (palpate run --list), or a TOML file of one's own; foam-hybrid if
+        nothing is named.
+    log
+        A log to play again, its columns named as for palpate identify.
+    record
+        A record of a run, or a bag (MCAP) with one wrench and one pose, which need no names.
+    seed
+        Of a simulation's noise.
+    whole_approach
+        Begin at the very start of the search for the surface, not shortly before the touch.
+    """
+
+    run: str | None = None
+    log: Path | None = None
+    record: Path | None = None
+    seed: Annotated[int, Parameter(converter=whole_number)] = 0
+    whole_approach: Annotated[bool, FLAG] = False
+
+    def file(self) -> Path | None:
+        """The log or the record; None for a simulation.
+
+        Raises:
+            InputError: more than one thing is named.
+        """
+        given = (("--run", self.run), ("--log", self.log), ("--record", self.record))
+        named = [name for name, value in given if value is not None]
+        if len(named) > 1:
+            raise InputError(f"{' and '.join(named)} are different things to show; give one of them")
+        return self.log or self.record
+
+
+@Parameter(name="*", group=Group("How it is served", sort_key=7))
+@dataclass(frozen=True, kw_only=True)
+class ServedOptions:
+    """Where a browser and other viewers connect to.
+
+    Parameters
+    ----------
+    port
+        To serve the page on; a free one is found if not given, or 0.
+    open_
+        Open the page in the browser.
+    foxglove
+        Serve Foxglove, Lichtblick and PlotJuggler too.
+    foxglove_port
+        Where those connect to.
+    """
+
+    port: Annotated[int, SIGNED] = 0
+    open_: Annotated[bool, FLAG, Parameter(name="--open")] = False
+    foxglove: Annotated[bool, FLAG] = False
+    foxglove_port: Annotated[int, SIGNED] = 8765
+
+
 def live(
     *,
-    run: Annotated[str | None, Parameter(group=_SHOWN)] = None,
-    log: Annotated[Path | None, Parameter(group=_SHOWN)] = None,
-    record: Annotated[Path | None, Parameter(group=_SHOWN)] = None,
-    seed: Annotated[int, Parameter(group=_SHOWN, converter=whole_number)] = 0,
-    whole_approach: Annotated[bool, _FLAG, Parameter(group=_SHOWN)] = False,
-    port: Annotated[int, Parameter(group=_SERVED, allow_leading_hyphen=True)] = 0,
-    open_: Annotated[bool, _FLAG, Parameter(name="--open", group=_SERVED)] = False,
-    foxglove: Annotated[bool, _FLAG, Parameter(group=_SERVED)] = False,
-    foxglove_port: Annotated[int, Parameter(group=_SERVED, allow_leading_hyphen=True)] = 8765,
+    shown: ShownOptions | None = None,
+    at: ServedOptions | None = None,
     source: LogOptions | None = None,
     frame: FrameOptions | None = None,
     arm: ArmOptions | None = None,
@@ -56,54 +109,23 @@ def live(
 
     The first line printed is the page's address. It is for this machine alone, works without a network, and is
     secret: nobody is answered who does not know it.
-
-    Parameters
-    ----------
-    run
-        An experiment to simulate at real time (palpate run --list), or a TOML file of one's own; foam-hybrid if
-        nothing is named.
-    log
-        A log to play again, its columns named as for palpate identify.
-    record
-        A record of a run, or a bag (MCAP) with one wrench and one pose, which need no names.
-    seed
-        Of a simulation's noise.
-    whole_approach
-        Begin at the very start of the search for the surface, not shortly before the touch.
-    port
-        To serve the page on; a free one is found if not given, or 0.
-    open_
-        Open the page in the browser.
-    foxglove
-        Serve Foxglove, Lichtblick and PlotJuggler too.
-    foxglove_port
-        Where those connect to.
     """
-    named = [
-        name for name, value in (("--run", run), ("--log", log), ("--record", record)) if value is not None
-    ]
-    if len(named) > 1:
-        raise InputError(f"{' and '.join(named)} are different things to show; give one of them")
-    if log is None and record is None:
-        shown: Source = _simulation(run or _DEFAULT, seed, whole_approach)
-    else:
-        from palpate.cli._one_log import OneLog
+    shown, at = shown or ShownOptions(), at or ServedOptions()
+    path = shown.file()
+    if path is None:
+        return _serve(_simulation(shown.run or _DEFAULT, shown.seed, shown.whole_approach), at)
+    from palpate.cli._one_log import OneLog
 
-        path = log or record
-        assert path is not None
-        asked = OneLog(
-            source or LogOptions(),
-            frame or FrameOptions(),
-            arm or ArmOptions(),
-            fitted or ModelOptions(),
-            IndenterOptions(),
-        )
-        if record is not None and not asked.source.plain:
-            raise InputError(
-                "a record names its own columns; give --log FILE with --time, --position, --force"
-            )
-        shown = _replay(path, asked, whole_approach)
-    return _serve(shown, port, open_, foxglove_port if foxglove else None)
+    asked = OneLog(
+        source or LogOptions(),
+        frame or FrameOptions(),
+        arm or ArmOptions(),
+        fitted or ModelOptions(),
+        IndenterOptions(),
+    )
+    if shown.record is not None and not asked.source.plain:
+        raise InputError("a record names its own columns; give --log FILE with --time, --position, --force")
+    return _serve(_replay(path, asked, shown.whole_approach), at)
 
 
 def _simulation(name: str, seed: int, whole: bool) -> Source:
@@ -129,7 +151,7 @@ def _replay(path: Path, asked: Any, whole: bool) -> Source:
     return of_log(source.title, found, along)
 
 
-def _serve(shown: Source, port: int, opened: bool, foxglove_port: int | None) -> int:
+def _serve(shown: Source, at: ServedOptions) -> int:
     from palpate.live.feed import Feed
     from palpate.live.player import Player
     from palpate.live.server import served
@@ -137,9 +159,9 @@ def _serve(shown: Source, port: int, opened: bool, foxglove_port: int | None) ->
     with _stability(shown) as (changed, latest, tell):
         player = Player(shown, Feed(), changed, latest)
         tell.append(player.news)
-        with player, served(player, port) as address, _viewers(player, foxglove_port) as more:
+        with player, served(player, at.port) as address, _viewers(player, at) as more:
             print_lines(str(address), *more)
-            if opened:
+            if at.open_:
                 import webbrowser
 
                 webbrowser.open(str(address))
@@ -170,9 +192,9 @@ def _stability(shown: Source) -> Iterator[tuple[Any, Any, list[Any]]]:
         own.close()
 
 
-def _viewers(player: Player, port: int | None) -> Any:
-    if port is None:
+def _viewers(player: Player, at: ServedOptions) -> Any:
+    if not at.foxglove:
         return nullcontext(())
     from palpate.live.foxglove import viewers
 
-    return viewers(player, port)
+    return viewers(player, at.foxglove_port)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter, Token
+from cyclopts import Group, Parameter, Token
 
+from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
-from palpate.cli._named import listed, source_of
+from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
 from palpate.errors import InputError
 from palpate.files import fresh_folder, signed, write_json, write_text
@@ -32,72 +33,84 @@ def whole_number(_: Any, tokens: Sequence[Token]) -> int:
     return int(token.value)
 
 
-# More than seven arguments: each is an option with a name of its own.
+@Parameter(name="*", group=Group("What is drawn", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class DrawnOptions:
+    """How figures are written.
+
+    Parameters
+    ----------
+    figures
+        As what they are written: png, svg, pdf; may be given again.
+    dpi
+        Of a PNG; 110 if not given.
+    movie
+        Write a film of the arm too, arm.gif; it takes some ten seconds.
+    """
+
+    figures: Annotated[tuple[str, ...], FLAG] = ("png",)
+    dpi: int | None = None
+    movie: Annotated[bool, FLAG] = False
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """Of the figures' files."""
+        return tuple(f".{kind.lower().lstrip('.')}" for kind in self.figures)
+
+    def check(self) -> None:
+        """Finds a figure that cannot be written before any work is done."""
+        from palpate.report.style import FORMATS, check_dpi
+
+        check_dpi(self.dpi)
+        for ending in self.endings:
+            if ending not in FORMATS:
+                raise InputError(
+                    f"--figures must be of {', '.join(kind[1:] for kind in FORMATS)}, got {ending[1:]!r}"
+                )
+
+
 def run(
     name: str | None = None,
     /,
     *,
     seed: Annotated[int, Parameter(converter=whole_number)] = 0,
-    out: Path | None = None,
-    force: bool = False,
-    list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
-    print_: Annotated[bool, Parameter(name="--print", negative="")] = False,
-    json: Annotated[bool, Parameter(negative="")] = False,
-    figures: Annotated[tuple[str, ...], Parameter(negative=())] = ("png",),
-    dpi: int | None = None,
-    movie: Annotated[bool, Parameter(negative="")] = False,
+    known: KnownOptions | None = None,
+    output: FolderOptions | None = None,
+    drawn: DrawnOptions | None = None,
 ) -> int:
     """Run an experiment: the arm approaches, touches, presses.
 
-    Args:
-        name: an experiment (see --list), or a TOML file of your own (see --print).
-        seed: of the noise; the same seed gives the same numbers.
-        out: folder for record.parquet, summary.json, figures and report.html; runs/NAME-SEED when left out.
-        force: replace the results that stand there already.
-        list_: list the experiments and stop.
-        print_: print the experiment's file, to copy and edit, and stop.
-        json: print the summary as JSON and nothing else.
-        figures: as what they are written: png, svg, pdf; may be given again.
-        dpi: of a PNG; 110 if not given.
-        movie: write a film of the arm too, arm.gif; it takes some ten seconds.
+    The folder holds record.parquet, summary.json, figures and report.html; it is runs/NAME-SEED if not named.
+
+    Parameters
+    ----------
+    name
+        An experiment (see --list), or a TOML file of your own (see --print).
+    seed
+        Of the noise; the same seed gives the same numbers.
     """
+    known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or DrawnOptions()
     from palpate.bench.experiments import tables as experiments
 
-    if list_:
-        listed(experiments.FILES, lambda known: experiments.load(known).title)
+    if known.list_:
+        listed(experiments.FILES, lambda one: experiments.load(one).title)
         return 0
-    source = source_of(experiments.FILES, name, "run", print_)
+    source = source_of(experiments.FILES, name, "run", known.print_)
     if name is None or source is None:
         return 0
-    folder = out if out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
+    folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
     from palpate.bench.ending import DONE, INTERRUPTED
-    from palpate.report.style import FORMATS, check_dpi
 
-    check_dpi(dpi)
-    endings = tuple(f".{kind.lower().lstrip('.')}" for kind in figures)
-    for ending in endings:
-        if ending not in FORMATS:
-            raise InputError(
-                f"--figures must be of {', '.join(kind[1:] for kind in FORMATS)}, got {ending[1:]!r}"
-            )
+    drawn.check()
     with noticed() as interrupted:
-        ran = _run(name, source, seed, folder, force, json, interrupted, _Drawn(endings, dpi, movie))
+        ran = _run(name, source, seed, folder, output, drawn, interrupted)
     # All is in its place, so that a reader of the output who has gone loses nothing.
-    _tell(ran, folder, json)
+    _tell(ran, folder, output.json)
     if ran.undrawn:
         raise InputError(f"{ran.undrawn}; the record is in {folder}")
     if interrupted() or ran.summary["end"] == INTERRUPTED:
         return 130
     return 0 if ran.summary["end"] == DONE else 1
-
-
-@dataclass(frozen=True)
-class _Drawn:
-    """How figures are written."""
-
-    endings: tuple[str, ...]
-    dpi: int | None
-    movie: bool
 
 
 @dataclass(frozen=True)
@@ -110,16 +123,14 @@ class _Ran:
     undrawn: str
 
 
-# More than seven arguments: each is an option with a name of its own.
 def _run(
     name: str,
     source: str,
     seed: int,
     folder: Path,
-    force: bool,
-    as_json: bool,
+    output: FolderOptions,
+    drawn: DrawnOptions,
     interrupted: Callable[[], bool],
-    drawn: _Drawn,
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise
@@ -129,10 +140,10 @@ def _run(
     from palpate.report.run.figures import draw
     from palpate.report.run.page import Told, run_page
 
-    with fresh_folder(folder, force=force) as fresh:
+    with fresh_folder(folder, force=output.force) as fresh:
         experiment = parse(source, name)
         command = shown(f"palpate run {shlex.quote(name)} --seed {seed}")
-        record = _record(console(stderr=as_json), name, experiment, seed, interrupted)
+        record = _record(console(stderr=output.json), name, experiment, seed, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / "record.parquet")
         found, why = _identified(fresh / "record.parquet")

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._named import listed, source_of
+from palpate.cli._flags import FLAG
+from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli._terminal import STYLE, console, head, place, print_json, say, show_table
 from palpate.errors import InputError
 from palpate.text import shown
@@ -65,55 +66,44 @@ class ClusterOptions:
         return Cluster(self.scheduler, certificates=Certificates(*given) if given else None)
 
 
-# More than seven arguments: each is a flag of the command.
 def study(
     name: str | None = None,
     /,
     *,
-    out: Path | None = None,
+    yes: Annotated[bool, FLAG] = False,
     where: ClusterOptions | None = None,
-    yes: Annotated[bool, Parameter(negative="")] = False,
-    force: Annotated[bool, Parameter(negative="")] = False,
-    list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
-    print_: Annotated[bool, Parameter(name="--print", negative="")] = False,
-    json: Annotated[bool, Parameter(negative="")] = False,
+    known: KnownOptions | None = None,
+    output: FolderOptions | None = None,
 ) -> int:
     """Run an experiment many times over a grid, a range or a random choice of parameters, or search for the best.
+
+    The folder holds results.parquet, report.html and the journal of runs; it is runs/study-NAME if not named. An
+    unfinished study there is gone on with.
 
     Parameters
     ----------
     name
         A study (see --list), or a TOML file of your own (see --print).
-    out
-        Folder for results.parquet, report.html and the journal of runs; runs/study-NAME when left out. An unfinished
-        study there is gone on with.
     yes
         Begin a study that takes very long without asking.
-    force
-        Replace the results that stand there already.
-    list_
-        List the studies and stop.
-    print_
-        Print the study's file, to copy and edit, and stop.
-    json
-        Print the summary as JSON and nothing else.
     """
+    known, output = known or KnownOptions(), output or FolderOptions()
     from palpate.studies import study as studies
 
-    if list_:
-        listed(studies.FILES, lambda known: studies.load(known).title)
+    if known.list_:
+        listed(studies.FILES, lambda one: studies.load(one).title)
         return 0
-    source = source_of(studies.FILES, name, "study", print_)
+    source = source_of(studies.FILES, name, "study", known.print_)
     if name is None or source is None:
         return 0
-    folder = out if out is not None else Path("runs") / f"study-{Path(name).stem}"
+    folder = output.out if output.out is not None else Path("runs") / f"study-{Path(name).stem}"
     try:
-        found = _done(name, source, folder, where or ClusterOptions(), yes, force)
+        found = _done(name, source, folder, where or ClusterOptions(), yes, output.force)
     except KeyboardInterrupt:
         kept = f"what is done is saved in {folder}, and the same command goes on from there"
         say(f"interrupted; {kept}")
         return 130
-    _tell(found, folder, json)
+    _tell(found, folder, output.json)
     return 0 if found.summary["results"].get("done") else 1
 
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from palpate.contact_frame.arm import robot_stiffness, with_arm
 from palpate.contact_frame.declared import Arm, ContactFrame
-from palpate.contact_frame.identifying import identify_contact
+from palpate.contact_frame.description import described
+from palpate.contact_frame.identify import identify_contact
 from palpate.contact_frame.payload import Payload, load_payload
 from palpate.contact_frame.projecting import project
-from palpate.contact_frame.telling import told
 from palpate.contact_frame.weighed import Weighed, weigh
 
 __all__ = [
@@ -20,11 +20,11 @@ __all__ = [
     "ContactFrame",
     "Payload",
     "Weighed",
+    "described",
     "identify_contact",
     "load_payload",
     "project",
     "robot_stiffness",
-    "told",
     "weigh",
     "with_arm",
 ]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.air import air_level
-from palpate.contact_frame.vectors import read_rows
+from palpate.contact_frame.free_level import free_level
+from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.errors import InputError
 from palpate.identification.contacts import contacts_of
 from palpate.identification.sampling import channels_of
@@ -15,8 +15,8 @@ from palpate.records import Record
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
-_FEWEST = 20
 _GUARD = 2.0
+"""Times the filters' settling: once before the touch is seen, once after it has left the filters."""
 
 
 def contact_rows(time: Array, force: Array, place: Array) -> tuple[Rows, Rows]:
@@ -30,7 +30,11 @@ def contact_rows(time: Array, force: Array, place: Array) -> tuple[Rows, Rows]:
         place: of the point that touches [m], shape (n, 3), likewise.
     """
     position, strength = _along_axis(place), _along_axis(force)
-    columns = {"time": time, "position": position, "force": strength - (air_level(strength, position) or 0.0)}
+    columns = {
+        "time": time,
+        "position": position,
+        "force": strength - (free_level(strength, position) or 0.0),
+    }
     channels = channels_of(Record(columns, {"time": "s", "position": "m", "force": "N"}))
     channels, chain, contacts = contacts_of(channels)
     inside, free = np.zeros(len(time), bool), np.full(len(time), not contacts.bonded)
@@ -40,7 +44,7 @@ def contact_rows(time: Array, force: Array, place: Array) -> tuple[Rows, Rows]:
         first, last = (channels.start + i * channels.dt - delay for i in (begin, end))
         inside |= (time >= first) & (time < last)
         free &= (time < first - guard) | (time > last + guard)
-    return inside, free if free.sum() >= _FEWEST else np.zeros(len(time), bool)
+    return inside, free if free.sum() >= FEWEST else np.zeros(len(time), bool)
 
 
 def rows_between(time: Array, span: tuple[float, float]) -> Rows:
@@ -50,9 +54,9 @@ def rows_between(time: Array, span: tuple[float, float]) -> Rows:
         InputError: there are too few.
     """
     rows = (time >= span[0]) & (time < span[1])
-    if rows.sum() < _FEWEST:
+    if rows.sum() < FEWEST:
         raise InputError(
-            f"only {int(rows.sum())} rows lie in the free stretch {span[0]:g} to {span[1]:g} s; at least {_FEWEST} are"
+            f"only {int(rows.sum())} rows lie in the free stretch {span[0]:g} to {span[1]:g} s; at least {FEWEST} are"
             f" needed, and the log spans {time[0]:.4g} to {time[-1]:.4g} s"
         )
     return rows

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.signals_in_base import Signals
-from palpate.contact_frame.vectors import read_rows
+from palpate.contact_frame.vectors import FEWEST, read_rows
 
 Rows = NDArray[np.bool_]
 
 _LEAST = 0.3
-_FEWEST = 20
+"""Of the largest force: the line of a weaker one is three times as uncertain, for the same noise of the torque."""
 
 
 def line_misses_tcp(signals: Signals, free: Rows, inside: Rows, frame: ContactFrame) -> float | None:
@@ -31,7 +31,7 @@ def line_misses_tcp(signals: Signals, free: Rows, inside: Rows, frame: ContactFr
         return None
     there = read_rows(signals.force) & read_rows(signals.torque)
     free, inside = free & there, inside & there
-    if free.sum() < _FEWEST or inside.sum() < _FEWEST or not np.ptp(signals.torque[there]):
+    if free.sum() < FEWEST or inside.sum() < FEWEST or not np.ptp(signals.torque[there]):
         return None
     force = signals.force[inside] - signals.force[free].mean(axis=0)
     torque = signals.torque[inside] - signals.torque[free].mean(axis=0)

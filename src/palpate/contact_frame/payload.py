@@ -13,9 +13,6 @@ from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.force.arm import NotNegative, Table, from_toml, read_small
 
-GRAVITY = 9.80665
-"""Standard gravity [m/s^2]."""
-
 
 class Payload(Table):
     """A tool beyond a force sensor, and the sensor's bias when it was weighed.

@@ -7,23 +7,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.air_inertia import air_inertia, wrong_sign
 from palpate.contact_frame.declared import ContactFrame
+from palpate.contact_frame.free_inertia import CHANCE, free_inertia, wrong_sign
 from palpate.contact_frame.lever import line_misses_tcp
 from palpate.contact_frame.load import load_of, turns
-from palpate.contact_frame.normal import Normal, direction_of, scale_std
+from palpate.contact_frame.load_removal import Unloaded, in_range
+from palpate.contact_frame.normal import MATTERS, Normal, direction_of, scale_std
 from palpate.contact_frame.signals_in_base import Signals, signals_of
-from palpate.contact_frame.unloading import Unloaded, in_range
 from palpate.contact_frame.vectors import read_rows
 from palpate.errors import InputError
 from palpate.records import Record
 
 Array = NDArray[np.float64]
 
-_FOLLOWS = 0.5
-_MATTERS = 0.02
-_FAR_OFF = 4.0
-"""Standard deviations in three dimensions that chance passes by as rarely (chi with three degrees of freedom)."""
+_FOLLOWS = 0.65
+"""Correlation that noise shows once in a thousand logs of twenty independent rows (Student's t with 18 degrees)."""
 
 
 def project(record: Record, frame: ContactFrame) -> Record:
@@ -126,7 +124,7 @@ def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) 
     if not normal.shown:
         text = "the force changes in all directions alike, so it shows no normal: is anything touched?"
         notes.append({"code": "normal-uncertain", "text": text})
-    elif spread > _MATTERS:
+    elif spread > MATTERS:
         text = (
             f"the normal is known to {np.degrees(normal.std):.2g} deg about each axis (one std), which leaves K, B and"
             f" M uncertain by {spread:.2g} of their value; give --normal"
@@ -148,13 +146,15 @@ def _inertia_in_air(
     payload = frame.payload
     centre = payload.centre if payload is not None and payload.centre is not None else (0.0, 0.0, 0.0)
     off = np.array(frame.wrench_at) + np.array(centre) - np.array(frame.tcp)
-    return air_inertia(signals.time, sign * freed.force, signals.place + signals.rotations @ off, freed.free)
+    return free_inertia(signals.time, sign * freed.force, signals.place + signals.rotations @ off, freed.free)
 
 
 def _doubts(
     freed: Unloaded, signals: Signals, frame: ContactFrame, inertia: tuple[float, float] | None
 ) -> list[dict[str, Any]]:
     """What the free rows say against the tool as it is compensated, or was weighed."""
+    from scipy.stats import chi
+
     notes = []
     if wrong_sign(inertia):
         assert inertia is not None
@@ -168,7 +168,9 @@ def _doubts(
         return notes
     own = load_of(signals.force[free], signals.rotations[free], weighs=True)
     off = float(np.linalg.norm(own.weight - np.array(frame.payload.weight)))
-    if own.separable and off > _FAR_OFF * float(np.hypot(own.weight_std, frame.payload.weight_std)):
+    if own.separable and off > float(chi.isf(CHANCE, 3)) * float(
+        np.hypot(own.weight_std, frame.payload.weight_std)
+    ):
         text = (
             f"the free rows weigh {off:.2g} N otherwise than the payload file says: is it of another tool, of a pose of"
             " another frame, or is the sensor saturated?"

@@ -6,26 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
+from palpate.signals.quaternions import continuous
 
 Array = NDArray[np.float64]
 
+FEWEST = 20
+"""Rows for a mean that is said of a log: its standard deviation is then a fifth of a reading's, or less."""
 _UNIT = 0.1
+"""By which a quaternion's length is off at most where its four numbers are rounded to one digit."""
 
 
 def read_rows(vectors: Array) -> NDArray[np.bool_]:
     """Rows of vectors, shape (n, k), that hold a reading in each component."""
     return np.isfinite(vectors.sum(axis=1))
-
-
-def continuous(quaternions: Array) -> Array:
-    """Quaternions, shape (n, 4), each with the sign that is nearer to the one before.
-
-    q and -q are the same rotation, and drivers change between them at will; what lies between them is none.
-    """
-    together = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
-    signs = np.cumprod(np.r_[1.0, np.where(together < 0, -1.0, 1.0)])
-    steady: Array = quaternions * signs[:, None]
-    return steady
 
 
 def matrices(time: Array, quaternions: Array) -> Array:

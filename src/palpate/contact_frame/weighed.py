@@ -8,23 +8,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.air_inertia import BLOCKS, air_inertia
 from palpate.contact_frame.declared import ContactFrame, Vector
+from palpate.contact_frame.free_inertia import BLOCKS, free_inertia
 from palpate.contact_frame.payload import Payload
 from palpate.contact_frame.signals_in_base import Signals, signals_of
-from palpate.contact_frame.vectors import read_rows
-from palpate.contact_frame.weighing import Fitted, Poses, Told, fit_centre, fit_force, groups_of, poses_of
-from palpate.contact_frame.weighing_doubts import doubts_of, noise_of
+from palpate.contact_frame.vectors import FEWEST, read_rows
+from palpate.contact_frame.weighing import (
+    Estimated,
+    Fitted,
+    Poses,
+    fit_centre,
+    fit_force,
+    groups_of,
+    poses_of,
+)
+from palpate.contact_frame.weighing_checks import noise_of, notes_against
 from palpate.errors import InputError
 from palpate.records import Record
 
 Array = NDArray[np.float64]
 
 _FEWEST = 3
-_UPRIGHT = 0.5
+"""Orientations of three axes each: weight, bias and drift are nine numbers."""
+_UPRIGHT = 0.5**0.5
+"""Cosine of the angle to the vertical at which a base is as near to one on a wall as to one that stands or hangs."""
 _ROUNDS = 3
+"""What is left of the tool's acceleration after a round is the share by which its mass is still wrong: of ten per cent
+three rounds leave a thousandth."""
 _SMOOTH = 0.1
-"""Of the window by which an acceleration is read off the positions [s]: what is slower than some 6 Hz passes."""
+"""Of the window by which an acceleration is read off the positions [s]: what is slower than some 6 Hz passes, and no
+arm turns its tool faster."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +55,7 @@ class Weighed:
     """
 
     payload: Payload | None
-    parameters: dict[str, Told]
+    parameters: dict[str, Estimated]
     lacking: list[str]
     notes: list[dict[str, Any]]
     poses: int
@@ -89,8 +102,8 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
             "a tool is weighed by turning it, and this pose has no orientation; log one with it (--pose, --rotation)"
         )
     there = read_rows(signals.force)
-    if there.sum() < 20:
-        raise InputError(f"only {int(there.sum())} rows hold a force; at least 20 are needed")
+    if there.sum() < FEWEST:
+        raise InputError(f"only {int(there.sum())} rows hold a force; at least {FEWEST} are needed")
     still = signals
     for _ in range(_ROUNDS):  # what the tool's own acceleration does is taken off as far as it is known
         fit = _fit(still, there, tolerance)
@@ -102,7 +115,7 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
     lacking = _lacking(poses, fitted, tolerance)
     notes: list[dict[str, Any]] = []
     if np.isfinite(fitted.left_out).all():
-        notes = doubts_of(record, frame, signals, there, poses, fitted, fit.means, parameters)
+        notes = notes_against(record, frame, signals, there, poses, fitted, fit.means, parameters)
     return Weighed(
         None if lacking else _payload(parameters, signals, frame, signals.force[there], poses.first),
         parameters,
@@ -120,7 +133,7 @@ class _Fit:
 
     poses: Poses
     fitted: Fitted
-    parameters: dict[str, Told]
+    parameters: dict[str, Estimated]
     means: Array
 
 
@@ -139,7 +152,9 @@ def _fit(signals: Signals, there: NDArray[np.bool_], tolerance: float) -> _Fit:
     return _Fit(poses, fitted, parameters, means)
 
 
-def _at_rest(signals: Signals, fitted: Fitted, parameters: dict[str, Told], frame: ContactFrame) -> Signals:
+def _at_rest(
+    signals: Signals, fitted: Fitted, parameters: dict[str, Estimated], frame: ContactFrame
+) -> Signals:
     """Force and torque without what the tool's acceleration does to them; as they are where that is not told."""
     from scipy.signal import savgol_filter
 
@@ -159,7 +174,7 @@ def _at_rest(signals: Signals, fitted: Fitted, parameters: dict[str, Told], fram
     return replace(signals, force=signals.force + added, torque=torque)
 
 
-def _centre_of(signals: Signals, parameters: dict[str, Told], frame: ContactFrame) -> Array:
+def _centre_of(signals: Signals, parameters: dict[str, Estimated], frame: ContactFrame) -> Array:
     """Where the centre of mass is, in the base [m], shape (n, 3); the sensor where it is not told."""
     at = np.array(frame.wrench_at) + (parameters["centre"].value if "centre" in parameters else 0.0)
     place: Array = signals.place + signals.rotations @ at
@@ -217,7 +232,7 @@ def _lacking(poses: Poses, fitted: Fitted, tolerance: float) -> list[str]:
 
 def _centre(
     signals: Signals, there: NDArray[np.bool_], time: Array, poses: Poses, fitted: Fitted
-) -> dict[str, Told]:
+) -> dict[str, Estimated]:
     """Centre of mass and bias of the torque, if there is one."""
     if (
         signals.torque is None
@@ -227,18 +242,18 @@ def _centre(
         return {}
     own = poses_of(time, signals.rotations[there], signals.torque[there], poses.first)
     found = fit_centre(own, fitted.whole[:3], drift=fitted.drift is not None)
-    centre = found.told(found.left_out[:, :3], found.whole[:3], "m")
+    centre = found.jackknifed(found.left_out[:, :3], found.whole[:3], "m")
     if not np.isfinite(centre.half).all():
         return {}
     # The centre is c = torque over weight, so the weight's own share of error is the centre's too.
     scale = float(fitted.mass.std / fitted.mass.value)
     std = np.hypot(centre.std, scale * np.abs(centre.value))
     half = np.hypot(centre.half, float(fitted.mass.half / fitted.mass.value) * np.abs(centre.value))
-    bias = found.told(found.left_out[:, 3:6], found.whole[3:6], "N m")
-    return {"centre": Told(centre.value, std, half, "m"), "torque_bias": bias}
+    bias = found.jackknifed(found.left_out[:, 3:6], found.whole[3:6], "N m")
+    return {"centre": Estimated(centre.value, std, half, "m"), "torque_bias": bias}
 
 
-def _inertia(signals: Signals, fit: _Fit, frame: ContactFrame) -> dict[str, Told]:
+def _inertia(signals: Signals, fit: _Fit, frame: ContactFrame) -> dict[str, Estimated]:
     """The mass by which the force follows the acceleration, if the tool is shaken."""
     from scipy.stats import t
 
@@ -249,12 +264,14 @@ def _inertia(signals: Signals, fit: _Fit, frame: ContactFrame) -> dict[str, Told
     left = signals.force - _modelled(time, signals.rotations, fit.fitted)
     exerted = side * np.einsum("nij,nj->ni", signals.rotations, left)
     place = _centre_of(signals, fit.parameters, frame)
-    found = air_inertia(signals.time, exerted, place, np.ones(len(time), bool))
+    found = free_inertia(signals.time, exerted, place, np.ones(len(time), bool))
     if found is None:
         return {}
     value, std = found
     return {
-        "inertia": Told(np.array(value), np.array(std), np.array(float(t.isf(0.025, BLOCKS - 1)) * std), "kg")
+        "inertia": Estimated(
+            np.array(value), np.array(std), np.array(float(t.isf(0.025, BLOCKS - 1)) * std), "kg"
+        )
     }
 
 
@@ -270,7 +287,11 @@ def side_of(weight: Array) -> float | None:
 
 
 def _payload(
-    parameters: dict[str, Told], signals: Signals, frame: ContactFrame, force: Array, first: NDArray[np.intp]
+    parameters: dict[str, Estimated],
+    signals: Signals,
+    frame: ContactFrame,
+    force: Array,
+    first: NDArray[np.intp],
 ) -> Payload:
     def vector(name: str) -> Vector | None:
         return _three(parameters[name].value) if name in parameters else None

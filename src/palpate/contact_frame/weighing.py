@@ -18,17 +18,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.contact_frame.payload import GRAVITY
+from palpate.units import GRAVITY
 
 Array = NDArray[np.float64]
 
 APART = np.radians(30.0)
 """Orientations nearer than this are one group: what errs alike in them is not counted as many readings [rad]."""
 _SINGULAR = 1e-9
+"""Least eigenvalue of scaled equations: the square of 3e-5 rad, and no pose is read finer."""
 
 
 @dataclass(frozen=True)
-class Told:
+class Estimated:
     """A number, or a vector, with its uncertainty.
 
     Args:
@@ -125,7 +126,7 @@ class Fitted:
     axes: Array
     dof: float
 
-    def told(self, replicas: Array, value: Array, unit: str) -> Told:
+    def jackknifed(self, replicas: Array, value: Array, unit: str) -> Estimated:
         """A number with its interval, from its replicas, shape (g,) or (g, 3)."""
         from scipy.stats import t
 
@@ -135,28 +136,28 @@ class Fitted:
         else:
             std = np.full(replicas.shape[1:], np.inf)
         half = np.full(np.shape(std), np.inf) if self.dof <= 0 else std * float(t.ppf(0.975, self.dof))
-        return Told(np.asarray(value), np.asarray(std), np.asarray(half), unit)
+        return Estimated(np.asarray(value), np.asarray(std), np.asarray(half), unit)
 
     @property
-    def weight(self) -> Told:
+    def weight(self) -> Estimated:
         """w [N]."""
-        return self.told(self.left_out[:, :3], self.whole[:3], "N")
+        return self.jackknifed(self.left_out[:, :3], self.whole[:3], "N")
 
     @property
-    def bias(self) -> Told:
+    def bias(self) -> Estimated:
         """b in the middle of the log [N]."""
-        return self.told(self.left_out[:, 3:6], self.whole[3:6], "N")
+        return self.jackknifed(self.left_out[:, 3:6], self.whole[3:6], "N")
 
     @property
-    def drift(self) -> Told | None:
+    def drift(self) -> Estimated | None:
         """d [N/s]."""
-        return self.told(self.left_out[:, 6:], self.whole[6:], "N/s") if len(self.whole) > 6 else None
+        return self.jackknifed(self.left_out[:, 6:], self.whole[6:], "N/s") if len(self.whole) > 6 else None
 
     @property
-    def mass(self) -> Told:
+    def mass(self) -> Estimated:
         """|w|/g [kg]."""
         sizes = np.linalg.norm(self.left_out[:, :3], axis=1) / GRAVITY
-        return self.told(sizes, np.asarray(np.linalg.norm(self.whole[:3]) / GRAVITY), "kg")
+        return self.jackknifed(sizes, np.asarray(np.linalg.norm(self.whole[:3]) / GRAVITY), "kg")
 
 
 def solve_force(poses: Poses, drift: bool) -> Array:

@@ -17,7 +17,7 @@ from palpate.identification.filters.state_variable import Chain, white_noise
 from palpate.identification.models import Motion
 from palpate.identification.options import Options
 from palpate.identification.prior import Lag, lag_prior
-from palpate.identification.sample_clock import Refreshes, refreshes_of
+from palpate.identification.sample_clock import SampleClock, sample_clock_of
 from palpate.identification.sampling import Channels
 from palpate.identification.touch import Touch, touching
 from palpate.identification.warning_codes import Code
@@ -313,7 +313,7 @@ def _of_sensor_path(channels: Channels, chain: Chain, contacts: Contacts, option
     low_pass = options.force_filter
     assert low_pass is not None
     raw = channels.raw
-    clock = refreshes_of(raw.held_force)
+    clock = sample_clock_of(raw.held_force)
     dt = raw.dt
     path = SensorPath(low_pass, raw.start, dt, clock.instants, clock.period * dt)
     time = raw.start + clock.instants * dt
@@ -341,7 +341,7 @@ def _of_sensor_path(channels: Channels, chain: Chain, contacts: Contacts, option
 
 
 def _path_usable(
-    clock: Refreshes, position: Array, valid: NDArray[np.bool_], path: SensorPath
+    clock: SampleClock, position: Array, valid: NDArray[np.bool_], path: SensorPath
 ) -> NDArray[np.bool_]:
     """Samples whose way through the sensor lies within the log, shape (m,)."""
     before, after = path.reach

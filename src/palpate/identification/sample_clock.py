@@ -29,7 +29,7 @@ _SHORTEST = 2.0
 
 
 @dataclass(frozen=True)
-class Refreshes:
+class SampleClock:
     """The sensor's own samples.
 
     Args:
@@ -45,7 +45,7 @@ class Refreshes:
     period: float
 
 
-def refreshes_of(values: Array) -> Refreshes:
+def sample_clock_of(values: Array) -> SampleClock:
     """The samples behind the readings `values`, shape (n,), of evenly spaced rows.
 
     A channel that changes in nearly every row is taken to be as fast as the log.
@@ -60,14 +60,14 @@ def refreshes_of(values: Array) -> Refreshes:
         return _in_every_row(len(values))
     if not even:  # each refresh is somewhere in the row before it shows
         own = changed.astype(np.float64) - 0.5
-        return Refreshes(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
+        return SampleClock(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
     grid = max(even, key=lambda grid: grid.period)  # with the fewest samples that no change shows
     first = int(np.ceil((-0.5 - grid.phase) / grid.period))
     last = int(np.floor((len(values) - 1 - grid.phase) / grid.period))
     instants = grid.phase + np.arange(first, last + 1) * grid.period
     rows = np.ceil(instants - grid.room * 1e-6).astype(np.intp)
     kept = (rows >= 0) & (rows < len(values))
-    return Refreshes(instants[kept], rows[kept], grid.spread, grid.period)
+    return SampleClock(instants[kept], rows[kept], grid.spread, grid.period)
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ class _Grid:
     spread: float
 
 
-def _in_every_row(count: int) -> Refreshes:
-    return Refreshes(np.arange(count, dtype=np.float64), np.arange(count), 0.0, 1.0)
+def _in_every_row(count: int) -> SampleClock:
+    return SampleClock(np.arange(count, dtype=np.float64), np.arange(count), 0.0, 1.0)
 
 
 def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:

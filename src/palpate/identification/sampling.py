@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.identification.filters.state_variable import block_means
-from palpate.identification.held import fresh_rows
 from palpate.identification.saturation import at_limit
 from palpate.identification.warning_codes import Code, Warn, from_word
 from palpate.records import Record
+from palpate.signals.held import fresh_rows
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -17,7 +17,7 @@ from palpate.identifiers.kernels.square_root import drifted, measured
 from palpate.identifiers.kernels.state_layout import (
     bounded,
     covariance_in,
-    doubt_in,
+    error_covariance_in,
     known_first,
     length,
     put,
@@ -96,13 +96,13 @@ class KalmanFilter(Streaming):
     @property
     def noise(self) -> float:
         """Standard deviation of the force's noise [N], as given or as estimated so far."""
-        doubt = doubt_in(self._state, AnyNumber(self._n))
+        doubt = error_covariance_in(self._state, AnyNumber(self._n))
         return float(np.sqrt(_variance(doubt, self._policy.variance, float(self._n))))
 
     def estimate(self) -> Estimate:
         """The estimate with what the initial doubt, the walk and the noise that was heard, of any colour, have left."""
         size, n = AnyNumber(self._n), self._n
-        doubt, walked = doubt_in(self._state, size), size.matrix(self._state, length(n))
+        doubt, walked = error_covariance_in(self._state, size), size.matrix(self._state, length(n))
         C = doubt.covariance(float(n)).of + walked.of
         seen = max(float(doubt.weight) - _GUESS - n, 0.0)
         return Estimate(self.names, self.theta, 0.5 * (C + C.T), seen)
@@ -134,7 +134,7 @@ def _absorb(state, phi, y, noise, size):
         return False
     n = size.n
     k = length(n)
-    S, doubt, steps = size.matrix(state, n), doubt_in(state, size), k + 2 * n * n
+    S, doubt, steps = size.matrix(state, n), error_covariance_in(state, size), k + 2 * n * n
     S = bounded(S, size.vector(state, k - 2 * n), size.vector(state, k - n), size)
     for i in range(n):
         S = drifted(S, size.axis(i), state[steps + i])

@@ -15,7 +15,7 @@ from palpate.identifiers.kernels.least_squares import learned
 from palpate.identifiers.kernels.state_layout import (
     bounded,
     covariance_in,
-    doubt_in,
+    error_covariance_in,
     known_first,
     length,
     put,
@@ -37,7 +37,7 @@ class LeastSquaresEstimator(Streaming):
         Measured over blocks of samples: noise that stays correlated for longer than a block of 100 makes it too
         small.
         """
-        doubt = doubt_in(self._state, AnyNumber(self._n))
+        doubt = error_covariance_in(self._state, AnyNumber(self._n))
         C = doubt.covariance(float(self._n)).of
         return Estimate(self.names, self.theta, 0.5 * (C + C.T), self._worth(float(doubt.weight)))
 
@@ -96,7 +96,7 @@ def absorb(state, phi, y, forgetting, size):
     S, counts = forgetting.forget(S, p, floor)
     if not counts:
         return 0.0, 1.0
-    theta, doubt = size.vector(state, 0), doubt_in(state, size)
+    theta, doubt = size.vector(state, 0), error_covariance_in(state, size)
     theta, S, doubt, e, a = learned(theta, S, doubt, p, y, forgetting.keep, size)
     put(state, size, theta, S, doubt)
     return e, a

@@ -10,7 +10,7 @@ from palpate.live.replay import Replay, Signals
 from palpate.live.view import Happened, View
 from palpate.records import Record
 from palpate.report.identification.page import TONES
-from palpate.report.identification.words import CALLED, said
+from palpate.report.identification.words import CALLED, formatted
 from palpate.text import shown
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def restarted(columns: dict[str, Array]) -> tuple[dict[str, Array], tuple[str, .
 
 
 def _told(name: str, p: Parameter) -> dict[str, str]:
-    text = said(p) if p.value is not None else "no number"
+    text = formatted(p) if p.value is not None else "no number"
     return {"name": shown(name), "text": text, "verdict": str(p.verdict), "tone": TONES[p.verdict]}
 
 

@@ -130,7 +130,7 @@ class Player:
         self.version += 1
         self.feed.tell()
 
-    def told(self) -> dict[str, Any]:
+    def described(self) -> dict[str, Any]:
         """How it stands, as the page takes it."""
         state = self.source.state
         return {

@@ -217,7 +217,7 @@ class _Server:
                 await connection.send(_text("clear"))
             if lost:
                 await connection.send(_text("lost", rows=lost))
-            told = self._player.told()
+            told = self._player.described()
             if told["version"] != version:
                 version = told["version"]
                 await connection.send(_text("state", **told))

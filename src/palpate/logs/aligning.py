@@ -11,12 +11,16 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.logs.stamps import Timed
+from palpate.signals.held import fresh_rows
 
 Array = NDArray[np.float64]
 
 _FEWEST = 20
+"""Readings of a stream: with fewer, a spline's ends are most of it, and identification refuses the log as well."""
 _SIMILAR = 0.6
+"""Of the fastest rate: above a half, no row between two readings of a stream stands alone."""
 _GAP = 3.0
+"""Usual steps: two lost readings in a row are bridged by the spline, more are a gap."""
 
 
 @dataclass
@@ -94,8 +98,6 @@ def _sorted(stream: Timed, missing: Sequence[float], notes: list[dict[str, Any]]
 
 def _fresh(stream: Timed, notes: list[dict[str, Any]]) -> Timed:
     """Without the messages that only repeat a held reading."""
-    from palpate.identification.held import fresh_rows
-
     liveliest = int(np.argmax(np.ptp(stream.values, axis=0)))
     fresh = fresh_rows(stream.values[:, liveliest])
     if fresh is None or fresh.sum() < _FEWEST:

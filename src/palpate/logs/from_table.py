@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.logs.doubts import epoch_unit
 from palpate.logs.missing import find_sentinel
+from palpate.logs.plausibility import epoch_unit
 from palpate.logs.roles import Loaded, check_apart, check_quantity, family, quantity, si_unit
 from palpate.logs.tables import Columns, Stated
 from palpate.units import split_spec, unit, unit_in_name

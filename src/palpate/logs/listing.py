@@ -12,10 +12,10 @@ from palpate.errors import InputError
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag
 from palpate.logs.bags.fields import leaves
-from palpate.logs.doubts import epoch_unit
 from palpate.logs.kinds import kind_of
 from palpate.logs.limits import Limits
 from palpate.logs.own_runs import is_run
+from palpate.logs.plausibility import epoch_unit
 from palpate.logs.proposal import Proposal, Seen, clock_of, for_a_run, from_columns, from_topics
 from palpate.logs.tables import Columns, Stated, open_table
 from palpate.units import unit, unit_in_name

@@ -7,7 +7,10 @@ from numpy.typing import NDArray
 
 _USUAL = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 99999.0)
 _LEAST_SHARE = 0.002
+"""Of the rows: a reading that is right by accident is rarer, one in the number of steps of its converter."""
 _APART = 0.5
+"""Least distance of such a value from the readings beside it, in the column's unit: half of the step between whole
+numbers, which these values are."""
 
 
 def find_sentinel(values: NDArray[np.float64]) -> float | None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag, Topic
-from palpate.logs.doubts import epoch_unit, usual_unit
+from palpate.logs.plausibility import epoch_unit, usual_unit
 from palpate.logs.tables import Columns
 from palpate.units import known_unit, unit, unit_in_name
 

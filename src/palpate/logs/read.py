@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.logs.bags import Bag
-from palpate.logs.doubts import check_range, doubts_about_time
 from palpate.logs.from_bag import from_bag
 from palpate.logs.from_table import from_table
 from palpate.logs.kinds import kind_of
 from palpate.logs.limits import Limits
+from palpate.logs.plausibility import check_range, implausible_times
 from palpate.logs.roles import Loaded
 from palpate.logs.store import read_record
 from palpate.logs.tables import open_table
@@ -78,7 +78,7 @@ def read_log(
         loaded = from_table(open_table(path, kind, delimiter, limits), columns, rate, missing)
     check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)
     if "time" in columns:
-        loaded.notes += doubts_about_time(loaded.columns, loaded.start, columns["time"])
+        loaded.notes += implausible_times(loaded.columns, loaded.start, columns["time"])
     return _record(loaded, path, start, end)
 
 

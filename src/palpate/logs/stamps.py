@@ -14,6 +14,7 @@ from palpate.logs.bags import Stream
 Array = NDArray[np.float64]
 
 _BLOCKS = 20
+"""Parts of a log in each of which the quickest message is looked for: a drift of the clocks shows between them."""
 _AGREE = 0.02
 """What different ways to the recorder may make [s]."""
 _TRANSPORT = 0.2

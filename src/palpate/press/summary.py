@@ -13,7 +13,7 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.identification import identify
-from palpate.identification.sample_clock import refreshes_of
+from palpate.identification.sample_clock import sample_clock_of
 from palpate.press.loops import series_of
 from palpate.press.setting import Place
 from palpate.records import Record
@@ -69,7 +69,7 @@ class Asked:
 
         Of one about as fast as the ticks it takes each row for fresh: a reading is then half a tick old in the mean.
         """
-        as_fast = refreshes_of(record["force_sampled"]).period == 1.0
+        as_fast = sample_clock_of(record["force_sampled"]).period == 1.0
         return 0.5 * self.gains.arm.tick if as_fast else 0.0
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.contact_frame import Weighed
-from palpate.contact_frame.weighing import Told
+from palpate.contact_frame.weighing import Estimated
 from palpate.files import write_text
 from palpate.report import style
 from palpate.report.page import Table, embedded, render
@@ -67,7 +67,7 @@ def write_page(found: Weighed, title: str, path: Path) -> Path:
     return path
 
 
-def _parts(one: Told) -> list[tuple[str, float, float]]:
+def _parts(one: Estimated) -> list[tuple[str, float, float]]:
     values, halves = np.atleast_1d(one.value), np.atleast_1d(one.half)
     axes = [""] if len(values) == 1 else [", x", ", y", ", z"]
     return [(a, float(v), float(h)) for a, v, h in zip(axes, values, halves, strict=True)]

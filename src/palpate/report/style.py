@@ -25,7 +25,6 @@ KNOWN: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": (0, (5, 4)
 """The line of what is asked for, or known to be true."""
 FORMATS = (".png", ".svg", ".pdf")
 BLUE, ORANGE, GREEN, RED, VIOLET, GREY = "#1f6fb4", "#e07b16", "#2a9254", "#c4342d", "#7b53a6", "#8a8a8a"
-SAND = "#ddaa33"
 VEIL = "#d0d0d0"
 DPI = 110
 _COARSEST, _FINEST = 30, 1200

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 Verdict = Literal["reproduced", "differs", "not checkable"]
+ENOUGH = 0.9
+"""Share of the runs that a claim has to hold for."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,12 @@ class Claim:
 def decided(holds: bool) -> Verdict:
     """The verdict of a claim that can be checked."""
     return "reproduced" if holds else "differs"
+
+
+def often(holds: Iterable[bool]) -> bool:
+    """Whether a claim holds in enough of the runs."""
+    runs = list(holds)
+    return sum(map(bool, runs)) >= ENOUGH * len(runs)
 
 
 def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:

@@ -6,13 +6,12 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment
+from palpate.thesis.claims import often
 from palpate.thesis.runs import Runs
 
 T = TypeVar("T")
 W = TypeVar("W")
 
-ENOUGH = 0.9
-"""Share of the seeds that a claim has to hold for."""
 VARIED_SEEDS = 3
 """Runs of each variation; the nominal case has all seeds."""
 
@@ -78,12 +77,11 @@ def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) 
     """A sentence: under which variations a conclusion holds, and under which it does not."""
     broken, kept = [], []
     for name, runs in found.items():
-        good = sum(map(holds, runs))
         told = name.replace("\n", " ")
-        if good >= ENOUGH * len(runs):
+        if often(map(holds, runs)):
             kept.append(told)
         else:
-            broken.append(f"{told} ({good} of {len(runs)} runs)")
+            broken.append(f"{told} ({sum(map(holds, runs))} of {len(runs)} runs)")
     parts = [f"holds with: {', '.join(kept)}"] if kept else []
     parts += [f"does not with: {', '.join(broken)}"] if broken else ["and under every variation tried"]
     return f"It {'; it '.join(parts) if broken else ', '.join(parts)}."

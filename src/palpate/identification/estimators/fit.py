@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.lag_uncertainty import hidden, undone, with_lag
+from palpate.identification.estimators.lag_uncertainty import bias_corrected, hidden, with_lag
 from palpate.identification.least_squares import Noise, covariance, noise_of, quantile, solve
 from palpate.identification.models import Knob, Model, Motion
 from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
@@ -308,7 +308,7 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag,
     std = known.std(names, level)
     fixed = np.zeros((len(names), len(names)))
     if model.of_position:
-        by_noise = undone(model, motion, jacobian, theta, level, lag, std)
+        by_noise = bias_corrected(model, motion, jacobian, theta, level, lag, std)
         theta, pulled, less = theta + by_noise.step, by_noise.doubt, by_noise.less
         more = hidden(model, motion, jacobian, theta)
     else:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
-from palpate.identification.evenly import even_period
+from palpate.identification.even_sampling import even_period
 from palpate.identification.filters.bandwidth import choose_cutoff
 from palpate.identification.filters.filter_bank import FilterBank
 from palpate.identification.filters.state_variable import Chain, low_pass_once

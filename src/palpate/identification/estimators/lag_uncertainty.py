@@ -23,7 +23,7 @@ def of_derivatives(model: Model, theta: Array) -> tuple[Array, Array]:
     return noisy, force
 
 
-def undone(
+def bias_corrected(
     model: Model, motion: Motion, jacobian: Array, theta: Array, level: float, lag: Lag, std: Array | None
 ) -> Compensation:
     """What the position's noise did to the answer; to the lag it did nothing if the log is not asked for it.

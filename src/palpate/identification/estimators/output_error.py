@@ -23,7 +23,7 @@ from palpate.identification.estimators.simulation import (
     fastest_mode,
     simulated,
 )
-from palpate.identification.evenly import even_period
+from palpate.identification.even_sampling import even_period
 from palpate.identification.least_squares import covariance, noise_of
 from palpate.signals.types import Estimate
 

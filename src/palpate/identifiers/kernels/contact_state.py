@@ -41,7 +41,8 @@ TOUCHING, SINCE, CONTACTS, LOST, LEVEL, LEVELS, SPREAD, SUM, START = range(9)
 """In contact; since which instant; contacts so far, and how many ended; level of the force [N], of how many samples,
 and its variance; the sum under test and the instant at which it was last zero."""
 WEIGHT, SQUARES, PRODUCTS, LAST, POWER, HEARD, PAST = range(10, 17)
-"""Of the innovations, as in `Doubt`; squares of the force's fourth differences, how many, and the last four forces."""
+"""Of the innovations, as in `ErrorCovariance`; squares of the force's fourth differences, how many, and the last four
+forces."""
 COUNT, QUANTUM, HIGHEST, STUCK, FROM, PAIRS, EQUAL, BEFORE, WHERE, LIMITED = range(20, 30)
 """Forces seen; smallest change; highest; readings in a row that stand there, since which position; pairs of readings
 between which the tip moved, how many were equal; last force and position; whether the range was found to end."""
@@ -55,7 +56,7 @@ _SIZE = Four()
 
 
 @law
-def told(contact, queue, capacity, read, settling, touch, averaged):
+def decide_contact(contact, queue, capacity, read, settling, touch, averaged):
     """By the mean of some samples, with hysteresis: noise must not choose which samples of a light contact count."""
     k = int((read - 1.0) % capacity) * SAMPLE
     total = 0.0

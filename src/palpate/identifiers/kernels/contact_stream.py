@@ -13,11 +13,11 @@ from palpate.identifiers.kernels.contact_state import (
     FIELDS,
     SAMPLE,
     TOUCHING,
+    decide_contact,
     found,
     learned,
     limited,
     pending,
-    told,
 )
 from palpate.identifiers.kernels.positions import (
     COUNT,
@@ -128,7 +128,9 @@ def _in_contact(state, queue, own):
     if state[TOUCH] < 0.0:
         found(contact, queue, state[QUEUE], own[READ], state[SETTLING])
     elif state[TOUCH] > 0.0:
-        told(contact, queue, state[QUEUE], own[READ], state[SETTLING], state[TOUCH], state[AVERAGED])
+        decide_contact(
+            contact, queue, state[QUEUE], own[READ], state[SETTLING], state[TOUCH], state[AVERAGED]
+        )
     elif queue[k] >= state[SETTLING]:
         contact[TOUCHING] = contact[CONTACTS] = queue[k + 5] = 1.0
 

@@ -24,7 +24,7 @@ _STUDENT = 2.4
 
 
 @part
-class Doubt(NamedTuple):
+class ErrorCovariance(NamedTuple):
     """The error of theta, as a rule and a covariance, and statistics of the noise.
 
     error = passed @ (error when the block began) + added. Matrices are `Mat3`, or arrays of shape (n, n).
@@ -58,7 +58,7 @@ class Doubt(NamedTuple):
         if filled >= BLOCK:
             left, heard = passed @ left, passed @ heard @ passed.T + outer(added, added)
             passed, added, blocks, filled = size.identity(), 0.0 * added, blocks + 1.0, 0.0
-        return Doubt(
+        return ErrorCovariance(
             left,
             passed,
             heard,
@@ -117,7 +117,9 @@ def carried(C, phi, gain, variance):
 @law
 def unsure(theta, root, identity):
     """The doubt before the first sample, from a root of the initial covariance."""
-    return Doubt(root, identity, 0.0 * root, NOTHING * root, 0.0 * theta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return ErrorCovariance(
+        root, identity, 0.0 * root, NOTHING * root, 0.0 * theta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
 
 
 @law

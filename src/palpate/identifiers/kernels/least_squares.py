@@ -5,7 +5,7 @@ from typing import NamedTuple
 from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, outer, sqrt, trace
 from palpate.identifiers.kernels.dimension import Three
-from palpate.identifiers.kernels.error_covariance import Doubt, unsure
+from palpate.identifiers.kernels.error_covariance import ErrorCovariance, unsure
 from palpate.identifiers.kernels.square_root import measured, stretch_of
 from palpate.identifiers.kernels.state_layout import bounded
 
@@ -51,7 +51,7 @@ def root3(P):
 class LeastSquaresState(NamedTuple):
     theta: Vec3  # estimate
     root: Mat3  # of the inverse information, of unit noise
-    doubt: Doubt
+    doubt: ErrorCovariance
 
     @property
     def weight(self):

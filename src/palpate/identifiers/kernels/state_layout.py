@@ -1,14 +1,14 @@
 """What is known of n parameters, as one flat array of numbers that a kernel changes in place.
 
-In this order: theta, root, left, passed, heard, white, added, six statistics, floor, even. See `Doubt`; floor is the
-inverse of each initial variance, even that of their sum, n times.
+In this order: theta, root, left, passed, heard, white, added, six statistics, floor, even. See `ErrorCovariance`; floor
+is the inverse of each initial variance, even that of their sum, n times.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate._jit import law
-from palpate.identifiers.kernels.error_covariance import NOTHING, Doubt
+from palpate.identifiers.kernels.error_covariance import NOTHING, ErrorCovariance
 from palpate.identifiers.kernels.square_root import held
 
 _STATISTICS = 6
@@ -37,11 +37,11 @@ def length(n):
 
 
 @law
-def doubt_in(state, size):
+def error_covariance_in(state, size):
     """The doubt as a state has it."""
     n = size.n
     k, m, s = n + n * n, n * n, statistics_at(n)
-    return Doubt(
+    return ErrorCovariance(
         size.matrix(state, k),
         size.matrix(state, k + m),
         size.matrix(state, k + 2 * m),

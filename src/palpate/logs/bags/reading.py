@@ -97,7 +97,7 @@ class Storage:
         return self.counts.total()
 
     @property
-    def said(self) -> str | None:
+    def complaint(self) -> str | None:
         """That it is cut, and how much is lost; None if it is whole."""
         if self.end.finished:
             return None
@@ -131,7 +131,7 @@ def open_files(
     """
     if kind is not Kind.FOLDER:
         files = [Storage(path, kind, budget)]
-        return files, [file.said for file in files if file.said]
+        return files, [file.complaint for file in files if file.complaint]
     about, troubles = _metadata(path)
     places = sorted(place for place in path.iterdir() if _is_storage(place))
     if not places:
@@ -146,7 +146,7 @@ def open_files(
             raise InputError(f"{place} is no storage of a bag; record or copy it again")
         files.append(Storage(file, found, budget, packed=about.compression_mode.lower() == "message"))
     files.sort(key=lambda file: min((first for first, _ in file.spans.values()), default=0))
-    return files, [*troubles, *(file.said for file in files if file.said)]
+    return files, [*troubles, *(file.complaint for file in files if file.complaint)]
 
 
 class _About(msgspec.Struct, frozen=True):

@@ -11,6 +11,7 @@ from palpate.report.numbers import plain, quantity
 DOUBTED = 1e-3
 """Probability below which residuals count as not white."""
 _FAR = 1000.0
+"""Times beyond which a ratio of powers says no more by its figures."""
 _AS_LARGE = 1.3
 """Times the noise out of contact up to which a misfit is no larger than that."""
 

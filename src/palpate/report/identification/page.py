@@ -23,10 +23,10 @@ from palpate.report.identification.words import (
     NO_NUMBER,
     advice,
     facts_of,
+    formatted,
     interval,
     limited_by,
     model_line,
-    said,
     sentence,
     subtitle,
     units_of,
@@ -156,7 +156,7 @@ def split(p: Parameter) -> dict[str, Any]:
     """A number, its half-width and its unit, to be written large and less large."""
     if p.value is None:
         return {"value": None, "text": NO_NUMBER, "half": "", "unit": ""}
-    text = said(p)
+    text = formatted(p)
     plus, _, unit = text.rpartition(" ") if p.unit != "1" else (text, "", "")
     if p.unit != "1" and " " in p.unit:  # N s/m: two words
         head, _, first = plus.rpartition(" ")

@@ -16,11 +16,14 @@ from palpate.identification.result import Identification, Traces
 Array = NDArray[np.float64]
 
 _SHORTEST = 16
+"""Rows of a stretch: with fewer, a Hann window leaves less than an octave between its own width and Nyquist's."""
 _PER_OCTAVE = 3
 _FEWEST_BINS = 3
+"""Of a band: by fewer, its power is known to worse than a factor of two, one standard deviation."""
 _SEEN = 1.25
 """Where the filter chain has taken all but a hundredth of the power, as a share of its cut-off."""
 _FEWEST_TESTED = 30
+"""Residuals for a test of whiteness: below, the sum of squares of the correlations is not yet chi-square."""
 _PASSED = 0.5
 """Up to this share of its cut-off the chain passes more than half of the amplitude."""
 _HANN = 35 / 18

@@ -11,11 +11,11 @@ from rich.text import Text
 from palpate.identification.result import Identification, Parameter, Verdict
 from palpate.report.identification.words import (
     facts_of,
+    formatted,
     interval,
     lag_of,
     lost,
     number,
-    said,
     sentence,
     unit,
     units_of,
@@ -65,7 +65,7 @@ def _point(found: Identification, console: Console) -> None:
     if point is None:
         return
     own = point.stiffness
-    value = NONE if own.value is None else said(own)
+    value = NONE if own.value is None else formatted(own)
     line = Text.assemble(("working point", "bold"), f": {value}, ", (str(own.verdict), STYLES[own.verdict]))
     line.append(f"; {', '.join(facts_of(found, point))}; from the {point.source}")
     console.print(line)

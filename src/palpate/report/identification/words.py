@@ -75,7 +75,7 @@ def sentence(found: Identification) -> str:
         return f"{start} {where} ({own.reason}); {next_step(limit, point.source)}."
     only = "" if own.verdict is Verdict.IDENTIFIED else f", known to {_share(own)} only,"
     return (
-        f"The stiffness is {said(own)}{only} {where}; what limits it most is {cause(limit, point.source)}:"
+        f"The stiffness is {formatted(own)}{only} {where}; what limits it most is {cause(limit, point.source)}:"
         f" {next_step(limit, point.source)}."
     )
 
@@ -173,7 +173,7 @@ def number(p: Parameter) -> str:
     return with_half(p.value, (p.ci95[1] - p.ci95[0]) / 2) if p.ci95 else plain(p.value)
 
 
-def said(p: Parameter) -> str:
+def formatted(p: Parameter) -> str:
     """The same with its unit."""
     if p.value is None:
         return NO_NUMBER

@@ -11,7 +11,7 @@ from palpate.files import write_text
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.source import Source
-from palpate.report.identification.words import CALLED, facts_of, interval, said
+from palpate.report.identification.words import CALLED, facts_of, formatted, interval
 from palpate.report.look.assets import TABLES, scripts
 from palpate.report.many import forest
 from palpate.report.many.rows import POINT, LogRow, drawn, json_of, quantities
@@ -84,7 +84,7 @@ def _row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
         "name": row.source.title,
         "sha256": row.source.sha256,
         "error": shown(row.error),
-        "cells": [said(p) if p is not None and p.value is not None else "–" for p in values],
+        "cells": [formatted(p) if p is not None and p.value is not None else "–" for p in values],
         "place": ", ".join(facts_of(found, point)) if found and point else "–",
         "model": found.model if found else "–",
         "tone": TONES[point.stiffness.verdict] if point else "fail" if found is None else "warn",
@@ -100,8 +100,8 @@ def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]
     )
     own = quantities(pooled)[name].parameter
     words = (
-        f"Pooled: {said(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its own,"
-        " the brackets hold where the next press falls. Pale: not pooled."
+        f"Pooled: {formatted(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
+        " own, the brackets hold where the next press falls. Pale: not pooled."
     )
     return {
         "title": title,

@@ -11,7 +11,7 @@ from rich.text import Text
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.identification.result import Parameter, Verdict
 from palpate.report.identification.table import STYLES, note
-from palpate.report.identification.words import facts_of, interval, number, said, unit
+from palpate.report.identification.words import facts_of, formatted, interval, number, unit
 from palpate.report.many.rows import POINT, LogRow, drawn, quantities
 from palpate.report.many.words import failures, sentence
 from palpate.report.numbers import NONE, quantity
@@ -72,7 +72,7 @@ def _together(pooled: Pooled) -> Table:
         p = own.parameter
         table.add_row(
             name,
-            NONE if p.value is None else said(p),
+            NONE if p.value is None else formatted(p),
             interval(own.prediction95, p.unit) or NONE,
             _between(own),
             f"{len(own.logs)} of {pooled.count}",

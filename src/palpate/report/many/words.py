@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from palpate.identification.pooling import Pooled, PooledPoint
 from palpate.report.identification.causes import cause, next_step
-from palpate.report.identification.words import interval, said, units_of
+from palpate.report.identification.words import formatted, interval, units_of
 from palpate.report.many.rows import LogRow
 from palpate.report.numbers import plain, quantity
 
@@ -24,7 +24,7 @@ def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
     after = point.stiffness.prediction95
     again = f", the next press will be from {interval(after, own.unit)} (95 %)" if after else ""
     return (
-        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {said(own)}{again}, {where};"
+        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {formatted(own)}{again}, {where};"
         f" what limits it most is {cause(limit)}: {next_step(limit)}."
     )
 

@@ -15,7 +15,7 @@ from palpate.identification.result import Identification
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.identification.page import TONES, split
-from palpate.report.identification.words import CALLED, said
+from palpate.report.identification.words import CALLED, formatted
 from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts
 from palpate.report.look.columns import packed, thinned
 from palpate.report.numbers import plain, quantity
@@ -179,7 +179,7 @@ def _surface(told: Told) -> list[dict[str, str]]:
                 "colour": name if name in _PARAMETERS else "other",
                 "tone": TONES[p.verdict],
                 "verdict": str(p.verdict),
-                "value": said(p) if p.value is not None else "no number",
+                "value": formatted(p) if p.value is not None else "no number",
                 "truth": quantity(known, truth[name]["unit"], digits=4) if known is not None else "–",
                 "off": off,
             }

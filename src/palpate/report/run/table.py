@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.identification.result import Identification
-from palpate.report.identification.words import CALLED, said
+from palpate.report.identification.words import CALLED, formatted
 from palpate.report.numbers import NONE, plain, quantity, with_half
 from palpate.report.page import Table
 from palpate.report.run.words import alerts
@@ -52,7 +52,7 @@ def surface_table(summary: dict[str, Any], found: Identification) -> Table:
         rows.append(
             (
                 f"{name}, {CALLED[name]}" if name in CALLED else name,
-                said(p) if p.value is not None else "no number",
+                formatted(p) if p.value is not None else "no number",
                 str(p.verdict),
                 quantity(known, truth[name]["unit"], digits=4) if known is not None else NONE,
             )

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.claims import Claim, decided, often, spread
 from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.neural_identifier import ablation as causes
 from palpate.thesis.neural_identifier import network, panels
 from palpate.thesis.neural_identifier.ablation import PARAMETERS, STRAIGHT, Data, Surface
-from palpate.thesis.neural_identifier.claims import ENOUGH
 from palpate.thesis.neural_identifier.network import Choice
 from palpate.thesis.neural_identifier.notes import share_of_starts
 from palpate.thesis.runs import Runs
@@ -57,7 +56,7 @@ def _stiffness(data: Data) -> Claim:
             f"{name} {_told([a.over for a in s.nominal], 'times f/x')}" for name, s in data.items()
         ),
         tolerance="9 of 10 runs between 1.3 and 2.3 times f/x on each surface",
-        verdict=decided(all(_enough(i) for i in inside.values())),
+        verdict=decided(all(often(i) for i in inside.values())),
         note=f"{_secant(data['foam'])} {_slope(data)} {_reach(data)} {_conditions(data)}",
     )
 
@@ -115,7 +114,7 @@ def _conditions(data: Data) -> str:
 def _mass(data: Data) -> Claim:
     firm = {name: firm_signs(s.masses) for name, s in data.items()}
     both = all((s.masses > 0).any() and (s.masses < 0).any() for s in data.values())
-    holds = both and all(_enough(list(f)) for f in firm.values())
+    holds = both and all(often(f) for f in firm.values())
     kept = {
         name: float(np.mean(np.sign(s.before) == np.sign(np.median(s.masses, axis=0))))
         for name, s in data.items()
@@ -159,7 +158,7 @@ def _steady_conditions(data: Data) -> tuple[int, int]:
         usual = np.sign(np.median(surface.masses, axis=0))[: network.VARIED_STARTS]
         for some in surface.varied.values():
             found = np.sign(np.array([a.M for a in some]).reshape(-1, network.VARIED_STARTS))
-            kept.append(np.mean(found == usual) >= ENOUGH)
+            kept.append(often(found == usual))
     return sum(map(bool, kept)), len(kept)
 
 
@@ -177,7 +176,7 @@ def _outside(data: Data) -> Claim:
             for name, s in data.items()
         ),
         tolerance="off by more than 10 % in 9 of 10 runs, with the warning probe-outside-learned each time",
-        verdict=decided(_enough(wrong)),
+        verdict=decided(often(wrong)),
         note=(
             "A sigmoid bends to its end, and a threshold does not grow with displacement: the force is "
             "underestimated. That the probe be inside what was learned is not enough, though: at the "
@@ -231,10 +230,6 @@ def _told(values: Sequence[float], unit: str) -> str:
     return spread(values, unit).replace(
         f"{len(values)} seeds", f"{seeds} seeds x {len(causes.MANY_STARTS)} starts"
     )
-
-
-def _enough(holds: Sequence[bool]) -> bool:
-    return sum(map(bool, holds)) >= ENOUGH * len(holds)
 
 
 def plot(data: Data) -> Figure:

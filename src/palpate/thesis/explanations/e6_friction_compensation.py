@@ -15,9 +15,8 @@ from palpate.bench.metrics.summary import losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
-from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.claims import Claim, decided, often, spread
 from palpate.thesis.conditions import (
-    ENOUGH,
     RELAXING_FOAM,
     RUBBER_SURFACE,
     SHORT,
@@ -134,7 +133,7 @@ def _never(data: Data) -> Claim:
             "in 9 of 10 runs the listing's rule, fed with the encoders' rates, reaches 90 % of the level at "
             "some tick"
         ),
-        verdict=decided(sum(f >= 0.9 for f in factors) >= ENOUGH * len(factors)),
+        verdict=decided(often(f >= 0.9 for f in factors)),
         note=(
             "The listing's factor is the speed over 0.002 rad/s up to that speed, and above it whatever it "
             "was before. One encoder count in a millisecond is 0.010 rad/s for motor 1 and 0.015 for motor "
@@ -164,7 +163,7 @@ def _acting(data: Data) -> Claim:
         tolerance=(
             f"in 9 of 10 runs with a blend of 0.05 rad/s: contact kept and at most {HALF:.0%} of the error"
         ),
-        verdict=decided(sum(r.helps for r in nominal) >= ENOUGH * len(nominal)),
+        verdict=decided(often(r.helps for r in nominal)),
         note=(
             "Levels known exactly, which nobody has: they are the bench's own. How much is left depends on "
             "how the last motion ended, since a Coulomb law knows the direction of motion and nothing of "
@@ -194,7 +193,7 @@ def _hammer(data: Data) -> Claim:
             f"in 9 of 10 runs the force's standard deviation is at least {SHAKES:g} times that without "
             "compensation"
         ),
-        verdict=decided(sum(s >= SHAKES for s in shares) >= ENOUGH * len(shares)),
+        verdict=decided(often(s >= SHAKES for s in shares)),
         note=(
             "Below one velocity quantum the blend is a relay: the encoder's last bit switches the whole "
             "Coulomb torque, a thousand times a second at worst. That shakes the arm loose, as a dither "

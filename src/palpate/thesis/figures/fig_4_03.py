@@ -13,8 +13,8 @@ from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.summary import losses
 from palpate.records import Record
 from palpate.report import style
-from palpate.thesis.claims import Claim, decided
-from palpate.thesis.conditions import ENOUGH, SHORT, VARIED_SEEDS, rougher
+from palpate.thesis.claims import Claim, decided, often
+from palpate.thesis.conditions import SHORT, VARIED_SEEDS, rougher
 from palpate.thesis.force_control.loop import ForceLoop
 from palpate.thesis.force_control.panels import across, panels
 from palpate.thesis.force_control.tracking import since_contact
@@ -122,9 +122,7 @@ def _linear(data: Data) -> Claim:
 def _whole(data: Data) -> Claim:
     kept = {c: sum(data.below[c]) for c in data.below}
     lost = {c: len(data.above[c]) - sum(data.above[c]) for c in data.above}
-    holds = all(
-        kept[c] >= ENOUGH * len(data.below[c]) and lost[c] >= ENOUGH * len(data.above[c]) for c in kept
-    )
+    holds = all(often(data.below[c]) and often(not a for a in data.above[c]) for c in kept)
     n = len(next(iter(data.below.values())))
     friction = ", ".join(f"{min(v):.2g} to {max(v):.2g}" for v in data.rough.values())
     return Claim(
@@ -209,7 +207,7 @@ def _damping_panel(axis: Axes, data: Data) -> None:
         for case, limit in data.limits.items():
             if case[1] == kf:
                 for share, found in ((BELOW, data.below), (ABOVE, data.above)):
-                    stable = np.mean(found[case]) >= ENOUGH
+                    stable = often(found[case])
                     face = color if stable else "white"
                     axis.plot(
                         case[0], share * limit / 1e3, "o", color=color, markerfacecolor=face, markersize=6

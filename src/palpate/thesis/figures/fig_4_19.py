@@ -13,9 +13,8 @@ from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
 from palpate.report import style
-from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.claims import Claim, decided, often, spread
 from palpate.thesis.conditions import (
-    ENOUGH,
     RELAXING_FOAM,
     RUBBER_SURFACE,
     SHORT,
@@ -123,7 +122,7 @@ def _as_printed(data: Data, same: Mapping[str, Any]) -> Claim:
             "in 9 of 10 runs: contact kept; a step of 10 N moves y and the angle at most half as far as "
             f"under (4.13); a jump of y by {1e3 * JUMP:.0f} mm moves the force by at most {SHARE:.0%}"
         ),
-        verdict=decided(_often(data.printed, _all)),
+        verdict=decided(often(map(_all, data.printed))),
         note=(
             "K_e multiplies where dimensions ask for 1/K_e: with the thesis' K_fp = 1 and K_e in N/m the "
             "loop gain is some twenty-seven million, and the motors hammer between their limits. There is no "
@@ -148,7 +147,7 @@ def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
         tolerance=(
             "in 9 of 10 runs: contact kept, and at most half as far as under (4.13) with the thesis' gains"
         ),
-        verdict=decided(_often(data.nominal, _angle_kept)),
+        verdict=decided(often(map(_angle_kept, data.nominal))),
         note=(
             "The spike that (4.13) gives the angle at each step is gone, as the right half of the figure "
             f"shows; there the corrected law leaves {spread([100 * p.angle for p in free], '%', 2)}, most of "
@@ -175,7 +174,7 @@ def _side(data: Data, same: Mapping[str, Any]) -> Claim:
         tolerance=(
             "in 9 of 10 runs: contact kept, and at most half as far as under (4.13) with the thesis' gains"
         ),
-        verdict=decided(_often(data.nominal, _side_kept)),
+        verdict=decided(often(map(_side_kept, data.nominal))),
         note=(
             "On the bench as chosen the tip sticks to the wall, a friction coefficient of 0.7, and y moves "
             "by a tenth of a millimetre under any law: there is nothing to decouple. The thesis does not "
@@ -201,7 +200,7 @@ def _force(data: Data, same: Mapping[str, Any]) -> Claim:
             f"in 9 of 10 runs: contact kept; within a second of a jump by {1e3 * JUMP:.0f} mm the true force "
             f"strays by at most {SHARE:.0%} of the desired one"
         ),
-        verdict=decided(_often(data.nominal, _force_kept)),
+        verdict=decided(often(map(_force_kept, data.nominal))),
         note=(
             "Neither law lets u_x into the force: even (4.18) couples one way only. What disturbs the force "
             "is the joints' friction: once y moves, joint 2 slides, and its friction is the force's main "
@@ -268,10 +267,6 @@ def _limits(signals: Sequence[Array]) -> tuple[float, float]:
     low, high = min(float(s.min()) for s in signals), max(float(s.max()) for s in signals)
     margin = 0.12 * (high - low)
     return low - margin, high + margin
-
-
-def _often(pairs: Sequence[Pair], holds: Any) -> bool:
-    return sum(map(holds, pairs)) >= ENOUGH * len(pairs)
 
 
 def _angle_kept(pair: Pair) -> bool:

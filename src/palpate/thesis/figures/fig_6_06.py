@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.report import style
-from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.claims import Claim, decided, often, spread
 from palpate.thesis.least_squares import panels
 from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.neural_identifier import network
-from palpate.thesis.neural_identifier.claims import ENOUGH
 from palpate.thesis.neural_identifier.network import STARTS, Answer, Choice, Press
 from palpate.thesis.runs import Runs
 
@@ -76,8 +75,8 @@ def check(data: Data) -> Sequence[Claim]:
 
 def _slower(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
     times = [f"{rate:g}: {spread([a.error_gone for a in found[rate]], 's', 2)}" for rate in SMALLER]
-    bad = [name for name, by_rate in data.varied.items() if not _enough(ordered(by_rate))]
-    other = [f"{a:g} N" for a in OTHERS if not _enough(ordered(data.found[a]))]
+    bad = [name for name, by_rate in data.varied.items() if not often(ordered(by_rate))]
+    other = [f"{a:g} N" for a in OTHERS if not often(ordered(data.found[a]))]
     exceptions = [*bad, *(f"output amplitude {a}" for a in other)]
     limits = (
         f"It does not hold with: {', '.join(exceptions)}." if exceptions else "It holds under all of them."
@@ -93,7 +92,7 @@ def _slower(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
             f"in 9 of 10 runs the error of the output (mean over 50 ms within {network.GONE:g} N) is gone "
             "later at each of the rates 1e-4, 3e-5, 1e-5 and 3e-6 than at the one before"
         ),
-        verdict=decided(_enough(ordered(found))),
+        verdict=decided(often(ordered(found))),
         note=(
             "As long as learning is slower than the press, the error dies away with a time constant that "
             "is roughly inversely proportional to the learning rate and to the square of the output "
@@ -146,14 +145,10 @@ def stuck(answer: Answer) -> bool:
 def stuck_from(by_rate: Mapping[float, Sequence[Answer]]) -> float:
     """The smallest rate above the thesis' from which on all are too large; infinite if there is none."""
     large = [rate for rate in RATES if rate > SMALLER[0]]
-    hopeless = [_enough([stuck(a) for a in by_rate[rate]]) for rate in large]
+    hopeless = [often([stuck(a) for a in by_rate[rate]]) for rate in large]
     good = [i for i, bad in enumerate(hopeless) if not bad]
     first = good[-1] + 1 if good else 0
     return large[first] if first < len(large) else float("inf")
-
-
-def _enough(holds: Sequence[bool]) -> bool:
-    return sum(holds) >= ENOUGH * len(holds)
 
 
 PANELS = {

@@ -15,8 +15,8 @@ from palpate.bench.metrics.summary import losses
 from palpate.bench.metrics.window import SETTLE, rms
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
-from palpate.thesis.claims import spread
-from palpate.thesis.conditions import ENOUGH, RELAXING_FOAM, SHORT, VARIED_SEEDS, friction_and_pose
+from palpate.thesis.claims import often, spread
+from palpate.thesis.conditions import RELAXING_FOAM, SHORT, VARIED_SEEDS, friction_and_pose
 from palpate.thesis.runs import Runs
 
 FOLLOWING = (
@@ -85,7 +85,7 @@ def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
 
 def following(found: Sequence[Tracking]) -> bool:
     """Whether enough runs follow."""
-    return sum(f.follows for f in found) >= ENOUGH * len(found)
+    return often(f.follows for f in found)
 
 
 def described(found: Sequence[Tracking]) -> str:

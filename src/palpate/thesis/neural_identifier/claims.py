@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.claims import ENOUGH, Claim, decided, spread
 from palpate.thesis.neural_identifier.network import GONE, Answer, Choice
 from palpate.thesis.neural_identifier.notes import TIME, Grounds, why
 
-ENOUGH = 0.9
-"""Share of the runs in which a claim has to hold."""
 SMALL = 1.0
 """What a small mass is below [kg]."""
 FOAM_BAND, RUBBER_BAND = 0.06, 0.15

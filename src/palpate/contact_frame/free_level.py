@@ -9,16 +9,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.contact_frame.free_inertia import CHANCE
+from palpate.contact_frame.vectors import FEWEST
+
 Array = NDArray[np.float64]
 
 _ENOUGH = 4000
+"""Rows that are looked at, of a longer log evenly: that is a matter of time, not of what is found."""
 _PLACES = np.linspace(0.05, 0.95, 37)
-_BENT = 0.7
+"""Of a bend, as shares of the stroke."""
+_BENT = CHANCE ** (2.0 / (2 * FEWEST - 3))
+"""Share of a straight line's misfit that a bend, one number more, leaves by chance once in a thousand logs of the
+fewest independent rows, by Fisher's distribution with 2 degrees of freedom."""
 _FLAT = 0.05
-_FEWEST = 20
+"""Of the slope beyond the bend: a spring whose force grows as the penetration to the third power shows 0.14."""
 
 
-def air_level(force: Array, position: Array) -> float | None:
+def free_level(force: Array, position: Array) -> float | None:
     """The force [N] of the flat side of a bend; None if there is no bend with one flat side.
 
     Args:
@@ -56,7 +63,7 @@ def _misfit(force: Array, regressor: Array) -> float:
 
 def _is_flat(force: Array, position: Array, flat: NDArray[np.bool_]) -> bool:
     """Whether the force does not follow the position on one side, measured by how it does on the other."""
-    if min(flat.sum(), (~flat).sum()) < _FEWEST or not (np.ptp(position[flat]) and np.ptp(position[~flat])):
+    if min(flat.sum(), (~flat).sum()) < FEWEST or not (np.ptp(position[flat]) and np.ptp(position[~flat])):
         return False
     slopes = [abs(float(np.polyfit(position[side], force[side], 1)[0])) for side in (flat, ~flat)]
     return slopes[0] < _FLAT * slopes[1]

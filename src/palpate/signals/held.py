@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 _LONG_JUMP = 4.0
+"""Times the sensor's own resolution from which a step is a jump."""
 _HELD_SHARE = 0.3
+"""Pairs of jumps between which a reading may move all the same."""
 
 
 def fresh_rows(values: NDArray[np.float64]) -> NDArray[np.bool_] | None:

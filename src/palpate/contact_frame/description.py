@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from palpate.identification.options import LEAST_SQUARES
+from palpate.units import GRAVITY
 
-_GRAVITY = 9.80665
 _FAR = 0.01
+"""Of a line of action from the point that touches [m]: a probe touches off its point by its radius, some millimetres;
+a lever arm that is told wrong is off by centimetres."""
 
 
-def told(meta: Mapping[str, Any]) -> list[str]:
+def described(meta: Mapping[str, Any]) -> list[str]:
     """Sentences for a user, from the metadata of a record along the normal."""
     lines = list(meta.get("facts", ()))
     about = meta.get("contact_frame")
@@ -62,7 +64,7 @@ def _load(about: Mapping[str, Any]) -> str:
             f"tool's weight {weight:.3g} N (std {std:.2g} N) by the payload file; bias {_listed(about['bias_N'])} N"
             f"{'' if about['free_rows'] else ' by the same, as the log has no free motion'}"
         )
-    mass = f"--tool-mass {weight / _GRAVITY:.3g}:{std / _GRAVITY:.1g} would take its inertia out of M"
+    mass = f"--tool-mass {weight / GRAVITY:.3g}:{std / GRAVITY:.1g} would take its inertia out of M"
     return f"tool's weight {weight:.3g} N (std {std:.2g} N; {mass}); bias {_listed(about['bias_N'])} N"
 
 

@@ -8,7 +8,7 @@ import pytest
 from contact_frame.synthetic_arm import any_world
 from contact_frame.synthetic_arm import log_of as press_of
 from palpate.contact_frame import ContactFrame, identify_contact
-from palpate.contact_frame.air_inertia import air_inertia
+from palpate.contact_frame.free_inertia import free_inertia
 from palpate.records import Record
 
 
@@ -29,7 +29,7 @@ def test_the_mass_is_found_with_an_interval_that_holds_it(mass):
     ratios = []
     for _ in range(20):
         time, force, place = shaken(rng, mass)
-        value, std = air_inertia(time, force + np.array([0.3, 0.0, -0.2]), place, np.ones(len(time), bool))
+        value, std = free_inertia(time, force + np.array([0.3, 0.0, -0.2]), place, np.ones(len(time), bool))
         ratios.append((value - mass) / std)
     # 20 draws of a unit deviation have a root mean square of 1 +- 0.16; the window is the one of the least std.
     assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 1.6
@@ -38,7 +38,7 @@ def test_the_mass_is_found_with_an_interval_that_holds_it(mass):
 def test_an_arm_at_rest_tells_nothing():
     time, force, place = shaken(np.random.default_rng(1), 0.5)
     still = place * 0.0 + np.random.default_rng(2).normal(0, 1e-6, place.shape)
-    found = air_inertia(time, force, still, np.ones(len(time), bool))
+    found = free_inertia(time, force, still, np.ones(len(time), bool))
     assert found is None or found[1] > 10.0
 
 

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 _ROUNDS = 4
+"""At most: the weight tells the free rows and they the weight, until neither changes."""
 
 
 @dataclass(frozen=True)
@@ -87,9 +88,13 @@ def _found(signals: Signals, there: Rows, frame: ContactFrame) -> tuple[Load, Ro
             if turned
             else no_load()
         )
+    before = none
     for _ in range(_ROUNDS if turned else 1):
         inside, free = _contact(signals, load)
         free &= there
+        if free.any() and np.array_equal(free, before):
+            break
+        before = free
         if not free.any():
             return _load(signals, none, frame) if frame.payload else no_load(), inside, free
         load = _load(signals, free, frame)

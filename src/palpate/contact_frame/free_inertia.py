@@ -4,8 +4,8 @@ A tool of mass m adds -m a to what it exerts on its sensor. A driver that takes 
 it off with the wrong sign leaves +m a, which in contact no log of second order tells from a lag and a damping.
 
 No acceleration is measured. With a smooth function phi that vanishes at both ends of a window, partial integration
-gives int phi a = int phi'' p (the modulating functions of Shinbrot, 1957), so that the position itself serves. The
-window is the one that tells the mass best.
+gives int phi a = int phi'' p (the modulating functions of Shinbrot, 1957), so that the position itself serves. Sums
+over rows and second differences obey the same rule exactly. The window is the one that tells the mass best.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ Rows = NDArray[np.bool_]
 
 _WINDOWS = np.geomspace(0.04, 2.0, 9)
 """Lengths that are tried [s]."""
-_FEWEST = 12
-"""Windows, and rows in one."""
+_ROWS = 12
+"""Fewest rows of a window: of a motion of one period a window, a second difference over n rows lacks (pi/(n - 1))^2/3
+of the acceleration, here 3 %."""
 BLOCKS = 20
 """Parts of the log, each of which is left out once."""
 CHANCE = 1e-3
 """How probable a doubt may be by chance alone."""
 
 
-def air_inertia(time: Array, force: Array, place: Array, free: Rows) -> tuple[float, float] | None:
+def free_inertia(time: Array, force: Array, place: Array, free: Rows) -> tuple[float, float] | None:
     """The mass m of f = -m a, and its standard deviation [kg]; None where the log does not tell.
 
     Args:
@@ -57,17 +58,15 @@ def wrong_sign(inertia: tuple[float, float] | None) -> bool:
 
 def _by_window(force: Array, place: Array, there: Rows, dt: float, n: int) -> tuple[float, float] | None:
     """Windows of n rows that overlap by half, all of whose rows are there."""
-    if n < _FEWEST or len(force) < n:
+    if n < _ROWS or len(force) < n:
         return None
     s = np.linspace(-1.0, 1.0, n)
-    u = 1.0 - s**2
-    phi = s * u**3  # odd, so that a bias that is left in the force does not matter
-    bend = (24.0 * s**3 * u - 18.0 * s * u**2) * (2.0 / ((n - 1) * dt)) ** 2
-    bend -= s * (bend @ s) / (s @ s)  # nor does a constant speed, in the sum as in the integral
+    phi = s * (1.0 - s**2) ** 3  # odd, so that a bias that is left in the force does not matter
+    bend = np.diff(np.r_[0.0, phi, 0.0], 2) / dt**2
     starts = np.arange(0, len(force) - n + 1, max(n // 2, 1))
     whole = np.r_[0, np.cumsum(there)]
     starts = starts[whole[starts + n] - whole[starts] == n]
-    if len(starts) < _FEWEST:
+    if len(starts) < BLOCKS:
         return None
     y = np.array([phi @ force[i : i + n] for i in starts])
     z = np.array([bend @ place[i : i + n] for i in starts])
@@ -76,14 +75,14 @@ def _by_window(force: Array, place: Array, there: Rows, dt: float, n: int) -> tu
 
 def _slope(y: Array, z: Array, noise: float) -> tuple[float, float] | None:
     """-y over z by least squares, less what noise of the position adds; std by leaving blocks out."""
-    blocks = np.array_split(np.arange(len(y)), min(BLOCKS, len(y)))
+    blocks = np.array_split(np.arange(len(y)), BLOCKS)
     top = np.array([np.sum(y[b] * z[b]) for b in blocks])
     bottom = np.array([np.sum(z[b] ** 2) - 3.0 * noise * len(b) for b in blocks])
     if not bottom.sum() > 3.0 * noise * len(y):  # the motion has to stand out of the noise
         return None
     left = -(top.sum() - top) / (bottom.sum() - bottom)
-    g = len(blocks)
-    return float(-top.sum() / bottom.sum()), float(np.sqrt((g - 1) / g * np.sum((left - left.mean()) ** 2)))
+    spread = np.sum((left - left.mean()) ** 2)
+    return float(-top.sum() / bottom.sum()), float(np.sqrt((BLOCKS - 1) / BLOCKS * spread))
 
 
 def _noise(place: Array) -> float:

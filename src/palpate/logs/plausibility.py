@@ -78,7 +78,7 @@ def check_range(columns: Mapping[str, Array], names: Mapping[str, str], path: Pa
             )
 
 
-def doubts_about_time(columns: Mapping[str, Array], start: float, spec: str) -> list[dict[str, Any]]:
+def implausible_times(columns: Mapping[str, Array], start: float, spec: str) -> list[dict[str, Any]]:
     """What is strange about the time of a log, as a record's meta has it.
 
     Args:
