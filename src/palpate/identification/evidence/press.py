@@ -93,8 +93,9 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
         begin = s.first + int(np.argmin(depth[s.first : top]))
         if top - begin >= _FEWEST:
             advance = slice(*_one_way(depth, channels[1], begin, top, reach))
-            whole = Stroke(*(own[begin:top] for own in channels))
-            stroke = Stroke(*(own[advance] for own in channels), whole)
+            x, v, f, t = channels
+            whole = Stroke(x[begin:top], v[begin:top], f[begin:top], t[begin:top])
+            stroke = Stroke(x[advance], v[advance], f[advance], t[advance], whole)
             found.append(replace(_sharpened(stroke, motion.chain), read=_as_read(problem, lag, stroke)))
     return found
 
