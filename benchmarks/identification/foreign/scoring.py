@@ -149,7 +149,9 @@ def _named(truth: Range) -> str:
 
 
 def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, ...]:
-    own = of_model(log.plan.surface, found.model, _untold_arm(log), found.depth)
+    touched = log.dense.depth[log.dense.contact]
+    depth = found.depth or (float(np.percentile(touched, 99)) if len(touched) else None)
+    own = of_model(log.plan.surface, found.model, _untold_arm(log), depth)
     answers = []
     for name, p in found.parameters.items():
         if str(p.verdict) != "identified" or p.value is None or p.ci95 is None:

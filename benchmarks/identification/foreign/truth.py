@@ -190,10 +190,24 @@ def of_model(
         slower = tau * (1 + branch / (surface["K"] + arm))
         return {"K": (low, surface["K"]), "K1": (high - low, branch), "tau": (tau, slower)}
     if model == "hunt-crossley" and surface["C"] and not surface.arms:
-        return {"K": (surface["C"],) * 2, "n": (surface["n"],) * 2, "B": (surface["C"] * surface["D"],) * 2}
+        return _power(surface, arm, depth or 0.0)
     if surface["Fc"] and model.startswith("kelvin-voigt"):
         return {"Fc": (surface["Fc"],) * 2}
     return {}
+
+
+def _power(surface: Surface, arm: float, depth: float) -> dict[str, Range]:
+    """The same of Hunt and Crossley's contact: F = C s^n, or the power law that has its force and slope at a depth [m].
+
+    Behind a spring k the depth is d = s + F/k, and with r = F/(k s) the exponent d ln F/d ln d is n (1 + r)/(1 + n r).
+    """
+    c, n = surface["C"], surface["n"]
+    share = c * depth ** (n - 1) / arm
+    bent = n * (1 + share) / (1 + n * share)
+    stiffness = c * depth**n / (depth * (1 + share)) ** bent if depth else c
+    return {
+        "K": (min(c, stiffness), max(c, stiffness)), "n": (bent, n), "B": (c * surface["D"],) * 2,
+    }  # fmt: skip
 
 
 def _tissue(surface: Surface, arm: float, depth: float) -> dict[str, Range]:
