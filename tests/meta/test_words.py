@@ -25,7 +25,6 @@ STILL = {
     "src/palpate/force/law.py",
     "src/palpate/force/telling.py",
     "src/palpate/force/worlds.py",
-    "src/palpate/identification/models.py",
     "src/palpate/report/run/page.py",
     "src/palpate/wires/lateness.py",
     "src/palpate/wires/press.py",

@@ -96,7 +96,7 @@ def without_noise(motion: Motion) -> Motion:
 
 
 @dataclass(frozen=True)
-class Knob:
+class NonlinearParameter:
     """A parameter that a model is not linear in: its start values, its limits and how it is stepped."""
 
     name: str
@@ -112,13 +112,13 @@ Columns = Callable[[Motion, dict[str, float], float], list[Array]]
 
 @dataclass(frozen=True)
 class Model:
-    """A contact model that is linear in all parameters but its knobs.
+    """A contact model that is linear in all parameters but some.
 
     Args:
         name: the word for `--model`.
         linear: names of the parameters that its columns stand for; `offset` is the last one, if there is one.
-        columns: from a motion, the knobs and the force's lag [s] to the columns, each of shape (m,).
-        knobs: what it is not linear in, scaled to the log at hand.
+        columns: from a motion, the nonlinear parameters and the force's lag [s] to the columns, each of shape (m,).
+        nonlinear: what it is not linear in, scaled to the log at hand.
         positive: parameters that no passive surface has below zero.
         depth: penetration that the stiffnesses and the damping belong to, where they grow with it [m]; None if not.
     """
@@ -126,7 +126,7 @@ class Model:
     name: str
     linear: tuple[str, ...]
     columns: Columns
-    knobs: tuple[Knob, ...] = ()
+    nonlinear: tuple[NonlinearParameter, ...] = ()
     positive: tuple[str, ...] = ("K", "B", "M", "Fc")
     depth: float | None = None
 
@@ -134,13 +134,15 @@ class Model:
     def of_position(self) -> bool:
         """Whether the force is made of the position and its derivatives alone, and so its noise too."""
         return (
-            self.linear[-1] == "offset" and set(self.linear[:-1]) == set(self.derivatives) and not self.knobs
+            self.linear[-1] == "offset"
+            and set(self.linear[:-1]) == set(self.derivatives)
+            and not self.nonlinear
         )
 
     @property
     def of_power(self) -> bool:
         """Whether the force goes with a power of the depth."""
-        return any(knob.name == "n" for knob in self.knobs)
+        return any(parameter.name == "n" for parameter in self.nonlinear)
 
     @property
     def derivatives(self) -> dict[str, int]:
@@ -148,24 +150,24 @@ class Model:
         return {name: k for name, k in (("K", 0), ("B", 1), ("M", 2)) if name in self.linear}
 
 
-def _kelvin_voigt(motion: Motion, _knobs: dict[str, float], lag: float) -> list[Array]:
+def _kelvin_voigt(motion: Motion, _nonlinear: dict[str, float], lag: float) -> list[Array]:
     """f = K x + B v."""
     return [motion.moved(0, lag), motion.moved(1, lag), motion.ones]
 
 
-def _kelvin_voigt_mass(motion: Motion, _knobs: dict[str, float], lag: float) -> list[Array]:
+def _kelvin_voigt_mass(motion: Motion, _nonlinear: dict[str, float], lag: float) -> list[Array]:
     """f = K x + B v + M a."""
     return [motion.moved(0, lag), motion.moved(1, lag), motion.moved(2, lag), motion.ones]
 
 
-def _deep(motion: Motion, knobs: dict[str, float]) -> Array:
+def _deep(motion: Motion, nonlinear: dict[str, float]) -> Array:
     """Penetration: the position beyond the surface, zero before it, shape (n,). A probe fixed to it is always in it."""
-    return motion.position if motion.bonded else np.maximum(motion.position - knobs["x0"], 0.0)
+    return motion.position if motion.bonded else np.maximum(motion.position - nonlinear["x0"], 0.0)
 
 
-def _standard_linear_solid(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+def _standard_linear_solid(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
     """f = K x + B v + K1 y, where the spring K1 of the Maxwell branch is stretched by y: y' + y/tau = x'."""
-    return _relaxing(motion, _deep(motion, knobs), knobs["tau"], lag)
+    return _relaxing(motion, _deep(motion, nonlinear), nonlinear["tau"], lag)
 
 
 def _relaxing(motion: Motion, u: Array, tau: float, lag: float) -> list[Array]:
@@ -175,10 +177,10 @@ def _relaxing(motion: Motion, u: Array, tau: float, lag: float) -> list[Array]:
     return [*columns, motion.filtered(branch, 0, lag), motion.ones]
 
 
-def _hunt_crossley(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
+def _hunt_crossley(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
     """f = K d^n + B d^n v. The damping's column is the derivative of d^(n+1)/(n+1), so that v is never formed."""
-    n = knobs["n"]
-    d = np.maximum(motion.position - knobs["x0"], 0.0)
+    n = nonlinear["n"]
+    d = np.maximum(motion.position - nonlinear["x0"], 0.0)
     power = d**n
     return [motion.filtered(power, 0, lag), motion.filtered(power * d / (n + 1), 1, lag), motion.ones]
 
@@ -202,8 +204,8 @@ NAMES = (
 
 def standard_linear_solid(motion: Motion) -> Model:
     """The standard linear solid."""
-    knobs = (_time(motion),) if motion.bonded else (_time(motion), _touch(motion))
-    return Model(NAMES[2], _RELAXING, _standard_linear_solid, knobs, _PASSIVE)
+    nonlinear = (_time(motion),) if motion.bonded else (_time(motion), _touch(motion))
+    return Model(NAMES[2], _RELAXING, _standard_linear_solid, nonlinear, _PASSIVE)
 
 
 def quasi_linear(motion: Motion) -> Model:
@@ -216,32 +218,32 @@ def quasi_linear(motion: Motion) -> Model:
     """
     deepest = float(motion.moved(0, 0.0).max())
 
-    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
-        n = knobs["n"]
-        u = deepest / n * (np.maximum(motion.position - knobs["x0"], 0.0) / deepest) ** n
-        return _relaxing(motion, u, knobs["tau"], lag)
+    def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
+        n = nonlinear["n"]
+        u = deepest / n * (np.maximum(motion.position - nonlinear["x0"], 0.0) / deepest) ** n
+        return _relaxing(motion, u, nonlinear["tau"], lag)
 
-    knobs = (_POWER, _time(motion), _touch(motion))
-    return Model(NAMES[4], _RELAXING, columns, knobs, _PASSIVE, deepest)
+    nonlinear = (_POWER, _time(motion), _touch(motion))
+    return Model(NAMES[4], _RELAXING, columns, nonlinear, _PASSIVE, deepest)
 
 
 _RELAXING = ("K", "B", "K1", "offset")
 _PASSIVE = ("K", "B", "K1", "Fc")
-_POWER = Knob("n", (1.5,), 0.5, 5.0, 1e-3)
+_POWER = NonlinearParameter("n", (1.5,), 0.5, 5.0, 1e-3)
 
 
-def _time(motion: Motion) -> Knob:
+def _time(motion: Motion) -> NonlinearParameter:
     """A relaxation time that this log can show: between the filter's and the log's."""
     shortest, longest = 2 / motion.chain.rate, motion.duration
     starts = tuple(np.geomspace(3 * shortest, longest / 3, 4))
-    return Knob("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
+    return NonlinearParameter("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
 
 
-def _touch(motion: Motion) -> Knob:
+def _touch(motion: Motion) -> NonlinearParameter:
     """Where the surface is, about the position at which the force was first seen, and on the way there at the least."""
     depth = float(np.max(motion.position)) or 1.0
     least = min(-depth, float(np.min(motion.position)))
-    return Knob("x0", (-0.02 * depth,), least, 0.5 * depth, 1e-4 * depth)
+    return NonlinearParameter("x0", (-0.02 * depth,), least, 0.5 * depth, 1e-4 * depth)
 
 
 def hunt_crossley(motion: Motion) -> Model:
@@ -257,8 +259,8 @@ def at_rest_before(model: Model) -> Model:
     An offset and the place of the surface do the same to a straight spring, and nearly the same to a curved one.
     """
 
-    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
-        return model.columns(motion, knobs, lag)[:-1]
+    def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
+        return model.columns(motion, nonlinear, lag)[:-1]
 
     return replace(model, linear=model.linear[:-1], columns=columns)
 
@@ -266,10 +268,10 @@ def at_rest_before(model: Model) -> Model:
 def begun_before(model: Model) -> Model:
     """The same in a log that begins in contact: what the Maxwell branch was stretched by then dies out with tau."""
 
-    def columns(motion: Motion, knobs: dict[str, float], lag: float) -> list[Array]:
-        own = model.columns(motion, knobs, lag)
+    def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
+        own = model.columns(motion, nonlinear, lag)
         since = np.arange(len(motion.position)) * motion.chain.dt
-        return [*own[:-1], motion.filtered(np.exp(-since / knobs["tau"]), 0, lag), own[-1]]
+        return [*own[:-1], motion.filtered(np.exp(-since / nonlinear["tau"]), 0, lag), own[-1]]
 
     return replace(model, linear=(*model.linear[:-1], "y0", model.linear[-1]), columns=columns)
 

@@ -188,8 +188,8 @@ def _traces(channels: Channels, chain: Chain, choice: Choice, terms: Terms) -> T
     step = max(len(channels.position) // _SHOWN, 1)
     size = max(len(problem.force) // _SHOWN, 1)
     linear = fitted.model.linear
-    knobs = {knob.name: fitted[knob.name] for knob in fitted.model.knobs}
-    columns = fitted.model.columns(problem.motion, knobs, fitted.lag)
+    nonlinear = {parameter.name: fitted[parameter.name] for parameter in fitted.model.nonlinear}
+    columns = fitted.model.columns(problem.motion, nonlinear, fitted.lag)
     lag = problem.lag
     return Traces(
         time=(channels.time - chain.delay)[::step],

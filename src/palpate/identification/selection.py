@@ -113,9 +113,9 @@ def _against(rich: Answer, plain: Answer, tolerance: float) -> str:
     """Why a richer model is not taken; empty if it is."""
     if (1 - rich.explained) > 0.5 * (1 - plain.explained):
         return "explains less than half of what the plainer model leaves"
-    for knob in rich.fit.model.knobs:
-        if not knob.low < rich.fit[knob.name] < knob.high:
-            return f"its {knob.name} lies beyond what the log can show"
+    for parameter in rich.fit.model.nonlinear:
+        if not parameter.low < rich.fit[parameter.name] < parameter.high:
+            return f"its {parameter.name} lies beyond what the log can show"
     for name in ("K", *_ADDED[rich.fit.model.name]):
         value, half = rich[name], rich.half_of(name)
         known = half <= tolerance * abs(value) and (name != "n" or abs(value - 1) > half)

@@ -64,7 +64,7 @@ def verdicts(
     lag = choice.problem.lag
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
     parameters = {name: _parameter(name, choice, holds, terms) for name in names}
-    if point is not None and found.fit.model.knobs:
+    if point is not None and found.fit.model.nonlinear:
         parameters = _showing(parameters, found, point)
     elif point is not None and {"K", "M"} <= set(found.names):
         parameters = _agreeing(parameters, found, point)

@@ -28,7 +28,7 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
         segments: of the rows.
     """
     found = {FRICTION: motion.filtered(direction(motion), 0, lag)}
-    if model.knobs:
+    if model.nonlinear:
         return found
     if motion.free is not None and motion.touched is not None:
         found[TOUCH] = motion.filtered(motion.touched, 0, lag)

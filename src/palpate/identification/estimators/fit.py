@@ -1,4 +1,4 @@
-"""Fitting one model to one log: least squares inside, its knobs and the force's lag by Gauss and Newton outside."""
+"""Fitting one model to one log: linear parameters inside; the nonlinear and the lag by Gauss and Newton outside."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from palpate.identification.estimators.lag_uncertainty import bias_corrected, hidden, with_lag
 from palpate.identification.least_squares import Noise, covariance, noise_of, quantile, solve
-from palpate.identification.models import Knob, Model, Motion
+from palpate.identification.models import Model, Motion, NonlinearParameter
 from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ class Fit:
 
     Args:
         model: which.
-        names: of the parameters: the linear ones, then the knobs, then the lag.
+        names: of the parameters: the linear ones, then the nonlinear ones, then the lag.
         theta: their values, shape (p,).
         cov: their covariance, coloured noise and the lag's uncertainty included, shape (p, p).
         fixed_cov: the same as if the lag were known exactly, shape (p, p).
@@ -76,7 +76,7 @@ class Fit:
 
 @dataclass
 class _Point:
-    knobs: dict[str, float]
+    nonlinear: dict[str, float]
     lag: float
     columns: Array
     theta: Array
@@ -160,17 +160,17 @@ class Prediction:
 
 def slope_of_lag(model: Model, motion: Motion, theta: dict[str, float], lag: float) -> Array:
     """Derivative of the predicted force by the lag [N/s], shape (n,), of a model without nonlinear parameters."""
-    knob = _lag_knob(motion, Lag(lag))
-    up, down = (model.columns(motion, {}, lag + step) for step in (knob.step, -knob.step))
+    parameter = _lag_parameter(motion, Lag(lag))
+    up, down = (model.columns(motion, {}, lag + step) for step in (parameter.step, -parameter.step))
     pairs = zip(model.linear, up, down, strict=True)
     change = sum((theta.get(n, 0.0) * (u - d) for n, u, d in pairs), np.zeros(len(motion.rows)))
-    return change / (2 * knob.step)
+    return change / (2 * parameter.step)
 
 
 def _evaluate(
-    model: Model, motion: Motion, force: Array, knobs: dict[str, float], lag: float, known: Prior
+    model: Model, motion: Motion, force: Array, nonlinear: dict[str, float], lag: float, known: Prior
 ) -> _Point:
-    columns = np.column_stack(model.columns(motion, knobs, lag))
+    columns = np.column_stack(model.columns(motion, nonlinear, lag))
     rows, targets = known.rows(model.linear)
     theta = (
         solve(np.vstack([columns, rows]), np.concatenate([force, targets]))
@@ -183,15 +183,20 @@ def _evaluate(
     if LAG in known.known:
         value, weight = known.known[LAG]
         against += (weight * (lag - value)) ** 2
-    return _Point(knobs, lag, columns, theta, residuals, rss, rss + against)
+    return _Point(nonlinear, lag, columns, theta, residuals, rss, rss + against)
 
 
 def _best_start(model: Model, motion: Motion, force: Array, lag: float) -> _Point:
     points = (
         _evaluate(
-            model, motion, force, dict(zip([k.name for k in model.knobs], values, strict=True)), lag, NOTHING
+            model,
+            motion,
+            force,
+            dict(zip([k.name for k in model.nonlinear], values, strict=True)),
+            lag,
+            NOTHING,
         )
-        for values in product(*(knob.starts for knob in model.knobs))
+        for values in product(*(parameter.starts for parameter in model.nonlinear))
     )
     return min(points, key=lambda point: point.rss)
 
@@ -205,9 +210,9 @@ def _descend(
     free_lag: bool,
     known: Prior,
 ) -> _Point:
-    """Levenberg and Marquardt over the knobs and the lag, the linear parameters solved for at every step."""
-    outer = [*model.knobs, *([_lag_knob(motion, lag)] if free_lag else [])]
-    point = _evaluate(model, motion, force, point.knobs, point.lag, known) if known.known else point
+    """Levenberg and Marquardt over the nonlinear parameters and the lag; each step solves for the linear ones."""
+    outer = [*model.nonlinear, *([_lag_parameter(motion, lag)] if free_lag else [])]
+    point = _evaluate(model, motion, force, point.nonlinear, point.lag, known) if known.known else point
     if not outer:
         return point
     damping = 1e-3
@@ -229,35 +234,39 @@ def _descend(
 
 
 def _with_rows(
-    jacobian: Array, point: _Point, model: Model, outer: list[Knob], known: Prior
+    jacobian: Array, point: _Point, model: Model, outer: list[NonlinearParameter], known: Prior
 ) -> tuple[Array, Array]:
     """The rows of what is known beforehand under those of the log."""
-    names = (*model.linear, *(knob.name for knob in outer))
+    names = (*model.linear, *(parameter.name for parameter in outer))
     rows, targets = known.rows(names)
     if not len(rows):
         return jacobian, point.residuals
-    now = np.array([*point.theta, *(point.knobs.get(knob.name, point.lag) for knob in outer)])
+    now = np.array([*point.theta, *(point.nonlinear.get(parameter.name, point.lag) for parameter in outer)])
     return np.vstack([jacobian, rows]), np.concatenate([point.residuals, targets - rows @ now])
 
 
-def _lag_knob(motion: Motion, lag: Lag) -> Knob:
+def _lag_parameter(motion: Motion, lag: Lag) -> NonlinearParameter:
     limit = 3 * lag.std
-    return Knob(LAG, (lag.value,), lag.value - limit, lag.value + limit, 0.02 / motion.chain.rate)
+    return NonlinearParameter(
+        LAG, (lag.value,), lag.value - limit, lag.value + limit, 0.02 / motion.chain.rate
+    )
 
 
-def _slopes(model: Model, motion: Motion, point: _Point, outer: list[Knob]) -> Array:
-    """Derivatives of the predicted force by each knob in its own scale, shape (n, len(outer))."""
+def _slopes(model: Model, motion: Motion, point: _Point, outer: list[NonlinearParameter]) -> Array:
+    """Derivatives of the predicted force by each parameter in its own scale, shape (n, len(outer))."""
     found = []
-    for knob in outer:
-        if knob.name == LAG:
-            up = model.columns(motion, point.knobs, point.lag + knob.step)
-            down = model.columns(motion, point.knobs, point.lag - knob.step)
-            found.append((np.column_stack(up) - np.column_stack(down)) @ point.theta / (2 * knob.step))
+    for parameter in outer:
+        if parameter.name == LAG:
+            up = model.columns(motion, point.nonlinear, point.lag + parameter.step)
+            down = model.columns(motion, point.nonlinear, point.lag - parameter.step)
+            found.append((np.column_stack(up) - np.column_stack(down)) @ point.theta / (2 * parameter.step))
             continue
-        value = point.knobs[knob.name]
-        step = knob.step * value if knob.logarithmic else knob.step
-        moved = np.column_stack(model.columns(motion, {**point.knobs, knob.name: value + step}, point.lag))
-        found.append((moved - point.columns) @ point.theta / knob.step)
+        value = point.nonlinear[parameter.name]
+        step = parameter.step * value if parameter.logarithmic else parameter.step
+        moved = np.column_stack(
+            model.columns(motion, {**point.nonlinear, parameter.name: value + step}, point.lag)
+        )
+        found.append((moved - point.columns) @ point.theta / parameter.step)
     return np.column_stack(found)
 
 
@@ -277,33 +286,35 @@ def _moved(
     motion: Motion,
     force: Array,
     point: _Point,
-    outer: list[Knob],
+    outer: list[NonlinearParameter],
     step: Array,
     known: Prior,
 ) -> _Point:
-    knobs, lag = dict(point.knobs), point.lag
-    for knob, change in zip(outer, step, strict=True):
-        if knob.name == LAG:
-            lag = float(np.clip(lag + change, knob.low, knob.high))
-        elif knob.logarithmic:
-            value = knobs[knob.name] * np.exp(np.clip(change, -1.0, 1.0))
-            knobs[knob.name] = float(np.clip(value, knob.low, knob.high))
+    nonlinear, lag = dict(point.nonlinear), point.lag
+    for parameter, change in zip(outer, step, strict=True):
+        if parameter.name == LAG:
+            lag = float(np.clip(lag + change, parameter.low, parameter.high))
+        elif parameter.logarithmic:
+            value = nonlinear[parameter.name] * np.exp(np.clip(change, -1.0, 1.0))
+            nonlinear[parameter.name] = float(np.clip(value, parameter.low, parameter.high))
         else:
-            knobs[knob.name] = float(np.clip(knobs[knob.name] + change, knob.low, knob.high))
-    return _evaluate(model, motion, force, knobs, lag, known)
+            nonlinear[parameter.name] = float(
+                np.clip(nonlinear[parameter.name] + change, parameter.low, parameter.high)
+            )
+    return _evaluate(model, motion, force, nonlinear, lag, known)
 
 
 def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag, known: Prior) -> Fit:
-    knob = _lag_knob(motion, lag)
-    outer = [*model.knobs, knob]
+    parameter = _lag_parameter(motion, lag)
+    outer = [*model.nonlinear, parameter]
     slopes = _slopes(model, motion, point, outer)
-    for i, own in enumerate(model.knobs):
+    for i, own in enumerate(model.nonlinear):
         if own.logarithmic:
-            slopes[:, i] /= point.knobs[own.name]
+            slopes[:, i] /= point.nonlinear[own.name]
     jacobian = np.column_stack([point.columns, slopes])
-    names = (*model.linear, *(k.name for k in model.knobs), LAG)
+    names = (*model.linear, *(k.name for k in model.nonlinear), LAG)
     noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.std == 0))
-    theta = np.array([*point.theta, *(point.knobs[k.name] for k in model.knobs), point.lag])
+    theta = np.array([*point.theta, *(point.nonlinear[k.name] for k in model.nonlinear), point.lag])
     level = float(np.sqrt(point.rss / max(len(force) - len(point.theta), 1)))
     std = known.std(names, level)
     fixed = np.zeros((len(names), len(names)))
@@ -325,7 +336,7 @@ def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag,
         )
         + pulled[:-1, :-1]
     )
-    residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.knobs.values(), point.lag])
+    residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.nonlinear.values(), point.lag])
     spread = float(np.mean((force - force.mean()) ** 2))
     rmse = float(np.sqrt(np.mean(residuals**2)))
     return Fit(

@@ -86,8 +86,11 @@ def _with(fitted: Fit, problem: Problem, estimate: Estimate) -> Fit:
     places = [fitted.names.index(name) for name in estimate.names]
     theta[places] = estimate.theta
     cov[np.ix_(places, places)] = estimate.covariance
-    knobs = {knob.name: float(theta[fitted.names.index(knob.name)]) for knob in fitted.model.knobs}
-    columns = np.column_stack(fitted.model.columns(problem.motion, knobs, fitted.lag))
+    nonlinear = {
+        parameter.name: float(theta[fitted.names.index(parameter.name)])
+        for parameter in fitted.model.nonlinear
+    }
+    columns = np.column_stack(fitted.model.columns(problem.motion, nonlinear, fitted.lag))
     predicted = columns @ theta[: len(fitted.model.linear)]
     residuals = problem.force - predicted
     rmse = float(np.sqrt(np.mean(residuals**2)))

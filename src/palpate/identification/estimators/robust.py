@@ -101,7 +101,7 @@ def answer(problem: Problem, model: Model) -> Answer:
     """
     question, solution = _in_contact(problem, model)
     plain = question.answered(solution)
-    wider = None if model.knobs else problem.with_approach
+    wider = None if model.nonlinear else problem.with_approach
     found = None if wider is None else _over_approach(wider, problem.in_contact, question, solution)
     if found is None:
         return plain
@@ -121,7 +121,9 @@ def _in_contact(problem: Problem, model: Model) -> tuple[_Question, Solution]:
     if not segments:
         raise InputError("every stretch in contact is too short; log longer or faster")
     lag, theta = problem.lag.value, None
-    if problem.lag.std > 0 and not model.knobs:  # the lag's column needs parameters that are roughly right
+    if (
+        problem.lag.std > 0 and not model.nonlinear
+    ):  # the lag's column needs parameters that are roughly right
         exact = replace(problem, lag=replace(problem.lag, std=0.0))
         first = _Question.of(exact, model, lag, segments, None)
         theta = dict(zip(first.names, estimate(first.system).theta, strict=True))
@@ -260,7 +262,7 @@ class _Question:
         chain, frequency = self.problem.motion.chain, self.octaves.frequency
         power = _line_of_noise(self.problem.motion, frequency) * chain.dt / self.dt * self.system.lines
         found = np.zeros((len(frequency), len(self.names), len(self.names)))
-        own = self.model.derivatives if not self.model.knobs else {}
+        own = self.model.derivatives if not self.model.nonlinear else {}
         for a, i in own.items():
             for b, j in own.items():
                 if (i + j) % 2 == 0:  # the others are in quadrature
@@ -333,7 +335,7 @@ def _linearised(
     The lag is among the parameters unless it is exact.
     """
     motion, asks = problem.motion, problem.lag.std > 0
-    if not model.knobs:
+    if not model.nonlinear:
         named = zip(model.linear, model.columns(motion, {}, lag), strict=True)
         own = {name: column for name, column in named if name != "offset"}
         if not asks:
