@@ -16,6 +16,7 @@ from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.contact_frame.weighing import (
     Estimated,
     Fitted,
+    PoseFit,
     Poses,
     fit_centre,
     fit_force,
@@ -115,7 +116,7 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
     lacking = _lacking(poses, fitted, tolerance)
     notes: list[dict[str, Any]] = []
     if np.isfinite(fitted.left_out).all():
-        notes = notes_against(record, frame, signals, there, poses, fitted, fit.means, parameters)
+        notes = notes_against(record, frame, signals, there, replace(fit, parameters=parameters))
     return Weighed(
         None if lacking else _payload(parameters, signals, frame, signals.force[there], poses.first),
         parameters,
@@ -127,17 +128,7 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
     )
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """Weight, bias, drift and centre; what is left in each orientation [N], shape (g, 3)."""
-
-    poses: Poses
-    fitted: Fitted
-    parameters: dict[str, Estimated]
-    means: Array
-
-
-def _fit(signals: Signals, there: NDArray[np.bool_], tolerance: float) -> _Fit:
+def _fit(signals: Signals, there: NDArray[np.bool_], tolerance: float) -> PoseFit:
     time = signals.time[there] - signals.time[there].mean()
     turns, force = signals.rotations[there], signals.force[there]
     poses = poses_of(time, turns, force, groups_of(turns))
@@ -149,7 +140,7 @@ def _fit(signals: Signals, there: NDArray[np.bool_], tolerance: float) -> _Fit:
         parameters |= _centre(signals, there, time, poses, fitted)
     left = force - _modelled(time, turns, fitted)
     means = np.add.reduceat(left, poses.first, axis=0) / poses.count[:, None]
-    return _Fit(poses, fitted, parameters, means)
+    return PoseFit(poses, fitted, parameters, means)
 
 
 def _at_rest(
@@ -253,7 +244,7 @@ def _centre(
     return {"centre": Estimated(centre.value, std, half, "m"), "torque_bias": bias}
 
 
-def _inertia(signals: Signals, fit: _Fit, frame: ContactFrame) -> dict[str, Estimated]:
+def _inertia(signals: Signals, fit: PoseFit, frame: ContactFrame) -> dict[str, Estimated]:
     """The mass by which the force follows the acceleration, if the tool is shaken."""
     from scipy.stats import t
 

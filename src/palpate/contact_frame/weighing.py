@@ -160,6 +160,23 @@ class Fitted:
         return self.jackknifed(sizes, np.asarray(np.linalg.norm(self.whole[:3]) / GRAVITY), "kg")
 
 
+@dataclass(frozen=True)
+class PoseFit:
+    """A fit of a whole log.
+
+    Args:
+        poses: the orientations.
+        fitted: weight, bias and drift.
+        parameters: by name, with intervals.
+        means: what the model leaves in each orientation [N], shape (g, 3).
+    """
+
+    poses: Poses
+    fitted: Fitted
+    parameters: dict[str, Estimated]
+    means: Array
+
+
 def solve_force(poses: Poses, drift: bool) -> Array:
     """Weight, bias and drift of a force, w, b, d; not finite where the poses do not tell them, shape (9,) or (6,)."""
     A, r = _normal_equations(poses)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.free_inertia import CHANCE, wrong_sign
 from palpate.contact_frame.signals_in_base import Signals, signals_of
-from palpate.contact_frame.weighing import Estimated, Fitted, Poses, groups_of, poses_of, solve_force
+from palpate.contact_frame.weighing import Estimated, Fitted, PoseFit, Poses, groups_of, poses_of, solve_force
 from palpate.identification.saturation import at_limit
 from palpate.records import Record
 
@@ -24,11 +24,9 @@ _FINE = np.radians(2.0)
 """Within which a mean of rotations is as good as a rotation [rad]: it is shorter by a sixth of the square, 2e-4."""
 
 
-# More than seven arguments: what each doubt is told from, by itself.
 def notes_against(
-    record: Record, frame: ContactFrame, signals: Signals, there: Rows, poses: Poses, fitted: Fitted, means: Array,
-    parameters: dict[str, Estimated],
-) -> list[dict[str, Any]]:  # fmt: skip
+    record: Record, frame: ContactFrame, signals: Signals, there: Rows, fit: PoseFit
+) -> list[dict[str, Any]]:
     """Notes, as a record's meta has them.
 
     Args:
@@ -36,21 +34,18 @@ def notes_against(
         frame: as declared.
         signals: of both.
         there: rows that hold a force, shape (n,).
-        poses: the orientations.
-        fitted: weight, bias and drift.
-        means: what the model leaves in each orientation [N], shape (g, 3).
-        parameters: with intervals.
+        fit: of them.
     """
     notes = [
-        *_saturated(signals, there, fitted),
-        *_another_frame(record, frame, signals, there, poses, fitted),
-        *_touched(signals.time[there], poses, means),
-        *_inertia(parameters),
+        *_saturated(signals, there, fit.fitted),
+        *_another_frame(record, frame, signals, there, fit.poses, fit.fitted),
+        *_touched(signals.time[there], fit.poses, fit.means),
+        *_inertia(fit.parameters),
     ]
     if signals.guess:
         notes.append({"code": "frame-guess", "text": f"{signals.guess}; say --wrench-frame if it is not so"})
     if not any(note["code"] == "pose-frame" for note in notes):
-        notes += _untared(parameters)
+        notes += _untared(fit.parameters)
     return notes
 
 
