@@ -18,6 +18,7 @@ COMMANDS = {
     "topics": "List what a log holds: topics, variables, columns.",
     "excite": "Design a force that shows what a surface is, and say how well beforehand.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
+    "export": "Write what was identified as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "press": "Press on a surface with any serial arm, in simulation.",
     "press-wire": "Press with a real arm, over its wire.",
