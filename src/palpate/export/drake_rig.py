@@ -118,6 +118,7 @@ class DrakeRig:
         return self.plant.get_geometry_query_input_port().Eval(self.context)
 
     def gap(self) -> tuple[float, Array]:
+        """See `Rig.gap`."""
         pair = self._query().ComputeSignedDistancePairClosestPoints(self._surface, self._probe)
         distance = float(pair.distance)
         outward = np.array(pair.nhat_BA_W) * (-1.0 if pair.id_A == self._surface else 1.0)
@@ -141,12 +142,15 @@ class DrakeRig:
         )
 
     def mass(self) -> Array:
+        """See `Rig.mass`."""
         return np.array(self.plant.CalcMassMatrix(self.context))
 
     def velocity(self) -> Array:
+        """See `Rig.velocity`."""
         return np.array(self.plant.GetVelocities(self.context))
 
     def move(self, change: Array) -> None:
+        """See `Rig.move`."""
         rate = self.plant.MapVelocityToQDot(self.context, change)
         positions = self.plant.GetPositions(self.context) + rate
         low, high = self.plant.GetPositionLowerLimits(), self.plant.GetPositionUpperLimits()

@@ -7,7 +7,6 @@ surface has k = K and tau = B / K, what presses on it a k without an end and no 
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,14 +39,13 @@ class Collision:
     Args:
         path: names of the elements around it and its own.
         end: byte at which its closing tag begins.
-        empty: it has no closing tag.
-        properties: begin and end of its proximity properties, without the tags; None if it has none.
+        properties: likewise of its proximity properties; None if it has none.
         taken: begin and end of each of its properties that are replaced.
     """
 
     path: tuple[str, ...]
     end: int = 0
-    properties: tuple[int, int] | None = None
+    properties: int | None = None
     taken: list[tuple[int, int]] = field(default_factory=list)
 
 
@@ -100,7 +98,7 @@ def load_scene(path: Path) -> Scene:
         OSError: no such file.
     """
     text = path.read_bytes()
-    reader = _Reader()
+    reader = _Reader(text)
     try:
         reader.parser.Parse(text, True)
     except expat.ExpatError as error:
@@ -113,7 +111,8 @@ def load_scene(path: Path) -> Scene:
 class _Reader:
     """Finds collisions and where they are, without a change to anything else."""
 
-    def __init__(self) -> None:
+    def __init__(self, text: bytes) -> None:
+        self.text = text
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._begin
         self.parser.EndElementHandler = self._end
@@ -123,7 +122,7 @@ class _Reader:
         self._names: list[str] = []
         self._tags: list[str] = []
         self._inside: Collision | None = None
-        self._begun = 0
+        self._child = 0
 
     def _begin(self, tag: str, attributes: dict[str, str]) -> None:
         self.root = self.root or tag
@@ -132,13 +131,11 @@ class _Reader:
         if tag == "collision" and attributes.get("name"):
             around = [n for t, n in zip(self._tags, self._names, strict=True) if t in {"model", "link"} and n]
             self._inside = Collision((*around, attributes["name"]))
-        elif self._inside is not None and self._tags[-2] == "collision" and tag == _PROPERTIES:
-            self._begun = self.parser.CurrentByteIndex
         elif self._inside is not None and self._tags[-2] == _PROPERTIES:
             self._child = self.parser.CurrentByteIndex
 
     def _end(self, tag: str) -> None:
-        at = self.parser.CurrentByteIndex
+        at, past = self._closing(tag)
         self._tags.pop()
         self._names.pop()
         own = self._inside
@@ -149,9 +146,18 @@ class _Reader:
             self.found.append(own)
             self._inside = None
         elif tag == _PROPERTIES:
-            own.properties = (self._begun, at)
+            own.properties = at
         elif self._tags[-1] == _PROPERTIES and tag.removeprefix("drake:") in (*_OWN, *_HYDROELASTIC):
-            own.taken.append((self._child, at))
+            own.taken.append((self._child, past))
+
+    def _closing(self, tag: str) -> tuple[int, int]:
+        """Where an element's closing tag begins, or the stroke of one that closes itself; and what is past it."""
+        at = self.parser.CurrentByteIndex
+        if self.text.startswith(f"</{tag}".encode(), at):
+            return at, self.text.index(b">", at) + 1
+        if self.text.endswith(b"/>", 0, at):  # expat is past such an element already
+            return at - 2, at
+        return self.text.index(b"/>", at), self.text.index(b"/>", at) + 2
 
 
 def _no_entities(*_: Any) -> None:
@@ -218,26 +224,18 @@ def _with(text: bytes, own: Collision, lines: str) -> bytes:
     if own.properties is None:
         new = f"<{_PROPERTIES}>{lines}</{_PROPERTIES}>".encode()
         return _inserted(text, own.end, new, "collision")
-    at = own.properties[1]
+    at = own.properties
     text = _inserted(text, at, lines.encode(), _PROPERTIES)
     for begin, end in reversed(own.taken):
-        text = text[:begin] + text[_past(text, end) :]
+        text = text[:begin] + text[end:]
     return text
 
 
 def _inserted(text: bytes, at: int, new: bytes, tag: str) -> bytes:
     """Before the closing tag at a byte; an element that closes itself is opened for it."""
-    if text[at : at + 2] == b"</":
+    if text.startswith(b"</", at):
         return text[:at] + new + text[at:]
-    close = text.index(b"/>", at)
-    return text[:close] + b">" + new + f"</{tag}>".encode() + text[close + 2 :]
-
-
-def _past(text: bytes, end: int) -> int:
-    """Past an element's closing tag, or past the one tag that it is."""
-    found = re.compile(rb">").search(text, end)
-    assert found is not None
-    return found.end()
+    return text[:at] + b">" + new + f"</{tag}>".encode() + text[at + 2 :]
 
 
 def plate(contact: Contact, name: str) -> str:

@@ -54,6 +54,7 @@ class MuJoCoRig:
         self._refresh()
 
     def gap(self) -> tuple[float, Array]:
+        """See `Rig.gap`."""
         ends = np.zeros(6)
         distance = float(
             mujoco().mj_geomDistance(self.model, self.data, self.surface, self.probe, _FAR, ends)
@@ -73,15 +74,18 @@ class MuJoCoRig:
         return across(self._normal) @ past
 
     def mass(self) -> Array:
+        """See `Rig.mass`."""
         whole = np.zeros((self.model.nv, self.model.nv))
         for unit, row in zip(np.eye(self.model.nv), whole, strict=True):
             mujoco().mj_mulM(self.model, self.data, row, unit)
         return whole
 
     def velocity(self) -> Array:
+        """See `Rig.velocity`."""
         return np.array(self.data.qvel)
 
     def move(self, change: Array) -> None:
+        """See `Rig.move`."""
         mujoco().mj_integratePos(self.model, self.data.qpos, change, 1.0)
         for joint in np.flatnonzero(self.model.jnt_limited):
             if self.model.jnt_type[joint] >= int(mujoco().mjtJoint.mjJNT_SLIDE):

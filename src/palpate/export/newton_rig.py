@@ -50,18 +50,22 @@ class NewtonRig:
         self._control = self.model.control()
 
     def gap(self) -> tuple[float, Array]:
+        """See `Rig.gap`."""
         return self._height() - _RADIUS, np.array([[1.0], [0.0], [0.0]])
 
     def _height(self) -> float:
         return float(self._now.body_q.numpy()[0, 2])
 
     def mass(self) -> Array:
+        """See `Rig.mass`."""
         return np.array([[_MASS]])
 
     def velocity(self) -> Array:
+        """See `Rig.velocity`."""
         return np.array([float(self._now.body_qd.numpy()[0, 2])])
 
     def move(self, change: Array) -> None:
+        """See `Rig.move`."""
         poses = self._now.body_q.numpy()
         poses[0, 2] += change[0]
         self._now.body_q.assign(poses)

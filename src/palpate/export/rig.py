@@ -16,7 +16,7 @@ _TOUCHING = 1e-7
 _STEPS = 400
 _FARTHEST = 0.1
 """Of one joint in one step on the way to the touch [rad or m]."""
-_RAMP, _PERIODS = 2, 6
+_RAMP, _PERIODS = 1, 2
 """Periods of the force: until it is whole, and after that."""
 _FINEST = 40
 """Time steps that a period has at least."""
