@@ -1,4 +1,4 @@
-"""The help of every command: an example that can be typed, options in groups, lines that fit and end between phrases."""
+"""The help of every command: an example that can be typed, options in groups, lines that end between phrases."""
 
 import json
 import re
@@ -70,7 +70,7 @@ def test_no_text_is_broken_where_its_source_was(help_of, command):
     """A line in a panel is short only where the next word would not fit, or a phrase ends."""
     lines = [line.strip("│ ").rstrip() for line in help_of(command).splitlines() if line.startswith("│")]
     inner = WIDTH - 4
-    for this, following in zip(lines, lines[1:], strict=False):
+    for this, following in pairwise(lines):
         if following.startswith(("-", "*")) or not this or not following:
             continue
         assert this.endswith((".", ",", ";", ":", ")", "]")) or len(this) > 0.3 * inner - len(
