@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -73,9 +74,8 @@ def test_no_text_is_broken_where_its_source_was(help_of, command):
     for this, following in pairwise(lines):
         if following.startswith(("-", "*")) or not this or not following:
             continue
-        assert this.endswith((".", ",", ";", ":", ")", "]")) or len(this) > 0.3 * inner - len(
-            following.split()[0]
-        ), this
+        phrase = this.endswith((".", ",", ";", ":", ")", "]"))
+        assert phrase or len(this) > 0.3 * inner - len(following.split()[0]), this
 
 
 @given(
@@ -137,7 +137,8 @@ def test_completion_knows_commands_and_options(capsys, shell):
 def completed(script, *words):
     """What bash would propose for the last word."""
     line = " ".join(map(shlex.quote, words))
-    asks = f'source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _palpate; printf "%s\\n" "${{COMPREPLY[@]}}"'
+    asked = f"COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _palpate"
+    asks = f'source {script}; {asked}; printf "%s\\n" "${{COMPREPLY[@]}}"'
     ran = subprocess.run(["bash", "--norc", "-c", asks], capture_output=True, text=True, check=True)
     return ran.stdout.split()
 
