@@ -49,7 +49,7 @@ class Result(Compared):
     """A result that can be read, drawn and written.
 
     A class says where its looks are: `class Identification(Result, shown_by="palpate.report.identification.shown")`, a
-    module with `line(found)`, `text(found)`, `html(found)`, `draw(found)` and `page(found)`. It is imported when it is first asked.
+    module with `line`, `text`, `html`, `draw` and `page`, each of one result. It is imported when it is first asked.
     """
 
     _shown_by = ""
