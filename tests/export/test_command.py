@@ -216,3 +216,19 @@ def test_pooled_logs_are_exported():
 def test_only_what_a_target_takes():
     with pytest.raises(ValueError, match="did you mean 'drake'"):
         Request("darke")
+
+
+def test_what_is_out_of_reach_is_not_pressed_and_does_not_fail_the_check(capsys, elsewhere):
+    """A scene has geoms, such as an arm's base, that no joint brings to the surface."""
+    far = '<body pos="1 0 .5"><joint type="slide" axis="0 1 0"/><geom name="far" type="sphere" size=".02" mass="1"/></body>'
+    text = (elsewhere / "scene.xml").read_text()
+    (elsewhere / "scene.xml").write_text(text.replace("</worldbody>", f"{far}</worldbody>"))
+    code, printed = run(capsys, *TO_MUJOCO, "--check")
+    assert code == 0
+    assert "not pressed" in printed.out
+    assert run(capsys, *TO_MUJOCO, "--check", "--probe", "far", "--replace")[0] == 1  # nothing was pressed
+
+
+def test_a_file_that_is_no_utf8_is_refused(capsys, elsewhere):
+    (elsewhere / "scene.sdf").write_bytes(b"<sdf>\xff</sdf>")
+    assert "not UTF-8" in refused(capsys, *TO_DRAKE)

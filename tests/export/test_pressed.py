@@ -171,3 +171,28 @@ def test_newton_pressed(tmp_path):
 def test_soft_and_stiff(tmp_path, K):
     _, (checked,) = exported(tmp_path, "mujoco", scenes.mjcf(tmp_path), K=K, B=np.sqrt(K))
     assert within([checked])[0] < 1e-4
+
+
+def test_a_surface_that_moves_too(tmp_path):
+    """Foam on a rail of its own: R is of both bodies, the penetration of both places."""
+    scene = tmp_path / "both.xml"
+    scene.write_text(
+        f'<mujoco><option {scenes.OPTIONS}/><worldbody><body><joint type="slide" axis="0 0 1"/>'
+        '<geom name="foam" type="box" size=".2 .2 .05" mass="3"/></body><body pos="0 0 .5">'
+        '<joint type="slide" axis="0 0 1"/><geom name="tip" type="sphere" size=".02" mass="2"/></body></worldbody></mujoco>'
+    )
+    made, (checked,) = exported(tmp_path, "mujoco", scene)
+    assert made.numbers["pairs"]["tip"]["mass_kg"] == pytest.approx(1.2)  # 1 / (1/2 + 1/3)
+    assert within([checked])[0] < 1e-4
+
+
+def test_a_plane_and_a_flat_probe(tmp_path):
+    scene = tmp_path / "plane.xml"
+    scene.write_text(
+        f'<mujoco><option {scenes.OPTIONS}/><worldbody><geom name="foam" type="plane" size="1 1 .1"/>'
+        '<body pos="0 0 .5"><joint type="slide" axis="0 0 1"/>'
+        '<geom name="tip" type="box" size=".02 .02 .02" mass="2"/></body></worldbody></mujoco>'
+    )
+    made, (checked,) = exported(tmp_path, "mujoco", scene)
+    assert made.numbers["pairs"]["tip"]["points"] == 4
+    assert within([checked])[0] < 1e-3  # the impedance adds for each of four points

@@ -128,7 +128,8 @@ def export(
     told = _told(exported, out, checked)
     write_json(beside, signed(told))
     _print(exported, told, checked, (out, beside), json=output.json)
-    return 1 if output.check and not (checked and all(one.passed for one in checked)) else 0
+    verdicts = [one.passed for one in checked if one.passed is not None]
+    return 1 if output.check and not (verdicts and all(verdicts)) else 0
 
 
 def _check_places(places: tuple[Path, ...], replace: bool, model: Path | None) -> None:
@@ -196,7 +197,7 @@ def _table(checked: list[Checked], told: dict[str, Any]) -> Any:
 def _row(one: Checked) -> tuple[str, ...]:
     measured = one.pressed
     if measured is None:
-        return one.probe, "-", "-", "-", "-", "failed"
+        return one.probe, "-", "-", "-", "-", "failed" if one.reached else "not pressed"
     errors = [f"{100 * (error or 0.0):.2g} %" for error in (one.error_K, one.error_B)]
     numbers = f"{measured.stiffness:.7g}", errors[0], f"{measured.damping:.6g}", errors[1]
     return (one.probe, *numbers, "passed" if one.passed else "failed")

@@ -29,6 +29,7 @@ _PLANT = (
     "for a discrete MultibodyPlant with contact_model point and discrete_contact_approximation sap; with others B is"
     " not exported"
 )
+_LARGEST = 1 << 26
 _PROPERTIES = "drake:proximity_properties"
 
 
@@ -97,7 +98,14 @@ def load_scene(path: Path) -> Scene:
         InputError: no SDF or URDF.
         OSError: no such file.
     """
-    text = path.read_bytes()
+    with path.open("rb") as file:
+        text = file.read(_LARGEST + 1)
+    if len(text) > _LARGEST:
+        raise InputError(f"{path}: more than {_LARGEST} bytes are no SDF or URDF file; check the path")
+    try:
+        text.decode()
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8, byte {error.start}; save it as UTF-8") from None
     reader = _Reader(text)
     try:
         reader.parser.Parse(text, True)

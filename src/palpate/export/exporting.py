@@ -76,6 +76,7 @@ class Checked:
         pressed: K, B and the rest as measured; None if it could not be pressed.
         error_K, error_B: as shares; None likewise.
         note: why not, or what it is of.
+        reached: whether the probe could be brought to the surface at all.
     """
 
     probe: str
@@ -83,10 +84,13 @@ class Checked:
     error_K: float | None
     error_B: float | None
     note: str = ""
+    reached: bool = True
 
     @property
-    def passed(self) -> bool:
-        """Whether both errors are within `TOLERANCE`."""
+    def passed(self) -> bool | None:
+        """Whether both errors are within `TOLERANCE`; None if it could not be pressed for want of reach."""
+        if not self.reached:
+            return None
         errors = (self.error_K, self.error_B)
         return all(error is not None and error <= TOLERANCE for error in errors)
 
@@ -200,6 +204,10 @@ def _judged(probe: str, pressed: Pressed | None, contact: Contact, note: str = "
     return Checked(probe, pressed, *pressed.errors(contact.stiffness.value, contact.damping.value), note)
 
 
+def _out_of_reach(probe: str) -> Checked:
+    return Checked(probe, None, None, None, "its joints cannot bring it to the surface", reached=False)
+
+
 def _force(contact: Contact) -> float:
     return contact.force if contact.force is not None else contact.stiffness.value * _DEPTH
 
@@ -246,7 +254,7 @@ def _pressed_pair(model: Any, scene: Any, pair: Any, contact: Contact) -> Checke
 
     rig = MuJoCoRig(model, scene.geom(scene.surface), scene.geom(pair.probe))
     if touched(rig) is None:
-        return Checked(pair.probe, None, None, None, "its joints cannot bring it to the surface")
+        return _out_of_reach(pair.probe)
     return _judged(pair.probe, press(rig, contact.stiffness.value, _force(contact)), contact)
 
 
@@ -272,7 +280,7 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
 
         rig = DrakeRig(path, surface, probe, scenes.RIGID)
         if touch(rig) is None:
-            return [Checked(named, None, None, None, "its joints cannot bring it to the surface")]
+            return [_out_of_reach(named)]
         note = f"SAP, point contact, {rig.time_step:g} s a step"
         return [_judged(named, press(rig, contact.stiffness.value, _force(contact)), contact, note)]
 
