@@ -169,14 +169,17 @@ def test_json_of_identify_is_complete(capsys, root):
         "--force",
         "force_N:N",
         "--lag",
-        "0.0076:0.0002",
+        "0",
+        "--no-bonded",
     ]
     assert main(["identify", str(log), *words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["file"] == str(log)
     assert len(told["sha256"]) == 64
     assert told["version"]
-    assert {"time": "time_s", "position": "position_mm:mm", "lag": 0.0076}.items() <= told["options"].items()
+    assert {"time": "time_s", "position": "position_mm:mm", "lag": 0.0, "bonded": False}.items() <= told[
+        "options"
+    ].items()
     assert told["models"]
     assert all({"model", "r2", "note"} <= set(one) for one in told["models"])
     assert told["model"] in {one["model"] for one in told["models"]} | {"kelvin-voigt"}

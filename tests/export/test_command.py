@@ -220,7 +220,8 @@ def test_only_what_a_target_takes():
 
 def test_what_is_out_of_reach_is_not_pressed_and_does_not_fail_the_check(capsys, elsewhere):
     """A scene has geoms, such as an arm's base, that no joint brings to the surface."""
-    far = '<body pos="1 0 .5"><joint type="slide" axis="0 1 0"/><geom name="far" type="sphere" size=".02" mass="1"/></body>'
+    ball = '<geom name="far" type="sphere" size=".02" mass="1"/>'
+    far = f'<body pos="1 0 .5"><joint type="slide" axis="0 1 0"/>{ball}</body>'
     text = (elsewhere / "scene.xml").read_text()
     (elsewhere / "scene.xml").write_text(text.replace("</worldbody>", f"{far}</worldbody>"))
     code, printed = run(capsys, *TO_MUJOCO, "--check")

@@ -176,11 +176,10 @@ def test_soft_and_stiff(tmp_path, K):
 def test_a_surface_that_moves_too(tmp_path):
     """Foam on a rail of its own: R is of both bodies, the penetration of both places."""
     scene = tmp_path / "both.xml"
-    scene.write_text(
-        f'<mujoco><option {scenes.OPTIONS}/><worldbody><body><joint type="slide" axis="0 0 1"/>'
-        '<geom name="foam" type="box" size=".2 .2 .05" mass="3"/></body><body pos="0 0 .5">'
-        '<joint type="slide" axis="0 0 1"/><geom name="tip" type="sphere" size=".02" mass="2"/></body></worldbody></mujoco>'
-    )
+    rail = '<joint type="slide" axis="0 0 1"/>'
+    foam = f'<body>{rail}<geom name="foam" type="box" size=".2 .2 .05" mass="3"/></body>'
+    tip = f'<body pos="0 0 .5">{rail}<geom name="tip" type="sphere" size=".02" mass="2"/></body>'
+    scene.write_text(f"<mujoco><option {scenes.OPTIONS}/><worldbody>{foam}{tip}</worldbody></mujoco>")
     made, (checked,) = exported(tmp_path, "mujoco", scene)
     assert made.numbers["pairs"]["tip"]["mass_kg"] == pytest.approx(1.2)  # 1 / (1/2 + 1/3)
     assert within([checked])[0] < 1e-4
