@@ -161,6 +161,7 @@ def test_completion_imports_nothing_heavy():
 
 def test_json_of_identify_is_complete(capsys, root):
     log = root / "examples" / "data" / "press.csv"
+    said = {"time": "time_s", "position": "position_mm:mm", "force": "force_N:N", "lag": 0.0, "bonded": False}
     words = [
         "--time",
         "time_s",
@@ -177,9 +178,7 @@ def test_json_of_identify_is_complete(capsys, root):
     assert told["file"] == str(log)
     assert len(told["sha256"]) == 64
     assert told["version"]
-    assert {"time": "time_s", "position": "position_mm:mm", "lag": 0.0, "bonded": False}.items() <= told[
-        "options"
-    ].items()
+    assert said.items() <= told["options"].items()
     assert told["models"]
     assert all({"model", "r2", "note"} <= set(one) for one in told["models"])
     assert told["model"] in {one["model"] for one in told["models"]} | {"kelvin-voigt"}
