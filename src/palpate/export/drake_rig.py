@@ -32,7 +32,9 @@ def drake() -> Any:
     try:
         import pydrake.all as found
     except ImportError:
-        raise InputError("pressing in Drake needs Drake; install it with: pip install drake") from None
+        raise InputError(
+            "pressing in Drake needs Drake; install it with: pip install 'palpate[drake]'"
+        ) from None
     return found
 
 

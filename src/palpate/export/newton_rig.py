@@ -32,8 +32,12 @@ class NewtonRig:
 
     def __init__(self, path: Path, time_step: float = 1e-3) -> None:
         if find_spec("newton") is None:
-            raise InputError("pressing in Newton needs Newton: pip install newton, or leave out --check")
-        newton, warp = import_module("newton"), import_module("warp")
+            raise InputError(
+                "pressing in Newton needs Newton: pip install 'palpate[newton]', or leave out --check"
+            )
+        warp = import_module("warp")
+        warp.config.log_level = warp.LOG_ERROR  # what it tells of itself goes to standard output
+        newton = import_module("newton")
 
         self.time_step, self._library, self._warp = time_step, newton, warp
         builder = newton.ModelBuilder(up_axis=newton.Axis.Z, gravity=(0.0, 0.0, 0.0))
@@ -48,6 +52,8 @@ class NewtonRig:
         self.solver = newton.solvers.SolverSemiImplicit(self.model)
         self._now, self._next = self.model.state(), self.model.state()
         self._control = self.model.control()
+        self._pipeline = newton.CollisionPipeline(self.model)
+        self._contacts = self._pipeline.contacts()
 
     def gap(self) -> tuple[float, Array]:
         """See `Rig.gap`."""
@@ -75,8 +81,8 @@ class NewtonRig:
         depth, speed = _RADIUS - self._height(), float(self.velocity()[0])
         self._now.clear_forces()
         self._now.body_f.assign(np.array([[0.0, 0.0, force[0], 0.0, 0.0, 0.0]], dtype=np.float32))
-        contacts = self.model.collide(self._now)
-        self.solver.step(self._now, self._next, self._control, contacts, self.time_step)
+        self._pipeline.collide(self._now, self._contacts)
+        self.solver.step(self._now, self._next, self._control, self._contacts, self.time_step)
         self._now, self._next = self._next, self._now
         pushed = _MASS * (float(self.velocity()[0]) - speed) / self.time_step - float(force[0])
         return depth, -speed, pushed
