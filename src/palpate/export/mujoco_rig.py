@@ -20,11 +20,15 @@ _FAR = 1e3
 """Gap that is looked for [m]."""
 
 
-def weightless(model: Any) -> Any:
-    """A copy of a model without weight and motors, for a rig."""
+def alone(model: Any, surface: int, probe: int) -> Any:
+    """A copy of a model without weight and motors, in which only these two geoms touch."""
     own = copy.copy(model)
     own.opt.gravity[:] = 0.0
     own.opt.disableflags |= int(mujoco().mjtDisableBit.mjDSBL_ACTUATION)
+    own.geom_contype[:], own.geom_conaffinity[:] = 0, 0
+    for i in range(own.npair):
+        if {int(own.pair_geom1[i]), int(own.pair_geom2[i])} != {surface, probe}:
+            own.pair_margin[i] = -_FAR
     return own
 
 
@@ -39,7 +43,7 @@ class MuJoCoRig:
     """
 
     def __init__(self, model: Any, surface: int, probe: int, plate: int | None = None) -> None:
-        self.model = weightless(model)
+        self.model = alone(model, surface, probe)
         self.data = mujoco().MjData(self.model)
         self.surface, self.probe, self.plate = surface, probe, plate
         self.time_step = float(self.model.opt.timestep)
@@ -54,7 +58,14 @@ class MuJoCoRig:
         self._refresh()
 
     def gap(self) -> tuple[float, Array]:
-        """See `Rig.gap`."""
+        """See `Rig.gap`; in contact, of the points together, each by its share of the force."""
+        held = self._points()
+        total = sum(force for force, *_ in held)
+        if total > 0.0:
+            shares = [(force / total, depth, rates) for force, depth, rates in held]
+            return -sum(a * depth for a, depth, _ in shares), np.sum(
+                [a * rates for a, _, rates in shares], axis=0
+            )
         ends = np.zeros(6)
         distance = float(
             mujoco().mj_geomDistance(self.model, self.data, self.surface, self.probe, _FAR, ends)
@@ -109,22 +120,27 @@ class MuJoCoRig:
         mujoco().mj_step(model, data)
         return row
 
-    def _read(self) -> tuple[float, float, float]:
-        wrench, total, deep, speed = np.zeros(6), 0.0, [0.0], [0.0]
-        held = self.contacts()
-        for i in held:
+    def _points(self) -> list[tuple[float, float, Array]]:
+        """Of each point of contact its force [N], its penetration [m], and its rates, as of a gap."""
+        wrench, found = np.zeros(6), []
+        for i in self.contacts():
             contact = self.data.contact[i]
             mujoco().mj_contactForce(self.model, self.data, i, wrench)
-            total += float(wrench[0])
-            deep.append(-float(contact.dist))
-            self._normal = np.array(contact.frame[:3]) * (1.0 if contact.geom[0] == self.surface else -1.0)
-            speed.append(-float(self._rates(contact.pos, contact.pos)[0] @ self.data.qvel))
+            outward = 1.0 if contact.geom[0] == self.surface else -1.0
+            self._normal = outward * np.array(contact.frame[:3])
+            found.append((float(wrench[0]), -float(contact.dist), self._rates(contact.pos, contact.pos)))
+        return found
+
+    def _read(self) -> tuple[float, float, float]:
+        held = self._points()
+        total = sum(force for force, *_ in held)
         if self.plate is not None:  # whose own mass takes its share of the force
             at = self.plate
             carried = total - float(self.model.body_mass[self.model.jnt_bodyid[at]] * self.data.qacc[at])
             return float(self.data.qpos[at]), float(self.data.qvel[at]), carried
         count = max(len(held), 1)
-        return sum(deep) / count, sum(speed) / count, total
+        deep = sum(depth for _, depth, _ in held) / count
+        return deep, -float(sum(rates[0] @ self.data.qvel for *_, rates in held)) / count, total
 
     def _refresh(self) -> None:
         mujoco().mj_fwdPosition(self.model, self.data)

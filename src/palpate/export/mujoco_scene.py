@@ -194,7 +194,10 @@ def _reach(scene: Scene, probe: str | None) -> tuple[dict[str, tuple[int, tuple[
     """
     own = scene.geom(scene.surface)
     wide = copy.copy(scene.model)
-    wide.geom_margin[own] = _WIDE * (1.0 + float(wide.stat.extent))
+    reach = _WIDE * (1.0 + float(wide.stat.extent))
+    wide.geom_margin[own] = reach
+    wide.body_margin[wide.geom_bodyid[own]] = reach  # by which the broad phase goes
+    wide.opt.disableflags |= int(mujoco().mjtDisableBit.mjDSBL_MIDPHASE)
     data = mujoco().MjData(wide)
     mujoco().mj_forward(wide, data)
     found: dict[str, tuple[int, tuple[float, ...]]] = {}
@@ -226,7 +229,7 @@ def _measured(rough: Any, scene: Scene, probe: str, own: tuple[int, tuple[float,
     mass = touched(rig)
     near = copy.copy(rig.model)
     margin = _CLOSE if mass is not None else _WIDE * (1.0 + float(near.stat.extent))
-    near.pair_margin[:] = margin
+    near.pair_margin[near.pair_margin >= 0.0] = margin
     rig.model = near
     mujoco().mj_forward(near, rig.data)
     held = rig.contacts()

@@ -142,8 +142,7 @@ def press(rig: Rig, stiffness: float, force: float, *, inward: bool = False) -> 
     path = _path(rig)
     if path is None:
         return None
-    way, mass, normal = path
-    inertia = rig.mass()
+    _, mass, _ = path
     natural = sqrt(stiffness / mass)
     pulse = min(natural / 2, 2 * pi / (_FINEST * rig.time_step))
     period = 2 * pi / pulse
@@ -152,17 +151,26 @@ def press(rig: Rig, stiffness: float, force: float, *, inward: bool = False) -> 
         time = k * rig.time_step
         grown = min(time / (_RAMP * period), 1.0)
         asked = force * grown * (1.0 + _SHARE * np.sin(pulse * time))
-        velocity = rig.velocity()
-        speed = float(normal @ velocity)
-        along = (held - asked) / mass - natural * speed
-        aside = (velocity - way * speed) / (2 * rig.time_step)
-        row = rig.step(inertia @ (way * along - aside) - held * normal)
+        path = _path(rig)
+        if path is None:
+            return None
+        row = rig.step(_drive(rig, path, asked, held, natural))
         if not np.all(np.isfinite(row)):
             return None
         held = row[2]
         rows.append(row)
     table = np.array(rows)
     return _fitted(table[table[:, 1] > 0.0] if inward else table, mass, rig.time_step)
+
+
+def _drive(rig: Rig, path: tuple[Array, float, Array], asked: float, held: float, natural: float) -> Array:
+    """Generalised force that presses along the path, and lets nothing else move."""
+    way, mass, normal = path
+    velocity = rig.velocity()
+    speed = float(normal @ velocity)
+    along = (held - asked) / mass - natural * speed
+    aside = (velocity - way * speed) / (2 * rig.time_step)
+    return rig.mass() @ (way * along - aside) - held * normal
 
 
 def _path(rig: Rig) -> tuple[Array, float, Array] | None:
@@ -194,9 +202,9 @@ def _fitted(rows: Array, mass: float, time_step: float) -> Pressed | None:
 
 
 def across(normal: Array) -> Array:
-    """Rows of a turn whose first is the normal, shape (3, 3)."""
+    """An orthogonal matrix whose first row is the normal, shape (3, 3): Householder's reflection of the first axis."""
     if not normal.any():
         return np.zeros((3, 3))
-    aside = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    aside /= np.linalg.norm(aside)
-    return np.array([normal, aside, np.cross(normal, aside)])
+    way = normal - np.array([1.0, 0.0, 0.0])
+    square = float(way @ way)
+    return np.eye(3) - (2.0 / square) * np.outer(way, way) if square > 0.0 else np.eye(3)

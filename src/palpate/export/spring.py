@@ -67,7 +67,8 @@ def pressed(text: str, contact: Contact, name: str, force: float) -> Pressed | N
         '<body name="palpate-probe" pos="0 0 0.1"><joint type="slide" axis="0 0 1"/>'
         f'<geom name="palpate-probe" type="sphere" size="0.02" mass="{_PROBE:g}"/></body>'
     )
-    whole = text.replace("</worldbody>", f"{probe}</worldbody>")
+    pair = f'<contact><pair geom1={quoteattr(name)} geom2="palpate-probe"/></contact>'
+    whole = text.replace("</worldbody>", f"{probe}</worldbody>{pair}")
     with refusals("the plate"):
         model = mujoco().MjModel.from_xml_string(whole)
     rig = MuJoCoRig(model, _geom(model, name), _geom(model, "palpate-probe"), plate=0)
