@@ -10,7 +10,7 @@ from palpate.report.identification import figure
 from palpate.report.identification import page as pages
 from palpate.report.identification.source import Source
 from palpate.report.identification.table import show
-from palpate.report.identification.words import said, sentence
+from palpate.report.identification.words import formatted, sentence
 from palpate.report.shown import as_html, printed
 from palpate.text import shown
 
@@ -43,7 +43,7 @@ def _row(name: str, own: Parameter) -> tuple[str, ...]:
 
 
 def _value(own: Parameter) -> str:
-    return "-" if own.value is None else said(own)
+    return "-" if own.value is None else formatted(own)
 
 
 def draw(found: Identification) -> Figure:
