@@ -1,6 +1,38 @@
 """palpate: identify what a robot touches, and press on it with exactly the force asked for.
 
-The names below are imported when they are first used, so that `import palpate` costs next to nothing.
+The first three lines:
+
+    import palpate
+    log = palpate.read_log("press.csv", time="time_s", position="position_mm:mm", force="force_N:N")
+    print(palpate.identify(log))
+
+A result is printed, shown by a notebook, drawn (`.plot()`), written as a page (`.report("press.html")`) and
+compared (`==`). What is wrong with a file or a number is an `InputError`, in one line. Numbers are in SI units; a
+column's own unit stands behind its name, as `position_mm:mm`.
+
+The rooms, each `palpate.ROOM`:
+
+    identification  from a record to stiffness, damping and mass, with intervals and verdicts
+    identifiers     the same on line, sample by sample: RecursiveLeastSquares, ContactIdentifier, ...
+    logs            files in and out: text, Parquet, MATLAB, ROS bags, MCAP
+    contact_frame   an arm's wrench and pose along the contact's normal; weighing a tool
+    excitation      which force to ask for, so that a surface shows what it is
+    force           a force loop for any arm: tune, certify, ForceLoop
+    wires           force loops on real arms: UR, Franka, ROS 2
+    export          what was identified as the contact of a scene of MuJoCo, Drake or Newton
+    robots          kinematics and dynamics: Planar3R, SerialArm.named("ur5e")
+    press           any serial arm presses on a surface, in simulation
+    bench           the thesis' closed loop: arm, sensors, surface, controller, identifier
+    controllers     of force and motion
+    environments    surfaces: Kelvin-Voigt, Hunt-Crossley, standard linear solid
+    instruments     encoders, force sensors, filters, each with its lag
+    analysis        a loop as a linear model: margins, boundaries of stability
+    studies         many runs: grids, random points, a search
+    report          figures, tables, pages
+    thesis          every figure and claim of the thesis, measured again
+
+Names and rooms are imported when they are first used, so that `import palpate` costs next to nothing. The same from
+a shell: `palpate --help`.
 """
 
 from __future__ import annotations
@@ -23,6 +55,27 @@ _HOME = {
     "read_log": "palpate.logs",
 }
 
+_ROOMS = (
+    "analysis",
+    "bench",
+    "contact_frame",
+    "controllers",
+    "environments",
+    "excitation",
+    "export",
+    "force",
+    "identification",
+    "identifiers",
+    "instruments",
+    "logs",
+    "press",
+    "report",
+    "robots",
+    "studies",
+    "thesis",
+    "wires",
+)
+
 __all__ = ["Identification", "InputError", "PalpateError", "Record", "identify", "read_log"]
 
 
@@ -31,6 +84,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("palpate")
+    if name in _ROOMS:
+        return import_module(f"palpate.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'palpate' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}")
     value = getattr(import_module(_HOME[name]), name)
@@ -39,4 +94,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME, "__version__"])
+    return sorted([*__all__, *_ROOMS, "__version__"])

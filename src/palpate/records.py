@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
+from palpate.results import Result
 
 
-@dataclass(frozen=True)
-class Record:
+@dataclass(frozen=True, eq=False, repr=False)
+class Record(Result, shown_by="palpate.report.record"):
     """A table of signals, as a log or a run leaves it.
 
     Args:

@@ -29,8 +29,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
 
     def run() -> int:
-        app = program()
         words = list(TYPED.get())
+        app = program(*words[:1])
         return app(
             expanded(words, app)
             if any(word.startswith(("--options", "--preset")) for word in words)

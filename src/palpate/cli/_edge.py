@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import sys
 import traceback
 from collections.abc import Callable
@@ -21,6 +22,8 @@ DEFECT = 70  # EX_SOFTWARE of sysexits.h; not 1, which means "ran, and the answe
 INTERRUPTED = 130  # 128 + SIGINT, as a shell reports it
 READER_GONE = 141  # 128 + SIGPIPE
 
+_DANGEROUS = {"--force", "--replace", "--yes"}
+"""Flags that remove what stands there, or let an arm or a long run begin without a question."""
 _REMEDIES = {
     errno.ENOSPC: "free some space, or choose another place",
     errno.EDQUOT: "free some space, or choose another place",
@@ -68,7 +71,7 @@ def _code_of(error: BaseException) -> int:
             _streams.drop(sys.stdout)
             return READER_GONE
         case CycloptsError():
-            return _say(f"{error} {_where_help_is(error)}", WRONG_INPUT)
+            return _say(f"{_without_danger(error)} {_where_help_is(error)}", WRONG_INPUT)
         case PalpateError():
             return _say(str(error), WRONG_INPUT)
         case OSError():
@@ -86,6 +89,27 @@ def _say(text: str, code: int) -> int:
     with suppress(OSError):  # standard error is full or closed: the code still tells
         print(f"palpate: {line}", file=sys.stderr)  # noqa: T201
     return code
+
+
+def _without_danger(error: CycloptsError) -> str:
+    """What is wrong, without the guess that a flag was meant which removes results or skips a question.
+
+    A slip of the finger shall not be answered with what to type to lose something.
+    """
+    text = str(error)
+    guess = re.search(r" ?Did you mean \"?(--[\w-]+)\"?\??", text)
+    if guess is None or guess[1].replace("--no-", "--") not in _DANGEROUS or _takes_value(error, guess[1]):
+        return text
+    return text.replace(guess[0], "")
+
+
+def _takes_value(error: CycloptsError, flag: str) -> bool:
+    """Whether the option of a command is no flag: --force of identify is a column."""
+    from palpate.cli._program import program
+
+    chain = error.command_chain or ()
+    found = program()[chain[-1]].assemble_argument_collection() if chain else ()
+    return any(flag in own.names and own.hint is not bool for own in found)
 
 
 def _where_help_is(error: CycloptsError) -> str:

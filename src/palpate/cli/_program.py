@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from contextvars import ContextVar
+from importlib import import_module
+from inspect import getdoc
 
-from cyclopts import App
+from cyclopts import App, Group
+
+from palpate.cli._help import PhraseFormatter
 
 TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
 """The words after the program's name, as they were typed."""
@@ -18,6 +23,7 @@ COMMANDS = {
     "topics": "List what a log holds: topics, variables, columns.",
     "excite": "Design a force that shows what a surface is, and say how well beforehand.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
+    "export": "Write what was identified as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "press": "Press on a surface with any serial arm, in simulation.",
     "press-wire": "Press with a real arm, over its wire.",
@@ -26,6 +32,7 @@ COMMANDS = {
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "thesis": "Measure every figure and every claim of the thesis again.",
     "speed": "Measure what one tick of the closed loop costs here.",
+    "completion": "Print what makes a shell complete commands, options and files.",
 }
 
 
@@ -40,13 +47,26 @@ def _version() -> str:
     return str(__version__)
 
 
-def program() -> App:
-    """The whole command line; errors are raised, not printed, and results are returned."""
+def _described(own: str) -> str:
+    """What a command's docstring says before its parameters, each paragraph on one line for the terminal to wrap."""
+    text = getdoc(getattr(import_module(f"palpate.cli.{own}"), own)) or ""
+    said = re.split(r"\n(?:Parameters\n-|Args:\n|Returns:\n)", text)[0]
+    return "\n\n".join(" ".join(part.split()) for part in said.split("\n\n")).strip()
+
+
+def program(asked: str = "") -> App:
+    """The whole command line; errors are raised, not printed, and results are returned.
+
+    Args:
+        asked: the command that was typed, whose help is its docstring, examples and all.
+    """
     app = App(
         name="palpate",
         help="Identify what a robot touches, and press on it with exactly the force asked for.",
         version=_version,
         help_format="plaintext",
+        help_formatter=PhraseFormatter(),
+        group_parameters=Group("Options", sort_key=0),
         exit_on_error=False,
         print_error=False,
         result_action="return_value",
@@ -54,5 +74,6 @@ def program() -> App:
     )
     for order, (name, line) in enumerate(COMMANDS.items()):
         own = name.replace("-", "_")
-        app.command(f"palpate.cli.{own}:{own}", name=name, help=line, sort_key=order)
+        text = _described(own) if name == asked else line
+        app.command(f"palpate.cli.{own}:{own}", name=name, help=text, sort_key=order)
     return app

@@ -80,6 +80,8 @@ def run(
 ) -> int:
     """Run an experiment: the arm approaches, touches, presses.
 
+    palpate run foam-hybrid --seed 1 --out runs/foam
+
     The folder holds record.parquet, summary.json, figures and report.html; it is runs/NAME-SEED if not named.
 
     Parameters

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from palpate.cli._terminal import print_json, print_lines, say
 
 
-def speed(*, json: Annotated[bool, Parameter(negative="")] = False) -> int:
+def speed(
+    *, json: Annotated[bool, Parameter(negative="", group=Group("What is written", sort_key=6))] = False
+) -> int:
     """Measure what one tick of the closed loop costs here: sense, think, act, and the physics in between.
 
-    Args:
-        json: print ns_per_tick, ticks_per_s, cores and times_real_time as JSON and nothing else.
+    palpate speed --json
+
+    Parameters
+    ----------
+    json
+        Print ns_per_tick, ticks_per_s, cores and times_real_time as JSON and nothing else.
     """
     from palpate.bench.speed import EXPERIMENT, STEPS, measure
     from palpate.cli._waiting import COMPILING

@@ -77,6 +77,8 @@ def study(
 ) -> int:
     """Run an experiment many times over a grid, a range or a random choice of parameters, or search for the best.
 
+    palpate study learning-rate --out runs/learning-rate
+
     The folder holds results.parquet, report.html and the journal of runs; it is runs/study-NAME if not named. An
     unfinished study there is gone on with.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Group, Parameter, validators
 
 from palpate.cli._terminal import console, place, print_lines, say, show_table
 
@@ -20,24 +20,38 @@ if TYPE_CHECKING:
 COLORS = {"reproduced": "green", "differs": "red", "not checkable": "bright_black"}
 
 
+_MEASURED = Group("What is measured", sort_key=1)
+_WRITTEN = Group("What is written", sort_key=6)
+
+
 def thesis(
     figure: str | None = None,
     /,
     *,
-    out: Path | None = None,
-    seeds: Annotated[int, Parameter(validator=validators.Number(gte=10, lte=1000))] = 10,
-    force: bool = False,
-    list_: Annotated[bool, Parameter(name="--list", negative="")] = False,
+    seeds: Annotated[int, Parameter(group=_MEASURED, validator=validators.Number(gte=10, lte=1000))] = 10,
+    list_: Annotated[bool, Parameter(group=_MEASURED, name="--list", negative="")] = False,
+    out: Annotated[Path | None, Parameter(group=_WRITTEN)] = None,
+    force: Annotated[bool, Parameter(group=_WRITTEN, negative=())] = False,
 ) -> int:
     """Measure the thesis again: each figure, each claim, with spread over the seeds and a verdict.
 
-    Args:
-        figure: the number of one figure, "6.11", or the name of one explanation; all of them when left out.
-        out: folder for claims.json, index.html and the figures; runs/thesis or runs/thesis-FIGURE when left out. An
-            unfinished measurement there is gone on with.
-        seeds: noise seeds for every measured claim.
-        force: replace the measurement that stands there already.
-        list_: list figures and explanations and stop.
+    palpate thesis 6.11 --out runs/thesis-6.11
+
+    palpate thesis --list
+
+    Parameters
+    ----------
+    figure
+        The number of one figure, "6.11", or the name of one explanation; all of them when left out.
+    seeds
+        Noise seeds for every measured claim.
+    list_
+        List figures and explanations and stop.
+    out
+        Folder for claims.json, index.html and the figures; runs/thesis or runs/thesis-FIGURE when left out. An
+        unfinished measurement there is gone on with.
+    force
+        Replace the measurement that stands there already.
     """
     from palpate.thesis.figure import studies, study
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from palpate.cli._log_options import GB, limits_of
 from palpate.cli._terminal import print_json, print_lines
@@ -15,16 +15,22 @@ if TYPE_CHECKING:
     from palpate.logs.listing import Entry, Listing
 
 
+_HOW = Group("How it is read", sort_key=1)
+_WRITTEN = Group("What is written", sort_key=6)
+
+
 def topics(
     log: Path,
     /,
     *,
-    delimiter: str | None = None,
-    max_size: float = GB,
-    max_seconds: float = 600.0,
-    json: Annotated[bool, Parameter(negative=())] = False,
+    delimiter: Annotated[str | None, Parameter(group=_HOW)] = None,
+    max_size: Annotated[float, Parameter(group=_HOW)] = GB,
+    max_seconds: Annotated[float, Parameter(group=_HOW)] = 600.0,
+    json: Annotated[bool, Parameter(negative=(), group=_WRITTEN)] = False,
 ) -> int:
     """List what a log holds, and propose how to identify it.
+
+    palpate topics press.mcap
 
     Parameters
     ----------

@@ -16,6 +16,7 @@ from palpate.cli._force_options import (
     SurfaceOptions,
     one_thread,
 )
+from palpate.cli._found import read_found
 from palpate.cli._log_options import LogOptions
 from palpate.cli._program import command
 from palpate.cli._terminal import console, place, print_json
@@ -25,8 +26,6 @@ from palpate.files import check_place, write_text
 if TYPE_CHECKING:
     from palpate.force import Known, Tuning
     from palpate.force.inner_loop import InnerLoop
-
-_LARGEST = 1 << 26
 
 
 @Parameter(name="*", group=Group("What is written", sort_key=6))
@@ -115,26 +114,8 @@ def _known(
         low, high = spread("--stiffness", stiffness, "stiffness")
         return Known((low, high))
     if found.suffix.lower() == ".json":
-        return known_from(_object(found), str(found))
+        return known_from(read_found(found), str(found))
     return known_from(_identified(found, source, payload), str(found))
-
-
-def _object(path: Path) -> dict[str, Any]:
-    from json import JSONDecodeError, loads
-
-    with path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise InputError(
-            f"{path}: more than {_LARGEST} bytes are not what palpate identify prints; check the path"
-        )
-    try:
-        value = loads(data)
-    except (JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not JSON: {error}; give what palpate identify --json printed") from None
-    if not isinstance(value, dict):
-        raise InputError(f"{path}: not what palpate identify --json prints")
-    return value
 
 
 def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from palpate.contact_frame.weighing import (
 from palpate.contact_frame.weighing_checks import noise_of, notes_against
 from palpate.errors import InputError
 from palpate.records import Record
+from palpate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -41,8 +42,8 @@ _SMOOTH = 0.1
 arm turns its tool faster."""
 
 
-@dataclass(frozen=True)
-class Weighed:
+@dataclass(frozen=True, eq=False, repr=False)
+class Weighed(Result, shown_by="palpate.report.weighed"):
     """What a log tells of a tool.
 
     Args:

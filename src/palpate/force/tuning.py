@@ -18,6 +18,7 @@ from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
 from palpate.force.peak import peak_bound
 from palpate.force.sensitivity import relief_of
 from palpate.force.steps import Margins, Step, margins, step_of
+from palpate.results import Result
 
 RIGID = 1e9
 """What is stiffer is said to be this stiff [N/m]."""
@@ -46,8 +47,8 @@ class Known:
     warnings: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True)
-class Tuning:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tuning(Result, shown_by="palpate.report.tuning"):
     """A tuned loop: what `palpate tune` says.
 
     Args:

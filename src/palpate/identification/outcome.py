@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from palpate.identification.contacts import Contacts
@@ -108,9 +110,13 @@ def nothing(
 
 
 def _plain_options(options: Options) -> dict[str, object]:
-    told = {name: getattr(options, name) for name in options.__dataclass_fields__}
-    told["force_filter"] = str(options.force_filter) if options.force_filter else None
-    return {name: value for name, value in told.items() if value not in (None, 0.0)}
+    """What was told, and the two that always matter; a lag of 0 and "not bonded" are told too."""
+    told = {
+        own.name: getattr(options, own.name)
+        for own in fields(options)
+        if own.name in {"tolerance", "method"} or getattr(options, own.name) != own.default
+    }
+    return told | ({"force_filter": str(options.force_filter)} if options.force_filter else {})
 
 
 def _lag(choice: Choice) -> LagFound | None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.warning_codes import Warn
+from palpate.results import Compared, Result
 from palpate.signals import Estimate
 
 
@@ -122,8 +123,8 @@ class Tangent:
     half: float
 
 
-@dataclass(frozen=True)
-class Press:
+@dataclass(frozen=True, eq=False)
+class Press(Compared):
     """Force over depth.
 
     Args:
@@ -205,8 +206,8 @@ class Comparison:
     note: str
 
 
-@dataclass(frozen=True)
-class Traces:
+@dataclass(frozen=True, eq=False)
+class Traces(Compared):
     """What the figure shows: filtered signals of the whole log, shape (n,), and the fit in contact, shape (m,).
 
     Args:
@@ -251,8 +252,8 @@ class LagFound:
     kind: str
 
 
-@dataclass(frozen=True)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Result, shown_by="palpate.report.identification.shown"):
     """What was touched: the model, its parameters with verdicts, and what to know about them.
 
     Args:

@@ -48,7 +48,7 @@ def page(told: Tuning, command: str = "palpate tune") -> str:
         ],
         figures=[
             _figure("Where it is proved stable, and what is touched", partial(one, _intervals, told, 1.6)),
-            _figure("The press at both ends, its stiffness known", partial(one, _steps, told, 2.6)),
+            _figure("The press at both ends, its stiffness known", partial(one, steps, told, 2.6)),
             _figure("Nyquist's curve on the stiffest surface", partial(one, _nyquist, told, 4.0)),
         ],
         source=told.gains.to_toml(),
@@ -89,7 +89,8 @@ def _intervals(axis: Axes, told: Tuning) -> None:
     style.logarithmic(axis, "x")
 
 
-def _steps(axis: Axes, told: Tuning) -> None:
+def steps(axis: Axes, told: Tuning) -> None:
+    """The force after the touch on the softest and on the stiffest surface."""
     for step, name, colour in zip(
         told.steps, ("softest", "stiffest"), (style.BLUE, style.ORANGE), strict=True
     ):

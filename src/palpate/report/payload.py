@@ -48,7 +48,13 @@ def sentence(found: Weighed) -> str:
 
 def write_page(found: Weighed, title: str, path: Path) -> Path:
     """Writes the page, whole or not at all; it opens without a network."""
-    text = render(
+    write_text(path, page(found, title))
+    return path
+
+
+def page(found: Weighed, title: str) -> str:
+    """The page as HTML."""
+    return render(
         "page.html",
         title=f"What hangs on the sensor, by {title}",
         about=sentence(found),
@@ -56,15 +62,13 @@ def write_page(found: Weighed, title: str, path: Path) -> Path:
         tables=[table(found)],
         figures=[
             {
-                "source": embedded(svg(_figure(found)), "image/svg+xml"),
+                "source": embedded(svg(draw(found)), "image/svg+xml"),
                 "caption": "The force in each orientation: measured (dots) and of tool and bias (rings)",
             }
         ],
         source="" if found.payload is None else found.payload.to_toml(),
         command=f"palpate payload {title}",
     )
-    write_text(path, text)
-    return path
 
 
 def _parts(one: Estimated) -> list[tuple[str, float, float]]:
@@ -77,7 +81,8 @@ def _half(half: float) -> str:
     return f"{half:.2g}" if np.isfinite(half) else "not told"
 
 
-def _figure(found: Weighed) -> Figure:
+def draw(found: Weighed) -> Figure:
+    """The force in each orientation, measured (dots) and of tool and bias (rings)."""
     with style.inked():
         figure, (axis,) = style.figure(height=2.8)
         places = np.arange(1, len(found.shown) + 1)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from palpate._jit import part
 from palpate._vector import Vec3
+from palpate.results import Compared
 
 
 @part
@@ -35,8 +36,8 @@ class Task(NamedTuple):
     s: Vec3  # selection: 1 where the force is controlled, 0 where the position is, shape (m,)
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, eq=False)
+class Estimate(Compared):
     """What an identifier knows so far.
 
     Args:

@@ -1,0 +1,34 @@
+"""What `palpate identify --json` printed, read back from a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import InputError
+
+_LARGEST = 1 << 26
+
+
+def read_found(path: Path) -> dict[str, Any]:
+    """The object in a file.
+
+    Raises:
+        InputError: it is too large, no JSON, or no object.
+        OSError: no such file.
+    """
+    from json import JSONDecodeError, loads
+
+    with path.open("rb") as file:
+        data = file.read(_LARGEST + 1)
+    if len(data) > _LARGEST:
+        raise InputError(
+            f"{path}: more than {_LARGEST} bytes are not what palpate identify prints; check the path"
+        )
+    try:
+        value = loads(data)
+    except (JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not JSON: {error}; give what palpate identify --json printed") from None
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: not what palpate identify --json prints")
+    return value

@@ -1,0 +1,128 @@
+"""The pages of `--help`: lines end between phrases where they can, and an example is a command that can be copied."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from cyclopts.help import DefaultFormatter
+
+if TYPE_CHECKING:
+    from cyclopts.help import HelpPanel
+    from rich.console import Console, ConsoleOptions, RenderResult
+
+EXAMPLE = "palpate "
+"""Begins a paragraph that is an example."""
+_INDENT = 4
+_PHRASE = (".", ",", ";", ":", ")", "]")
+"""What a phrase ends with."""
+_BROKEN = 0.3
+"""Share of the width that is rather left empty than a phrase broken."""
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """Lines of at most `width` letters (a word alone may be longer), most of which end with a phrase.
+
+    Of all ways to break the text, the one of least cost: the square of what each line but the last leaves empty, as a
+    share of the width, and `_BROKEN` squared where a line ends within a phrase.
+    """
+    words = text.split()
+    best: list[tuple[float, int]] = [(0.0, 0)] * (
+        len(words) + 1
+    )  # cost from this word on, and where its line ends
+    for begin in reversed(range(len(words))):
+        length, options = -1, []
+        for end in range(begin + 1, len(words) + 1):
+            length += 1 + len(words[end - 1])
+            if length > width and end > begin + 1:
+                break
+            options.append((_cost(words[end - 1], length, width, last=end == len(words)) + best[end][0], end))
+        best[begin] = min(options, key=lambda one: (one[0], -one[1]))
+    lines, at = [], 0
+    while at < len(words):
+        end = best[at][1]
+        lines.append(" ".join(words[at:end]))
+        at = end
+    return lines
+
+
+def _cost(word: str, length: int, width: int, *, last: bool) -> float:
+    if last:
+        return 0.0
+    empty = max(width - length, 0) / width
+    return empty**2 + (0.0 if word.endswith(_PHRASE) else _BROKEN**2)
+
+
+def example(text: str, width: int) -> list[str]:
+    """A command, indented, continued with a backslash before an option where it is too long."""
+    parts = re.split(r" (?=--?\w|> )", " ".join(text.split()))
+    lines = [" " * _INDENT + parts[0]]
+    for part in parts[1:]:
+        if len(lines[-1]) + 1 + len(part) + 2 > width:
+            lines[-1] += " \\"
+            lines.append(" " * 2 * _INDENT + part)
+        else:
+            lines[-1] += f" {part}"
+    return lines
+
+
+def page(text: str, width: int) -> str:
+    """A command's description: paragraphs and examples."""
+    parts = [part for part in re.split(r"\n\s*\n", text) if part.strip()]
+    return "\n\n".join(
+        "\n".join(example(part, width) if part.lstrip().startswith(EXAMPLE) else wrapped(part, width))
+        for part in parts
+    )
+
+
+class Phrases:
+    """A text that rich breaks between phrases, in whatever width it is given."""
+
+    def __init__(self, text: str) -> None:
+        self.text = " ".join(text.split())
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.text import Text
+
+        yield Text("\n".join(wrapped(self.text, options.max_width)))
+
+    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Any:
+        from rich.measure import Measurement
+
+        longest = max((len(word) for word in self.text.split()), default=0)
+        return Measurement(min(longest, options.max_width), min(len(self.text), options.max_width))
+
+
+class PhraseFormatter(DefaultFormatter):
+    """Panels of options whose texts are broken between phrases."""
+
+    def __call__(self, console: Console, options: ConsoleOptions, panel: HelpPanel) -> None:
+        """Render one panel."""
+        from attrs import evolve
+
+        entries = [evolve(entry, **_told(entry)) for entry in panel.entries]
+        super().__call__(console, options, panel.copy(entries=entries))
+
+    def render_description(self, console: Console, options: ConsoleOptions, description: Any) -> None:
+        """Render what a command does, with its examples."""
+        text = _plain(description)
+        if text:
+            console.print(page(text, console.width), soft_wrap=True, markup=False, highlight=False)
+            console.print()
+
+
+def _told(entry: Any) -> dict[str, Any]:
+    """An entry's text with what else is known of it, as one."""
+    choices = [f"[choices: {', '.join(entry.choices)}]"] if entry.choices else []
+    empty: Sequence[object] = (None, "False", "()", "('',)")
+    default = [] if entry.default in empty else [f"[default: {entry.default}]"]
+    required = ["[required]"] if entry.required else []
+    text = " ".join([_plain(entry.description), *choices, *default, *required])
+    return {"description": Phrases(text), "choices": (), "default": None, "required": False}
+
+
+def _plain(description: Any) -> str:
+    """The letters of what cyclopts makes of a text."""
+    inner = getattr(description, "primary_renderable", description)
+    return getattr(inner, "plain", str(inner) if inner else "").strip()

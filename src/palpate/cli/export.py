@@ -1,0 +1,203 @@
+"""`palpate export`: what was identified, as the contact of a simulator's scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Group, Parameter
+
+from palpate.cli._found import read_found
+from palpate.cli._program import command
+from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
+from palpate.errors import InputError
+from palpate.files import MADE, check_place, signed, whole, write_json
+
+if TYPE_CHECKING:
+    from palpate.export import Checked, Exported
+
+_FLAG = Parameter(negative=())
+_NUMBER = Parameter(allow_leading_hyphen=True)
+
+
+@Parameter(name="*", group=Group("The scene", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class SceneOptions:
+    """Where the contact goes.
+
+    Parameters
+    ----------
+    to
+        mujoco, drake, newton, or mjcf-spring: a plate on a slide joint.
+    model
+        The scene: MJCF for mujoco, SDF or URDF for drake.
+    geom
+        The surface: a geom of MJCF, a collision of SDF or URDF; without a scene, what to call it.
+    probe
+        What presses on it, likewise; all that can touch it if not given.
+    """
+
+    to: Literal["mujoco", "drake", "newton", "mjcf-spring"]
+    model: Path | None = None
+    geom: str | None = None
+    probe: str | None = None
+
+
+@Parameter(name="*", group=Group("What was not identified", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class GivenOptions:
+    """Numbers in place of identified ones.
+
+    Parameters
+    ----------
+    damping
+        B in N s/m, where none was identified, or instead of it; 0 for a pure spring.
+    mass
+        M in kg of the plate of mjcf-spring, likewise.
+    working_point
+        Take the stiffness at the working point in place of the model's K: of a surface that no linear model explains.
+    """
+
+    damping: Annotated[float | None, _NUMBER] = None
+    mass: Annotated[float | None, _NUMBER] = None
+    working_point: Annotated[bool, _FLAG] = False
+
+
+@Parameter(name="*", group=Group("What is written", sort_key=6))
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions:
+    """Where results go.
+
+    Parameters
+    ----------
+    out
+        The file; beside the scene, called SCENE-GEOM, if not given. A comment in it, and FILE.json beside it, tell
+        intervals and assumptions.
+    replace
+        Replace what an earlier export wrote there.
+    check
+        Press the contact in the simulator, and state the error in K and B; exit code 1 if one is above 0.1 %.
+    json
+        Print one JSON object and nothing else.
+    """
+
+    out: Path | None = None
+    replace: Annotated[bool, _FLAG] = False
+    check: Annotated[bool, _FLAG] = False
+    json: Annotated[bool, _FLAG] = False
+
+
+def export(
+    found: Path,
+    /,
+    *,
+    scene: SceneOptions,
+    given: GivenOptions | None = None,
+    output: OutputOptions | None = None,
+) -> int:
+    """Write what was identified as the contact of a simulator's scene, and press it there.
+
+    palpate identify press.csv --time time_s --position position_mm:mm --force force_N:N --json > found.json
+
+    palpate export found.json --to mujoco --model scene.xml --geom foam --check
+
+    The scene's own file is not changed: what is written includes it (MuJoCo) or is a copy (Drake).
+
+    Parameters
+    ----------
+    found
+        What palpate identify --json printed.
+    """
+    from palpate.export import Request, contact_from, prepare
+
+    given, output = given or GivenOptions(), output or OutputOptions()
+    request = Request(scene.to, scene.model, scene.geom, scene.probe)
+    out = output.out or request.default_place()
+    beside = out.with_name(f"{out.name}.json")
+    _check_places((out, beside), output.replace, scene.model)
+    contact = contact_from(
+        read_found(found),
+        found.name,
+        damping=given.damping,
+        mass=given.mass,
+        working_point=given.working_point,
+    )
+    exported = prepare(contact, request, out)
+    checked = _written(exported, out, output.check)
+    told = _told(exported, out, checked)
+    write_json(beside, signed(told))
+    _print(exported, told, checked, (out, beside), json=output.json)
+    verdicts = [one.passed for one in checked if one.passed is not None]
+    return 1 if output.check and not (verdicts and all(verdicts)) else 0
+
+
+def _check_places(places: tuple[Path, ...], replace: bool, model: Path | None) -> None:
+    for path in places:
+        if model is not None and path.absolute() == model.absolute():
+            raise InputError(f"--out {path} is the scene itself; name another file")
+        check_place(path, "--out")
+        if path.exists() and not replace:
+            raise InputError(f"{path} exists; name another with --out, or add --replace")
+
+
+def _written(exported: Exported, out: Path, wanted: bool) -> list[Checked]:
+    """Write the file and press what is in it; what the engine refuses is not left behind."""
+    from palpate import __version__
+    from palpate.export import check
+
+    mark = MADE.removeprefix("# ")
+    with whole(out) as draft:
+        draft.write_text(exported.commented(f"{mark} {__version__}"), encoding="utf-8", newline="\n")
+        exported.validate(draft)
+        return check(exported, draft) if wanted else []
+
+
+def _told(exported: Exported, out: Path, checked: list[Checked]) -> dict[str, Any]:
+    from palpate import __version__
+
+    return {
+        "file": str(out),
+        **exported.to_json(),
+        "check": [one.to_json() for one in checked] or None,
+        "command": command(),
+        "version": __version__,
+    }
+
+
+def _print(
+    exported: Exported, told: dict[str, Any], checked: list[Checked], places: tuple[Path, ...], *, json: bool
+) -> None:
+    if json:
+        print_json(told)
+        return
+    screen = console()
+    own = exported.contact
+    head(screen, exported.target, f": K = {own.stiffness}; B = {own.damping}")
+    if checked:
+        show_table(screen, _table(checked, told))
+        for one in checked:
+            if one.note:
+                screen.print(f"- pressed by {one.probe}: {one.note}", soft_wrap=True)
+    for note in exported.notes:
+        screen.print(f"- {note}", style=STYLE if "unstable" in note else "", soft_wrap=True)
+    for path in places:
+        place(screen, "written:", path)
+
+
+def _table(checked: list[Checked], told: dict[str, Any]) -> Any:
+    from palpate.report.page import Table
+
+    title = f"pressed in {told['to']}"
+    return Table(
+        title, ("by", "K [N/m]", "error", "B [N s/m]", "error", "check"), [_row(one) for one in checked]
+    )
+
+
+def _row(one: Checked) -> tuple[str, ...]:
+    measured = one.pressed
+    if measured is None:
+        return one.probe, "-", "-", "-", "-", "failed" if one.reached else "not pressed"
+    errors = [f"{100 * (error or 0.0):.2g} %" for error in (one.error_K, one.error_B)]
+    numbers = f"{measured.stiffness:.7g}", errors[0], f"{measured.damping:.6g}", errors[1]
+    return (one.probe, *numbers, "passed" if one.passed else "failed")

@@ -1,0 +1,174 @@
+"""Two collision geometries of Drake, as a rig to press them on each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError
+from palpate.export.drake_scene import properties
+from palpate.export.rig import across
+
+Array = NDArray[np.float64]
+
+TIME_STEP = 1e-3
+"""Of the plant in a check [s]."""
+_DIRECTED = 1e-6
+"""Gap from which on its direction is taken [m]."""
+PROBE = "palpate-probe"
+_PROBE_MASS = 1.0
+
+
+def drake() -> Any:
+    """The package.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        import pydrake.all as found
+    except ImportError:
+        raise InputError(
+            "pressing in Drake needs Drake; install it with: pip install 'palpate[drake]'"
+        ) from None
+    return found
+
+
+def probe_sdf(rigid: float) -> str:
+    """A sphere of 1 kg on a vertical rail above the origin."""
+    return f"""<sdf version="1.7" xmlns:drake="http://drake.mit.edu"><model name="{PROBE}">
+<link name="{PROBE}"><inertial><mass>{_PROBE_MASS:g}</mass></inertial>
+<collision name="{PROBE}"><geometry><sphere><radius>0.02</radius></sphere></geometry>
+<drake:proximity_properties>{properties(rigid, 0.0, urdf=False)}</drake:proximity_properties></collision></link>
+<joint name="rail" type="prismatic"><parent>world</parent><child>{PROBE}</child><axis><xyz>0 0 1</xyz></axis></joint>
+</model></sdf>"""
+
+
+def _add(parser: Any, path: Path) -> None:
+    """Add the models of a file; one with another ending is read under one that Drake knows, in the same folder."""
+    if path.suffix in {".sdf", ".urdf"}:
+        parser.AddModels(str(path))
+        return
+    ending = ".urdf" if b"<robot" in path.read_bytes() else ".sdf"
+    with NamedTemporaryFile(dir=path.parent, prefix=".palpate-", suffix=ending) as copy:
+        copy.write(path.read_bytes())
+        copy.flush()
+        parser.AddModels(copy.name)
+
+
+class DrakeRig:
+    """See `palpate.export.rig.Rig`.
+
+    Args:
+        path: SDF or URDF file.
+        surface, probe: paths of the collisions; the probe's is None for a sphere of its own above the origin.
+        rigid: point stiffness of that sphere [N/m].
+        time_step: of the plant [s].
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        surface: tuple[str, ...],
+        probe: tuple[str, ...] | None,
+        rigid: float,
+        time_step: float = TIME_STEP,
+    ) -> None:
+        self.time_step = time_step
+        library = drake()
+        builder = library.DiagramBuilder()
+        config = library.MultibodyPlantConfig(
+            time_step=time_step, contact_model="point", discrete_contact_approximation="sap"
+        )
+        self.plant, self.scene = library.AddMultibodyPlant(config, builder)
+        try:
+            parser = library.Parser(self.plant)
+            _add(parser, path)
+            if probe is None:
+                parser.AddModelsFromString(probe_sdf(rigid), "sdf")
+        except RuntimeError as error:
+            raise InputError(f"{path}: Drake refuses it: {' '.join(str(error).split())}") from None
+        self.plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
+        self.plant.Finalize()
+        diagram = builder.Build()
+        self.root = diagram.CreateDefaultContext()
+        self.context = self.plant.GetMyMutableContextFromRoot(self.root)
+        self.n = int(self.plant.num_velocities())
+        self._push(np.zeros(self.n))
+        self.simulator = library.Simulator(diagram, self.root)
+        self._surface, self._probe = self._geometry(surface), self._geometry(probe or (PROBE, PROBE))
+        self._normal = np.zeros(3)
+
+    def _geometry(self, path: tuple[str, ...]) -> Any:
+        """The geometry of a collision: of that name, on a body of the link's."""
+        inspector = self.scene.model_inspector()
+        for own in inspector.GetAllGeometryIds():
+            body = self.plant.GetBodyFromFrameId(inspector.GetFrameId(own))
+            named = (body.name(), inspector.GetName(own).split("::")[-1])
+            if named == path[-2:] and inspector.GetProximityProperties(own) is not None:
+                return own
+        raise InputError(f"Drake has no collision geometry {'::'.join(path)!r} in what it read")
+
+    def _push(self, force: Array) -> None:
+        self.plant.get_applied_generalized_force_input_port().FixValue(self.context, force)
+
+    def _query(self) -> Any:
+        return self.plant.get_geometry_query_input_port().Eval(self.context)
+
+    def gap(self) -> tuple[float, Array]:
+        """See `Rig.gap`."""
+        pair = self._query().ComputeSignedDistancePairClosestPoints(self._surface, self._probe)
+        distance = float(pair.distance)
+        outward = np.array(pair.nhat_BA_W) * (-1.0 if pair.id_A == self._surface else 1.0)
+        if abs(distance) > _DIRECTED or not self._normal.any():
+            self._normal = outward
+        ends = (pair.id_A, pair.p_ACa), (pair.id_B, pair.p_BCb)
+        at = {own: np.array(point) for own, point in ends}
+        moves = {own: self._moves(own, at[own]) for own in at}
+        return distance, across(self._normal) @ (moves[self._probe] - moves[self._surface])
+
+    def _moves(self, geometry: Any, point: Array) -> Array:
+        """Velocity of a point of a geometry in the world per generalised velocity, shape (3, n)."""
+        library, inspector = drake(), self.scene.model_inspector()
+        frame = self.plant.GetBodyFromFrameId(inspector.GetFrameId(geometry)).body_frame()
+        in_frame = inspector.GetPoseInFrame(geometry) @ point
+        world = self.plant.world_frame()
+        return np.array(
+            self.plant.CalcJacobianTranslationalVelocity(
+                self.context, library.JacobianWrtVariable.kV, frame, in_frame, world, world
+            )
+        )
+
+    def mass(self) -> Array:
+        """See `Rig.mass`."""
+        return np.array(self.plant.CalcMassMatrix(self.context))
+
+    def velocity(self) -> Array:
+        """See `Rig.velocity`."""
+        return np.array(self.plant.GetVelocities(self.context))
+
+    def move(self, change: Array) -> None:
+        """See `Rig.move`."""
+        rate = self.plant.MapVelocityToQDot(self.context, change)
+        positions = self.plant.GetPositions(self.context) + rate
+        low, high = self.plant.GetPositionLowerLimits(), self.plant.GetPositionUpperLimits()
+        self.plant.SetPositions(self.context, np.clip(positions, low, high))
+
+    def step(self, force: Array) -> tuple[float, float, float]:
+        """See `Rig.step`; penetration and rate are those at the step's end, to which SAP's implicit force belongs."""
+        self._push(force)
+        time = self.root.get_time()
+        self.simulator.AdvanceTo(time + self.time_step)
+        results = self.plant.get_contact_results_output_port().Eval(self.context)
+        for i in range(results.num_point_pair_contacts()):
+            own = results.point_pair_contact_info(i)
+            pair = own.point_pair()
+            if {pair.id_A, pair.id_B} == {self._surface, self._probe}:
+                pushed = abs(float(np.dot(own.contact_force(), pair.nhat_BA_W)))
+                gap, rates = self.gap()
+                return -gap, -float(rates[0] @ self.velocity()), pushed
+        return 0.0, 0.0, 0.0

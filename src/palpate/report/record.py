@@ -1,0 +1,127 @@
+"""A record in Python: its columns in a line each, drawn over time, and as a page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.errors import InputError
+from palpate.records import Record
+from palpate.report import style
+from palpate.report.page import Table, embedded, render
+from palpate.report.shown import as_html, as_text
+from palpate.text import shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+HEAD = ("column", "unit", "least", "mean", "largest", "missing")
+_TIMES = ("time", "t")
+_DRAWN = 12
+"""Columns of a figure; more are not legible."""
+_POINTS = 4000
+"""Points of a line at most: what is more is drawn by its extremes."""
+
+
+def line(record: Record) -> str:
+    """How many columns and rows, which time, from where."""
+    count, clock = len(record), _clock(record)
+    columns = (
+        f"{len(record.columns)} column{'s' * (len(record.columns) != 1)} of {count} row{'s' * (count != 1)}"
+    )
+    source = record.meta.get("source")
+    named = f", from {source}" if isinstance(source, str) else ""
+    span = f", {record[clock][0]:.4g} to {record[clock][-1]:.4g} s" if clock is not None and count > 1 else ""
+    return shown(f"{columns}{span}{named}")
+
+
+def text(record: Record) -> str:
+    """A line on the whole, and one a column."""
+    return as_text(f"Record: {line(record)}", [HEAD, *rows(record)])
+
+
+def html(record: Record) -> str:
+    """The same as a table."""
+    return as_html(f"Record: {line(record)}", [HEAD, *rows(record)])
+
+
+def rows(record: Record) -> list[tuple[str, ...]]:
+    """Name, unit, extremes and mean of each column, and how many of its values are missing."""
+    return [
+        (shown(name), shown(record.units[name]), *_numbers(np.asarray(column)))
+        for name, column in record.columns.items()
+    ]
+
+
+def _numbers(column: NDArray[np.float64]) -> tuple[str, ...]:
+    finite = column[np.isfinite(column)]
+    figures = (finite.min(), finite.mean(), finite.max()) if len(finite) else ()
+    told = [f"{float(number):.5g}" for number in figures] or ["-"] * 3
+    return (*told, str(len(column) - len(finite)))
+
+
+def _clock(record: Record) -> str | None:
+    return next((name for name in _TIMES if name in record.columns), None)
+
+
+def draw(record: Record) -> Figure:
+    """Each column over time, or over its rows where there is no time.
+
+    Raises:
+        InputError: there is nothing to draw.
+    """
+    clock = _clock(record)
+    names = [name for name in record.columns if name != clock and np.isfinite(record[name]).any()][:_DRAWN]
+    if not names:
+        raise InputError(
+            "this record holds no column with numbers besides its time; there is nothing to draw"
+        )
+    time = record[clock] if clock else np.arange(len(record), dtype=float)
+    with style.inked():
+        figure, axes = style.figure(rows=len(names), height=1.6)
+        for axis, name in zip(axes, names, strict=True):
+            axis.plot(*_thinned(time, record[name]), color=style.BLUE, linewidth=0.9)
+            axis.set_ylabel(style.literal(f"{name} [{record.units[name]}]"))
+        axes[-1].set_xlabel("time [s]" if clock else "row")
+    return figure
+
+
+def _thinned(time: NDArray[np.float64], column: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """A line of as many points as can be told apart: of each stretch the least and the largest value."""
+    size = 2 * len(column) // _POINTS
+    if size < 2:
+        return time, column
+    whole = len(column) // size * size
+    blocks = column[:whole].reshape(-1, size)
+    ends = np.stack(
+        [np.where(np.isfinite(blocks), blocks, np.inf), np.where(np.isfinite(blocks), blocks, -np.inf)]
+    )
+    picked = np.stack([ends[0].argmin(axis=1), ends[1].argmax(axis=1)], axis=1)
+    at = np.sort(picked + np.arange(0, whole, size)[:, None], axis=1).ravel()
+    return time[at], column[at]
+
+
+def page(record: Record) -> str:
+    """The table and the figure as a page."""
+    from palpate.report.svg import svg
+
+    figures = []
+    if any(np.isfinite(record[name]).any() for name in record.columns if name != _clock(record)):
+        caption = (
+            f"Its first {_DRAWN} columns over time"
+            if len(record.columns) > _DRAWN
+            else "Its columns over time"
+        )
+        figures = [{"source": embedded(svg(draw(record)), "image/svg+xml"), "caption": caption}]
+    return render(
+        "page.html",
+        title="A record",
+        about=line(record),
+        notes=(),
+        tables=[Table("Columns", HEAD, rows(record))],
+        figures=figures,
+        source="",
+        command="palpate.read_log(...).report(...)",
+    )

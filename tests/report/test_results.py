@@ -1,0 +1,193 @@
+"""Results in Python: printed, shown by a notebook, drawn, written, compared; and what `palpate` itself tells."""
+
+import copy
+import pickle
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import palpate
+from palpate.errors import InputError
+from palpate.force import Known, load_arm, tune
+from palpate.results import same
+
+HOSTILE = "<script>alert(1)</script>\x1b[31m&\"'"
+
+
+@pytest.fixture(scope="module")
+def record(root):
+    log = root / "examples" / "data" / "press.csv"
+    return palpate.read_log(log, time="time_s", position="position_mm:mm", force="force_N:N")
+
+
+@pytest.fixture(scope="module")
+def found(record):
+    return palpate.identify(record, lag=0.0076, lag_std=0.0002)
+
+
+@pytest.fixture(scope="module")
+def tuned():
+    return tune(load_arm("ur5e"), 20.0, Known((1e3, 1e5)), prove_adapting=False)
+
+
+class Tags(HTMLParser):
+    """The tags of a text, and whether they are closed."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.seen = [], set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        self.seen.add(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_an_identification_is_readable(found):
+    text = str(found)
+    assert text.startswith("The stiffness is ")
+    assert re.search(r"^K +5330 ± 110 .*identified", text, re.MULTILINE)
+    assert "\x1b" not in text
+    assert max(map(len, text.splitlines())) <= 100
+    assert repr(found).startswith("<Identification: kelvin-voigt; K 5330 ± 110 N/m identified, B ")
+    assert "\n" not in repr(found)
+
+
+def test_a_record_is_readable(record):
+    lines = str(record).splitlines()
+    assert lines[0].startswith("Record: 3 columns of 4000 rows, 0 to 7.998 s")
+    assert [line.split()[:2] for line in lines[2:]] == [["time", "s"], ["position", "m"], ["force", "N"]]
+    assert repr(record).startswith("<Record: 3 columns of 4000 rows")
+
+
+@pytest.mark.parametrize("name", ["record", "found", "tuned"])
+def test_a_notebook_gets_a_table_and_nothing_that_runs(request, name):
+    html = request.getfixturevalue(name)._repr_html_()
+    tags = Tags(html)
+    assert not tags.open
+    assert tags.seen == {"div", "p", "b", "table", "tr", "th", "td"}
+
+
+def test_names_of_a_stranger_are_shown_and_do_nothing(found, tmp_path):
+    hostile = palpate.Record({HOSTILE: np.arange(3.0)}, {HOSTILE: HOSTILE}, {"source": HOSTILE})
+    for text in (hostile._repr_html_(), hostile.report(tmp_path / "r.html").read_text()):
+        assert "<script>alert" not in text
+        assert "\x1b" not in text
+        assert "&lt;script&gt;" in text
+    assert "\x1b" not in str(hostile) + repr(hostile)
+    hostile.plot(tmp_path / "r.svg")
+    assert "<script" not in (tmp_path / "r.svg").read_text()
+    reason = replace(found.parameters["K"], reason=HOSTILE)
+    told = replace(found, parameters={HOSTILE: reason})
+    assert "<script" not in told._repr_html_()
+    assert "\x1b" not in str(told)
+
+
+@pytest.mark.parametrize("name", ["record", "found", "tuned"])
+def test_results_are_drawn_and_written(request, name, tmp_path):
+    result = request.getfixturevalue(name)
+    figure = result.plot(tmp_path / "it.png")
+    assert len(figure.get_axes()) > 0
+    assert (tmp_path / "it.png").read_bytes().startswith(b"\x89PNG")
+    assert result.report(tmp_path / "it.html") == tmp_path / "it.html"
+    page = (tmp_path / "it.html").read_text()
+    assert page.lower().startswith("<!doctype html>")
+    assert "http://" not in re.sub(r"http://www\.w3\.org\S*", "", page)
+
+
+def test_what_cannot_be_written_is_one_line(found, record, tmp_path):
+    (tmp_path / "mine.html").write_text("mine")
+    with pytest.raises(InputError, match="palpate did not write it"):
+        found.report(tmp_path / "mine.html")
+    with pytest.raises(InputError, match="HTML file"):
+        record.report(tmp_path / "it.pdf")
+    with pytest.raises(InputError, match="a figure ends in"):
+        record.plot(tmp_path / "it.bmp")
+    with pytest.raises(InputError, match="nothing to draw"):
+        palpate.Record({"time": np.arange(3.0)}, {"time": "s"}).plot()
+    with pytest.raises(InputError, match="no traces"):
+        replace(found, traces=None).plot()
+
+
+def test_equal_is_by_value(record, found):
+    assert record == copy.deepcopy(record)
+    assert found == copy.deepcopy(found)
+    assert found == pickle.loads(pickle.dumps(found))
+    assert found == palpate.identify(record, lag=0.0076, lag_std=0.0002)
+    assert found != palpate.identify(record, lag=0.0)
+    assert found.traces == copy.deepcopy(found.traces)
+    assert found.press == copy.deepcopy(found.press)
+    assert found.estimate == copy.deepcopy(found.estimate)
+    changed = {name: column.copy() for name, column in record.columns.items()}
+    changed["force"][7] += 1e-12
+    assert record != replace(record, columns=changed)
+    assert record != replace(record, units={**record.units, "force": "1"})
+    assert record != 3
+    with pytest.raises(TypeError):
+        hash(record)
+
+
+def test_no_number_equals_no_number():
+    gap = palpate.Record(
+        {"x": np.array([1.0, np.nan])}, {"x": "m"}, {"gain": float("nan"), "list": [1, (2.0,)]}
+    )
+    assert gap == copy.deepcopy(gap)
+    assert not same([1, 2], [1, 2, 3])
+    assert not same({"a": 1}, {"b": 1})
+    assert not same(np.zeros(2), [0.0, 0.0])
+    assert not same(float("nan"), 1.0)
+
+
+def test_an_empty_record_is_shown(tmp_path):
+    empty = palpate.Record({}, {})
+    assert str(empty) == "Record: 0 columns of 0 rows\n  column  unit  least  mean  largest  missing"
+    assert empty.report(tmp_path / "empty.html").exists()
+    nothing = palpate.Record({"force": np.full(5, np.nan)}, {"force": "N"})
+    assert str(nothing).splitlines()[-1].split() == ["force", "N", "-", "-", "-", "5"]
+
+
+def test_a_long_record_is_drawn_by_its_extremes(tmp_path):
+    force = np.zeros(300_000)
+    force[123_456] = 9.0
+    (axis,) = palpate.Record({"force": force}, {"force": "N"}).plot().get_axes()
+    (line,) = axis.get_lines()
+    assert len(line.get_ydata()) < 10_000
+    assert line.get_ydata().max() == 9.0
+    assert line.get_xdata()[line.get_ydata().argmax()] == 123_456
+
+
+def test_dir_is_what_a_user_can_use():
+    names = dir(palpate)
+    assert not [name for name in names if name.startswith("_") and name != "__version__"]
+    assert {"identify", "read_log", "Record", "Identification", "InputError"} <= set(names)
+    assert not {"annotations", "import_module", "Any", "TYPE_CHECKING"} & set(names)
+    for name in names:
+        assert getattr(palpate, name) is not None
+
+
+def test_help_tells_the_rooms_and_the_first_lines(root, tmp_path):
+    told = palpate.__doc__
+    first = [line.strip() for line in told.split("The first three lines:")[1].splitlines() if line.strip()][
+        :3
+    ]
+    assert first[0] == "import palpate"
+    (tmp_path / "press.csv").write_bytes((root / "examples" / "data" / "press.csv").read_bytes())
+    ran = subprocess.run(
+        [sys.executable, "-c", "\n".join(first)], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.startswith("The stiffness is ")
+    rooms = re.findall(r"^    ([a-z_]+)  +\S", told, re.MULTILINE)
+    assert sorted(rooms) == [name for name in dir(palpate) if (root / "src" / "palpate" / name).is_dir()]
+
+
+def test_an_unknown_name_is_told():
+    with pytest.raises(AttributeError, match="it has"):
+        palpate.identfy  # noqa: B018
