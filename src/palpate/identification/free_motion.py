@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +87,11 @@ def free_motion_of(
     size = max(len(force) // _MOST, 1)
     force, position = block_means(force, size), block_means(position, size)
     slope = _in_contact(force, position, ends)
-    steep = max(abs(slope), *(_steepest(force, way * position) for way in (1.0, -1.0)))
+
+    @cache
+    def steep() -> float:
+        return max(abs(slope), *(_steepest(force, way * position) for way in (1.0, -1.0)))
+
     found = [0.0, 0.0]
     for bound in (np.inf, _OUTLYING):
         if slope and not any(found):
@@ -144,7 +150,9 @@ def _steepest(force: Array, position: Array) -> float:
     return max((abs(own[0]) - own[1] for own in found if own is not None), default=0.0)
 
 
-def _share(force: Array, position: Array, slopes: tuple[float, float], bound: float, none: bool) -> float:
+def _share(
+    force: Array, position: Array, slopes: tuple[float, Callable[[], float]], bound: float, none: bool
+) -> float:
     """The largest share of the position's range, from its lower end, over which the force stays; 0 if over none.
 
     Its slope is clearly below that of the contact there, or over the next larger share, which may hold a touch. That of
@@ -153,7 +161,7 @@ def _share(force: Array, position: Array, slopes: tuple[float, float], bound: fl
     Args:
         force: shape (n,).
         position: shape (n,).
-        slopes: of the contact, over all of it and the steepest [N/m].
+        slopes: of the contact, over all of it and, if it is asked for, the steepest [N/m].
         bound: as `_slope` has it.
         none: as `free_motion_of` has it.
     """
@@ -166,8 +174,10 @@ def _share(force: Array, position: Array, slopes: tuple[float, float], bound: fl
             continue
         own, doubt = found[0] / slope, found[1] / abs(slope)
         before, clear = clear, own + doubt < FLAT
-        falls = (found[0] * np.sign(slope) - found[1]) / steep
-        if (clear or before) and (-FLAT < falls <= 0 or not (none or abs(found[0]) >= FLAT * steep)):
+        if not (clear or before) or (none and own > doubt):
+            continue
+        least = (own - doubt if none else abs(own)) * abs(slope)
+        if abs(least) < FLAT * abs(slope) or abs(least) < FLAT * steep():
             return float(share)
     return 0.0
 

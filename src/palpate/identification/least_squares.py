@@ -154,9 +154,13 @@ def quantile(effective: float, parameters: int, level: float = 0.975) -> float:
 
 
 def _closed_up(place: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Rows counted in steps of the finest spacing between them, so that a thinned grid has no holes."""
-    step = int(np.gcd.reduce(np.diff(place)))
-    closed: NDArray[np.intp] = (place - place[0]) // max(step, 1)
+    """Rows counted in steps of the finest spacing between them, so that a thinned grid has no holes.
+
+    Nor gaps longer than any lag that is looked at.
+    """
+    jumps = np.diff(place)
+    step = max(int(np.gcd.reduce(jumps)), 1)
+    closed: NDArray[np.intp] = np.r_[0, np.cumsum(np.minimum(jumps // step, _LONGEST + 1))]
     return closed
 
 

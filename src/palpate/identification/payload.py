@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,15 +66,15 @@ def payload_of(
     stays = [(a + memory, b) for a, b in air.among(channels.position) if b - a - memory >= _FEWEST]
     if not stays:
         return None
-    force, place, speed, motion = (
-        np.concatenate([own[i:j] - own[i:j].mean() for i, j in stays])
-        for own in (chain(channels.force), *(chain(channels.position, k, lag) for k in (0, 1, 2)))
-    )
+
+    def own(filtered: Array) -> Array:
+        return np.concatenate([filtered[i:j] - filtered[i:j].mean() for i, j in stays])
+
+    force, motion = own(chain(channels.force)), own(chain(channels.position, 2, lag))
     size = float(motion @ motion)
     spread = chain.noise_spread(position_noise([channels.position[i:j] for i, j in stays]))[2, 2]
-    if size <= _SEEN * len(motion) * float(spread) or not _of_inertia(
-        force, motion, [speed, place] if alone else [speed]
-    ):
+    others = (own(chain(channels.position, k, lag)) for k in ((1, 0) if alone else (1,)))
+    if size <= _SEEN * len(motion) * float(spread) or not _of_inertia(force, motion, others):
         return None
     mass = float(motion @ force) / size
     noise = noise_of(force - mass * motion, np.arange(len(force)), len(stays) + 1)
@@ -82,13 +83,15 @@ def payload_of(
     return Payload(mass, half / 1.96) if abs(mass) > half else None
 
 
-def _of_inertia(force: Array, motion: Array, others: list[Array]) -> bool:
+def _of_inertia(force: Array, motion: Array, others: Iterable[Array]) -> bool:
     """Whether the acceleration accounts for more of the force than all else, and for twice what others do.
 
     A force that is read late, or that sinks after a contact, goes with the speed as well.
     """
-    whole = float(force @ force)
-    by_motion, *by_others = (
-        float(own @ force) ** 2 / max(float(own @ own) * whole, 1e-300) for own in (motion, *others)
-    )
-    return by_motion > _MOST and by_motion > _OTHERS * max(by_others)
+    by_motion = _accounts(motion, force)
+    return by_motion > _MOST and all(by_motion > _OTHERS * _accounts(own, force) for own in others)
+
+
+def _accounts(column: Array, force: Array) -> float:
+    """Share of the force's power that a column accounts for."""
+    return float(column @ force) ** 2 / max(float(column @ column) * float(force @ force), 1e-300)
