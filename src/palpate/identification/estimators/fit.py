@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.lag_uncertainty import bias_corrected, hidden, with_lag
+from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import Noise, covariance, noise_of, quantile, solve
 from palpate.identification.models import Model, Motion, NonlinearParameter
 from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
@@ -158,13 +159,30 @@ class Prediction:
         return self.theta[name]
 
 
-def slope_of_lag(model: Model, motion: Motion, theta: dict[str, float], lag: float) -> Array:
-    """Derivative of the predicted force by the lag [N/s], shape (n,), of a model without nonlinear parameters."""
-    parameter = _lag_parameter(motion, Lag(lag))
-    up, down = (model.columns(motion, {}, lag + step) for step in (parameter.step, -parameter.step))
+def slope_of_lag(
+    model: Model,
+    motion: Motion,
+    theta: dict[str, float],
+    lag: float,
+    nonlinear: dict[str, float] | None = None,
+) -> Array:
+    """Derivative of the predicted force by the lag [N/s], shape (n,): of a sum of the position's derivatives the next.
+
+    Args:
+        model: which.
+        motion: the position.
+        theta: its linear parameters.
+        lag: of the force [s].
+        nonlinear: its nonlinear parameters, if it has any.
+    """
+    if model.of_position and isinstance(motion.chain, Chain):
+        parts = [theta.get(n, 0.0) * motion.moved(k + 1, lag) for n, k in model.derivatives.items()]
+        return -sum(parts, np.zeros(len(motion.rows)))
+    step = _lag_parameter(motion, Lag(lag)).step
+    up, down = (model.columns(motion, nonlinear or {}, at) for at in (lag + step, lag - step))
     pairs = zip(model.linear, up, down, strict=True)
     change = sum((theta.get(n, 0.0) * (u - d) for n, u, d in pairs), np.zeros(len(motion.rows)))
-    return change / (2 * parameter.step)
+    return change / (2 * step)
 
 
 def _evaluate(
@@ -257,9 +275,8 @@ def _slopes(model: Model, motion: Motion, point: _Point, outer: list[NonlinearPa
     found = []
     for parameter in outer:
         if parameter.name == LAG:
-            up = model.columns(motion, point.nonlinear, point.lag + parameter.step)
-            down = model.columns(motion, point.nonlinear, point.lag - parameter.step)
-            found.append((np.column_stack(up) - np.column_stack(down)) @ point.theta / (2 * parameter.step))
+            theta = dict(zip(model.linear, point.theta.tolist(), strict=True))
+            found.append(slope_of_lag(model, motion, theta, point.lag, point.nonlinear))
             continue
         value = point.nonlinear[parameter.name]
         step = parameter.step * value if parameter.logarithmic else parameter.step

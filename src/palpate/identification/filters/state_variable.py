@@ -8,7 +8,6 @@ filtered channels exactly as for the raw ones, because F is the same on all of t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from math import factorial, pi
 
 import numpy as np
@@ -96,15 +95,23 @@ class Chain:
         return full[start : start + len(signal)] + (level if derivative == 0 else 0.0)
 
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
-        """The same at the samples `rows` only, shape (len(rows),)."""
+        """The same at the samples `rows` only, in their order, shape (len(rows),).
+
+        Stretches that are far apart are filtered as one signal, each with what the filter remembers on either side.
+        """
+        if not len(rows):
+            return np.empty(0)
         memory = _memory(self, lag)
         cuts = np.flatnonzero(np.diff(rows) > 2 * memory) + 1
-        found = np.empty(len(rows))
-        for first, last in pairwise([0, *cuts.tolist(), len(rows)]):
-            if last > first:
-                own = rows[first:last]
-                begin, end = max(int(own[0]) - memory, 0), int(own[-1]) + memory
-                found[first:last] = self(signal[begin:end], derivative, lag)[own - begin]
+        stretches = np.split(rows, cuts)
+        begins = [max(int(own[0]) - memory, 0) for own in stretches]
+        parts = [signal[a : int(own[-1]) + memory] for a, own in zip(begins, stretches, strict=True)]
+        firsts = np.cumsum([0, *(len(part) for part in parts[:-1])])
+        at = np.concatenate([own + (f - b) for own, f, b in zip(stretches, firsts, begins, strict=True)])
+        found: Array = self(np.concatenate([part - part[0] for part in parts]), derivative, lag)[at]
+        if derivative == 0:
+            levels = [float(part[0]) for part in parts]
+            found += np.repeat(levels, [len(own) for own in stretches])
         return found
 
     def noise_spread(self, noise: PositionNoise) -> Array:
