@@ -21,6 +21,11 @@ _CAUSES = {
         "move at one frequency, the one that you need",
     ),
     "speed": ("what the force has of the speed", "press more slowly"),
+    "filter": ("that the press is as short as the filter's memory", "press more slowly, or log faster"),
+    "unseen way": (
+        "that the position jumps where no reading was taken, and the touch may lie there",
+        "move more slowly, log faster, or give --bonded",
+    ),
     "tool's inertia": ("the tool's own inertia", "move faster in the air, or take it out beforehand"),
     "position noise": ("noise of the position", "measure the position finer, or move further"),
     "calibration": ("the scales of force and position", "calibrate them and give --calibration"),
