@@ -49,7 +49,7 @@ bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold s
 	$(BIN)/python benchmarks/arms/first_press.py
 
 live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a second, and slider to picture
-	$(BIN)/python benchmarks/live.py
+	$(BIN)/python benchmarks/live/measure.py
 
 attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hour of each experiment; into docs/reliability.md
 	$(BIN)/python benchmarks/attack/run.py --write

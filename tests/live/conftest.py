@@ -1,8 +1,9 @@
 """A page that is served, a client of its stream, and a browser where there is one."""
 
 import json
-import shutil
+import sys
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,19 +15,11 @@ from palpate.live.server import served
 from palpate.live.simulation import Simulation
 from palpate.live.view import AT, COLUMNS
 
-CHROMIUM = ("/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome")
-QUIET = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-PATIENCE = 60.0
-"""Within which what has to happen does, on whatever machine [s]: a loaded one is slow, not wrong."""
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "live"))
+import headless
+
+PATIENCE = headless.PATIENCE
+"""Within which what has to happen does [s]."""
 
 
 class Stream:
@@ -106,11 +99,8 @@ def playing(source):
 @pytest.fixture(scope="session")
 def browser():
     """Headless Chromium; skipped where there is none."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
-    if path is None:
+    pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    if headless.chromium() is None:
         pytest.skip("there is no Chromium on this machine (Debian: apt-get install chromium)")
-    with sync_api.sync_playwright() as playwright:
-        own = playwright.chromium.launch(executable_path=path, args=QUIET)
+    with headless.browser() as own:
         yield own
-        own.close()

@@ -18,7 +18,8 @@ from palpate.bench.sequence import CONTACT, LOST
 from palpate.bench.tick import LoopState, compiled_march, start_at
 from palpate.environments import SurfaceState
 from palpate.errors import InputError
-from palpate.live.view import AT, COLUMNS, LEAD, STRIDE, Happened, Slider, State, View
+from palpate.live.stability import OfBench
+from palpate.live.view import AT, COLUMNS, LEAD, STRIDE, Happened, Slider, State, View, planar_bones
 from palpate.text import shown
 
 Array = NDArray[np.float64]
@@ -125,13 +126,7 @@ class Simulation:
         Raises:
             InputError: none of that key, or a value out of range.
         """
-        slider = next((one for one in self.view.sliders if one.key == key), None)
-        if slider is None:
-            raise InputError(f"there is no slider {key!r}")
-        if not slider.low <= value <= slider.high:
-            raise InputError(
-                f"{slider.name} must be from {slider.low:g} to {slider.high:g} {slider.unit}, got {value:g}"
-            )
+        self.view.check(key, value)
         if value == self.state.values[key]:
             return
         experiment = changed(self._experiment, {key: value})
@@ -161,6 +156,15 @@ class Simulation:
     def experiment(self) -> Experiment:
         """As it now is, with what was changed."""
         return self._experiment
+
+    @property
+    def loop_asked(self) -> OfBench:
+        """The loop as it now is, for `palpate.live.stability`."""
+        return OfBench(self._experiment)
+
+    def bones(self, row: Array) -> Array:
+        """See `Source`."""
+        return planar_bones(self.view.links, row)
 
     def _begin(self) -> None:
         bench: Bench = build(self._experiment)
