@@ -1,4 +1,4 @@
-/* Charts that move: a strip on which only what is new is drawn; it is drawn whole where its scale changes. */
+/* Charts that move: two tiles that lie side by side and are shifted; only what is new is drawn, and all where a scale changes. */
 "use strict";
 palpate.strips = (columns, span) => {
   const { token, faded, figure, make, legend, repaints } = palpate;
@@ -23,26 +23,29 @@ palpate.strips = (columns, span) => {
   const strip = (host, spec) => {
     const self = { marks: [] };
     const read = make("span", { class: "read" });
-    const canvas = make("canvas", { role: "img", "aria-label": spec.title });
+    const scale = make("div", { class: "scale" });
     const line = make("span", { class: "pointer" });
-    const box = make("div", { class: "plot strip" }, canvas, line);
+    const tiles = [make("canvas"), make("canvas")], belt = make("div", { class: "belt" }, ...tiles), face = make("div", { class: "face" }, belt);
+    const box = make("div", { class: "plot strip", role: "img", "aria-label": spec.title }, scale, face, line);
     host.classList.add("chart");
     host.replaceChildren(make("header", {}, make("h3", {}, spec.title), legend(spec.series)),
       make("div", { class: "axis" }, make("span", {}, spec.y), read), box);
     if (spec.x) host.append(make("div", { class: "axis below" }, make("span", {}, spec.x)));
-    const front = canvas.getContext("2d"), ring = document.createElement("canvas"), pen = ring.getContext("2d");
+    const pens = tiles.map((one) => one.getContext("2d"));
     const lines = spec.series.filter((one) => one.kind !== "band"), bands = spec.series.filter((one) => one.kind === "band");
-    let wide = 0, tall = 0, dense = 1, low = 0, high = 1, ticks = [], zero = null, drawn = -Infinity, at = 0, clean = 0, second = 0, column = 0, whole = true;
+    let wide = 0, tall = 0, dense = 1, low = 0, high = 1, ticks = [], zero = null, drawn = -Infinity, at = 0, laid = -1, second = 0, column = 0, whole = true, pen = null;
 
     const x = (t) => (t - zero) * wide / span;
     const y = (v) => tall * (high - v) / (high - low);
     const sized = () => {
       dense = devicePixelRatio || 1;
       const across = Math.max(160, box.clientWidth), up = spec.height();
-      canvas.style.height = `${up}px`;
-      canvas.width = Math.round(across * dense); canvas.height = Math.round(up * dense);
+      box.style.height = `${up}px`;
       wide = Math.round((across - LEFT - RIGHT) * dense); tall = Math.round((up - TOP - BELOW) * dense);
-      ring.width = wide + 8; ring.height = tall + Math.round(BELOW * dense);
+      for (const one of tiles) {
+        one.width = wide; one.height = tall + Math.round(BELOW * dense);
+        one.style.width = `${wide / dense}px`; one.style.height = `${one.height / dense}px`;
+      }
       whole = true;
     };
     const scaled = () => {
@@ -56,30 +59,31 @@ palpate.strips = (columns, span) => {
       for (let i = 0; from + i * step <= to + step / 2; i++) ticks.push(from + i * step);
       whole = true;
     };
-    const axis = () => {
-      front.setTransform(1, 0, 0, 1, 0, 0);
-      front.clearRect(0, 0, canvas.width, canvas.height);
-      front.font = `${12 * dense}px sans-serif`; front.fillStyle = token("quiet"); front.textAlign = "right"; front.textBaseline = "middle";
-      for (const value of ticks) front.fillText(word(value), (LEFT - 6) * dense, TOP * dense + y(value));
+    const axis = () => scale.replaceChildren(...ticks.map((value) => {
+      const one = make("span", {}, word(value));
+      one.style.top = `${TOP + y(value) / dense}px`;
+      return one;
+    }));
+    /* Tile n holds the places from n times its width on; what goes over its end is drawn on both. */
+    const across = (from, to, act) => {
+      for (let n = Math.max(0, laid - 1, Math.floor(from / wide)); n <= Math.min(laid, Math.floor(to / wide)); n++) {
+        pen = pens[n % 2];
+        pen.setTransform(1, 0, 0, 1, -n * wide, 0);
+        act();
+      }
     };
-    /* On the ring a place comes again after its width: what goes over its end is drawn at both. */
-    const twice = (from, to, act) => {
-      const first = Math.floor(from / ring.width), last = Math.floor(to / ring.width);
-      for (let turn = first; turn <= last; turn++) { pen.setTransform(1, 0, 0, 1, -turn * ring.width, 0); act(); }
-    };
-    const wipe = (to) => {
-      if (to <= clean) return;
-      twice(clean, to, () => {
-        pen.clearRect(clean, 0, to - clean, ring.height);
-        pen.fillStyle = token("grid");
-        for (const value of ticks) pen.fillRect(clean, Math.round(y(value)), to - clean, 1);
-      });
-      clean = to;
+    const lay = (n) => {
+      const one = tiles[n % 2];
+      pen = pens[n % 2]; laid = n;
+      one.style.left = `${n * wide / dense}px`;
+      pen.setTransform(1, 0, 0, 1, 0, 0); pen.clearRect(0, 0, wide, one.height);
+      pen.fillStyle = token("grid");
+      for (const value of ticks) pen.fillRect(0, Math.round(y(value)), wide, 1);
     };
     const seconds = (now) => {
       const each = wide / dense < 420 ? 2 : 1;
       for (let s = Math.max(second, Math.ceil(zero)); x(s) + 14 * dense < x(now); s++, second = s) {
-        twice(x(s) - 14 * dense, x(s) + 14 * dense, () => {
+        across(x(s) - 14 * dense, x(s) + 14 * dense, () => {
           pen.globalCompositeOperation = "destination-over"; pen.fillStyle = token("grid"); pen.fillRect(Math.round(x(s)), 0, 1, tall);
           pen.globalCompositeOperation = "source-over";
           if (s % each) return;
@@ -125,8 +129,8 @@ palpate.strips = (columns, span) => {
       while (first > 0 && t[first] > drawn) first--;
       while (first < end && t[first] < drawn) first++;
       first = Math.max(0, first - (t[first] > drawn ? 1 : 0));
-      wipe(Math.ceil(x(now)) + 4);
-      twice(x(t[first]) - 2, x(now) + 2, () => {
+      while (laid < Math.floor(x(now) / wide)) lay(laid + 1);
+      across(x(t[first]) - 2, x(now) + 2, () => {
         pen.save();
         pen.beginPath(); pen.rect(x(t[first]) - 4, 0, x(now) - x(t[first]) + 8, tall); pen.clip();
         lines.forEach((one) => trace(one, first, end));
@@ -136,43 +140,42 @@ palpate.strips = (columns, span) => {
       column = Math.floor(x(now)); drawn = now; at = end;
       seconds(now);
     };
+    /* A moment's line and word; one that is told late is drawn where it was. */
+    const mark = (one) => {
+      const px = Math.round(x(one.x)) + 0.5, failed = one.tone === "fail", worded = one.text && !spec.wordless;
+      pen = pens[0]; pen.font = `${failed ? 600 : 400} ${12 * dense}px sans-serif`;
+      const length = worded ? pen.measureText(one.text).width : 0;
+      across(px - 2, px + length + 10 * dense, () => {
+        pen.strokeStyle = token(failed ? "fail" : "quiet"); pen.lineWidth = 1.25 * dense; pen.setLineDash([3 * dense, 3 * dense]); pen.lineDashOffset = 0;
+        pen.beginPath(); pen.moveTo(px, 0); pen.lineTo(px, tall); pen.stroke(); pen.setLineDash([]);
+        if (!worded) return;
+        pen.font = `${failed ? 600 : 400} ${12 * dense}px sans-serif`;
+        pen.textAlign = "left"; pen.textBaseline = "alphabetic"; pen.lineJoin = "round"; pen.lineWidth = 4 * dense;
+        pen.strokeStyle = token("paper"); pen.fillStyle = token(failed ? "bad" : "quiet");
+        pen.strokeText(one.text, px + 5 * dense, tall - 8 * dense); pen.fillText(one.text, px + 5 * dense, tall - 8 * dense);
+      });
+    };
+    let marked = new Set();
+    const marks = () => {
+      for (const one of self.marks) {
+        const key = `${one.x} ${one.text}`;
+        if (marked.has(key) || one.x < zero || x(one.x) + 90 * dense > x(drawn)) continue;
+        marked.add(key); mark(one);
+      }
+    };
     const again = () => {
       const t = columns.t, now = t[t.length - 1];
-      pen.setTransform(1, 0, 0, 1, 0, 0); pen.clearRect(0, 0, ring.width, ring.height);
       zero = t[0]; if (now - span > zero) zero = now - span;
-      at = nearest(zero); drawn = -Infinity; clean = 0; second = Math.ceil(zero); column = 0;
+      at = nearest(zero); laid = -1; second = Math.ceil(zero); column = 0; marked = new Set();
       while (at < t.length - 1 && t[at] < zero) at++;
-      drawn = t[at]; axis(); add();
+      drawn = at < t.length - 1 ? t[at] : -Infinity; axis(); add();
+      if (laid < 0) lay(0);
       whole = false;
     };
-    const marks = (from) => {
-      let free = -Infinity;
-      front.save();
-      front.beginPath(); front.rect(0, 0, wide, tall); front.clip();
-      for (const mark of self.marks) {
-        const px = Math.round(x(mark.x) - from) + 0.5, failed = mark.tone === "fail";
-        if (px < 0 || px > wide) continue;
-        front.strokeStyle = token(failed ? "fail" : "quiet"); front.lineWidth = 1.25 * dense; front.setLineDash([3 * dense, 3 * dense]);
-        front.beginPath(); front.moveTo(px, 0); front.lineTo(px, tall); front.stroke(); front.setLineDash([]);
-        if (!mark.text || spec.wordless) continue;
-        front.font = `${failed ? 600 : 400} ${12 * dense}px sans-serif`;
-        const length = front.measureText(mark.text).width, start = px + length + 10 * dense > wide ? px - length - 5 * dense : px + 5 * dense;
-        if (start < free) continue;
-        free = start + length + 6 * dense;
-        front.textAlign = "left"; front.textBaseline = "alphabetic"; front.lineJoin = "round"; front.lineWidth = 4 * dense;
-        front.strokeStyle = token("paper"); front.fillStyle = token(failed ? "bad" : "quiet");
-        front.strokeText(mark.text, start, tall - 8 * dense); front.fillText(mark.text, start, tall - 8 * dense);
-      }
-      front.restore();
-    };
     const show = () => {
-      const now = columns.t[columns.t.length - 1], from = Math.max(0, Math.round(x(now)) - wide), part = from % ring.width;
-      front.setTransform(1, 0, 0, 1, LEFT * dense, TOP * dense);
-      front.clearRect(0, 0, wide + RIGHT * dense, ring.height);
-      const first = Math.min(wide, ring.width - part);
-      front.drawImage(ring, part, 0, first, ring.height, 0, 0, first, ring.height);
-      if (first < wide) front.drawImage(ring, 0, 0, wide - first, ring.height, first, 0, wide - first, ring.height);
-      if (self.marks.length) marks(from);
+      marks();
+      const from = Math.max(0, Math.round(x(drawn)) - wide);
+      belt.style.transform = `translateX(${-from / dense}px)`;
     };
     self.draw = () => {
       if (!columns.t.length) { whole = true; return; }

@@ -56,6 +56,18 @@ palpate.arm = (canvas, links) => {
       return [x, y];
     })];
   };
+  /* Drawn once by light and once by dark. */
+  const patterns = new Map();
+  const hatch = (draw) => {
+    const colour = faded("measured", 0.4);
+    if (!patterns.has(colour)) {
+      const tile = document.createElement("canvas"), pen = tile.getContext("2d");
+      tile.width = tile.height = 11; pen.strokeStyle = colour; pen.lineWidth = 1;
+      pen.beginPath(); for (const k of [-11, 0, 11]) { pen.moveTo(k - 1, 12); pen.lineTo(k + 12, -1); } pen.stroke();
+      patterns.set(colour, draw.createPattern(tile, "repeat"));
+    }
+    return patterns.get(colour);
+  };
   const reach = links.reduce((sum, length) => sum + length, 0);
 
   /* seen: q [rad], rest (q at the start, drawn pale), wall [m], depth [m], force [N], side (y of the tip [m]). */
@@ -78,12 +90,7 @@ palpate.arm = (canvas, links) => {
     draw.strokeStyle = token("measured"); draw.lineWidth = 1.5; draw.stroke();
     draw.lineTo(wide, tall); draw.lineTo(wide, 0); draw.closePath();
     draw.fillStyle = faded("measured", 0.16); draw.fill();
-    draw.save(); draw.clip();
-    draw.strokeStyle = faded("measured", 0.4); draw.lineWidth = 1;
-    for (let y = -wide; y < tall + wide; y += 11) {
-      draw.beginPath(); draw.moveTo(wall, y); draw.lineTo(wide, y - (wide - wall)); draw.stroke();
-    }
-    draw.restore();
+    draw.fillStyle = hatch(draw); draw.fill();
 
     const drawn = (q, colour, width, alpha) => {
       draw.globalAlpha = alpha; draw.strokeStyle = colour; draw.lineWidth = width;
