@@ -65,7 +65,7 @@ leaderboard: .venv/dev.stamp ## put force controllers to the same touches again,
 	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
-	$(BIN)/zensical build --clean
+	$(BIN)/zensical build --clean --strict
 
 pictures: .venv/run.stamp ## make the pictures of the README again
 	$(BIN)/palpate run foam-rls --seed 1 --out build/foam-rls --force
