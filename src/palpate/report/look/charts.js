@@ -30,7 +30,7 @@ const palpate = (() => {
     const behind = digits - 1 - Math.floor(Math.log10(Math.abs(value)));
     return value.toFixed(Math.max(0, Math.min(6, behind))).replace("-", "−");
   };
-  const tick = (value) => String(+value.toPrecision(6)).replace("-", "−");
+  const tick = (value) => (value == null ? "" : String(+value.toPrecision(6)).replace("-", "−"));
 
   /* A column as `look/columns.py` packs it; gaps are null. */
   const unpacked = (column) => {
@@ -48,6 +48,7 @@ const palpate = (() => {
     measured: { width: 1, dash: [] },
     own: { width: 2, dash: [] },
     known: { width: 1.25, dash: [5, 4] },
+    model: { width: 1.5, dash: [] },
     other: { width: 1.5, dash: [8, 3] },
   };
   const sample = (one) => {
@@ -66,7 +67,7 @@ const palpate = (() => {
     return svg;
   };
 
-  const legend = (series) => make("ul", { class: "legend" }, ...series.map((one) => make("li", {}, sample(one), one.label)));
+  const legend = (series) => make("ul", { class: "legend" }, ...series.filter((one) => !one.silent).map((one) => make("li", {}, sample(one), one.label)));
 
   class Group {
     constructor() { this.charts = []; this.watchers = []; this.busy = false; }
@@ -92,7 +93,8 @@ const palpate = (() => {
   /* A chart in `host`.
      spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, text,
      tone}], shades [[from, to]], series [{label, kind, colour, of}] or [{..., kind: "band",
-     low, high}], where `of`, `low` and `high` name columns; `x_of` names that of x. */
+     low, high}], where `of`, `low` and `high` name columns, and a `silent` one has no place in the legend; `x_of` names that of x; log
+     is "x", "y" or "xy". */
   const chart = (host, spec, columns, group = new Group()) => {
     const self = { marks: spec.marks || [] };
     const whole = make("button", { type: "button", class: "screen" }, "whole range");
@@ -115,12 +117,14 @@ const palpate = (() => {
         series.push({ stroke: () => token(one.colour), ...KINDS[one.kind], points: { show: false } });
       }
     }
+    const logarithmic = { x: (spec.log || "").includes("x"), y: (spec.log || "").includes("y") };
     const taken = (from) => [from[spec.x_of || "t"], ...rows.map((name) => from[name])];
     const data = taken(columns);
     const height = () => (innerWidth < 560 ? Math.round(0.85 * spec.height) : spec.height);
     const ends = () => [data[0][0], data[0][data[0].length - 1]];
     const padded = (_, low, high) => {
       if (low == null) return [0, 1];
+      if (logarithmic.y) return [low / 1.3, high * 1.3];
       const room = 0.07 * (high - low) || Math.abs(high) * 0.1 || 1;
       return [low - room, high + room];
     };
@@ -135,7 +139,9 @@ const palpate = (() => {
       let k = 1;
       for (const one of spec.series) {
         const digits = spec.digits || 4;
-        if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i], digits)} to ${figure(data[k][i], digits)}`); k += 2; }
+        if (one.kind === "band" && one.silent) k += 2;
+        else if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i], digits)} to ${figure(data[k][i], digits)}`); k += 2; }
+        else if (one.silent) k++;
         else parts.push(`${one.label} ${figure(data[k++][i], digits)}`);
       }
       read.textContent = parts.join("  ·  ");
@@ -179,7 +185,8 @@ const palpate = (() => {
       width: Math.max(160, box.clientWidth), height: height(), padding: [8, 8, 0, 0], legend: { show: false },
       cursor: { y: false, drag: { x: true, y: false, setScale: true }, points: { show: false },
         bind: { dblclick: () => () => full() } },
-      scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: { range: spec.range || padded } },
+      scales: { x: { time: false, distr: logarithmic.x ? 3 : 1, range: (_, low, high) => [low, high] },
+        y: { distr: logarithmic.y ? 3 : 1, range: spec.range || padded } },
       axes: [axis({ size: 26 }), axis({ size: spec.left || 52, space: 22 })],
       series, bands,
       hooks: {
