@@ -11,6 +11,7 @@ import pytest
 from palpate.bench.experiments.tables import parse
 from palpate.cli import main
 from palpate.logs.store import read_record
+from palpate.report.excitation.table import percent
 
 SURFACES = ("--stiffness", "3:8:N/mm", "--damping", "100:300", "--mass", "0.1:0.3")
 ONE = ("--stiffness", "5000", "--damping", "200", "--mass", "0.2", "--force", "15", "--peak", "20")
@@ -65,7 +66,7 @@ def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
     assert code == 0
     text = (elsewhere / "page.html").read_text(encoding="utf-8")
     for name in ("K", "B", "M"):
-        assert f"± {100 * found['reached'][name]:.2g} %" in text
+        assert f"± {percent(found['reached'][name])}" in text.replace("&gt;", ">")
     assert text.count("<tr>") == 1 + len(found["surfaces"])
     charts = json.loads(re.search(r'id="excitation">(.*?)</script>', text, re.DOTALL).group(1))
     assert charts["seconds"] == found["duration_s"]

@@ -79,7 +79,7 @@ def _sentence(found: Design) -> str:
             f"In {lasts} this force shows every surface of the range as precisely as asked: {asked} (95 %)."
         )
     worst = reached(found.made.worst(found.seconds), found)
-    return f"Within these limits no force shows every surface as precisely as asked, {asked} (95 %); the best is {worst}."
+    return f"No force within these limits shows every surface as precisely as asked, {asked} (95 %): at best {worst}."
 
 
 def _cards(found: Design) -> list[dict[str, str]]:
