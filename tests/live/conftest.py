@@ -1,10 +1,9 @@
 """A page that is served, a client of its stream, and a browser where there is one."""
 
 import json
-import sys
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 
+import headless
 import numpy as np
 import pytest
 
@@ -14,9 +13,6 @@ from palpate.live.player import Player
 from palpate.live.server import served
 from palpate.live.simulation import Simulation
 from palpate.live.view import AT, COLUMNS
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "live"))
-import headless
 
 PATIENCE = headless.PATIENCE
 """Within which what has to happen does [s]."""
@@ -94,13 +90,3 @@ def playing(source):
             for one in clients:
                 one.close()
     assert player.failure is None
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """Headless Chromium; skipped where there is none."""
-    pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    if headless.chromium() is None:
-        pytest.skip("there is no Chromium on this machine (Debian: apt-get install chromium)")
-    with headless.browser() as own:
-        yield own

@@ -107,7 +107,7 @@ def _tell(screen: Console, done: Sequence[Done], folder: Path) -> None:
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
     table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
     show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
-    verdicts = Counter(claim.verdict for claim in claims)
+    verdicts = Counter[str](claim.verdict for claim in claims)
     told = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in COLORS)
     screen.print(f"{len(claims)} claims: {told}")
     place(screen, "page:", folder / "index.html")

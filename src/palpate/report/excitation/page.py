@@ -15,7 +15,7 @@ from palpate.excitation import Design, Remedy
 from palpate.files import write_text
 from palpate.report import style
 from palpate.report.excitation.figure import curves, draw, lines_of
-from palpate.report.excitation.table import percent, reached, remedy_told, wave_told
+from palpate.report.excitation.table import describe_remedy, describe_wave, percent, reached
 from palpate.report.identification.words import CALLED
 from palpate.report.look.assets import CHARTS, TABLES, data, scripts
 from palpate.report.look.columns import packed, thinned
@@ -47,7 +47,7 @@ def write_page(found: Design, helps: Sequence[Remedy], path: Path, command: str)
 
 def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
     """The page as HTML."""
-    told = wave_told(found)
+    told = describe_wave(found)
     codes = (*scripts(*CHARTS, *TABLES), _own("excitation.js"))
     with style.inked():
         still = embedded(svg(draw(found)), "image/svg+xml")
@@ -61,7 +61,7 @@ def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
         about=f"{told[0].upper()}{told[1:]}.",
         feasible=found.feasible,
         cards=_cards(found),
-        remedies=[(one.change, remedy_told(one, found), one.enough) for one in helps],
+        remedies=[(one.change, describe_remedy(one, found), one.enough) for one in helps],
         head=_head(found),
         rows=_rows(found),
         charts=data(_charts(found)),

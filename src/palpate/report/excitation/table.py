@@ -16,14 +16,14 @@ from palpate.references.waves import Multisine
 
 def show(found: Design, remedies: list[Remedy], console: Console) -> None:
     """Print a design, and for an infeasible one what would help."""
-    console.print(wave_told(found))
+    console.print(describe_wave(found))
     console.print(_table(found))
     console.print(_verdict(found))
     for remedy in remedies:
-        console.print(f"  {remedy.change}: {remedy_told(remedy, found)}")
+        console.print(f"  {remedy.change}: {describe_remedy(remedy, found)}")
 
 
-def remedy_told(remedy: Remedy, found: Design) -> str:
+def describe_remedy(remedy: Remedy, found: Design) -> str:
     """Whether a change would be enough, in words."""
     to = reached(remedy.reached, found)
     if remedy.enough:
@@ -32,7 +32,7 @@ def remedy_told(remedy: Remedy, found: Design) -> str:
     return f"not enough, {to}{later}"
 
 
-def wave_told(found: Design) -> str:
+def describe_wave(found: Design) -> str:
     """What is asked for, in a line."""
     budget, wave = found.question.budget, found.wave
     if isinstance(wave, Multisine):
