@@ -1,6 +1,7 @@
 """A page that is served, a client of its stream, and a browser where there is one."""
 
 import json
+import time
 from contextlib import ExitStack, contextmanager
 
 import headless
@@ -39,8 +40,10 @@ class Stream:
         self._socket.send(text)
 
     def until(self, wanted):
-        """Reads until `wanted(self)` is true; fails where nothing comes any more."""
+        """Reads until `wanted(self)` is true; fails where nothing comes any more, or never what is wanted."""
+        end = time.monotonic() + PATIENCE
         while not wanted(self):
+            assert time.monotonic() < end, f"not within {PATIENCE:.0f} s; the state is {self.state}"
             message = self._socket.recv(timeout=PATIENCE)
             if isinstance(message, bytes):
                 self.rows = np.concatenate([self.rows, np.frombuffer(message).reshape(-1, len(COLUMNS))])
