@@ -16,7 +16,20 @@ from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.identifiers import ContactIdentifier
 from palpate.live.stability import OfArm
-from palpate.live.view import AT, COLUMNS, JOINTS, STRIDE, Happened, Scene, Slider, State, View
+from palpate.live.view import (
+    AT,
+    COLUMNS,
+    JOINTS,
+    LONGEST,
+    OVER,
+    STRIDE,
+    Happened,
+    Scene,
+    Slider,
+    State,
+    View,
+    check_ahead,
+)
 from palpate.press.loops import series_of
 from palpate.press.pilots import Cautious
 from palpate.press.prepare import Question, prepared
@@ -27,8 +40,6 @@ from palpate.text import shown
 
 Array = NDArray[np.float64]
 
-LONGEST = 3600.0
-"""Of a run [s]; then it stands still."""
 FORCE, STIFFNESS, DAMPING = 20.0, 5000.0, 50.0
 """Where the sliders stand at first [N, N/m, N s/m]."""
 _PATCH = 0.12
@@ -91,11 +102,7 @@ class PressingArm:
 
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
-        if seed is not None:
-            if seed < 0:
-                raise InputError(f"the seed must be 0 or above, got {seed}")
-            self.state.seed = seed
-        self.state.ended, self.state.happened, self.state.warning = "", [], ""
+        self.state.begin(seed)
         loop, cell = self._gains.arm, cell_of(self._arm, self._place, self._surface, self._gains.arm)
         self._simulated = SimulatedArm(self._arm, loop, self._place, cell, "own", self.state.seed or 0)
         self._pilot = Cautious(self._simulated, self._gains, self._place.normal)
@@ -145,10 +152,7 @@ class PressingArm:
             InputError: it lies behind, or beyond a run's longest.
         """
         here = self._k * self._gains.arm.tick
-        if not here <= time <= LONGEST:
-            raise InputError(
-                f"a simulation runs on to {here:.3f} s at the earliest and {LONGEST:.0f} s at the latest"
-            )
+        check_ahead(here, time)
         while self._k * self._gains.arm.tick < time - self.view.stride and not self.state.ended:
             self.advance(min(1.0, time - self._k * self._gains.arm.tick))
 
@@ -245,9 +249,7 @@ class PressingArm:
                 f"{JOINT_LIMIT}: {shown(self._arm.names[beyond[0]])} reached the end of its range"
             )
         elif now >= LONGEST:
-            self.state.ended = (
-                f"done: an hour of simulated time ({LONGEST:.0f} s) is over; reset to begin again"
-            )
+            self.state.ended = OVER
 
 
 def _sliders(gains: Gains) -> tuple[Slider, ...]:

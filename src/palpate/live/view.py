@@ -42,6 +42,9 @@ JOINTS = 7
 STRIDE = 0.005
 """Time between two rows that are shown [s]."""
 
+LONGEST = 3600.0
+"""Of a simulation [s]; then it stands still."""
+OVER = f"done: an hour of simulated time ({LONGEST:.0f} s) is over; reset to begin again"
 LEAD = 1.5
 """Before the first touch, from where it begins [s]: the long search for the surface is passed over."""
 
@@ -183,9 +186,33 @@ class State:
 
     _MOST = 12
 
+    def begin(self, seed: int | None) -> None:
+        """At the beginning again, with another seed if one is given.
+
+        Raises:
+            InputError: a seed below 0.
+        """
+        if seed is not None:
+            if seed < 0:
+                raise InputError(f"the seed must be 0 or above, got {seed}")
+            self.seed = seed
+        self.ended, self.happened, self.warning = "", [], ""
+
     def note(self, happened: Happened) -> None:
         """Keeps a moment, and forgets those long ago."""
         self.happened = [*self.happened, happened][-self._MOST :]
+
+
+def check_ahead(here: float, time: float) -> None:
+    """Refuses a moment that a simulation cannot run on to.
+
+    Raises:
+        InputError: it lies behind, or beyond the longest run.
+    """
+    if not here <= time <= LONGEST:
+        raise InputError(
+            f"a simulation runs on to {here:.3f} s at the earliest and {LONGEST:.0f} s at the latest"
+        )
 
 
 def planar_bones(links: tuple[float, ...], row: Array) -> Array:
