@@ -49,7 +49,7 @@ bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold s
 	$(BIN)/python benchmarks/arms/first_press.py
 
 live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a second, and slider to picture
-	$(BIN)/python benchmarks/live.py
+	$(BIN)/python benchmarks/live/measure.py
 
 attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hour of each experiment; into docs/reliability.md
 	$(BIN)/python benchmarks/attack/run.py --write
@@ -65,7 +65,7 @@ leaderboard: .venv/dev.stamp ## put force controllers to the same touches again,
 	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
-	$(BIN)/zensical build --clean
+	$(BIN)/zensical build --clean --strict
 
 pictures: .venv/run.stamp ## make the pictures of the README again
 	$(BIN)/palpate run foam-rls --seed 1 --out build/foam-rls --force

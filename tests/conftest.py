@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,6 +20,8 @@ settings.load_profile("palpate")
 os.environ.setdefault("MPLBACKEND", "Agg")
 # What is started here buffers its output as it does for a user: a reader of a pipe must get a line when it is due.
 os.environ.pop("PYTHONUNBUFFERED", None)
+# What starts program and browser, for tests as for measurements.
+sys.path.insert(0, str(ROOT / "benchmarks" / "live"))
 
 # A shell that starts the tests in the background has Ctrl-C ignored, and whatever they start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -49,3 +52,15 @@ def program(capsys):
         return SimpleNamespace(returncode=code, stdout=printed.out, stderr=printed.err)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Headless Chromium; skipped where there is none."""
+    import headless
+
+    pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    if headless.chromium() is None:
+        pytest.skip("there is no Chromium on this machine (Debian: apt-get install chromium)")
+    with headless.browser() as own:
+        yield own

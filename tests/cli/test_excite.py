@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from palpate.bench.experiments.tables import parse
 from palpate.cli import main
 from palpate.logs.store import read_record
+from palpate.report.excitation.table import percent
 
 SURFACES = ("--stiffness", "3:8:N/mm", "--damping", "100:300", "--mass", "0.1:0.3")
 ONE = ("--stiffness", "5000", "--damping", "200", "--mass", "0.2", "--force", "15", "--peak", "20")
@@ -55,6 +57,23 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
     assert "written: excite.png" in printed
     assert (elsewhere / "excite.png").read_bytes().startswith(b"\x89PNG")
     assert main(["excite", *ASKED, "--duration", "4"]) == 0  # over its own figure
+
+
+def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
+    assert main(["excite", *ASKED, "--duration", "4", "--no-figure", "--report", "page.html"]) == 0
+    assert "written: page.html" in capsys.readouterr().out
+    code, found = ask(capsys, *ASKED, "--duration", "4", "--no-figure")
+    assert code == 0
+    text = (elsewhere / "page.html").read_text(encoding="utf-8")
+    for name in ("K", "B", "M"):
+        assert f"± {percent(found['reached'][name])}" in text.replace("&gt;", ">")
+    assert text.count("<tr>") == 1 + len(found["surfaces"])
+    charts = json.loads(re.search(r'id="excitation">(.*?)</script>', text, re.DOTALL).group(1))
+    assert charts["seconds"] == found["duration_s"]
+    assert charts["spectrum"]["t"] == pytest.approx(found["wave"]["frequencies"])
+    for tag in (' src="http', ' href="http', "@import"):
+        assert tag not in text
+    assert main(["excite", *ASKED, "--no-figure", "--report", "page.pdf"]) == 2
 
 
 def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):

@@ -1,9 +1,10 @@
 """A page that is served, a client of its stream, and a browser where there is one."""
 
 import json
-import shutil
+import time
 from contextlib import ExitStack, contextmanager
 
+import headless
 import numpy as np
 import pytest
 
@@ -14,19 +15,8 @@ from palpate.live.server import served
 from palpate.live.simulation import Simulation
 from palpate.live.view import AT, COLUMNS
 
-CHROMIUM = ("/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome")
-QUIET = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-PATIENCE = 60.0
-"""Within which what has to happen does, on whatever machine [s]: a loaded one is slow, not wrong."""
+PATIENCE = headless.PATIENCE
+"""Within which what has to happen does [s]."""
 
 
 class Stream:
@@ -50,8 +40,10 @@ class Stream:
         self._socket.send(text)
 
     def until(self, wanted):
-        """Reads until `wanted(self)` is true; fails where nothing comes any more."""
+        """Reads until `wanted(self)` is true; fails where nothing comes any more, or never what is wanted."""
+        end = time.monotonic() + PATIENCE
         while not wanted(self):
+            assert time.monotonic() < end, f"not within {PATIENCE:.0f} s; the state is {self.state}"
             message = self._socket.recv(timeout=PATIENCE)
             if isinstance(message, bytes):
                 self.rows = np.concatenate([self.rows, np.frombuffer(message).reshape(-1, len(COLUMNS))])
@@ -101,16 +93,3 @@ def playing(source):
             for one in clients:
                 one.close()
     assert player.failure is None
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """Headless Chromium; skipped where there is none."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
-    if path is None:
-        pytest.skip("there is no Chromium on this machine (Debian: apt-get install chromium)")
-    with sync_api.sync_playwright() as playwright:
-        own = playwright.chromium.launch(executable_path=path, args=QUIET)
-        yield own
-        own.close()

@@ -1,18 +1,14 @@
 """`palpate live`: its first line is its address, and what is wrong is a line and exit code 2."""
 
 import json
-import os
 import re
-import signal
 import socket
-import subprocess
-import sys
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
-from live.conftest import PATIENCE, Stream, near
+from live.conftest import PATIENCE, Stream, headless, near
 from palpate.bench import build
 from palpate.cli import main
 from palpate.live.view import AT
@@ -23,19 +19,11 @@ ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/[\w-]{24}/")
 
 @contextmanager
 def running(*words, lines=1):
-    """The program, until the block ends; its first lines, which it writes at once whatever the environment says."""
-    command = [sys.executable, "-m", "palpate", "live", *map(str, words)]
-    env = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
-    ) as process:
-        try:
-            yield [process.stdout.readline().strip() for _ in range(lines)]
-        finally:
-            process.send_signal(signal.SIGINT)
-            process.said = process.communicate(timeout=PATIENCE)
-            assert process.returncode == 130, process.said
-            assert "Traceback" not in process.said[1]
+    """The program, until the block ends; its first lines."""
+    with headless.running(*words, lines=lines) as (process, said):
+        yield said
+    assert process.returncode == 130, process.said
+    assert "Traceback" not in process.said[1]
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +61,25 @@ def test_a_log_without_joints_says_so_and_is_played(root):
         one.close()
 
 
+def test_an_arm_presses_in_space_and_viewers_see_all_of_it():
+    from websockets.sync.client import connect
+
+    with running("--arm", "ur5e", "--foxglove", "--foxglove-port", 0, lines=2) as (address, viewers):
+        one = Stream(address).until(lambda c: len(c.rows) > 20)
+        assert np.isfinite(one.rows[:, AT["q1"] : AT["q6"] + 1]).all()
+        assert np.isnan(one.rows[:, AT["q7"]]).all()
+        one.close()
+        url = viewers.removeprefix("viewers: ")
+        with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE) as client:
+            offered = {}
+            for _ in range(10):
+                told = json.loads(client.recv(PATIENCE))
+                offered |= {c["topic"]: c for c in told.get("channels", [])}
+                if {"/palpate/contact", "/palpate/arm"} <= set(offered):
+                    break
+        assert {"/palpate/contact", "/palpate/arm"} <= set(offered)
+
+
 def test_viewers_are_served_beside_the_page(record):
     """Foxglove's protocol, by a client of its own: what is offered, and that messages come."""
     from websockets.sync.client import connect
@@ -82,14 +89,16 @@ def test_viewers_are_served_beside_the_page(record):
         url = viewers.removeprefix("viewers: ")
         with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE) as client:
             offered = {}
-            while not {"/palpate/contact", "/palpate/arm"} <= set(offered):
+            for _ in range(10):
                 told = json.loads(client.recv(PATIENCE))
                 offered |= {c["topic"]: c for c in told.get("channels", [])}
+                if {"/palpate/contact", "/palpate/arm"} <= set(offered):
+                    break
             number = offered["/palpate/contact"]["id"]
             client.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": number}]}))
             # op code 1, the subscription's number, nanoseconds, then the message
-            while not isinstance(data := client.recv(PATIENCE), bytes) or data[0] != 1:
-                pass
+            messages = (client.recv(PATIENCE) for _ in range(1000))
+            data = next(one for one in messages if isinstance(one, bytes) and one[0] == 1)
             subscription, message = int.from_bytes(data[1:5], "little"), json.loads(data[13:])
     assert offered["/palpate/contact"]["encoding"] == "json"
     assert subscription == 7
@@ -114,6 +123,9 @@ def test_a_port_in_use(capsys, record):
     [
         (["--run", "foam-hybird"], "did you mean 'foam-hybrid'"),
         (["--run", "foam-hybrid", "--log", "x.csv"], "--run and --log are different things"),
+        (["--arm", "fr3", "--run", "foam-hybrid"], "--run and --arm are different things"),
+        (["--arm", "fr33"], "did you mean 'fr3'"),
+        (["--arm", "absent.toml"], "absent.toml"),
         (["--log", "absent.csv"], "absent.csv"),
         (["--record", "absent.parquet"], "absent.parquet"),
         (["--record", "r.parquet", "--time", "t"], "a record names its own columns"),

@@ -213,7 +213,7 @@ def test_a_slow_reader_loses_rows_not_memory():
     source = Clock()
     with Player(source, feed := Feed(rows=400)) as player, served(player) as address:
         parts = urlsplit(str(address))
-        slow = socket.create_connection((parts.hostname, parts.port))
+        slow = socket.create_connection((parts.hostname, parts.port), timeout=PATIENCE)
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         slow.sendall(
             f"GET {parts.path}stream HTTP/1.1\r\nHost: {parts.netloc}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"

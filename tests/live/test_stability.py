@@ -6,13 +6,17 @@ import pytest
 
 from live.conftest import PATIENCE, near
 from palpate.analysis import linearise, margins
-from palpate.live.stability import Stability, answers
+from palpate.force.certificate import Claim
+from palpate.force.steps import margins as margins_on
+from palpate.live import stability
+from palpate.live.stability import OfArm, OfBench, Stability, answers
+from palpate.press.loops import gains_for, loop_of
 from palpate.report.numbers import plain
 
 
 def test_the_first_answers_are_those_of_the_linear_model():
     experiment = near()
-    found = answers(experiment)
+    found = answers(OfBench(experiment))
     assert next(found)["text"] == "Stable on this surface, by the linear model."
     second = next(found)
     assert f"the gain may grow {plain(margins(linearise(experiment)).gain, 2)} times" in second["text"]
@@ -21,11 +25,11 @@ def test_the_first_answers_are_those_of_the_linear_model():
 
 def test_an_unstable_gain_is_said():
     unstable = near(**{"controller.kf": 40.0})
-    assert next(answers(unstable))["text"] == "Unstable on this surface, by the linear model."
+    assert next(answers(OfBench(unstable)))["text"] == "Unstable on this surface, by the linear model."
 
 
 def test_what_has_no_state_of_rest_is_said():
-    found = list(answers(near(**{"force.first": 500.0})))
+    found = list(answers(OfBench(near(**{"force.first": 500.0}))))
     assert found[-1]["stiffness"] is None
     assert found[-1]["text"].startswith("Nothing is known of its stability")
 
@@ -34,7 +38,7 @@ def test_what_has_no_state_of_rest_is_said():
 def test_a_process_of_its_own_answers_and_ends():
     came = threading.Event()
     own = Stability(came.set)
-    own.ask(near())
+    own.ask(OfBench(near()))
     assert own.latest["text"].startswith("Working out")
     assert came.wait(PATIENCE)
     assert "linear model" in own.latest["text"]
@@ -43,21 +47,39 @@ def test_a_process_of_its_own_answers_and_ends():
     assert process.poll() is not None
 
 
-def test_a_proof_is_not_claimed_of_a_surface_that_it_does_not_cover(monkeypatch):
-    import palpate.force
+@pytest.fixture
+def proof(monkeypatch):
+    """A claim of surfaces without damping: the proof itself takes ten seconds, and is `tests/force`'s."""
+    kinds = ("held", "adapting")
+    claims = tuple(
+        Claim(kind=kind, low=400.0, high=4e5, least=0.0, most=0.0, shares=(0.0, 1.0), jitter=0)
+        for kind in kinds
+    )
+    monkeypatch.setattr(stability, "_proof", lambda encoded, adapting: claims[: 1 + adapting])
 
-    class Proof:
-        def __init__(self):
-            self.claims = [type("Claim", (), {"kind": "held", "low": 400.0, "high": 4e5})()]
 
-        def check(self):
-            return type("Verdict", (), {"holds": True})()
-
-    # The proof itself takes ten seconds, and is `tests/force`'s.
-    monkeypatch.setattr(palpate.force, "certify", lambda gains, adapting: Proof())
-    (bare,) = answers(near("foam-cautious", **{"surface.damping": 0.0}))
-    (damped,) = answers(near("foam-cautious"))
+def test_a_proof_is_not_claimed_of_a_surface_that_it_does_not_cover(proof):
+    bare = list(answers(OfBench(near("foam-cautious", **{"surface.damping": 0.0}))))[-1]
+    damped = list(answers(OfBench(near("foam-cautious"))))[-1]
     assert bare["stiffness"] == damped["stiffness"] == [400.0, 4e5]
     assert bare["proved"]
     assert not damped["proved"]
-    assert "of which nothing is proved" in damped["text"]
+    assert "that proof says nothing" in damped["text"]
+
+
+def test_an_arm_s_proof_and_margins_are_those_of_its_gains(proof):
+    gains = gains_for(loop_of("ur5e", "UR5e", "position", 5.0), 20.0)
+    found = list(answers(OfArm(gains, 5000.0, 0.0)))
+    assert "Proving" in found[0]["text"]
+    assert f"the gain may grow {plain(margins_on(gains, gains.seen_cap).gain, 2)} times" in found[-1]["text"]
+    # The claim is of what the encoders feel; the page's axis of the surface's own stiffness.
+    assert found[-1]["stiffness"] == [gains.arm.surface(400.0), gains.cap]
+    assert "while it adapts: every constant K, without damping" in found[-1]["text"]
+    softer = list(answers(OfArm(gains, 100.0, 0.0)))[-1]
+    assert not softer["proved"]
+
+
+def test_what_cannot_be_proved_is_said(monkeypatch):
+    monkeypatch.setattr(stability, "_proof", lambda encoded, adapting: ())
+    gains = gains_for(loop_of("fr3", "FR3", "torque", 5.0), 20.0)
+    assert list(answers(OfArm(gains, 5000.0, 0.0)))[-1]["text"].startswith("Nothing could be proved")

@@ -3,7 +3,6 @@
 import re
 import shlex
 import subprocess
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,8 @@ PAGES = [
     "CONTRIBUTING.md",
     *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")),
 ]
+TYPED = ("README.md", "docs/tutorial.md")
+"""Whose Python and whose commands have tests of their own."""
 FENCED = re.compile(r"(?ms)^```(\w*)\n(.*?)^```$")
 INDENTED = re.compile(r"(?m)^    (\S.*)$")
 
@@ -88,7 +89,7 @@ LONG = ("docs/arms.md", "docs/force.md", "docs/analysis.md")
     [
         pytest.param(page, marks=pytest.mark.long if page in LONG else ())
         for page in PAGES
-        if page != "README.md" and alone(page)
+        if page not in TYPED and alone(page)
     ],
 )
 def test_python_of_the_pages_runs(page, tmp_path, monkeypatch):
@@ -119,9 +120,3 @@ def test_links_lead_somewhere(root, page):
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
         if "://" not in target:
             assert ((root / page).parent / target).exists(), f"{page}: {target}"
-
-
-def test_each_page_of_the_documentation_is_in_its_menu(root):
-    config = tomllib.loads((root / "zensical.toml").read_text(encoding="utf-8"))
-    menu = {name for entry in config["project"]["nav"] for name in entry.values()}
-    assert menu == {str(path.relative_to(root / "docs")) for path in (root / "docs").rglob("*.md")}

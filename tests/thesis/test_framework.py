@@ -20,6 +20,7 @@ from palpate.errors import InputError
 from palpate.thesis.claims import Claim, decided, spread, with_wholes
 from palpate.thesis.figure import studies, study
 from palpate.thesis.measure import STATE, measure
+from palpate.thesis.page import chapter_of
 from palpate.thesis.runs import Runs
 
 FIELDS = ["id", "source", "claim", "thesis", "measured", "tolerance", "verdict", "note"]
@@ -119,6 +120,36 @@ def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
     assert "&lt;it&gt; holds &amp; is told" in page
     assert page.count("data:image/png;base64,") == 2
     assert "://" not in re.sub(r"http://www\.w3\.org\S*", "", page), "the page opens without a network"
+
+
+def test_there_is_one_count_of_claims(tmp_path, capsys):
+    """The page's sentence, its buttons and its articles, claims.json and the terminal."""
+    assert main(["thesis", "3.7", "--out", str(tmp_path / "t")]) == 0
+    told = capsys.readouterr().out
+    claims = json.loads((tmp_path / "t" / "claims.json").read_text("utf-8"))
+    good = sum(claim["verdict"] == "reproduced" for claim in claims)
+    page = (tmp_path / "t" / "index.html").read_text("utf-8")
+    assert f"{len(claims)} claims: {good} reproduced" in told
+    assert f"Of {len(claims)} claims, {good} are reproduced" in page
+    assert f"all<b>{len(claims)}</b>" in page
+    assert page.count('<article class="claim"') == len(claims)
+    for claim in claims:
+        assert f'id="{claim["id"]}"' in page
+
+
+@pytest.mark.parametrize(
+    ("number", "chapter"),
+    [
+        ("2.1", "Earlier schemes"),
+        ("4.19", "The controllers"),
+        ("6.5", "Least squares"),
+        ("6.9", "Neural identifier"),
+        ("6.10", "Force control"),
+        ("why-negative-mass", "Explanations"),
+    ],
+)
+def test_figures_stand_in_their_chapters(number, chapter):
+    assert chapter_of(number) == chapter
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])

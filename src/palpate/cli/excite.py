@@ -13,6 +13,7 @@ from palpate.cli._flags import FLAG, SIGNED, check_new, in_si, in_si_if_given
 from palpate.cli._terminal import console, place, print_json
 from palpate.errors import InputError
 from palpate.files import check_place
+from palpate.text import shown
 
 if TYPE_CHECKING:
     from palpate.excitation import Budget, Design, ForceLoop, Question, Remedy, Sensors, SurfaceRange
@@ -236,6 +237,8 @@ class OutputOptions:
         Where to write the figure, a PNG; excite.png in the current folder if not given.
     no_figure
         Write no figure.
+    report
+        Where to write a page that opens without a network, HTML.
     json
         Print one JSON object and nothing else; a figure is written only if --figure is given.
     """
@@ -245,6 +248,7 @@ class OutputOptions:
     replace: Annotated[bool, FLAG] = False
     figure: Path | None = None
     no_figure: Annotated[bool, FLAG] = False
+    report: Path | None = None
     json: Annotated[bool, FLAG] = False
 
 
@@ -304,6 +308,8 @@ def _check_places(output: OutputOptions) -> None:
         check_ending(output.out)
     check_new(output.out, "--out", replace=output.replace)
     check_new(output.experiment, "--experiment", replace=output.replace, ending=".toml")
+    if output.report is not None:
+        check_place(output.report, "--report", ending=".html")
 
 
 def _answer(question: Question, rate: int, output: OutputOptions, picture: Path | None) -> int:
@@ -317,7 +323,13 @@ def _answer(question: Question, rate: int, output: OutputOptions, picture: Path 
         from palpate.report.excitation.figure import write_figure
 
         write_figure(found, picture)
-    _print(found, helps, [output.out, output.experiment] if found.feasible else [], picture, output.json)
+    if output.report is not None:
+        from palpate.cli._program import command
+        from palpate.report.excitation.page import write_page
+
+        write_page(found, helps, output.report, shown(command()))
+    written = [*([output.out, output.experiment] if found.feasible else []), output.report]
+    _print(found, helps, written, picture, output.json)
     return 0 if found.feasible else 1
 
 

@@ -36,6 +36,8 @@ class ShownOptions:
     run
         An experiment to simulate at real time (palpate run --list), or a TOML file of one's own; foam-hybrid if
         nothing is named.
+    arm_
+        An arm to simulate in space with the cautious law: ur5e, fr3, panda, iiwa14, or a file as for palpate press.
     log
         A log to play again, its columns named as for palpate identify.
     record
@@ -47,6 +49,7 @@ class ShownOptions:
     """
 
     run: str | None = None
+    arm_: Annotated[str | None, Parameter(name="--arm")] = None
     log: Path | None = None
     record: Path | None = None
     seed: Annotated[int, Parameter(converter=whole_number)] = 0
@@ -58,7 +61,7 @@ class ShownOptions:
         Raises:
             InputError: more than one thing is named.
         """
-        given = (("--run", self.run), ("--log", self.log), ("--record", self.record))
+        given = (("--run", self.run), ("--arm", self.arm_), ("--log", self.log), ("--record", self.record))
         named = [name for name, value in given if value is not None]
         if len(named) > 1:
             raise InputError(f"{' and '.join(named)} are different things to show; give one of them")
@@ -103,6 +106,8 @@ def live(
 
     palpate live --run rubber-hybrid --seed 3
 
+    palpate live --arm fr3
+
     palpate live --record runs/foam-hybrid-1/record.parquet
 
     palpate live --log press.csv --time time_s --position position_mm:mm --force force_mN:mN
@@ -112,6 +117,8 @@ def live(
     """
     shown, at = shown or ShownOptions(), at or ServedOptions()
     path = shown.file()
+    if shown.arm_ is not None:
+        return _serve(_pressing(shown.arm_, shown.seed), at)
     if path is None:
         return _serve(_simulation(shown.run or _DEFAULT, shown.seed, shown.whole_approach), at)
     from palpate.cli._one_log import OneLog
@@ -138,6 +145,13 @@ def _simulation(name: str, seed: int, whole: bool) -> Source:
         return Simulation(name, experiment, seed, whole=whole, waiting=lambda: say(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
+
+
+def _pressing(name: str, seed: int) -> Source:
+    from palpate.cli._waiting import COMPILING
+    from palpate.live.pressing import PressingArm
+
+    return PressingArm(name, seed, waiting=lambda: say(COMPILING))
 
 
 def _replay(path: Path, asked: Any, whole: bool) -> Source:
@@ -173,11 +187,10 @@ def _serve(shown: Source, at: ServedOptions) -> int:
 @contextmanager
 def _stability(shown: Source) -> Iterator[tuple[Any, Any, list[Any]]]:
     """What is known of the loop's stability, beside a simulation; a log has no loop."""
-    from palpate.live.simulation import Simulation
     from palpate.live.stability import Stability
 
     tell: list[Any] = []
-    if not isinstance(shown, Simulation):
+    if shown.loop_asked is None:
         yield (lambda: None), (lambda: None), tell
         return
 
@@ -187,7 +200,7 @@ def _stability(shown: Source) -> Iterator[tuple[Any, Any, list[Any]]]:
 
     own = Stability(told)
     try:
-        yield (lambda: own.ask(shown.experiment)), (lambda: own.latest), tell
+        yield (lambda: own.ask(shown.loop_asked)), (lambda: own.latest), tell
     finally:
         own.close()
 

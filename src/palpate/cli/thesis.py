@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,10 +15,10 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from palpate.thesis.claims import Done
     from palpate.thesis.figure import Study
-    from palpate.thesis.measure import Done
 
-COLORS = {"reproduced": "green", "differs": "red", "not checkable": "bright_black"}
+COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
 
 
 _MEASURED = Group("What is measured", sort_key=1)
@@ -100,9 +101,13 @@ def _measure(chosen: Sequence[Study], folder: Path, seeds: Sequence[int], comman
 
 def _tell(screen: Console, done: Sequence[Done], folder: Path) -> None:
     from palpate.report.page import Table
+    from palpate.thesis.claims import rows_of
 
-    claims = [claim for one in done for claim in one.claims]
+    claims = rows_of(done)
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
     table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
     show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
+    verdicts = Counter[str](claim.verdict for claim in claims)
+    told = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in COLORS)
+    screen.print(f"{len(claims)} claims: {told}")
     place(screen, "page:", folder / "index.html")

@@ -8,10 +8,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from palpate.errors import InputError
 from palpate.live.player import Player
 from palpate.live.server import HOST
-from palpate.live.view import COLUMNS
+from palpate.live.view import AT, COLUMNS, JOINTS, View
 
 TOPIC = "/palpate/contact"
 ARM = "/palpate/arm"
@@ -27,11 +30,9 @@ _UNITS = {
     "B_half": "N s/m",
     "K_true": "N/m",
     "B_true": "N s/m",
-    "q1": "rad",
-    "q2": "rad",
-    "q3": "rad",
     "wall": "m",
     "phase": "1",
+    **{f"q{i}": "rad" for i in range(1, JOINTS + 1)},
 }
 _SECOND = 1_000_000_000
 
@@ -89,7 +90,7 @@ class _Sender(threading.Thread):
             "properties": {name: {"type": "number", "description": unit} for name, unit in shown.items()},
         }
         self._contact = foxglove.Channel(TOPIC, schema=schema, context=context)
-        self._arm = SceneUpdateChannel(ARM, context=context) if player.source.view.links else None
+        self._arm = SceneUpdateChannel(ARM, context=context) if _drawn(player.source.view) else None
 
     def end(self) -> None:
         """Ends the thread."""
@@ -108,9 +109,9 @@ class _Sender(threading.Thread):
                 known = {name: float(v) for name, v in zip(COLUMNS, row, strict=True) if math.isfinite(v)}
                 self._contact.log(known, log_time=_stamp(known["t"]))
             if self._arm is not None and len(rows):
-                self._draw(dict(zip(COLUMNS, map(float, rows[-1]), strict=True)))
+                self._draw(rows[-1])
 
-    def _draw(self, row: dict[str, float]) -> None:
+    def _draw(self, row: NDArray[np.float64]) -> None:
         from foxglove.messages import (
             Color,
             LinePrimitive,
@@ -120,13 +121,11 @@ class _Sender(threading.Thread):
             SceneUpdate,
         )
 
-        angle, x, y = 0.0, 0.0, 0.0
-        points = [Point3(x=0.0, y=0.0, z=0.0)]
-        for length, name in zip(self._player.source.view.links, ("q1", "q2", "q3"), strict=True):
-            angle += row[name]
-            x, y = x + length * math.cos(angle), y + length * math.sin(angle)
-            points.append(Point3(x=x, y=y, z=0.0))
-        wall = [Point3(x=row["wall"], y=side, z=0.0) for side in (-0.2, 0.2)]
+        view = self._player.source.view
+        points = [Point3(x=float(x), y=float(y), z=float(z)) for x, y, z in self._player.source.bones(row)]
+        wall = [
+            Point3(x=float(x), y=float(y), z=float(z)) for x, y, z in _surface(view, float(row[AT["wall"]]))
+        ]
         lines = [
             LinePrimitive(
                 type=LinePrimitiveLineType.LineStrip,
@@ -141,7 +140,19 @@ class _Sender(threading.Thread):
         ]
         assert self._arm is not None
         entity = SceneEntity(frame_id="base", id="arm", lines=lines)
-        self._arm.log(SceneUpdate(entities=[entity]), log_time=_stamp(row["t"]))
+        self._arm.log(SceneUpdate(entities=[entity]), log_time=_stamp(float(row[AT["t"]])))
+
+
+def _drawn(view: View) -> bool:
+    """Whether there is an arm."""
+    return bool(view.links) or view.scene is not None
+
+
+def _surface(view: View, wall: float) -> list[tuple[float, ...]]:
+    """Points of the line that stands for the surface [m]."""
+    if view.scene is not None:
+        return [*view.scene.patch, view.scene.patch[0]]
+    return [(wall, side, 0.0) for side in (-0.2, 0.2)]
 
 
 def _stamp(time: float) -> int:

@@ -1,38 +1,50 @@
 /* The live page: rows come in by a socket, and are drawn when the screen is. */
 "use strict";
 (() => {
-  const { Group, chart, figure, make, token, repaints } = palpate;
+  const { figure, make, token, repaints } = palpate;
   const view = JSON.parse(document.getElementById("view").textContent);
-  const at = Object.fromEntries(view.columns.map((name, i) => [name, i]));
   const there = new Set(view.shown);
-  const SPAN = 10, MOST = Math.ceil(1.1 * SPAN / view.stride);
+  const SPAN = 10, MOST = Math.ceil(1.1 * SPAN / view.stride), CALM = 100;
   const byId = (id) => document.getElementById(id);
   const live = { frames: 0, rows: 0, latest: {}, state: null };
   palpate.live = live;
+  const write = (node, text) => { if (node.textContent !== text) node.textContent = text; };
 
-  /* Rows of the last seconds, by column; what is no number is a gap. */
+  /* Rows of the last seconds, by column, and the ends of the intervals; what is no number is a gap. */
   const columns = Object.fromEntries(view.columns.map((name) => [name, []]));
-  const forget = () => { for (const list of Object.values(columns)) list.length = 0; };
+  const halves = ["K", "B"].filter((name) => there.has(`${name}_half`));
+  for (const name of halves) { columns[`${name}_high`] = []; columns[`${name}_low`] = []; }
+  const forget = () => { for (const list of Object.values(columns)) list.length = 0; strips.forEach((one) => one.forget()); };
   const take = (numbers) => {
     const width = view.columns.length, count = numbers.length / width;
     view.columns.forEach((name, i) => {
-      const list = columns[name];
-      for (let row = 0; row < count; row++) { const value = numbers[row * width + i]; list.push(Number.isNaN(value) ? null : value); }
-      if (list.length > 1.2 * MOST) list.splice(0, list.length - MOST);
+      for (let row = 0; row < count; row++) { const value = numbers[row * width + i]; columns[name].push(Number.isNaN(value) ? null : value); }
     });
+    for (const name of halves) {
+      const value = columns[name], half = columns[`${name}_half`];
+      for (let i = value.length - count; i < value.length; i++) {
+        const known = value[i] != null && half[i] != null;
+        columns[`${name}_high`].push(known ? value[i] + half[i] : null); columns[`${name}_low`].push(known ? value[i] - half[i] : null);
+      }
+    }
+    if (columns.t.length > 1.2 * MOST) for (const list of Object.values(columns)) list.splice(0, list.length - MOST);
     live.rows += count;
   };
   const last = (name) => { const list = columns[name]; return list.length ? list[list.length - 1] : null; };
 
   /* Charts */
-  const group = new Group();
-  const interval = (name) => {
-    const value = columns[name], half = columns[`${name}_half`];
-    return [value.map((v, i) => (v == null || half[i] == null ? null : v + half[i])), value.map((v, i) => (v == null || half[i] == null ? null : v - half[i]))];
+  const around = (names) => () => {
+    let low = Infinity, high = -Infinity;
+    const t = columns.t, end = t.length - 1;
+    for (const name of names) for (let i = end, list = columns[name]; i >= 0 && t[i] >= t[end] - SPAN; i--) {
+      const v = list[i];
+      if (v != null) { if (v < low) low = v; if (v > high) high = v; }
+    }
+    return high > low ? [low, high] : high === low ? [low - Math.abs(low) / 10 - 1e-9, high + Math.abs(high) / 10 + 1e-9] : null;
   };
-  const about = (name, share) => (_, low, high) => {
+  const about = (name, share) => () => {
     const value = last(`${name}_true`) ?? last(name), half = last(`${name}_half`) ?? 0;
-    if (value == null) return low == null ? [0, 1] : [low, high];
+    if (value == null) return null;
     const room = Math.max(share * value, 2.2 * half, 1.3 * Math.abs((last(name) ?? value) - value));
     return [value - room, value + room];
   };
@@ -45,33 +57,31 @@
     { label: "truth", kind: "known", colour: "ink", of: `${name}_true` },
   ];
   const offered = [
-    { title: "Force", y: `force [${view.units.measured}]`, needs: "measured", series: [measured, force, desired], digits: 4 },
+    { title: "Force", y: `force [${view.units.measured}]`, needs: "measured", series: [measured, force, desired] },
     { title: "Position", y: `${view.position} [${view.units.depth}]`, needs: "depth", series: [{ label: view.position, kind: "own", colour: "F", of: "depth" }] },
-    { title: "Stiffness K", y: "K [N/m]", needs: "K", series: estimated("K"), range: about("K", 0.06) },
-    { title: "Damping B", y: "B [N s/m]", needs: "B", series: estimated("B"), range: about("B", 0.3) },
+    { title: "Stiffness K", y: "K [N/m]", needs: "K", series: estimated("K"), wanted: about("K", 0.06) },
+    { title: "Damping B", y: "B [N s/m]", needs: "B", series: estimated("B"), wanted: about("B", 0.3) },
   ].filter((one) => there.has(one.needs));
   offered.forEach((one) => { one.series = one.series.filter((s) => there.has((s.of || s.high).replace("_high", "_half"))); });
-  const fed = () => {
-    const more = {};
-    for (const name of ["K", "B"]) if (there.has(`${name}_half`)) [more[`${name}_high`], more[`${name}_low`]] = interval(name);
-    return { ...columns, ...more };
-  };
   const tall = () => (innerWidth > 900 ? Math.max(120, (innerHeight - 150) / offered.length - 44) : 170);
-  const charts = offered.map((one, i) => {
+  const strip = palpate.strips(columns, SPAN);
+  const strips = offered.map((one, i) => {
     const host = make("figure");
     byId("charts").append(host);
-    return chart(host, { ...one, moving: true, height: tall(), alt: one.title, wordless: i > 0, x: i === offered.length - 1 ? "time [s]" : "" }, fed(), group);
+    return strip(host, { wanted: around(one.series.map((s) => s.of)), ...one, height: tall, wordless: i > 0, x: i === offered.length - 1 ? "time [s]" : "" });
   });
-  addEventListener("resize", () => charts.forEach((one) => one.tall(tall())));
 
   /* The picture: an arm, or force over position where no joints are known */
   const canvas = byId("picture");
-  const arm = view.links.length ? palpate.arm(canvas, view.links) : null;
+  const arm = view.scene ? palpate.arm3(canvas, view.scene, view.rest, () => { fresh = true; }) : view.links.length ? palpate.arm(canvas, view.links) : null;
+  const joints = view.rest.map((_, i) => `q${i + 1}`);
   const press = () => {
     const dense = devicePixelRatio || 1, wide = canvas.clientWidth, high = canvas.clientHeight, draw = canvas.getContext("2d");
     canvas.width = Math.round(wide * dense); canvas.height = Math.round(high * dense);
     draw.setTransform(dense, 0, 0, dense, 0, 0);
-    const x = columns.depth, y = columns.measured, known = x.map((v, i) => v != null && y[i] != null);
+    /* One row in four: on a screen the others lie between. */
+    const few = (list) => list.filter((_, i) => (list.length - 1 - i) % 4 === 0);
+    const x = few(columns.depth), y = few(columns.measured), known = x.map((v, i) => v != null && y[i] != null);
     const xs = x.filter((_, i) => known[i]), ys = y.filter((_, i) => known[i]);
     draw.font = "12px sans-serif"; draw.fillStyle = token("quiet");
     draw.textAlign = "left"; draw.fillText(`force [${view.units.measured}]`, 14, 20);
@@ -93,7 +103,7 @@
   };
   const picture = () => {
     if (!arm) { press(); return; }
-    const q = ["q1", "q2", "q3"].map(last), force = last("force") ?? last("measured") ?? 0;
+    const q = joints.map(last), force = last("force") ?? last("measured") ?? 0;
     if (q.some((v) => v == null)) return;
     arm({ q, rest: view.rest.length ? view.rest : null, wall: last("wall"), depth: last("depth") / 1000, force });
   };
@@ -143,8 +153,11 @@
   const card = () => {
     if (!there.has("K")) { byId("stiffness").style.display = "none"; return; }
     const K = last("K"), half = last("K_half"), truth = last("K_true"), told = live.state && live.state.stability;
-    const number = byId("number");
-    number.replaceChildren(...(K == null ? [make("span", { class: "quiet" }, "not known yet")] : [figure(K, 4), make("i", {}, ` ± ${figure(half, 2)}`), make("small", {}, " N/m")]));
+    const number = byId("number"), text = K == null ? "" : `${figure(K, 4)} ${figure(half, 2)}`;
+    if (number.dataset.text !== text) {
+      number.dataset.text = text;
+      number.replaceChildren(...(K == null ? [make("span", { class: "quiet" }, "not known yet")] : [figure(K, 4), make("i", {}, ` ± ${figure(half, 2)}`), make("small", {}, " N/m")]));
+    }
     const stable = told && told.stiffness, values = [K, K && K - half > 0 ? K - half : null, K && K + half, truth, ...(stable || [])].filter((v) => v > 0);
     if (!values.length) return;
     scale(Math.min(...values), Math.max(...values));
@@ -155,8 +168,8 @@
     const kinds = [["estimate", "estimate"], ["interval", "95 %"], ...(stable ? [["stable", told.label]] : []), ...(truth ? [["truth", "truth"]] : [])];
     const key = JSON.stringify(kinds);
     if (key !== legendOf) { legendOf = key; legend.replaceChildren(...kinds.map(([kind, text]) => entry(kind, text))); }
-    byId("stiffness-what").textContent = stable ? "estimated, and where the loop is stable" : "estimated";
-    byId("why").textContent = told ? told.text : "";
+    write(byId("stiffness-what"), stable ? `estimated, and ${told.label}` : "estimated");
+    write(byId("why"), told ? told.text : "");
   };
 
   /* How it stands */
@@ -173,7 +186,7 @@
     if (seed && document.activeElement !== seed) seed.value = state.seed;
     const pace = byId("pace");
     if (pace) pace.value = String(state.pace);
-    charts.forEach((one) => { one.marks = state.happened; });
+    strips.forEach((one) => { one.marks = state.happened; });
     const over = state.ended.startsWith("done");
     alerts.replaceChildren(
       ...(away ? [alert("", "The program is gone.", away)] : []),
@@ -209,34 +222,38 @@
     });
   };
 
-  /* Drawn once a frame, and only if there is something new */
-  const draw = () => {
+  /* Drawn once a frame, and only if there is something new; words and the card ten times a second. */
+  let calm = 0;
+  const draw = (clock) => {
     requestAnimationFrame(draw);
     if (!fresh) return;
     fresh = false;
     live.frames++;
     for (const name of view.columns) live.latest[name] = last(name);
-    const now = last("t");
-    phase();
-    if (now != null) {
-      const first = columns.t[0], from = now - SPAN > first ? now - SPAN : first, rows = fed();
-      for (const one of charts) one.put(rows, from, from + SPAN);
-      byId("clock").textContent = `${now.toFixed(2)} s`;
-      const moment = byId("moment");
-      if (moment && document.activeElement !== moment) moment.value = now;
-      if (moment) byId("of").textContent = `${now.toFixed(1)} of ${view.span[1].toFixed(1)} s`;
-    }
-    picture(); card();
+    strips.forEach((one) => one.draw());
+    picture();
+    if (clock - calm < CALM) { fresh = fresh || !live.state || !live.state.playing; return; }
+    calm = clock;
+    told();
+  };
+  const told = () => {
+    const now = last("t"), moment = byId("moment");
+    phase(); card(); strips.forEach((one) => one.read());
+    if (now == null) return;
+    write(byId("clock"), `${now.toFixed(2)} s`);
+    if (moment && document.activeElement !== moment) moment.value = now;
+    if (moment) write(byId("of"), `${now.toFixed(1)} of ${view.span[1].toFixed(1)} s`);
   };
   const again = () => { fresh = true; };
   repaints.add(again);
   new ResizeObserver(again).observe(canvas);
 
   /* Buttons and keys */
+  const forceSlider = sliders["force.first"] || sliders.force;
   const paused = () => live.state && !live.state.playing;
   const acts = {
     " ": () => send({ do: "pause", on: !paused() }), ".": () => send({ do: "step" }), 0: () => send({ do: "reset" }),
-    ArrowUp: () => sliders["force.first"]?.by((v) => v + 1), ArrowDown: () => sliders["force.first"]?.by((v) => v - 1),
+    ArrowUp: () => forceSlider?.by((v) => v + 1), ArrowDown: () => forceSlider?.by((v) => v - 1),
     "[": () => sliders["surface.stiffness"]?.by((v) => v / 1.1), "]": () => sliders["surface.stiffness"]?.by((v) => v * 1.1),
   };
   byId("pause").addEventListener("click", acts[" "]);

@@ -6,7 +6,7 @@ from dataclasses import replace
 from importlib import resources
 
 from palpate.live.view import View
-from palpate.report.look.assets import ARM, CHARTS, data, policy, scripts
+from palpate.report.look.assets import ARM, ARM_IN_SPACE, CHARTS, data, policy, scripts
 from palpate.report.page import render
 from palpate.text import shown
 
@@ -23,7 +23,8 @@ PAGE_HEADERS = {
 
 def page(view: View) -> str:
     """The page of a source as HTML."""
-    codes = (*scripts(*CHARTS, *ARM), _own("live.js"))
+    drawing = ARM if view.scene is None else ARM_IN_SPACE
+    codes = (*scripts(*CHARTS, *drawing), _own("strip.js"), _own("live.js"))
     shown_view = replace(
         view,
         title=shown(view.title),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.live.view import AT, COLUMNS, STRIDE, Happened, State, View
+from palpate.live.view import AT, COLUMNS, STRIDE, Happened, State, View, planar_bones
 
 Array = NDArray[np.float64]
 
@@ -74,6 +74,15 @@ class Replay:
         self.state = State()
         self._first = float(t[0]) if first is None else first
         self._now, self._at = self._first, 0
+
+    @property
+    def loop_asked(self) -> None:
+        """A log has no loop."""
+        return
+
+    def bones(self, row: Array) -> Array:
+        """See `Source`."""
+        return planar_bones(self.view.links, row)
 
     def reset(self, seed: int | None = None) -> None:
         """To the beginning; a log has no noise to draw again."""

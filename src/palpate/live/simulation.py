@@ -17,14 +17,25 @@ from palpate.bench.row import COLUMNS as ROW
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.bench.tick import LoopState, compiled_march, start_at
 from palpate.environments import SurfaceState
-from palpate.errors import InputError
-from palpate.live.view import AT, COLUMNS, LEAD, STRIDE, Happened, Slider, State, View
+from palpate.live.stability import OfBench
+from palpate.live.view import (
+    AT,
+    COLUMNS,
+    LEAD,
+    LONGEST,
+    OVER,
+    STRIDE,
+    Happened,
+    Slider,
+    State,
+    View,
+    check_ahead,
+    planar_bones,
+)
 from palpate.text import shown
 
 Array = NDArray[np.float64]
 
-LONGEST = 3600.0
-"""Of a run [s]; then it stands still."""
 _FROM = {name: i for i, name in enumerate(ROW)}
 _TAKEN = {
     "t": "t",
@@ -90,11 +101,7 @@ class Simulation:
 
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
-        if seed is not None:
-            if seed < 0:
-                raise InputError(f"the seed must be 0 or above, got {seed}")
-            self.state.seed = seed
-        self.state.ended, self.state.happened, self.state.warning = "", [], ""
+        self.state.begin(seed)
         first = 0 if self._whole else self._before_touch()
         self._begin()
         while self._k < first:
@@ -114,9 +121,7 @@ class Simulation:
             self.state.ended = f"{ending.end}: {ending.why}"
             self.state.note(Happened(float(out[-1, 0]) if len(out) else 0.0, ending.end, "fail"))
         elif self._k >= LONGEST * self._rate:
-            self.state.ended = (
-                f"done: an hour of simulated time ({LONGEST:.0f} s) is over; reset to begin again"
-            )
+            self.state.ended = OVER
         return self._shown(out)
 
     def set(self, key: str, value: float) -> None:
@@ -125,13 +130,7 @@ class Simulation:
         Raises:
             InputError: none of that key, or a value out of range.
         """
-        slider = next((one for one in self.view.sliders if one.key == key), None)
-        if slider is None:
-            raise InputError(f"there is no slider {key!r}")
-        if not slider.low <= value <= slider.high:
-            raise InputError(
-                f"{slider.name} must be from {slider.low:g} to {slider.high:g} {slider.unit}, got {value:g}"
-            )
+        self.view.check(key, value)
         if value == self.state.values[key]:
             return
         experiment = changed(self._experiment, {key: value})
@@ -150,10 +149,7 @@ class Simulation:
             InputError: it lies behind, or beyond a run's longest.
         """
         here = self._k / self._rate
-        if not here <= time <= LONGEST:
-            raise InputError(
-                f"a simulation runs on to {here:.3f} s at the earliest and {LONGEST:.0f} s at the latest"
-            )
+        check_ahead(here, time)
         while self._k < round(time * self._rate) and not self.state.ended:
             self.advance(min(2.5, STRIDE * round((time - self._k / self._rate) / STRIDE) or STRIDE))
 
@@ -161,6 +157,15 @@ class Simulation:
     def experiment(self) -> Experiment:
         """As it now is, with what was changed."""
         return self._experiment
+
+    @property
+    def loop_asked(self) -> OfBench:
+        """The loop as it now is, for `palpate.live.stability`."""
+        return OfBench(self._experiment)
+
+    def bones(self, row: Array) -> Array:
+        """See `Source`."""
+        return planar_bones(self.view.links, row)
 
     def _begin(self) -> None:
         bench: Bench = build(self._experiment)

@@ -1,7 +1,7 @@
 """Where the loop that runs is stable: by proof where its law has one, else by its linear model.
 
-It takes seconds, so it is worked out by a process of its own (`python -m palpate.live.stability`): an experiment as
-JSON on each line in, answers as JSON lines out, the last of each with `"more": false`.
+It takes seconds, so it is worked out by a process of its own (`python -m palpate.live.stability`): a loop as JSON on
+each line in, answers as JSON lines out, the last of each with `"more": false`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import cache
 from math import isfinite
 from typing import Any
 
@@ -20,14 +21,39 @@ import msgspec
 from palpate.bench.experiments.tables import Experiment
 from palpate.controllers import CautiousController
 from palpate.errors import InputError, PalpateError
+from palpate.force.certificate import Claim
+from palpate.force.gains import Gains
 from palpate.report.numbers import plain, quantity
 
 Answer = dict[str, Any]
 NICE = 10
 
 
+class OfBench(msgspec.Struct, frozen=True, tag="bench"):
+    """The loop of an experiment."""
+
+    experiment: Experiment
+
+
+class OfArm(msgspec.Struct, frozen=True, tag="arm"):
+    """The cautious law on an arm, before a surface.
+
+    Args:
+        gains: of the law.
+        stiffness: of the surface [N/m].
+        damping: of the surface [N s/m].
+    """
+
+    gains: Gains
+    stiffness: float
+    damping: float
+
+
+Asked = OfBench | OfArm
+
+
 class Stability:
-    """Answers for the experiment that was asked for last.
+    """Answers for the loop that was asked for last.
 
     Args:
         told: called, from another thread, when there is a new answer.
@@ -41,9 +67,9 @@ class Stability:
         self._thread = threading.Thread(target=self._work, name="stability", daemon=True)
         self._thread.start()
 
-    def ask(self, experiment: Experiment) -> None:
+    def ask(self, asked: Asked) -> None:
         """Has it worked out for these numbers; what was asked before is forgotten."""
-        self._wanted = msgspec.json.encode(experiment) + b"\n"
+        self._wanted = msgspec.json.encode(asked) + b"\n"
         self.latest = {"stiffness": None, "proved": False, "text": "Working out where this loop is stable …"}
         self._news.set()
 
@@ -86,48 +112,100 @@ class Stability:
                 return
 
 
-def answers(experiment: Experiment) -> Iterator[Answer]:
+def answers(asked: Asked) -> Iterator[Answer]:
     """What can be said of the loop, sooner and then better.
 
     Each has `stiffness`, the interval of surfaces [N/m] or None, and its `label`; `proved`, whether this surface is one
     of which a proof holds; and `text`.
     """
     try:
-        if isinstance(experiment.controller, CautiousController):
-            yield _proved(experiment, experiment.controller)
+        if isinstance(asked, OfArm):
+            yield from _of_arm(asked)
+        elif isinstance(asked.experiment.controller, CautiousController):
+            yield from _of_arm(_as_arm(asked.experiment, asked.experiment.controller))
         else:
-            yield from _linear(experiment)
+            yield from _linear(asked.experiment)
     except PalpateError as error:
         yield {"stiffness": None, "proved": False, "text": f"Nothing is known of its stability: {error}."}
 
 
-def _proved(experiment: Experiment, table: CautiousController) -> Answer:
-    """By the certificate of the cautious law on the bench's arm."""
+def _as_arm(experiment: Experiment, table: CautiousController) -> OfArm:
+    """The cautious law on the bench's arm."""
     from palpate.controllers.cautious_press import gains_on_bench
-    from palpate.force import certify
-    from palpate.force.steps import margins
 
     made: Any = gains_on_bench
     gains = made(1.0 / experiment.run.rate, table.spring, table.damping, table.force, table.cap)
-    certificate = certify(gains, adapting=False)
-    held = next((claim for claim in certificate.claims if claim.kind == "held"), None)
+    return OfArm(gains, float(experiment.surface.stiffness), float(experiment.surface.damping))
+
+
+def _of_arm(asked: OfArm) -> Iterator[Answer]:
+    """By the certificate of the cautious law: its gain held at that for the stiffest surface, then while it adapts."""
+    from palpate.force.steps import margins
+
+    gains = asked.gains
     own = margins(gains, gains.seen_cap)
     said = f"On the stiffest surface {_margins(own.gain, own.phase, own.delay)}."
-    if held is None or not certificate.check().holds:
-        return {"stiffness": None, "proved": False, "text": f"Nothing could be proved. {said}"}
-    bare = experiment.surface.damping == 0.0
-    text = (
-        f"Proved stable with its gain held: every surface without damping from {quantity(held.low, 'N/m')} to "
-        f"{quantity(held.high, 'N/m')}. {said}"
-    )
-    if not bare:
-        text += " This surface has damping, of which nothing is proved."
-    return {
-        "stiffness": [held.low, held.high],
-        "proved": bare,
-        "label": "proved stable" if bare else "proved stable, were there no damping",
-        "text": text,
+    nothing: Answer = {"stiffness": None, "proved": False, "label": ""}
+    yield nothing | {"text": f"Proving where it is stable … {said}", "more": True}
+    held = next((claim for claim in _proof(_encoded(gains), False) if claim.kind == "held"), None)
+    if held is None:
+        yield nothing | {"text": f"Nothing could be proved. {said}"}
+        return
+    covered = _covers(held, gains, asked.stiffness, asked.damping)
+    told = f"Proved stable with its gain held: K + B/θ from {_span(held, gains)}, {_damped(held)}."
+    if not covered:
+        told += " Of the surface as it now is, that proof says nothing."
+    answer: Answer = {
+        "stiffness": list(_ends(held, gains)),
+        "proved": covered,
+        "label": "proved stable" if covered else "proved stable of others",
     }
+    yield answer | {"text": f"{told} {said}", "more": True}
+    adapting = [claim for claim in _proof(_encoded(gains), True) if claim.kind == "adapting"]
+    if adapting:
+        every = (
+            "every constant K"
+            if gains.arm.kind == "position"
+            else f"every constant K from {_span(adapting[0], gains)}"
+        )
+        told += f" Proved while it adapts: {every}, {_damped(adapting[0])}."
+    yield answer | {"text": f"{told} {said}"}
+
+
+@cache
+def _proof(encoded: bytes, adapting: bool) -> tuple[Claim, ...]:
+    """What is proved of gains, given as JSON; a proof that does not hold proves nothing."""
+    from palpate.force import certify
+
+    certificate = certify(msgspec.json.decode(encoded, type=Gains), adapting=adapting)
+    return certificate.claims if certificate.check().holds else ()
+
+
+def _encoded(gains: Gains) -> bytes:
+    return msgspec.json.encode(gains)
+
+
+def _ends(claim: Claim, gains: Gains) -> tuple[float, float]:
+    """A claim's surfaces by their own K + B/theta [N/m]; one that the arm's own spring hides is at the cap."""
+    if gains.arm.kind == "torque":
+        return claim.low, claim.high
+    return gains.arm.surface(claim.low), min(gains.arm.surface(claim.high), gains.cap)
+
+
+def _span(claim: Claim, gains: Gains) -> str:
+    low, high = _ends(claim, gains)
+    return f"{quantity(low, 'N/m', digits=3)} to {quantity(high, 'N/m', digits=3)}"
+
+
+def _damped(claim: Claim) -> str:
+    return "without damping" if claim.most == 0.0 else f"B/K up to {quantity(claim.most, 's', digits=2)}"
+
+
+def _covers(claim: Claim, gains: Gains, stiffness: float, damping: float) -> bool:
+    """Whether a surface is one of the claim's."""
+    total = stiffness + damping / gains.theta
+    felt = gains.arm.seen(total) if gains.arm.kind == "position" else total
+    return claim.low <= felt <= claim.high and claim.least <= damping / stiffness <= claim.most
 
 
 def _linear(experiment: Experiment) -> Iterator[Answer]:
@@ -169,9 +247,9 @@ def main() -> None:
     """Answers line by line until its input ends."""
     os.nice(NICE)
     for line in sys.stdin.buffer:
-        experiment = msgspec.json.decode(line, type=Experiment)
+        asked = msgspec.json.decode(line, type=Asked)
         last: Answer = {"stiffness": None, "proved": False, "text": ""}
-        for answer in answers(experiment):
+        for answer in answers(asked):
             last = answer
             if answer.get("more"):
                 _say(answer)

@@ -8,6 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.errors import InputError
+
 Array = NDArray[np.float64]
 
 COLUMNS = (
@@ -22,18 +24,27 @@ COLUMNS = (
     "B_half",
     "K_true",
     "B_true",
+    "wall",
+    "phase",
     "q1",
     "q2",
     "q3",
-    "wall",
-    "phase",
+    "q4",
+    "q5",
+    "q6",
+    "q7",
 )
 """Time [s]; measured, true and desired force [N]; depth in the surface [mm]; K [N/m] and B [N s/m], half-widths of
-their 95 % intervals, and the truth; joint angles [rad]; the undeformed surface [m]; phase (`bench.sequence`)."""
+their 95 % intervals, and the truth; the undeformed surface [m]; phase (`bench.sequence`); joint positions [rad, m]."""
 AT = {name: i for i, name in enumerate(COLUMNS)}
+JOINTS = 7
+"""That there is room for."""
 STRIDE = 0.005
 """Time between two rows that are shown [s]."""
 
+LONGEST = 3600.0
+"""Of a simulation [s]; then it stands still."""
+OVER = f"done: an hour of simulated time ({LONGEST:.0f} s) is over; reset to begin again"
 LEAD = 1.5
 """Before the first touch, from where it begins [s]: the long search for the surface is passed over."""
 
@@ -63,6 +74,27 @@ class Slider:
 
 
 @dataclass(frozen=True)
+class Scene:
+    """A serial arm and the surface before it, as they are drawn in space; everything in the base's axes [m].
+
+    Args:
+        at: origin of each joint's frame in the one before, shape (n, 3).
+        turn: its axes there, shape (n, 3, 3).
+        slide: whether each joint is prismatic.
+        tip: in the last joint's frame.
+        normal: into the surface.
+        patch: corners of the surface around the tip, shape (4, 3).
+    """
+
+    at: tuple[tuple[float, ...], ...]
+    turn: tuple[tuple[tuple[float, ...], ...], ...]
+    slide: tuple[bool, ...]
+    tip: tuple[float, ...]
+    normal: tuple[float, ...]
+    patch: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
 class View:
     """What is shown.
 
@@ -73,7 +105,9 @@ class View:
         rate: rows a second of the data itself [Hz].
         shown: which of `COLUMNS` there are.
         sliders: what can be changed.
-        links: lengths of the arm [m]; empty if there is none to draw.
+        stride: time between two rows [s].
+        links: lengths of a planar arm [m]; empty if there is none to draw.
+        scene: a serial arm in space; None if there is none to draw.
         rest: joint angles at the start [rad].
         span: of a replay's time, first and last [s].
         notes: what a reader should know, such as what the log lacks.
@@ -87,8 +121,10 @@ class View:
     kind: str
     rate: float
     shown: tuple[str, ...] = COLUMNS
+    stride: float = STRIDE
     sliders: tuple[Slider, ...] = ()
     links: tuple[float, ...] = ()
+    scene: Scene | None = None
     rest: tuple[float, ...] = ()
     span: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
@@ -98,7 +134,21 @@ class View:
 
     def to_json(self) -> dict[str, Any]:
         """As the page takes it."""
-        return {"columns": COLUMNS, "stride": STRIDE, **asdict(self)}
+        return {"columns": COLUMNS, **asdict(self)}
+
+    def check(self, key: str, value: float) -> None:
+        """Refuses a slider that is not there, or stands elsewhere than it can.
+
+        Raises:
+            InputError: it is one.
+        """
+        slider = next((one for one in self.sliders if one.key == key), None)
+        if slider is None:
+            raise InputError(f"there is no slider {key!r}")
+        if not slider.low <= value <= slider.high:
+            raise InputError(
+                f"{slider.name} must be from {slider.low:g} to {slider.high:g} {slider.unit}, got {value:g}"
+            )
 
 
 @dataclass(frozen=True)
@@ -136,9 +186,42 @@ class State:
 
     _MOST = 12
 
+    def begin(self, seed: int | None) -> None:
+        """At the beginning again, with another seed if one is given.
+
+        Raises:
+            InputError: a seed below 0.
+        """
+        if seed is not None:
+            if seed < 0:
+                raise InputError(f"the seed must be 0 or above, got {seed}")
+            self.seed = seed
+        self.ended, self.happened, self.warning = "", [], ""
+
     def note(self, happened: Happened) -> None:
         """Keeps a moment, and forgets those long ago."""
         self.happened = [*self.happened, happened][-self._MOST :]
+
+
+def check_ahead(here: float, time: float) -> None:
+    """Refuses a moment that a simulation cannot run on to.
+
+    Raises:
+        InputError: it lies behind, or beyond the longest run.
+    """
+    if not here <= time <= LONGEST:
+        raise InputError(
+            f"a simulation runs on to {here:.3f} s at the earliest and {LONGEST:.0f} s at the latest"
+        )
+
+
+def planar_bones(links: tuple[float, ...], row: Array) -> Array:
+    """Places of a planar arm's joints and its tip at a row [m], shape (n + 1, 3); of no links, the base alone."""
+    angles = np.cumsum(row[AT["q1"] : AT["q1"] + len(links)])
+    ends = np.cumsum(
+        np.array(links)[:, None] * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles]), axis=0
+    )
+    return np.vstack([np.zeros((1, 3)), ends])
 
 
 class Source(Protocol):
@@ -146,6 +229,15 @@ class Source(Protocol):
 
     view: View
     state: State
+
+    @property
+    def loop_asked(self) -> Any:
+        """What `palpate.live.stability` is asked of it; None where there is no loop."""
+        ...
+
+    def bones(self, row: Array) -> Array:
+        """Places of the joints that are drawn, the base first and the tip last [m], shape (n, 3)."""
+        ...
 
     def advance(self, seconds: float) -> Array:
         """The rows of the time to come, shape (n, len(COLUMNS)); none once it has ended."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from palpate._jit import Bound
 from palpate._vector import ZERO3, Mat3, Vec3, Vec6
+from palpate.bench.given_motion import rest_for
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
@@ -128,6 +129,19 @@ class SimulatedArm:
 
     def close(self) -> None:
         """Nothing is left to do."""
+
+    def change_surface(self, cell: Cell) -> None:
+        """Puts the surface of another cell in the place of this one's, such that it bears the force of this moment.
+
+        Palpate's own physics alone can; MuJoCo keeps the step it began with.
+        """
+        touching, old = self._touch.surface, self.cell.surface
+        if touching.contact == 1.0:
+            force = float(old.force(touching, touching.deflection, touching.rate))  # type: ignore[no-untyped-call]
+            depth = rest_for(cell.surface, force, touching.rate)
+            cell = cell._replace(place=self.cell.place + touching.deflection - depth)
+            self._touch = self._touch._replace(surface=touching._replace(deflection=depth))
+        self.cell = cell
 
     @property
     def truth(self) -> Truth:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from palpate.bench.sequence import CONTACT
 from palpate.press.setting import Place
 from palpate.records import Record
+from palpate.report.look.tokens import DATA, PAIRS
 from palpate.robots.serial.serial_arm import SerialArm
 
 Array = NDArray[np.float64]
@@ -24,16 +25,20 @@ _ARM = (20.0, 20.0, 420.0, 380.0)
 _TIP = (480.0, 30.0, 400.0, 170.0)
 _FORCE = (480.0, 250.0, 400.0, 130.0)
 
-_STYLE = """
-:root{--ink:#1a1d21;--quiet:#59616c;--line:#c9cfd8;--link:#35506e;--tip:#268c5e;--want:#d07a05;--ground:#eef1f5}
-@media (prefers-color-scheme:dark){:root{--ink:#e8eaed;--quiet:#a3abb6;--line:#3a424c;--link:#9fc0e4;--tip:#5cc08b;
---want:#f0a35b;--ground:#1b1f25}}
-text{font:13px system-ui,sans-serif;fill:var(--quiet)} .arm{fill:none;stroke:var(--link);stroke-width:11;
-stroke-linejoin:round;stroke-linecap:round} .joint{fill:var(--ground);stroke:var(--link)}
-.surface{fill:var(--line);stroke:var(--quiet)} .flat{fill:none;stroke:var(--line);stroke-width:1}
-.force{fill:none;stroke:var(--tip);stroke-width:1.6} .want{fill:none;stroke:var(--want);stroke-width:1.4}
-.dot,.probe{fill:var(--tip)} .shadow{fill:none;stroke:var(--line);stroke-width:7;stroke-linejoin:round}
-"""
+
+def _sheet() -> str:
+    """Colours by light and by dark: the pages' own."""
+    names = ("ink", "quiet", "line", "card")
+    light, dark = ("".join(f"--{name}:{PAIRS[name][i]};" for name in names) for i in (0, 1))
+    return (
+        f":root{{{light}--tip:{DATA['F']}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
+        "text{font:13px system-ui,sans-serif;fill:var(--quiet)} .arm{fill:none;stroke:var(--ink);stroke-width:11;"
+        "stroke-linejoin:round;stroke-linecap:round} .joint{fill:var(--card);stroke:var(--ink)}\n"
+        ".surface{fill:var(--line);stroke:var(--quiet)} .flat{fill:none;stroke:var(--line);stroke-width:1}\n"
+        ".force{fill:none;stroke:var(--tip);stroke-width:1.6}\n"
+        ".want{fill:none;stroke:var(--ink);stroke-width:1.25;stroke-dasharray:5 4}\n"
+        ".dot,.probe{fill:var(--tip)} .shadow{fill:none;stroke:var(--line);stroke-width:7;stroke-linejoin:round}\n"
+    )
 
 
 _MARKER = (
@@ -70,7 +75,7 @@ def film(record: Record, arm: SerialArm, place: Place) -> str:
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDE:g} {_HIGH:g}">',
         "<!-- Made by palpate -->",
-        f"<style>{_STYLE}</style>",
+        f"<style>{_sheet()}</style>",
         *_arm_panel(arm, place, q, seconds),
         *_tip_panel(record, rows, seconds),
         *_force_panel(record, rows, seconds),

@@ -80,7 +80,7 @@ def _force_table(summary: dict[str, Any]) -> Table:
             ("contact at", f"{summary['contact_at_s']:.3f} s"),
             ("approach", f"{1e3 * loop['approach_speed_m_s']:.2f} mm/s"),
             ("desired at the end", f"{f['desired_N']:.2f} N"),
-            ("error, last second", f"{f['error_N']:+.3f} ± {f['std_N']:.3f} N"),
+            ("error, last second", f"{f['error_N']:+.3f} N, standard deviation {f['std_N']:.3f} N"),
             ("settling to 5 %", settling),
             ("overshoot", NONE if f["overshoot_N"] is None else f"{f['overshoot_N']:.2f} N"),
             ("noise of the measured force", f"{f['measured_std_N']:.3f} N"),
@@ -116,9 +116,9 @@ def _arm(record: Record, asked: Asked, path: Path) -> str:
         flat = asked.place.axes[1:][:, [i, j]]
         for direction in flat:
             ends = centre[[i, j]] + along[:, None] * direction
-            axis.plot(ends[:, 0], ends[:, 1], color=style.RED, linewidth=2)
-        axis.plot(bones[:, i], bones[:, j], "-o", color=style.BLUE, linewidth=4, markersize=6)
-        axis.plot(bones[-1, i], bones[-1, j], "o", color=style.GREEN)
+            axis.plot(ends[:, 0], ends[:, 1], color=style.MEASURED, linewidth=2)
+        axis.plot(bones[:, i], bones[:, j], "-o", color=style.INK, linewidth=4, markersize=6)
+        axis.plot(bones[-1, i], bones[-1, j], "o", color=style.F)
         axis.set(xlabel=f"{names[0]} [m]", ylabel=f"{names[1]} [m]", aspect="equal")
     style.save(drawing, path)
     return "The arm at the end of the press from two sides: joints, tip, and the surface around it."
@@ -127,16 +127,16 @@ def _arm(record: Record, asked: Asked, path: Path) -> str:
 def _force(record: Record, asked: Asked, path: Path) -> str:
     drawing, (force, depth) = style.figure(2, height=2.1)
     t, pressing = record["t"], record["phase"] == CONTACT
-    force.plot(t, record["force_sampled"], color="#a9c8e4", linewidth=0.7, label="reading")
-    force.plot(t, record["force"], color=style.BLUE, linewidth=1.4, label="true")
+    force.plot(t, record["force_sampled"], color=style.MEASURED, linewidth=0.7, label="reading")
+    force.plot(t, record["force"], color=style.F, linewidth=1.4, label="true")
     wanted = np.where(pressing, record["force_desired"], np.nan)
-    force.plot(t, wanted, color=style.ORANGE, linewidth=1.2, label="desired")
+    force.plot(t, wanted, **style.KNOWN, label="desired")
     force.set_ylabel("force [N]")
     style.legend(force)
-    depth.plot(t, 1e3 * record["penetration"], color=style.BLUE, linewidth=1.4, label="true")
+    depth.plot(t, 1e3 * record["penetration"], color=style.F, linewidth=1.4, label="true")
     seen = record["x_measured"] - asked.place.place
-    depth.plot(t, 1e3 * seen, color=style.GREY, linewidth=1.0, label="by the encoders")
-    depth.axhline(0.0, color=style.RED, linewidth=0.8)
+    depth.plot(t, 1e3 * seen, color=style.MEASURED, linewidth=1.0, label="by the encoders")
+    depth.axhline(0.0, color=style.QUIET, linewidth=0.8)
     depth.set(xlabel="time [s]", ylabel="depth [mm]")
     style.legend(depth)
     style.save(drawing, path)

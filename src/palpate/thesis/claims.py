@@ -38,6 +38,17 @@ class Claim:
     note: str
 
 
+@dataclass
+class Done:
+    """One study as it stands on disk."""
+
+    number: str
+    title: str
+    caption: str
+    claims: list[Claim]
+    seconds: float
+
+
 def decided(holds: bool) -> Verdict:
     """The verdict of a claim that can be checked."""
     return "reproduced" if holds else "differs"
@@ -59,6 +70,11 @@ def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
     lost = f", {len(v) - len(good)} without a value" if len(good) < len(v) else ""
     low, middle, high = (f"{x:.{digits}g}" for x in (good.min(), np.median(good), good.max()))
     return f"{middle}{tail} ({low} to {high}, {len(v)} seeds{lost})"
+
+
+def rows_of(studies: Sequence[Done]) -> list[Claim]:
+    """The claims of these studies, one count for the page, claims.json and the terminal: see `with_wholes`."""
+    return with_wholes([claim for done in studies for claim in done.claims])
 
 
 def with_wholes(claims: Sequence[Claim]) -> list[Claim]:

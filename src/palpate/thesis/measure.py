@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -14,23 +13,13 @@ from palpate._jit import sources_stamp
 from palpate.errors import InputError
 from palpate.files import check_place, kept_folder, signed, write_json, write_text
 from palpate.report import style
-from palpate.report.page import png, render
-from palpate.thesis.claims import Claim, with_wholes
+from palpate.report.page import png
+from palpate.thesis.claims import Done, rows_of
 from palpate.thesis.figure import Study
+from palpate.thesis.page import index_page
 from palpate.thesis.runs import Runs
 
 STATE = "thesis.json"
-
-
-@dataclass
-class Done:
-    """One study as it stands on disk."""
-
-    number: str
-    title: str
-    caption: str
-    claims: list[Claim]
-    seconds: float
 
 
 @dataclass
@@ -108,29 +97,12 @@ def _stored(folder: Path) -> State | None:
 def _write(state: State, folder: Path) -> None:
     """Everything that the folder says, each file whole or as it was."""
     finished = [state.done[n] for n in state.wanted if n in state.done]
-    rows = with_wholes([claim for done in finished for claim in done.claims])
-    write_json(folder / "claims.json", [asdict(row) for row in rows])
-    write_text(folder / "index.html", index_page(state, finished, folder))
+    write_json(folder / "claims.json", [asdict(row) for row in rows_of(finished)])
+    pictures = {done.number: png(folder / f"{done.number}.png") for done in finished}
+    missing = [number for number in state.wanted if number not in state.done]
+    write_text(folder / "index.html", index_page(finished, pictures, missing, state.command))
     _write_state(state, folder)
 
 
 def _write_state(state: State, folder: Path) -> None:
     write_json(folder / STATE, signed(asdict(state)))
-
-
-def index_page(state: State, done: Sequence[Done], folder: Path) -> str:
-    """The page as HTML, figures included; it opens without a network."""
-    claims = [claim for d in done for claim in d.claims]
-    return render(
-        "index.html",
-        "palpate.thesis",
-        title="The thesis, measured again",
-        done=done,
-        images={d.number: png(folder / f"{d.number}.png") for d in done},
-        verdicts=Counter(claim.verdict for claim in claims),
-        claims=with_wholes(claims),
-        figure={claim.id: d.number for d in done for claim in d.claims},
-        missing=[n for n in state.wanted if n not in state.done],
-        command=state.command,
-        seconds=sum(d.seconds for d in done),
-    )

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLORS = {"K": style.BLUE, "B": style.ORANGE, "M": style.GREEN}
+COLORS = {"K": style.K, "B": style.B, "M": style.M}
+Array = NDArray[np.float64]
+
 _SHOWN = 4.0  # s of the desired force; more would be a block of ink
 
 
@@ -45,20 +47,19 @@ def _force(axis: Axes, found: Design) -> None:
     shown = time <= found.settle + _SHOWN if isinstance(found.wave, Multisine) else np.full(len(time), True)
     low = min(prediction.force[0] for prediction in found.predictions)
     high = max(prediction.force[1] for prediction in found.predictions)
-    axis.axhspan(low, high, color=style.BLUE, alpha=0.12, linewidth=0, label="force on the surfaces")
+    axis.axhspan(low, high, color=style.F, alpha=0.12, linewidth=0, label="force on the surfaces")
     axis.plot(time[shown], force[shown], color=style.INK, linewidth=0.8, label="desired force")
     for limit in (budget.mean - budget.swing, budget.mean + budget.swing):
-        axis.axhline(limit, color=style.RED, linewidth=0.8, linestyle="--")
+        axis.axhline(limit, **style.KNOWN)
     rest = "" if shown.all() else f", the first {time[shown][-1]:g} of {time[-1]:g} s"
     axis.set(xlabel=f"time [s]{rest}", ylabel="force [N]", xlim=(0, time[shown][-1]))
     style.legend(axis)
 
 
 def _spectrum(axis: Axes, found: Design) -> None:
-    frequencies, amplitudes = _lines(found)
-    forces = np.abs(found.question.forces(2 * np.pi * frequencies, amplitudes))
+    frequencies, amplitudes, forces = lines_of(found)
     axis.fill_between(
-        frequencies, forces.min(axis=0), forces.max(axis=0), color=style.BLUE, alpha=0.2, linewidth=0,
+        frequencies, forces.min(axis=0), forces.max(axis=0), color=style.F, alpha=0.2, linewidth=0,
         label="on the surfaces",
     )  # fmt: skip
     if isinstance(found.wave, Multisine):
@@ -74,18 +75,30 @@ def _spectrum(axis: Axes, found: Design) -> None:
     style.legend(axis)
 
 
-def _lines(found: Design) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def lines_of(found: Design) -> tuple[Array, Array, Array]:
+    """Frequencies [Hz], amplitudes of the desired force [N], and those on each surface, shapes (n,), (n,), (s, n)."""
     wave = found.wave
     if isinstance(wave, Multisine):
-        return np.array(wave.frequencies), np.array(wave.amplitudes)
-    frequencies = np.geomspace(wave.low, wave.high, 100)
-    return frequencies, np.full(len(frequencies), wave.amplitude)
+        frequencies, amplitudes = np.array(wave.frequencies), np.array(wave.amplitudes)
+    else:
+        frequencies = np.geomspace(wave.low, wave.high, 100)
+        amplitudes = np.full(len(frequencies), wave.amplitude)
+    return frequencies, amplitudes, np.abs(found.question.forces(2 * np.pi * frequencies, amplitudes))
+
+
+def curves(found: Design) -> tuple[Array, dict[str, Array]]:
+    """Durations [s], shape (n,), and each parameter's 95 % half-width as a share, on each surface, shape (s, n)."""
+    seconds = np.geomspace(0.1 * found.seconds, 5 * found.seconds, 40)
+    names = found.predictions[0].names
+    return seconds, {
+        name: np.array([[one.half_widths(t)[name] for t in seconds] for one in found.predictions])
+        for name in names
+    }
 
 
 def _precision(axis: Axes, found: Design) -> None:
-    seconds = np.geomspace(0.1 * found.seconds, 5 * found.seconds, 40)
-    for name in found.predictions[0].names:
-        widths = np.array([[p.half_widths(t)[name] for t in seconds] for p in found.predictions])
+    seconds, known = curves(found)
+    for name, widths in known.items():
         axis.fill_between(
             seconds, 100 * widths.min(axis=0), 100 * widths.max(axis=0), color=COLORS[name], alpha=0.25,
             linewidth=0,
@@ -94,7 +107,7 @@ def _precision(axis: Axes, found: Design) -> None:
         if name in found.question.precision:
             asked = 100 * found.question.precision[name]
             axis.plot(seconds[[0, -1]], [asked, asked], color=COLORS[name], linewidth=0.9, linestyle="--")
-    axis.axvline(found.seconds, color=style.GREY, linewidth=0.9)
+    axis.axvline(found.seconds, color=style.MEASURED, linewidth=0.9)
     for which in "xy":
         style.logarithmic(axis, which)
     axis.set(xlabel="seconds of it", ylabel="95 % half-width [%]")

@@ -16,22 +16,24 @@ from palpate.references.waves import Multisine
 
 def show(found: Design, remedies: list[Remedy], console: Console) -> None:
     """Print a design, and for an infeasible one what would help."""
-    console.print(_wave(found))
+    console.print(describe_wave(found))
     console.print(_table(found))
     console.print(_verdict(found))
     for remedy in remedies:
-        console.print(f"  {remedy.change}: {_told(remedy, found)}")
+        console.print(f"  {remedy.change}: {describe_remedy(remedy, found)}")
 
 
-def _told(remedy: Remedy, found: Design) -> str:
-    reached = _reached(remedy.reached, found)
+def describe_remedy(remedy: Remedy, found: Design) -> str:
+    """Whether a change would be enough, in words."""
+    to = reached(remedy.reached, found)
     if remedy.enough:
-        return f"enough, {reached}"
+        return f"enough, {to}"
     later = f"; enough after {ceil(remedy.needed)} s" if remedy.needed <= LONGEST else ""
-    return f"not enough, {reached}{later}"
+    return f"not enough, {to}{later}"
 
 
-def _wave(found: Design) -> str:
+def describe_wave(found: Design) -> str:
+    """What is asked for, in a line."""
     budget, wave = found.question.budget, found.wave
     if isinstance(wave, Multisine):
         low, high = wave.frequencies[0], wave.frequencies[-1]
@@ -74,20 +76,22 @@ def _row(prediction: Prediction, found: Design) -> list[str | Text]:
 
 def _width(width: float, asked: float | None) -> Text:
     style = "" if asked is None else "green" if width <= asked else "red"
-    return Text(_percent(width), style=style)
+    return Text(percent(width), style=style)
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """A share in per cent."""
     return f"{100 * share:.2g} %" if share < 1 else "> 100 %"
 
 
 def _verdict(found: Design) -> str:
     worst = found.made.worst(found.seconds)
-    asked = ", ".join(f"{name} {_percent(share)}" for name, share in found.question.precision.items())
+    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.question.precision.items())
     if found.feasible:
-        return f"every surface to within {asked} (95 %): yes, predicted {_reached(worst, found)}"
-    return f"every surface to within {asked} (95 %): no; the best is {_reached(worst, found)}. What would change that:"
+        return f"every surface to within {asked} (95 %): yes, predicted {reached(worst, found)}"
+    return f"every surface to within {asked} (95 %): no; the best is {reached(worst, found)}. What would change that:"
 
 
-def _reached(widths: dict[str, float], found: Design) -> str:
-    return ", ".join(f"{name} {_percent(widths[name])}" for name in found.question.precision)
+def reached(widths: dict[str, float], found: Design) -> str:
+    """The half-widths of what was asked for."""
+    return ", ".join(f"{name} {percent(widths[name])}" for name in found.question.precision)

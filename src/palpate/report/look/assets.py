@@ -14,6 +14,7 @@ from palpate.report.look.tokens import style_sheet
 CHARTS = ("vendor/uplot/uPlot.iife.min.js", "charts.js")
 """What draws charts that can be zoomed and read."""
 ARM = ("arm.js",)
+ARM_IN_SPACE = (*ARM, "arm3.js")
 TABLES = ("tables.js",)
 
 

@@ -1,7 +1,12 @@
 /* Charts that can be zoomed and read: one cursor and one zoom for all charts of a group. */
 "use strict";
 const palpate = (() => {
-  const token = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  /* Colours are asked of the style sheet once, and again where light turns to dark. */
+  const known = new Map();
+  const token = (name) => {
+    if (!known.has(name)) known.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+    return known.get(name);
+  };
   const faded = (name, alpha) => {
     const code = parseInt(token(name).slice(1), 16);
     return `rgba(${code >> 16},${(code >> 8) & 255},${code & 255},${alpha})`;
@@ -13,7 +18,7 @@ const palpate = (() => {
     return node;
   };
   const repaints = new Set();
-  const repaint = () => repaints.forEach((again) => again());
+  const repaint = () => { known.clear(); repaints.forEach((again) => again()); };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   addEventListener("beforeprint", () => { document.documentElement.dataset.print = ""; repaint(); });
   addEventListener("afterprint", () => { delete document.documentElement.dataset.print; repaint(); });
@@ -25,7 +30,7 @@ const palpate = (() => {
     const behind = digits - 1 - Math.floor(Math.log10(Math.abs(value)));
     return value.toFixed(Math.max(0, Math.min(6, behind))).replace("-", "−");
   };
-  const tick = (value) => String(+value.toPrecision(6)).replace("-", "−");
+  const tick = (value) => (value == null ? "" : String(+value.toPrecision(6)).replace("-", "−"));
 
   /* A column as `look/columns.py` packs it; gaps are null. */
   const unpacked = (column) => {
@@ -43,6 +48,7 @@ const palpate = (() => {
     measured: { width: 1, dash: [] },
     own: { width: 2, dash: [] },
     known: { width: 1.25, dash: [5, 4] },
+    model: { width: 1.5, dash: [] },
     other: { width: 1.5, dash: [8, 3] },
   };
   const sample = (one) => {
@@ -60,6 +66,8 @@ const palpate = (() => {
       "stroke-dasharray": KINDS[one.kind].dash.join(" ") });
     return svg;
   };
+
+  const legend = (series) => make("ul", { class: "legend" }, ...series.filter((one) => !one.silent).map((one) => make("li", {}, sample(one), one.label)));
 
   class Group {
     constructor() { this.charts = []; this.watchers = []; this.busy = false; }
@@ -84,15 +92,13 @@ const palpate = (() => {
 
   /* A chart in `host`.
      spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, text,
-     tone}], shades [[from, to]], moving (fed, not zoomed), series [{label, kind, colour, of}] or [{..., kind: "band",
-     low, high}], where `of`, `low` and `high` name columns; `x_of` names that of x. */
+     tone}], shades [[from, to]], series [{label, kind, colour, of}] or [{..., kind: "band",
+     low, high}], where `of`, `low` and `high` name columns, and a `silent` one has no place in the legend; `x_of` names that of x; log
+     is "x", "y" or "xy". */
   const chart = (host, spec, columns, group = new Group()) => {
     const self = { marks: spec.marks || [] };
-    const legend = make("ul", { class: "legend" });
-    for (const one of spec.series) legend.append(make("li", {}, sample(one), one.label));
-    const head = make("header", {}, make("h3", {}, spec.title), legend);
     const whole = make("button", { type: "button", class: "screen" }, "whole range");
-    if (!spec.moving) head.append(whole);
+    const head = make("header", {}, make("h3", {}, spec.title), legend(spec.series), whole);
     const read = make("span", { class: "read" });
     const box = make("div", { class: "plot", tabindex: 0, role: "img", "aria-label": spec.alt || spec.title });
     host.classList.add("chart");
@@ -111,12 +117,14 @@ const palpate = (() => {
         series.push({ stroke: () => token(one.colour), ...KINDS[one.kind], points: { show: false } });
       }
     }
+    const logarithmic = { x: (spec.log || "").includes("x"), y: (spec.log || "").includes("y") };
     const taken = (from) => [from[spec.x_of || "t"], ...rows.map((name) => from[name])];
-    let data = taken(columns);
+    const data = taken(columns);
     const height = () => (innerWidth < 560 ? Math.round(0.85 * spec.height) : spec.height);
     const ends = () => [data[0][0], data[0][data[0].length - 1]];
     const padded = (_, low, high) => {
       if (low == null) return [0, 1];
+      if (logarithmic.y) return [low / 1.3, high * 1.3];
       const room = 0.07 * (high - low) || Math.abs(high) * 0.1 || 1;
       return [low - room, high + room];
     };
@@ -131,7 +139,9 @@ const palpate = (() => {
       let k = 1;
       for (const one of spec.series) {
         const digits = spec.digits || 4;
-        if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i], digits)} to ${figure(data[k][i], digits)}`); k += 2; }
+        if (one.kind === "band" && one.silent) k += 2;
+        else if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i], digits)} to ${figure(data[k][i], digits)}`); k += 2; }
+        else if (one.silent) k++;
         else parts.push(`${one.label} ${figure(data[k++][i], digits)}`);
       }
       read.textContent = parts.join("  ·  ");
@@ -173,9 +183,10 @@ const palpate = (() => {
     let ready = false;
     const plot = new uPlot({
       width: Math.max(160, box.clientWidth), height: height(), padding: [8, 8, 0, 0], legend: { show: false },
-      cursor: { y: false, drag: { x: !spec.moving, y: false, setScale: !spec.moving }, points: { show: false },
+      cursor: { y: false, drag: { x: true, y: false, setScale: true }, points: { show: false },
         bind: { dblclick: () => () => full() } },
-      scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: { range: spec.range || padded } },
+      scales: { x: { time: false, distr: logarithmic.x ? 3 : 1, range: (_, low, high) => [low, high] },
+        y: { distr: logarithmic.y ? 3 : 1, range: spec.range || padded } },
       axes: [axis({ size: 26 }), axis({ size: spec.left || 52, space: 22 })],
       series, bands,
       hooks: {
@@ -185,7 +196,7 @@ const palpate = (() => {
           tell(x); group.point(x, self);
         }],
         setScale: [(own, key) => {
-          if (key !== "x" || spec.moving) return;
+          if (key !== "x") return;
           const { min, max } = own.scales.x, [low, high] = ends();
           host.classList.toggle("zoomed", max - min < 0.995 * (high - low));
           if (ready) group.zoom(min, max, self);
@@ -199,11 +210,6 @@ const palpate = (() => {
       plot.setCursor({ left: x == null ? -10 : plot.valToPos(x, "x"), top: 10 }, false, false);
       tell(x);
     };
-    self.put = (from, low, high) => {
-      data = taken(from);
-      plot.batch(() => { plot.setData(data, false); plot.setScale("x", { min: low, max: high }); });
-    };
-    self.tall = (pixels) => { spec.height = pixels; plot.setSize({ width: plot.width, height: height() }); };
     whole.addEventListener("click", full);
     let at = null;
     box.addEventListener("keydown", (event) => {
@@ -215,7 +221,7 @@ const palpate = (() => {
         "-": () => plot.setScale("x", { min: Math.max(low, middle - wide), max: Math.min(high, middle + wide) }),
         0: () => { at = null; full(); }, Escape: () => { at = null; full(); },
       };
-      if (spec.moving || !moves[event.key]) return;
+      if (!moves[event.key]) return;
       event.preventDefault();
       moves[event.key](); self.point(at); group.point(at, self);
     });
@@ -228,5 +234,5 @@ const palpate = (() => {
     setTimeout(() => { ready = true; });
     return self;
   };
-  return { Group, chart, unpacked, figure, token, faded, make, repaints };
+  return { Group, KINDS, chart, unpacked, figure, token, faded, make, legend, repaints };
 })();

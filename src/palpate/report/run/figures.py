@@ -128,7 +128,7 @@ def _force(record: Record) -> Figure:
 
 def _identification(record: Record) -> Figure:
     figure, axes = style.figure(3, height=2.0)
-    since, shown = _around_contact(record)
+    since, shown = _around_contact(record, 0.0)  # before it there is nothing to be known
     truth: dict[str, Any] = record.meta["truth"]
     units = (("K", "N/m"), ("B", "N s/m"), ("M", "kg"))
     for axis, (name, unit) in zip(axes, units, strict=True):
@@ -175,11 +175,11 @@ def _torque(record: Record) -> Figure:
     return figure
 
 
-def _around_contact(record: Record) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _around_contact(record: Record, before: float = BEFORE) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Time since contact [s] where it is shown, and which rows those are."""
     t = record["t"]
     start = t[np.argmax(record["phase"] == CONTACT)]
-    shown = t >= start - BEFORE
+    shown = t >= start - before
     return (t - start)[shown], shown
 
 

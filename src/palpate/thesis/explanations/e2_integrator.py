@@ -163,7 +163,7 @@ def plot(data: Data) -> Figure:
 def _overlay(axis: Axes, name: str, pair: Pair) -> None:
     axis.plot(pair.network.t, pair.network.true, color=PALE, linewidth=3.2, label="network")
     axis.plot(pair.pi.t, pair.pi.true, color=style.BLUE, linewidth=1.0, label="PI")
-    axis.plot(pair.pi.t, pair.pi.desired, color=style.ORANGE, linewidth=1.0, label="desired")
+    axis.plot(pair.pi.t, pair.pi.desired, **style.KNOWN, label="desired")
     limits(axis, pair.network)
     axis.set_title(
         f"{name}: {_median(pair.network_found):.2f} and {_median(pair.pi_found):.2f} N",

@@ -221,7 +221,7 @@ def _over_time(axis: Axes, data: Data, name: str) -> None:
     axis.set_xlim(0.0, PARAMETERS.run.press)
     if name == "force":
         first = next(iter(data.traces.values()))
-        axis.plot(first.t, first.desired, color=style.ORANGE, linewidth=1.2, label="desired")
+        axis.plot(first.t, first.desired, **style.KNOWN, label="desired")
         axis.set_ylabel("true force [N]")
         style.legend(axis)
     else:

@@ -196,8 +196,8 @@ def plot(data: Data) -> Figure:
     drawing, grid = panels([2.6, 2.6], 2, 11.0)
     force = across(grid[0])
     c = data.record
-    force.plot(c["t"], c["force"], color=style.BLUE, linewidth=1.1, label="true force")
-    force.plot(c["t"], c["force_desired"], color=style.ORANGE, linewidth=1.2, label="desired")
+    force.plot(c["t"], c["force"], color=style.F, linewidth=1.1, label="true force")
+    force.plot(c["t"], c["force_desired"], **style.KNOWN, label="desired")
     force.plot(c["t"], 1e4 * c["gain"], color=style.GREY, linewidth=0.9, label="gain [0.1 mN m per N and ms]")
     force.set(xlabel="time [s]", ylabel="force [N]", xlim=(0.0, DURATION), ylim=(0.0, 27.0))
     style.legend(force)

@@ -180,7 +180,7 @@ def _force(axis: Axes, data: Data) -> None:
     titled(axis, "a", "Force through the switch")
     for (name, (t, force)), color in zip(data.shown.items(), (style.BLUE, style.GREEN), strict=True):
         axis.plot(t, force, color=color, linewidth=1.0, label=name)
-    axis.plot([0.0, AFTER], [DESIRED, DESIRED], color=style.ORANGE, linewidth=1.2, label="desired")
+    axis.plot([0.0, AFTER], [DESIRED, DESIRED], **style.KNOWN, label="desired")
     axis.axvspan(-BEFORE, 0.0, color=style.GREY, alpha=0.10, linewidth=0.0)
     axis.text(-0.98 * BEFORE, 21.0, "position control", fontsize=8, color=style.INK)
     axis.text(0.02, 23.2, "hybrid control", fontsize=8, color=style.INK)

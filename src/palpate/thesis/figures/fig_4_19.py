@@ -251,7 +251,7 @@ def _column(axes: Sequence[Axes], traces: Mapping[str, Trace]) -> None:
         for axis, signal in zip(axes, (one.force, one.y, one.phi), strict=True):
             axis.plot(one.t, signal, label=name, **options)
     shown = traces[LAWS[0]]
-    axes[0].plot(shown.t, shown.desired, color=style.ORANGE, linewidth=1.2, label="desired")
+    axes[0].plot(shown.t, shown.desired, **style.KNOWN, label="desired")
     quiet = [traces[name] for name in LAWS[:2]]
     for axis, signals in zip(axes[1:], ([q.y for q in quiet], [q.phi for q in quiet]), strict=True):
         axis.set_ylim(*_limits(signals))

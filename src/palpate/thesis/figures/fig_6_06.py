@@ -177,7 +177,7 @@ def plot(data: Data) -> Figure:
 
 def _curves(axes: list[Axes], data: Data) -> None:
     t = np.arange(len(data.press.force)) * network.TICK
-    axes[0].plot(t, data.press.force, color=style.INK, linewidth=0.6, alpha=0.5, label="measured")
+    axes[0].plot(t, data.press.force, color=style.MEASURED, linewidth=0.6, label="measured")
     for rate, color in SHOWN.items():
         curve = data.curves[rate]
         axes[0].plot(t, data.press.force - curve[:, 3], color=color, linewidth=1.0, label=f"{rate:g}")

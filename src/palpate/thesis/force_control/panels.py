@@ -43,10 +43,10 @@ def across(row: Sequence[Axes]) -> Axes:
 
 
 def force_panel(axis: Axes, shown: Slot, title: str = "") -> None:
-    """Desired and measured force, the true one paler, and where a motor is at its limit."""
-    axis.plot(shown.t, shown.measured, color=style.BLUE, linewidth=0.7, label="measured")
-    axis.plot(shown.t, shown.true, color=PALE, linewidth=1.8, label="true")
-    axis.plot(shown.t, shown.desired, color=style.ORANGE, linewidth=1.4, label="desired")
+    """Measured, true and desired force, and where a motor is at its limit."""
+    axis.plot(shown.t, shown.measured, color=style.MEASURED, linewidth=0.7, label="measured")
+    axis.plot(shown.t, shown.true, color=style.F, linewidth=1.6, label="true")
+    axis.plot(shown.t, shown.desired, **style.KNOWN, label="desired")
     limits(axis, shown)
     axis.set(ylabel="force [N]", xlabel="time since contact [s]", xlim=(shown.t[0], shown.t[-1]))
     axis.set_title(title, loc="left", fontsize=9.5)

@@ -214,7 +214,7 @@ def _starts(axis: Axes, data: Data, limit: float) -> None:
 def _conditions(axis: Axes, data: Data, limit: float) -> None:
     panels.titled(axis, "h", f"Time to settle under varied conditions, {next(iter(data.found))}")
     nominal = {"as chosen": next(iter(data.found.values()))}
-    colors = {"$K_e$": style.BLUE, "$B_e$": style.VIOLET, "$M_e$": style.GREY}
+    colors = {"$K_e$": style.K, "$B_e$": style.B, "$M_e$": style.M}
     groups = {
         f"${key}_e$": {
             name: [getattr(f, f"settled_{key}") for f in some]

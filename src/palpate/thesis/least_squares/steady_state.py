@@ -236,7 +236,7 @@ def _ratios(axis: Axes, data: Data) -> None:
         axis.plot(middle, i, "|", color=style.INK, markersize=13, label="ratios, middle" if i == 0 else None)
         fit = median([getattr(f, key) for f in data.found[surface]]) / data.truth[key]
         axis.plot(fit, i, "o", color=style.BLUE, label="least squares" if i == 0 else None)
-    axis.axvline(1.0, color=style.GREEN, linewidth=1.0, label="true")
+    axis.axvline(1.0, **style.KNOWN, label="true")
     axis.set_xscale("symlog", linthresh=2.0)
     axis.set_yticks(range(3), ["K", "B", "M"])
     axis.set_ylim(2.6, -0.6)

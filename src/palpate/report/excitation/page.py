@@ -1,0 +1,189 @@
+"""The page of a designed excitation: whether it is enough, how well each surface will be known, and the force."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.excitation import Design, Remedy
+from palpate.files import write_text
+from palpate.report import style
+from palpate.report.excitation.figure import curves, draw, lines_of
+from palpate.report.excitation.table import describe_remedy, describe_wave, percent, reached
+from palpate.report.identification.words import CALLED
+from palpate.report.look.assets import CHARTS, TABLES, data, scripts
+from palpate.report.look.columns import packed, thinned
+from palpate.report.numbers import plain, quantity
+from palpate.report.page import embedded, render
+from palpate.report.svg import svg
+
+Array = NDArray[np.float64]
+
+_ROWS = 6000
+"""Of the desired force that lie in the page, its peaks among them."""
+_SHOWN = 4.0
+"""Of it that is seen at first, after it has settled [s]."""
+_UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
+
+
+def write_page(found: Design, helps: Sequence[Remedy], path: Path, command: str) -> Path:
+    """Writes the page of a design, whole or not at all; it opens without a network.
+
+    Args:
+        found: the design.
+        helps: what would make it enough, if it is not.
+        path: of the HTML file.
+        command: that made it.
+    """
+    write_text(path, page(found, helps, command))
+    return path
+
+
+def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
+    """The page as HTML."""
+    told = describe_wave(found)
+    codes = (*scripts(*CHARTS, *TABLES), _own("excitation.js"))
+    with style.inked():
+        still = embedded(svg(draw(found)), "image/svg+xml")
+    return render(
+        "excitation.html",
+        "palpate.report.excitation",
+        room="excite",
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
+        title="A force to ask for",
+        sentence=_sentence(found),
+        about=f"{told[0].upper()}{told[1:]}.",
+        feasible=found.feasible,
+        cards=_cards(found),
+        remedies=[(one.change, describe_remedy(one, found), one.enough) for one in helps],
+        head=_head(found),
+        rows=_rows(found),
+        charts=data(_charts(found)),
+        still=still,
+        scripts=codes,
+        command=command,
+    )
+
+
+def _sentence(found: Design) -> str:
+    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.question.precision.items())
+    lasts = quantity(found.seconds, "s", digits=3)
+    if found.feasible:
+        return (
+            f"In {lasts} this force shows every surface of the range as precisely as asked: {asked} (95 %)."
+        )
+    worst = reached(found.made.worst(found.seconds), found)
+    return f"No force within these limits shows every surface as precisely as asked, {asked} (95 %): at best {worst}."
+
+
+def _cards(found: Design) -> list[dict[str, str]]:
+    """Each parameter on the surface that shows it worst, then how long and how hard."""
+    worst = found.made.worst(found.seconds)
+    cards = []
+    for name in found.predictions[0].names:
+        asked = found.question.precision.get(name)
+        enough = asked is None or worst[name] <= asked
+        cards.append(
+            {
+                "name": name,
+                "called": CALLED[name],
+                "colour": name,
+                "number": f"± {percent(worst[name])}",
+                "tone": "none" if asked is None else "ok" if enough else "fail",
+                "verdict": "not asked for" if asked is None else "enough" if enough else "not enough",
+                "why": "95 % half-width on the worst surface"
+                + ("" if asked is None else f"; asked: {percent(asked)}"),
+            }
+        )
+    _, force = found.force()
+    low = min(one.force[0] for one in found.predictions)
+    high = max(one.force[1] for one in found.predictions)
+    settles = f" after {quantity(found.settle, 's', digits=2)} to settle" if found.settle else ""
+    cards.append(
+        {"name": "Duration", "number": quantity(found.seconds, "s", digits=3), "why": f"of pressing{settles}"}
+    )
+    cards.append(
+        {
+            "name": "Force",
+            "number": f"{plain(low, 3)} to {plain(high, 3)} N",
+            "why": f"on the surfaces; asked of the robot: {plain(force.min(), 3)} to {plain(force.max(), 3)} N",
+        }
+    )
+    return cards
+
+
+def _head(found: Design) -> list[str]:
+    names = found.predictions[0].names
+    return [
+        *(f"{name} [{_UNITS[name]}]" for name in names),
+        *(f"{name}, 95 %" for name in names),
+        "force [N]",
+        "travel [µm]",
+    ]
+
+
+def _rows(found: Design) -> list[list[dict[str, Any]]]:
+    """Each surface: its numbers, how well they will be known, and what it will feel."""
+    rows = []
+    for one in found.predictions:
+        widths = one.half_widths(found.seconds)
+        values = dict(zip(("K", "B", "M"), one.surface.values, strict=True))
+        row = [{"text": plain(values[name], 4), "value": values[name]} for name in one.names]
+        for name in one.names:
+            asked = found.question.precision.get(name)
+            bad = asked is not None and widths[name] > asked
+            row.append({"text": f"± {percent(widths[name])}", "value": widths[name], "bad": bad})
+        low, high = one.force
+        row += [
+            {"text": f"{low:.1f} to {high:.1f}", "value": high},
+            {"text": f"{1e6 * one.travel:.0f}", "value": one.travel},
+        ]
+        rows.append(row)
+    return rows
+
+
+def _charts(found: Design) -> dict[str, Any]:
+    """What the charts are drawn from, in plain values."""
+    time, force = found.force()
+    rows = thinned(force, _ROWS)
+    budget = found.question.budget
+    n = len(rows)
+    over = {
+        "t": time[rows],
+        "desired": force[rows],
+        "low": np.full(n, min(one.force[0] for one in found.predictions)),
+        "high": np.full(n, max(one.force[1] for one in found.predictions)),
+        "least": np.full(n, budget.mean - budget.swing),
+        "most": np.full(n, budget.mean + budget.swing),
+    }
+    frequencies, amplitudes, felt = lines_of(found)
+    seconds, widths = curves(found)
+    precision: dict[str, Array] = {"t": seconds}
+    for name, share in widths.items():
+        precision |= {f"{name}_low": 100 * share.min(axis=0), f"{name}_high": 100 * share.max(axis=0)}
+        asked = found.question.precision.get(name)
+        if asked is not None:
+            precision[f"{name}_asked"] = np.full(len(seconds), 100 * asked)
+    return {
+        "force": {name: packed(values) for name, values in over.items()},
+        "spectrum": {
+            "t": frequencies.tolist(),
+            "desired": amplitudes.tolist(),
+            "low": felt.min(axis=0).tolist(),
+            "high": felt.max(axis=0).tolist(),
+        },
+        "precision": {name: values.tolist() for name, values in precision.items()},
+        "names": list(widths),
+        "window": [0.0, min(float(time[-1]), found.settle + _SHOWN)],
+        "seconds": found.seconds,
+    }
+
+
+def _own(name: str) -> str:
+    return (resources.files("palpate.report.excitation") / name).read_text(encoding="utf-8")

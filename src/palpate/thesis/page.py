@@ -1,0 +1,80 @@
+"""The page of the thesis, measured again: contents, a filter, and each figure beside its claims."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from importlib import resources
+from typing import Any
+
+from palpate.report.page import render
+from palpate.thesis.claims import Claim, Done, rows_of
+
+TONES = {"reproduced": "ok", "differs": "warn", "not checkable": "none"}
+_CHAPTERS = (("2.", "Earlier schemes"), ("3.", "The bench"), ("4.", "The controllers"))
+_PARTS = ((5, "Least squares"), (9, "Neural identifier"), (17, "Force control"))
+"""Of chapter 6, by the last figure of each."""
+_OTHERS = "Explanations"
+
+
+def index_page(
+    done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], command: str
+) -> str:
+    """The page as HTML, figures included; it opens without a network.
+
+    Args:
+        done: studies that are measured.
+        pictures: of each by its number, as the source of an image.
+        missing: numbers of those still to come.
+        command: that measures them.
+    """
+    rows = rows_of(done)
+    own = {claim.id: one.number for one in done for claim in one.claims}
+    return render(
+        "index.html",
+        "palpate.thesis",
+        room="thesis",
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
+        title="The thesis, measured again",
+        chapters=_chapters(done, rows, own),
+        count=len(rows),
+        verdicts=Counter(claim.verdict for claim in rows),
+        tones=TONES,
+        images=pictures,
+        missing=missing,
+        command=command,
+        seconds=sum(one.seconds for one in done),
+        scripts=(_script(),),
+    )
+
+
+def _chapters(done: Sequence[Done], rows: Sequence[Claim], own: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Studies by chapter, each with its rows; the row of a whole stands with its first part."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for one in done:
+        claims = [row for row in rows if _home(row, own) == one.number]
+        found.setdefault(chapter_of(one.number), []).append({"study": one, "claims": claims})
+    return [{"title": title, "studies": studies} for title, studies in found.items()]
+
+
+def _home(row: Claim, own: Mapping[str, str]) -> str | None:
+    """The study under which a row stands."""
+    if row.id in own:
+        return own[row.id]
+    return next((number for name, number in own.items() if name.startswith(f"{row.id}.")), None)
+
+
+def chapter_of(number: str) -> str:
+    """What a figure is about, by its number in the thesis; names of ours are explanations."""
+    for start, title in _CHAPTERS:
+        if number.startswith(start):
+            return title
+    head, _, tail = number.partition(".")
+    if head != "6" or not tail.isdigit():
+        return _OTHERS
+    return next((title for last, title in _PARTS if int(tail) <= last), _OTHERS)
+
+
+def _script() -> str:
+    return (resources.files("palpate.thesis") / "index.js").read_text(encoding="utf-8")

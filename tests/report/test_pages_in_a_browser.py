@@ -1,0 +1,80 @@
+"""Pages as a reader opens them: from a file, by light and by dark, on a wide screen and on a telephone's."""
+
+import shlex
+from contextlib import contextmanager
+
+import pytest
+
+from palpate.cli import main
+
+EXCITE = (
+    "excite --stiffness 3:8:N/mm --damping 100:300 --mass 0.1 --force 15 --peak 20 --duration 4 --no-figure"
+)
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """A designed excitation that is enough, one that is not, and a figure of the thesis."""
+    folder = tmp_path_factory.mktemp("pages")
+    enough, little, thesis = folder / "enough.html", folder / "little.html", folder / "thesis"
+    assert main([*shlex.split(EXCITE), "--precision", "K=20%", "--report", str(enough)]) == 0
+    assert main([*shlex.split(EXCITE), "--precision", "M=1%", "--report", str(little)]) == 1
+    assert main(["thesis", "3.7", "--out", str(thesis)]) == 0
+    return {"enough": enough, "little": little, "thesis": thesis / "index.html"}
+
+
+@contextmanager
+def opened(browser, path, **context):
+    own = browser.new_context(**context)
+    page = own.new_page()
+    page.set_default_timeout(60_000)
+    page.asked, page.wrong = [], []
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.on("pageerror", lambda error: page.wrong.append(str(error)))
+    page.on("console", lambda message: page.wrong.append(message.text))
+    page.goto(f"file://{path}")
+    try:
+        yield page
+    finally:
+        own.close()
+
+
+@pytest.mark.parametrize("name", ["enough", "little", "thesis"])
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
+def test_it_opens_alone_and_is_no_wider_than_the_screen(browser, pages, name, width, scheme):
+    with opened(browser, pages[name], viewport={"width": width, "height": 860}, color_scheme=scheme) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert [url for url in page.asked if not url.startswith(("file:", "data:"))] == []
+        assert page.wrong == []
+
+
+def test_the_charts_of_an_excitation_are_drawn_and_told(browser, pages):
+    with opened(browser, pages["little"], viewport={"width": 1400, "height": 1000}) as page:
+        titles = page.locator("figure.chart h3").all_text_contents()
+        assert titles == ["Desired force", "Spectrum", "What it will tell"]
+        for chart in page.locator("figure.chart canvas").all():
+            assert chart.evaluate(
+                "c => [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data].some(v => v)"
+            )
+        page.locator("#chart-precision .plot").hover()
+        assert (
+            page.locator("#chart-precision .read")
+            .text_content()
+            .startswith(("1", "2", "3", "4", "5", "6", "7", "8", "9"))
+        )
+        assert page.get_by_text("The precision cannot be had").is_visible()
+
+
+def test_claims_of_one_verdict_are_shown(browser, pages):
+    with opened(browser, pages["thesis"]) as page:
+        every = page.locator(".claim").count()
+        page.click("#filter button[value=differs]")
+        left = page.locator(".claim:visible").count()
+        assert 0 < left < every
+        assert page.locator("#shown").text_content() == f"{left} of {every} shown"
+        page.fill("#word", "no claim has this")
+        assert page.locator(".claim:visible").count() == 0
+        assert page.locator("nav .line:visible").count() == 0
+        page.fill("#word", "")
+        page.click("#filter button[value='']")
+        assert page.locator(".claim:visible").count() == every
