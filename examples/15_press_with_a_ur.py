@@ -39,7 +39,7 @@ controller = [sys.executable, "-m", "palpate.wires.rtde_arm", "--address", ADDRE
 with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
     assert arm.stdout is not None
     wire = arm.stdout.readline().strip()
-    press = f"press-wire --wire {wire} --gains gains.toml --force 20:N --direction 0,0,-1 {LIMITS}"
+    press = f"press --wire {wire} --gains gains.toml --force 20:N --seconds 2 --normal 0,0,-1 {LIMITS}"
     try:
         palpate("tune --arm cell.toml --stiffness 1e3:1e5 --force 20 --out gains.toml --json", "tuned.json")
         palpate(f"{press} --dry-run")

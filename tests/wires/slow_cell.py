@@ -41,8 +41,8 @@ full_scale = 100
 speed = 0.25
 stiffness = 1e4
 """
-WORDS = ("--force", "10:N", "--direction", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",
-         "--travel-limit", "30:mm", "--time-limit", "20:s", "--ordinary-priority")  # fmt: skip
+WORDS = ("--force", "10:N", "--normal", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",
+         "--travel-limit", "30:mm", "--time-limit", "20:s", "--seconds", "2", "--ordinary-priority")  # fmt: skip
 
 
 def cell(folder: Path) -> Path:

@@ -67,7 +67,7 @@ def words_of(folder, *more, kind="twist", command="/command"):
         f"ros2:{DOMAIN}?wrench=/ft/wrench&pose=/tcp/pose&command={command}&as={kind}"
         "&wrench-frame=tool&force-sign=reaction"
     )
-    return ["press-wire", "--wire", where, "--gains", str(folder / "gains.toml"), *WORDS, "--json", *more]
+    return ["press", "--wire", where, "--gains", str(folder / "gains.toml"), *WORDS, "--json", *more]
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def words_of(folder, *more, kind="twist", command="/command"):
 )
 def test_it_presses_with_the_force_asked_for(folder, here, capsys, kind):
     with node(folder, kind=kind):
-        code = main(words_of(folder, "--yes", "--record", "rec", "--hold", "2.5:s", kind=kind))
+        code = main(words_of(folder, "--yes", "--record", "rec", "--seconds", "2.5", kind=kind))
         told = json.loads(capsys.readouterr().out)
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
@@ -90,7 +90,7 @@ def test_a_node_that_dies_ends_the_press(folder, here, capsys):
             process.kill()
 
         threading.Thread(target=die, daemon=True).start()
-        code = main(words_of(folder, "--yes", "--record", "rec", "--hold", "10:s"))
+        code = main(words_of(folder, "--yes", "--record", "rec", "--seconds", "10"))
         told = json.loads(capsys.readouterr().out)
     assert code == 1
     assert "no reading at /ft/wrench" in told["ended"]

@@ -57,7 +57,7 @@ def controller(folder, address, *words):
 
 def words_of(folder, address, *more):
     return [
-        "press-wire",
+        "press",
         "--wire",
         f"rtde:{address}",
         "--gains",
@@ -70,7 +70,7 @@ def words_of(folder, address, *more):
 
 def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
     with controller(folder, address, "--stiffness", "4000"):
-        code = main(words_of(folder, address, "--yes", "--record", "rec", "--hold", "2.5:s"))
+        code = main(words_of(folder, address, "--yes", "--record", "rec", "--seconds", "2.5"))
         told = json.loads(capsys.readouterr().out)
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
@@ -91,7 +91,7 @@ def test_a_controller_that_falls_silent_ends_the_press_and_stops_the_arm(folder,
             process.kill()
 
         threading.Thread(target=die, daemon=True).start()
-        code = main(words_of(folder, address, "--yes", "--record", "rec", "--hold", "10:s"))
+        code = main(words_of(folder, address, "--yes", "--record", "rec", "--seconds", "10"))
         told = json.loads(capsys.readouterr().out)
     assert code == 1
     assert "no reading for" in told["ended"] or "could not be sent" in told["ended"]
@@ -102,7 +102,7 @@ def test_the_controller_stops_the_arm_where_its_master_dies(folder, here, addres
     with controller(folder, address, "--gap", "0.05"):
         words = [
             w
-            for w in words_of(folder, address, "--yes", "--record", "rec", "--hold", "10:s")
+            for w in words_of(folder, address, "--yes", "--record", "rec", "--seconds", "10")
             if w != "--json"
         ]
         with subprocess.Popen([sys.executable, "-m", "palpate", *words], stdout=subprocess.DEVNULL) as master:

@@ -26,8 +26,9 @@ _PATIENCE = 1.0
 class FrankaWire:
     """A Franka at an address, unlocked, with its interface (FCI) activated.
 
-    The wrench is the controller's own estimate from the joints' torques, at the stiffness frame, in the base's axes; the
-    pose is that of the end effector that the controller was told of. It follows the speed under its joint impedance.
+    The wrench is the controller's own estimate from the joints' torques, at the stiffness frame, in the base's axes;
+    the pose is that of the end effector that the controller was told of. It follows the speed under joint
+    impedance.
 
     Args:
         where: address of the controller, and `?force-sign=reaction` if its wrench turns out to have the other sign.

@@ -1,8 +1,8 @@
 """A simulated arm that speaks as a Franka does, to rehearse with: libfranka's protocol, on a loopback address.
 
 `python -m palpate.wires.franka_arm --address 127.0.0.10`. The protocol is franky-sim's (`pip install franky-sim`), by
-which libfranka cannot tell it from a controller; behind it stands an arm of one direction. As a controller does, it ends
-the motion where 20 commands in a row are missing.
+which libfranka cannot tell it from a controller; behind it stands an arm of one direction. As a controller does, it
+ends the motion where 20 commands in a row are missing.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ def robot_of(arm: OneDirection) -> Any:
             super().__init__(has_gripper=False)
             self.speed, self.silent = 0.0, 0
 
-        def cartesian_velocity_control(self, velocity: Any, _elbow: Any, has_new_command: bool = True) -> None:
+        def cartesian_velocity_control(
+            self, velocity: Any, _elbow: Any, has_new_command: bool = True
+        ) -> None:
             self.silent = 0 if has_new_command else self.silent + 1
             self.speed = -float(velocity[2])
 
@@ -48,14 +50,7 @@ def robot_of(arm: OneDirection) -> Any:
         def _get_state(self) -> Any:
             return InnerRobotState(_Q, (0.0,) * 7, (0.0,) * 7)
 
-        def _torque_control(self, torques: Any) -> None:
-            raise NotImplementedError
-
-        def set_hand_goal(self, width: float, max_velocity: float, max_force: float) -> None:
-            raise NotImplementedError
-
-        def _get_hand_width(self) -> float:
-            return 0.0
+        _torque_control = set_hand_goal = _get_hand_width = None  # abstract there, and never asked for
 
         def reset_motion_state(self) -> None:
             self.speed, self.silent = 0.0, 0

@@ -85,9 +85,10 @@ class Driver:
                 message = self._wire.recv(link.LARGEST)
             except OSError:
                 message = b""
-            if not message:
-                return self._gone()
-            self._obey(message)
+            if message:
+                self._obey(message)
+            else:
+                self._gone()
 
     def _obey(self, message: bytes) -> None:
         if message[0] == link.MOVE:
@@ -104,7 +105,8 @@ class Driver:
         try:
             self._control = self._robot.start_cartesian_velocity_control(mode)
         except Exception as error:  # noqa: BLE001 - libfranka throws kinds of no common base
-            return self._tell(link.text(link.REFUSED, line(error)))
+            self._tell(link.text(link.REFUSED, line(error)))
+            return
         self._wanted, self._speed, self._silent, self._ending = _ZERO, _ZERO, 0, False
         self._tell(link.text(link.BEGUN, ""))
 

@@ -23,7 +23,7 @@ def state(sense: Sense) -> bytes:
 def read_state(message: bytes) -> Sense:
     """The reading of a message of that kind."""
     _, received, stamp, *v = _STATE.unpack(message)
-    return Sense(received, stamp, tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:13]))  # type: ignore[arg-type]
+    return Sense(received, stamp, tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:13]))
 
 
 def move(velocity: Triple) -> bytes:
