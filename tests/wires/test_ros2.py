@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
-import threading
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,7 +11,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from wires.slow_cell import WORDS, cell, wait_for_rows
+from wires.slow_cell import WORDS, cell, child, killed_when_it_moves
 
 pytest.importorskip("cyclonedds", reason="cyclonedds has no wheel for this system")
 
@@ -43,23 +40,10 @@ def here(tmp_path, monkeypatch):
 @contextmanager
 def node(folder, stiffness=4000.0, gap=0.002, kind="twist"):
     script = Path(__file__).parent / "ros2_cell.py"
-    command = [
-        sys.executable,
-        str(script),
-        str(DOMAIN),
-        str(folder / "arm.toml"),
-        str(stiffness),
-        str(gap),
-        kind,
-        "60",
-    ]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "CYCLONEDDS_URI": ALONE}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        try:
-            assert process.stdout.readline().strip() == "ready"
-            yield process
-        finally:
-            process.kill()
+    words = (script, DOMAIN, folder / "arm.toml", stiffness, gap, kind, 60)
+    with child(*words, CYCLONEDDS_URI=ALONE) as (process, line):
+        assert line == "ready"
+        yield process
 
 
 def words_of(folder, *more, kind="twist", command="/command"):
@@ -84,12 +68,7 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, kind):
 
 def test_a_node_that_dies_ends_the_press(folder, here, capsys):
     with node(folder, gap=0.05) as process:
-
-        def die():
-            wait_for_rows(here / "rec" / "rows.f64")
-            process.kill()
-
-        threading.Thread(target=die, daemon=True).start()
+        killed_when_it_moves(process, here / "rec" / "rows.f64")
         code = main(words_of(folder, "--yes", "--record", "rec", "--seconds", "10"))
         told = json.loads(capsys.readouterr().out)
     assert code == 1

@@ -154,7 +154,7 @@ def test_an_arm_that_dies_and_comes_again_is_lost_and_not_followed(folder, here,
     [
         (("--force-limit", "11:N", "--seconds", "10"), "above the limit of 11 N"),
         (("--travel-limit", "0.5:mm", "--retreat", "0:mm"), "beyond the limit of 0.5 mm"),
-        (("--time-limit", "2.6:s"), "the time limit of 2.6 s is over"),
+        (("--time-limit", "2.6:s", "--seconds", "2"), "the time limit of 2.6 s is over"),
         (("--normal", "0,0,1", "--travel-limit", "1:mm", "--retreat", "0:mm"), "beyond the limit of 1 mm"),
     ],
 )
@@ -305,12 +305,15 @@ def test_an_untared_sensor_is_refused(folder, here, capsys):
     ("words", "says"),
     [
         ((), "none of them has a default"),
-        (("--wire", "sim:127.0.0.1:9"), "--gains, --force, --direction, --force-limit"),
+        (("--wire", "sim:127.0.0.1:9"), "--gains, --force, --normal, --force-limit"),
         (("--wire", "x", "--gains", "G", *WORDS[:-1], "--normal", "0,0,0"), "must have a length"),
         (("--wire", "x", "--gains", "G", *WORDS[:-1], "--force-limit", "9:N"), "must lie between the force"),
         (("--wire", "x", "--gains", "G", *WORDS[:-1], "--speed-limit", "0.001:mm/s"), "certified approach"),
         (("--wire", "x", "--gains", "G", *WORDS[:-1], "--travel-limit", "-1:mm"), "travel limit"),
-        (("--wire", "x", "--gains", "G", *WORDS[:-1], "--time-limit", "5:kg"), "--time-limit needs a time"),
+        (
+            ("--wire", "x", "--gains", "G", *WORDS[:-1], "--time-limit", "5:kg"),
+            "unknown unit of time in --time-limit",
+        ),
     ],
 )
 def test_bad_words_are_refused(folder, here, capsys, words, says):

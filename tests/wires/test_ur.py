@@ -18,7 +18,7 @@ from palpate.cli import main
 from palpate.logs import read_record
 from palpate.wires import open_wire
 from palpate.wires.turns import from_rotation_vector, turned
-from wires.slow_cell import WORDS, cell, wait_for_rows
+from wires.slow_cell import WORDS, cell, child, killed_when_it_moves, wait_for_rows
 
 pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
 
@@ -44,15 +44,10 @@ def address():
 
 @contextmanager
 def controller(folder, address, *words):
-    command = [sys.executable, "-m", "palpate.wires.rtde_arm", "--address", address, "--arm", str(folder / "arm.toml"),
-               "--seconds", "60", *words]  # fmt: skip
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        try:
-            assert process.stdout.readline().strip() == f"rtde:{address}"
-            yield process
-        finally:
-            process.kill()
+    where = ("--address", address, "--arm", folder / "arm.toml", "--seconds", "60")
+    with child("-m", "palpate.wires.rtde_arm", *where, *words) as (process, line):
+        assert line == f"rtde:{address}"
+        yield process
 
 
 def words_of(folder, address, *more):
@@ -85,12 +80,7 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
 
 def test_a_controller_that_falls_silent_ends_the_press_and_stops_the_arm(folder, here, capsys, address):
     with controller(folder, address, "--gap", "0.05") as process:
-
-        def die():
-            wait_for_rows(here / "rec" / "rows.f64")
-            process.kill()
-
-        threading.Thread(target=die, daemon=True).start()
+        killed_when_it_moves(process, here / "rec" / "rows.f64")
         code = main(words_of(folder, address, "--yes", "--record", "rec", "--seconds", "10"))
         told = json.loads(capsys.readouterr().out)
     assert code == 1
