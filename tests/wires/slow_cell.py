@@ -43,6 +43,13 @@ full_scale = 100
 speed = 0.25
 stiffness = 1e4
 """
+ALONE = (
+    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
+    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
+)
+"""Of DDS, which is kept on the loopback."""
+DOMAIN = 20 + os.getpid() % 180
 PATIENCE = 20.0
 """For which a process may take to start, or to end [s]."""
 WORDS = ("--force", "10:N", "--normal", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",

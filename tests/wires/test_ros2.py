@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from contextlib import contextmanager
 
 import numpy as np
@@ -12,16 +11,9 @@ import pytest
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.logs import read_record
-from wires.slow_cell import WORDS, cell, child, killed_when_it_moves
+from wires.slow_cell import ALONE, DOMAIN, WORDS, cell, child, killed_when_it_moves
 
 pytest.importorskip("cyclonedds", reason="cyclonedds has no wheel for this system")
-
-ALONE = (
-    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
-    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
-)
-DOMAIN = 20 + os.getpid() % 180
 
 
 @pytest.fixture(scope="module")

@@ -89,7 +89,7 @@ class JointTool:
         """By forward kinematics."""
         pose = self._arm.forward_kinematics(self._q)
         x, y, z = (float(v) for v in pose[:3, 3])
-        return (x, y, z), from_matrix_by_columns(pose.T.ravel())
+        return (x, y, z), from_matrix_by_columns(pose.T.ravel().tolist())
 
     def speeds(self, velocity: Triple) -> list[float]:
         """The smallest joint speeds that do it, J^+ (v, 0)."""
