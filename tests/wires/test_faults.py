@@ -17,6 +17,7 @@ import pytest
 from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
+from palpate.logs.own_runs import read_run
 from wires.slow_cell import ALONE, DOMAIN, WORDS, cell, child, wait_for_rows
 
 OWN = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}"
@@ -176,6 +177,7 @@ def test_a_tool_that_was_weighed_is_compared_and_its_mass_is_kept(folders, here,
     capsys.readouterr()
     record = read_record(here / "rec" / "record.parquet")
     assert record.meta["wire"]["tool_mass_kg"] == [1.0, 0.01]
+    assert read_run(here / "rec" / "record.parquet").meta["tool_mass_kg"] == (1.0, 0.01)
 
 
 def test_options_that_were_saved_make_the_command_short_and_never_move_an_arm(folders, here, capsys):
