@@ -62,6 +62,13 @@ def standing(kind, folders, *words):
         yield process, ["press", *at, *WORDS, "--json"]
 
 
+def said(capsys):
+    """The JSON that was printed, and nothing beside it."""
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    return json.loads(printed.out)
+
+
 def while_it_presses(rows, act):
     """Do something as soon as a press keeps rows; returns when that was."""
     begun = []
@@ -83,7 +90,7 @@ def test_silence_ends_the_press_in_time_and_loses_nothing(folders, here, capsys,
         halted = while_it_presses(here / "rec" / "rows.f64", lambda: process.send_signal(signal.SIGSTOP))
         code = main([*words, "--yes", "--record", "rec", "--seconds", "10"])
         took = time.monotonic() - halted[0]
-    told = json.loads(capsys.readouterr().out)
+    told = said(capsys)
     assert code == 1
     assert told["ended"].startswith("no reading"), told["ended"]
     assert f"for {1e3 * theta:.3g} ms" in told["ended"]
@@ -111,7 +118,7 @@ def test_jitter_that_it_can_bear_is_measured_and_told(folders, here, capsys, kin
             code = main([*words, "--yes", "--record", "rec", "--seconds", "2"])
         finally:
             done.set()
-    told = json.loads(capsys.readouterr().out)
+    told = said(capsys)
     assert code == 0, told["ended"]
     late = told["lateness"]
     assert late["most_s"] > 0.03
@@ -127,7 +134,7 @@ def test_a_controller_that_starts_again_is_lost_and_then_met_anew(folders, here,
         capsys.readouterr()
     with standing(kind, folders) as (_, words):
         assert main([*words, "--dry-run"]) == 0
-        assert json.loads(capsys.readouterr().out)["rate_Hz"] == pytest.approx(100, rel=0.05)
+        assert said(capsys)["rate_Hz"] == pytest.approx(100, rel=0.05)
 
 
 @pytest.mark.parametrize("kind", ["rtde", pytest.param("ros2", marks=pytest.mark.long)])
@@ -190,7 +197,7 @@ def test_options_that_were_saved_make_the_command_short_and_never_move_an_arm(fo
         at = words[words.index("--wire") + 1]
         short = ["press", "--wire", at, "--force", "10:N", "--options", "cell.toml", "--dry-run", "--json"]
         assert main(short) == 0
-        assert json.loads(capsys.readouterr().out)["rate_Hz"] == pytest.approx(100, rel=0.05)
+        assert said(capsys)["rate_Hz"] == pytest.approx(100, rel=0.05)
     (here / "cell.toml").write_text(kept + 'wire = "sim:127.0.0.1:4000"\n')
     assert main(["press", "--force", "10:N", "--options", "cell.toml"]) == 2
     assert "wire" in capsys.readouterr().err

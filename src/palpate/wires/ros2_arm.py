@@ -69,7 +69,7 @@ class Node:
         from palpate.wires import ros2_messages
 
         self._m: Any = ros2_messages
-        self._kind, self._joints = kind, joints
+        self._kind, self._joints, self._begun = kind, joints, time.time_ns()
         participant = DomainParticipant(domain)
         qos = Qos(Policy.Reliability.Reliable(10**8), Policy.History.KeepLast(1))
 
@@ -104,7 +104,8 @@ class Node:
 
     def publish(self, arm: OneDirection) -> None:
         """All that there is."""
-        head = self._m.header(time.time_ns(), "base")
+        # Stamped by the arm's own clock, as a controller's cycle is.
+        head = self._m.header(self._begun + round(1e9 * arm.time), "base")
         _, _, fz, *_, x, y, z = arm.reading()[:9]
         if self._joints is not None:
             self._joints.moved(arm.body.x)
