@@ -57,7 +57,7 @@ with subprocess.Popen(node, stdout=subprocess.PIPE, text=True) as arm:  # noqa: 
     limits = "--force-limit 40:N --speed-limit 50:mm/s --travel-limit 15:mm --time-limit 20:s"
     try:
         palpate("tune --arm cell.toml --stiffness 1e3:1e4 --force 15 --out gains.toml")
-        words = f"press --wire {wire} --force 15:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 2"
+        words = f"press --wire {wire} --force 15:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 3 --probe 0.2"
         palpate(f"{words} --dry-run")
         if palpate(f"{words} --yes --ordinary-priority --record first"):
             print("the press ended before it was done, as said above: a busy machine is late")

@@ -38,7 +38,7 @@ with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PI
     limits = "--force-limit 60:N --speed-limit 50:mm/s --travel-limit 40:mm --time-limit 20:s"
     try:
         palpate("tune --arm cell.toml --stiffness 1e3:1e5 --force 20 --out gains.toml")
-        words = f"press --wire {wire} --force 20:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 2"
+        words = f"press --wire {wire} --force 20:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 3 --probe 0.2"
         palpate(f"{words} --dry-run")
         if palpate(f"{words} --yes --record first"):
             print("the press ended before it was done, as said above: a busy machine is late")

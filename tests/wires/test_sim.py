@@ -51,7 +51,9 @@ def refused(capsys, *words):
 
 def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folder, here, capsys):
     with arm(folder, "--stiffness", "4000") as (_, address):
-        code, told = press(capsys, folder, address, "--yes", "--record", "rec", "--seconds", "2.5")
+        code, told = press(
+            capsys, folder, address, "--yes", "--record", "rec", "--seconds", "3", "--probe", "0.2"
+        )
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
     assert told["lateness"]["ticks"] > 200
@@ -62,10 +64,14 @@ def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folde
     assert sorted(p.name for p in (here / "rec").iterdir()) == ["press.json", "record.parquet"]
     assert main(["identify", "rec/record.parquet", "--json"]) in {0, 1}
     found = json.loads(capsys.readouterr().out)
-    assert found["working_point"]["stiffness"]["value"] is not None
-    # The arm's own 50 kN/m are in series. A late reading here and there moves the loop's estimate by some per cent.
-    assert told["stiffness_N_per_m"][0] == pytest.approx(4000 / (1 + 4000 / 5e4), rel=0.1)
     assert "series-compliance" in {warn["code"] for warn in found["warnings"]}
+    assert main(["identify", "rec/record.parquet", "--robot-stiffness", "50000:1000", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    K = found["parameters"]["K"]
+    assert K["verdict"] == "identified"
+    assert K["ci95"][0] < 4000 < K["ci95"][1]
+    # A late reading here and there moves the loop's estimate by some per cent.
+    assert told["stiffness_N_per_m"][0] == pytest.approx(4000 / (1 + 4000 / 5e4), rel=0.1)
 
 
 def test_a_dry_run_moves_nothing(folder, here, capsys):

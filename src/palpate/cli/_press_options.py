@@ -38,12 +38,16 @@ class AskOptions:
     normal
         Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated arm
         presses where its tip points at home if left out.
+    probe
+        Share of the force by which it is lowered three times, so that the surface shows what it is: a force that stays
+        tells palpate identify little. 0.2 of a simulated arm, 0 of a real one if left out.
     """
 
     force: Annotated[str | None, _TEXT] = None
     seconds: Annotated[float, _TEXT] = 6.0
     gains: Path | None = None
     normal: Annotated[str | None, _TEXT] = None
+    probe: Annotated[float | None, _TEXT] = None
 
     @property
     def desired(self) -> float:
@@ -77,8 +81,6 @@ class SimulatedOptions:
         cautious (with gains for any surface), or of torques: hybrid, proportional-integral, impedance.
     at
         Point of the surface in the base's axes, x,y,z or x,y,z:mm; before the tip at home when left out.
-    probe
-        Share of the force by which it is lowered now and then, so that the surface shows what it is.
     seed
         Of the noise; the same seed gives the same numbers.
     out
@@ -94,7 +96,6 @@ class SimulatedOptions:
     physics: str = "own"
     controller: str = "cautious"
     at: Annotated[str | None, _TEXT] = None
-    probe: Annotated[float, _TEXT] = 0.2
     seed: Annotated[int, Parameter(converter=whole_number)] = 0
     out: Path | None = None
     replace: Annotated[bool, _FLAG] = False
@@ -110,7 +111,8 @@ class SimulatedOptions:
         return Question(
             arm=self.arm, force=asked.desired, surface=surface_of(self.surface), site=self.site, mode=self.mode,
             physics=self.physics, controller=self.controller, gains=asked.gains, at=vector("at", self.at, "length"),
-            normal=vector("normal", asked.normal, "number"), seconds=asked.seconds, probe=self.probe, seed=self.seed,
+            normal=vector("normal", asked.normal, "number"), seconds=asked.seconds,
+            probe=0.2 if asked.probe is None else asked.probe, seed=self.seed,
         )  # fmt: skip
 
     @property
@@ -222,7 +224,8 @@ def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple
         _amount("travel-limit", str(limits.travel_limit), "length"),
         _amount("time-limit", str(limits.time_limit), "time"),
     )
-    return Task(asked.desired, normal, asked.seconds, _amount("retreat", wire.retreat, "length")), most
+    retreat = _amount("retreat", wire.retreat, "length")
+    return Task(asked.desired, normal, asked.seconds, retreat, asked.probe or 0.0), most
 
 
 def _amount(option: str, text: str, kind: str) -> float:

@@ -111,11 +111,12 @@ def _pressed(arm: Wire, order: Order, rows: Rows, ordinary: bool) -> tuple[Outco
 def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     task, limits, gains = order.task, order.limits, order.loop.gains
     x, y, z = task.direction
+    lowered = f" (lowered by {100.0 * task.probe:g} % three times)" if task.probe else ""
     last = 1e3 * (gains.theta + gains.arm.tick)
     does = (
         f"rests 0.5 s in the air and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
-        f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s, goes back"
-        f" {1e3 * task.retreat:g} mm, rests"
+        f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s{lowered}, goes"
+        f" back {1e3 * task.retreat:g} mm, rests"
     )
     stops = (
         f"stops at {limits.force:g} N, {1e3 * limits.speed:g} mm/s, {1e3 * limits.travel:g} mm from here, after"

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.force import ForceLoop
+from palpate.press.plan import Plan
 from palpate.wires.lateness import Lateness, Stopwatch
 from palpate.wires.protocol import Command, LostError, Sense, Triple, Wire
 from palpate.wires.recording import Rows
@@ -69,12 +70,25 @@ class Task:
         direction: into the surface, of unit length in the base.
         hold: how long to press after the touch [s].
         retreat: way back afterwards [m].
+        probe: share of the force by which it is lowered now and then.
+
+    Raises:
+        InputError: a probe that is no share, a hold that is no time.
     """
 
     force: float
     direction: Triple
     hold: float
     retreat: float
+    probe: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.plan  # noqa: B018 - it refuses what it cannot be
+
+    @property
+    def plan(self) -> Plan:
+        """The force at each time since the touch."""
+        return Plan(self.force, self.hold, self.probe)
 
 
 @dataclass(frozen=True)
@@ -104,7 +118,7 @@ class Outcome:
         ended: why, in words.
         ok: it pressed for as long as was asked.
         touched: the surface was met.
-        force: mean over the last half of the hold [N]; None if it was not reached.
+        force: mean over the last third of the hold [N]; None if it was not reached.
         settled: seconds from the touch until the force was within 5 % for good; None if it was not.
         stiffness: what the loop found of the surface, as the position feels it, and its std [N/m]; None if nothing.
         lateness: of the loop.
@@ -204,9 +218,10 @@ def _check_air(air: Air, moved: float, order: Order) -> None:
         )
     if moved > max(gains.approach * TARE, 1e-5):
         raise InputError(f"the arm moved by {1e3 * moved:.3g} mm in {TARE:g} s; let it rest first")
-    if 8.0 * air.noise > task.force:
+    lowest = task.force * (1.0 - task.probe)
+    if 8.0 * air.noise > lowest:
         raise InputError(
-            f"the force's noise is {air.noise:.2g} N in the air: {task.force:g} N is below 8 standard deviations of it"
+            f"the force's noise is {air.noise:.2g} N in the air: {lowest:g} N is below 8 standard deviations of it"
         )
 
 
@@ -245,11 +260,11 @@ class Running:
     def __init__(self, wire: Wire, order: Order, rows: Rows, asked_to_stop: Callable[[], bool], air: Air):
         self.wire, self.rows, self.asked_to_stop, self.air = wire, rows, asked_to_stop, air
         self.loop, self.task, self.limits = order.loop, order.task, order.limits
-        loop, task = order.loop, order.task
+        loop, self.plan = order.loop, order.task.plan
         self.tick = loop.gains.arm.tick
         allowed = _jitter(loop)
         self.watch = Stopwatch(self.tick, None if allowed is None else allowed * self.tick, order.most)
-        self.direction = np.array(task.direction)
+        self.direction = np.array(self.task.direction)
         self.x_command, self.begun = 0.0, air.last.stamp
         self.touched: float | None = None
         self.last, self.depth = air.last, 0.0
@@ -292,6 +307,8 @@ class Running:
         )
         self._check(sense, force, (self.depth - before) / max(ticks, 1.0) / self.tick)
         self.last = sense
+        if self.touched is not None and not self._held():
+            self.loop.desired = self.plan.desired(sense.stamp - self.touched)
         speed = min(max(law(force, self.depth, float(missed)), -self.limits.speed), self.limits.speed)
         self.x_command += self.tick * speed
         self.wire.write(
@@ -351,7 +368,10 @@ class Running:
 
     def _told(self, ended: str, ok: bool) -> Outcome:
         times, forces = np.array(self.forces or [(0.0, 0.0)]).T
-        late = forces[times > times[-1] / 2.0]
+        late = forces[times > 2.0 / 3.0 * times[-1]]
+        mean = float(late.mean()) if ok and len(late) else None
+        if self.task.probe:  # until it is lowered for the first time
+            times, forces = times[times < times[-1] / 3.0], forces[times < times[-1] / 3.0]
         # Of a mean over a whole lag: noise of single readings is not the force.
         width = max(round(self.loop.gains.theta / self.tick), 1)
         smooth = np.convolve(forces, np.full(width, 1.0 / width), "valid") if len(forces) > width else forces
@@ -359,7 +379,7 @@ class Running:
         inside = ok and (not len(outside) or outside[-1] < len(smooth) - 1)
         settled = float(times[outside[-1] + 1]) if inside and len(outside) else (0.0 if inside else None)
         return Outcome(
-            ended, ok, self.touched is not None, float(late.mean()) if ok and len(late) else None, settled,
+            ended, ok, self.touched is not None, mean, settled,
             self.stiffness, self.watch.told(), self.air,
         )  # fmt: skip
 
