@@ -310,7 +310,11 @@ def test_an_untared_sensor_is_refused(folder, here, capsys):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ((), "none of them has a default"),
+        ((), "no --wire leads to one"),
+        (
+            ("--wire", "x", "--gains", "G", *WORDS[:-1], "--surface", "K=5000"),
+            "--surface is of a simulated arm",
+        ),
         (("--wire", "sim:127.0.0.1:9"), "--gains, --force, --normal, --force-limit"),
         (("--wire", "x", "--gains", "G", *WORDS[:-1], "--normal", "0,0,0"), "must have a length"),
         (("--wire", "x", "--gains", "G", *WORDS[:-1], "--force-limit", "9:N"), "must lie between the force"),
