@@ -16,7 +16,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from palpate.wires import open_wire
+from palpate.wires import Command, open_wire
 from palpate.wires.turns import from_rotation_vector, turned
 from wires.slow_cell import WORDS, cell, child, killed_when_it_moves, wait_for_rows
 
@@ -63,9 +63,10 @@ def words_of(folder, address, *more):
     ]
 
 
-def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
+@pytest.mark.parametrize("way", ["", pytest.param("?as=servo", marks=pytest.mark.long)])
+def test_it_presses_with_the_force_asked_for(folder, here, capsys, address, way):
     with controller(folder, address, "--stiffness", "4000"):
-        code = main(words_of(folder, address, "--yes", "--record", "rec", "--seconds", "2.5"))
+        code = main(words_of(folder, address + way, "--yes", "--record", "rec", "--seconds", "2.5"))
         told = json.loads(capsys.readouterr().out)
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
@@ -112,6 +113,12 @@ def test_a_second_master_is_refused(folder, here, capsys, address):
         assert main(words_of(folder, address, "--yes")) == 2
         assert "with no other master" in capsys.readouterr().err
         first.close()
+        second = open_wire(f"rtde:{address}")  # when the first has gone, it is taken over
+        second.begin()
+        for _ in range(10):
+            second.read(1.0)
+            second.write(Command((0.0, 0.0, -0.001), (0.0, 0.0, 0.0)))
+        second.close()
 
 
 def test_nothing_at_the_address_and_another_protocol_are_named(folder, here, capsys, address):
@@ -133,6 +140,11 @@ def test_nothing_at_the_address_and_another_protocol_are_named(folder, here, cap
         err = capsys.readouterr().err
     assert "no UR answers" in err
     assert "Traceback" not in err
+
+
+def test_another_way_to_move_is_refused(folder, here, capsys):
+    assert main(words_of(folder, "127.0.0.1?as=force", "--dry-run")) == 2
+    assert "rtde:ADDRESS?as=servo" in capsys.readouterr().err
 
 
 def test_turns_are_those_of_a_library():

@@ -19,7 +19,7 @@ from palpate.force.worlds import surface
 from palpate.press.setting import place_of
 from palpate.robots import SerialArm
 from palpate.wires.ros2 import SENT
-from palpate.wires.sim_arm import OneDirection
+from palpate.wires.sim_arm import START, OneDirection
 
 _REST = 10
 _DOWN = (1.0, 0.0, 0.0, 0.0)
@@ -96,7 +96,7 @@ class Node:
         if self._kind == "twist":
             return -float(sample.twist.linear.z)
         if self._kind == "pose":
-            return (0.3 - float(sample.pose.position.z) - arm.command) / arm.world.tick
+            return (START - float(sample.pose.position.z) - arm.command) / arm.world.tick
         if self._kind == "joint-speeds":
             assert self._joints is not None
             return self._joints.speed(sample.data)

@@ -21,6 +21,8 @@ from palpate.force.touching import BodyState, Surface, World, moved
 from palpate.force.worlds import surface, world_of
 from palpate.wires import sim_protocol as protocol
 
+START = 0.3
+"""Height of the surface in the base [m]."""
 _REST = 10
 """Ticks without a command after which it rests."""
 _LEFT = 1.0
@@ -66,7 +68,7 @@ class OneDirection:
     def reading(self) -> tuple[float, ...]:
         """Force, torque, position, quaternion: the tool points down."""
         force = (self.bias[0], self.bias[1], self.bias[2] - self.body.reading)
-        return (*force, 0.0, 0.0, 0.0, 0.4, 0.0, 0.3 - self.body.x, 1.0, 0.0, 0.0, 0.0)
+        return (*force, 0.0, 0.0, 0.0, 0.4, 0.0, START - self.body.x, 1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass
