@@ -7,17 +7,13 @@ ends the motion where 20 commands in a row are missing.
 
 from __future__ import annotations
 
-import argparse
-import sys
-import time
 from typing import Any
 
 from palpate.errors import InputError
-from palpate.force.arm import load_arm
-from palpate.force.worlds import surface
-from palpate.wires.sim_arm import OneDirection
+from palpate.wires.rehearsal import OneDirection, arm_of, loopback, paced, ready, words_of
 
 _Q = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
+_RATE = 1000.0
 _MOST = 20
 """Commands missing in a row at which the motion ends (Franka Control Interface)."""
 
@@ -80,15 +76,8 @@ def serve(arm: OneDirection, address: str, seconds: float) -> None:
 
     server: Any = FrankaRobotServer(robot, [address])
     server.init()
-    sys.stdout.write(f"franka:{address}\n")
-    sys.stdout.flush()
-    begun = time.monotonic()
-    while arm.time < seconds:
-        wait = begun + arm.time - time.monotonic()
-        if wait > 0.0:
-            time.sleep(wait)
-        elif wait < -1.0:  # this process was stopped: time is not made up for in a hurry
-            begun -= wait
+    ready(f"franka:{address}")
+    for _ in paced(arm, seconds):
         server.process_commands()
         if robot.silent > _MOST:
             server.stop_motion()
@@ -101,21 +90,15 @@ def serve(arm: OneDirection, address: str, seconds: float) -> None:
 
 def main() -> None:
     """Read the words, and serve."""
-    words = argparse.ArgumentParser(prog="python -m palpate.wires.franka_arm", description=__doc__)
+    words = words_of("franka_arm", __doc__)
     words.add_argument("--address", default="127.0.0.10", help="of the loopback")
-    words.add_argument("--arm", required=True, help="a TOML file of palpate tune, at 1000 Hz")
-    words.add_argument("--stiffness", type=float, default=5000.0, help="of the surface, N/m")
-    words.add_argument("--damping", type=float, default=20.0, help="of the surface, N s/m")
-    words.add_argument("--gap", type=float, default=0.002, help="between tool and surface, m")
-    words.add_argument("--seconds", type=float, default=600.0, help="after which it ends")
     told = words.parse_args()
-    if not told.address.startswith("127."):
-        words.error(f"--address must be one of the loopback, 127.*, got {told.address}")
-    arm = OneDirection(
-        load_arm(told.arm), surface(told.stiffness, told.damping), told.gap, (0.0, 0.0, 1.0), 0
-    )
+    address = loopback(words, told.address)
+    arm = arm_of(told, (0.0, 0.0, 1.0))
+    if arm.arm.rate != _RATE:
+        words.error(f"--arm must be of {_RATE:g} Hz, as libfranka is, and {told.arm} is of {arm.arm.rate:g}")
     try:
-        serve(arm, told.address, told.seconds)
+        serve(arm, address, told.seconds)
     except InputError as error:
         words.error(str(error))
 

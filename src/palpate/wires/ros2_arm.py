@@ -7,19 +7,15 @@ controller of ros2_control does after its time-out.
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
 from typing import Any
 
 import numpy as np
 
-from palpate.force.arm import load_arm
-from palpate.force.worlds import surface
 from palpate.press.setting import place_of
 from palpate.robots import SerialArm
+from palpate.wires.rehearsal import START, OneDirection, arm_of, paced, ready, words_of
 from palpate.wires.ros2 import SENT
-from palpate.wires.sim_arm import START, OneDirection
 
 _REST = 10
 _DOWN = (1.0, 0.0, 0.0, 0.0)
@@ -118,13 +114,8 @@ class Node:
 
 def serve(arm: OneDirection, node: Node, seconds: float) -> None:
     """Run at real time until the seconds of the arm are over."""
-    begun, speed, silent = time.monotonic(), 0.0, 0
-    while arm.time < seconds:
-        wait = begun + arm.time - time.monotonic()
-        if wait > 0.0:
-            time.sleep(wait)
-        elif wait < -1.0:  # this process was stopped: time is not made up for in a hurry
-            begun -= wait
+    speed, silent = 0.0, 0
+    for _ in paced(arm, seconds):
         heard = node.heard(arm)
         silent = 0 if heard is not None else silent + 1
         speed = heard if heard is not None else (speed if silent < _REST else 0.0)
@@ -134,26 +125,18 @@ def serve(arm: OneDirection, node: Node, seconds: float) -> None:
 
 def main() -> None:
     """Read the words, and serve."""
-    words = argparse.ArgumentParser(prog="python -m palpate.wires.ros2_arm", description=__doc__)
+    words = words_of("ros2_arm", __doc__)
     words.add_argument("--domain", type=int, required=True, help="ROS_DOMAIN_ID")
     words.add_argument(
         "--as", dest="kind", choices=list(SENT), default="twist", help="what comes at /command"
     )
     words.add_argument("--joints", action="store_true", help="publish a UR5e's joints too")
-    words.add_argument("--arm", default="ur5e", help="ur5e or a TOML file")
-    words.add_argument("--stiffness", type=float, default=5000.0, help="of the surface, N/m")
-    words.add_argument("--damping", type=float, default=20.0, help="of the surface, N s/m")
-    words.add_argument("--gap", type=float, default=0.002, help="between tool and surface, m")
-    words.add_argument("--seconds", type=float, default=600.0, help="after which it ends")
     told = words.parse_args()
     if told.kind == "joint-speeds" and not told.joints:
         words.error("--as joint-speeds needs --joints")
-    arm = OneDirection(
-        load_arm(told.arm), surface(told.stiffness, told.damping), told.gap, (0.0, 0.0, 1.0), 0
-    )
+    arm = arm_of(told, (0.0, 0.0, 1.0))
     node = Node(told.domain, told.kind, Joints() if told.joints else None)
-    sys.stdout.write(f"ros2:{told.domain}\n")
-    sys.stdout.flush()
+    ready(f"ros2:{told.domain}")
     serve(arm, node, told.seconds)
 
 

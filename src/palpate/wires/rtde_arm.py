@@ -6,18 +6,14 @@ servoL and their stops, zeroFtSensor, the watchdog, the end; to all else it answ
 
 from __future__ import annotations
 
-import argparse
 import selectors
 import socket
 import struct
-import sys
 import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from palpate.force.arm import load_arm
-from palpate.force.worlds import surface
-from palpate.wires.sim_arm import START, OneDirection
+from palpate.wires.rehearsal import START, OneDirection, arm_of, loopback, ready, words_of
 
 RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
 _VERSION = (5, 15, 0, 0)
@@ -272,22 +268,13 @@ class Server:
 
 def main() -> None:
     """Read the words, bind, say where, and serve."""
-    words = argparse.ArgumentParser(prog="python -m palpate.wires.rtde_arm", description=__doc__)
+    words = words_of("rtde_arm", __doc__)
     words.add_argument("--address", default="127.0.0.9", help="of the loopback")
-    words.add_argument("--arm", default="ur5e", help="ur5e or a TOML file")
-    words.add_argument("--stiffness", type=float, default=5000.0, help="of the surface, N/m")
-    words.add_argument("--damping", type=float, default=20.0, help="of the surface, N s/m")
-    words.add_argument("--gap", type=float, default=0.002, help="between tool and surface, m")
-    words.add_argument("--seconds", type=float, default=600.0, help="after which it ends")
     told = words.parse_args()
-    if not told.address.startswith("127."):
-        words.error(f"--address must be one of the loopback, 127.*, got {told.address}")
-    arm = OneDirection(
-        load_arm(told.arm), surface(told.stiffness, told.damping), told.gap, (0.0, 0.0, 3.0), 0
-    )
-    server = Server(told.address, Controller(arm))
-    sys.stdout.write(f"rtde:{told.address}\n")
-    sys.stdout.flush()
+    address = loopback(words, told.address)
+    arm = arm_of(told, (0.0, 0.0, 3.0))
+    server = Server(address, Controller(arm))
+    ready(f"rtde:{address}")
     server.serve(told.seconds)
 
 
