@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._flags import FLAG, SIGNED, in_si
 from palpate.cli._options_file import said
 from palpate.cli._values import vector
 from palpate.cli.run import whole_number
@@ -16,9 +17,6 @@ from palpate.errors import InputError
 if TYPE_CHECKING:
     from palpate.press.prepare import Question
     from palpate.wires import Limits, Task
-
-_FLAG = Parameter(negative=())
-_TEXT = Parameter(allow_leading_hyphen=True)
 
 
 @Parameter(name="*", group=Group("The press", sort_key=1))
@@ -43,18 +41,18 @@ class AskOptions:
         tells palpate identify little. 0.2 of a simulated arm, 0 of a real one if left out.
     """
 
-    force: Annotated[str | None, _TEXT] = None
-    seconds: Annotated[float, _TEXT] = 6.0
+    force: Annotated[str | None, SIGNED] = None
+    seconds: Annotated[float, SIGNED] = 6.0
     gains: Path | None = None
-    normal: Annotated[str | None, _TEXT] = None
-    probe: Annotated[float | None, _TEXT] = None
+    normal: Annotated[str | None, SIGNED] = None
+    probe: Annotated[float | None, SIGNED] = None
 
     @property
     def desired(self) -> float:
         """F_d [N]."""
         if self.force is None:
             raise InputError("how hard? Say --force, as 20:N")
-        force = _amount("force", self.force, "force")
+        force = in_si("--force", self.force, "force")
         if not force > 0.0:
             raise InputError(f"--force must be above 0 N (it presses), got {force:g} N")
         return force
@@ -95,10 +93,10 @@ class SimulatedOptions:
     mode: str | None = None
     physics: str = "own"
     controller: str = "cautious"
-    at: Annotated[str | None, _TEXT] = None
+    at: Annotated[str | None, SIGNED] = None
     seed: Annotated[int, Parameter(converter=whole_number)] = 0
     out: Path | None = None
-    replace: Annotated[bool, _FLAG] = False
+    replace: Annotated[bool, FLAG] = False
 
     def question(self, asked: AskOptions) -> Question:
         """What is to be simulated."""
@@ -156,13 +154,13 @@ class WireOptions:
     """
 
     wire: str | None = None
-    dry_run: Annotated[bool, _FLAG] = False
-    yes: Annotated[bool, _FLAG] = False
+    dry_run: Annotated[bool, FLAG] = False
+    yes: Annotated[bool, FLAG] = False
     record: Path | None = None
     certificate: Path | None = None
     payload: Path | None = None
-    retreat: Annotated[str, _TEXT] = "2:mm"
-    ordinary_priority: Annotated[bool, _FLAG] = False
+    retreat: Annotated[str, SIGNED] = "2:mm"
+    ordinary_priority: Annotated[bool, FLAG] = False
     recover: Path | None = None
 
 
@@ -183,10 +181,10 @@ class LimitOptions:
         Of all, as 20:s.
     """
 
-    force_limit: Annotated[str | None, _TEXT] = None
-    speed_limit: Annotated[str | None, _TEXT] = None
-    travel_limit: Annotated[str | None, _TEXT] = None
-    time_limit: Annotated[str | None, _TEXT] = None
+    force_limit: Annotated[str | None, SIGNED] = None
+    speed_limit: Annotated[str | None, SIGNED] = None
+    travel_limit: Annotated[str | None, SIGNED] = None
+    time_limit: Annotated[str | None, SIGNED] = None
 
 
 def only(part: SimulatedOptions | WireOptions | LimitOptions, of: str) -> None:
@@ -219,17 +217,10 @@ def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple
     normal = vector("normal", asked.normal, "number")
     assert normal is not None
     most = Limits(
-        _amount("force-limit", str(limits.force_limit), "force"),
-        _amount("speed-limit", str(limits.speed_limit), "velocity"),
-        _amount("travel-limit", str(limits.travel_limit), "length"),
-        _amount("time-limit", str(limits.time_limit), "time"),
+        in_si("--force-limit", str(limits.force_limit), "force"),
+        in_si("--speed-limit", str(limits.speed_limit), "velocity"),
+        in_si("--travel-limit", str(limits.travel_limit), "length"),
+        in_si("--time-limit", str(limits.time_limit), "time"),
     )
-    retreat = _amount("retreat", wire.retreat, "length")
+    retreat = in_si("--retreat", wire.retreat, "length")
     return Task(asked.desired, normal, asked.seconds, retreat, asked.probe or 0.0), most
-
-
-def _amount(option: str, text: str, kind: str) -> float:
-    """`NUMBER` or `NUMBER:UNIT` in SI."""
-    from palpate.excitation.quantities import quantity
-
-    return quantity(f"--{option}", text, kind)

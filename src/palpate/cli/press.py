@@ -6,8 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
-
+from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
 from palpate.cli._options_file import CellOptions
 from palpate.cli._press_options import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
@@ -30,7 +29,7 @@ def press(
     wire: WireOptions | None = None,
     limits: LimitOptions | None = None,
     cell: CellOptions | None = None,
-    json: Annotated[bool, Parameter(negative=())] = False,
+    json: Annotated[bool, FLAG] = False,
 ) -> int:
     """Press on a surface with the force asked for: with a simulated arm, or with a real one over its wire.
 
