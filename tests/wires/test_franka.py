@@ -66,15 +66,22 @@ def pressed(capsys, folder, address, *more):
 
 
 def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
-    with controller(folder, address, "--stiffness", "4000"):
-        code, told = pressed(capsys, folder, address, "--record", "rec", "--seconds", "3")
+    for name in (
+        "first",
+        "second",
+        "rec",
+    ):  # a machine that is busy is late, and then the arm is stopped: as it should be
+        with controller(folder, address, "--stiffness", "4000"):
+            code, told = pressed(capsys, folder, address, "--record", name, "--seconds", "3")
+        if "late" not in told["ended"] and "no reading" not in told["ended"]:
+            break
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
     assert told["rate_Hz"] == pytest.approx(1000, rel=0.01)
     assert told["lateness"]["ticks"] > 1000
-    record = read_record(here / "rec" / "record.parquet")
+    record = read_record(here / name / "record.parquet")
     assert len(record) == told["lateness"]["ticks"]
-    assert main(["identify", "rec/record.parquet", "--json"]) in {0, 1}
+    assert main(["identify", f"{name}/record.parquet", "--json"]) in {0, 1}
     assert json.loads(capsys.readouterr().out)["working_point"]["stiffness"]["value"] is not None
 
 
