@@ -1,4 +1,4 @@
-"""A UR cell from nothing to a press of 20 N: gains, a look, a press, the surface, better gains.
+"""A UR cell from its log to gains to pressing: a look, a cautious press, the surface, better gains, a press with them.
 
 The arm is a simulated one that speaks as a UR's controller does, so that ur-rtde itself moves it; with a real one only
 the address is another, and `--yes` is left out, so that it asks. Each line is a command as it can be typed.
@@ -39,14 +39,21 @@ controller = [sys.executable, "-m", "palpate.wires.rtde_arm", "--address", ADDRE
 with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
     assert arm.stdout is not None
     wire = arm.stdout.readline().strip()
-    press = f"press-wire --wire {wire} --gains gains.toml --force 20:N --direction 0,0,-1 {LIMITS}"
     try:
-        palpate("tune --arm cell.toml --stiffness 1e3:1e5 --force 20 --out gains.toml --json", "tuned.json")
-        palpate(f"{press} --dry-run")
-        code = palpate(f"{press} --yes --ordinary-priority --record first")
-        if code:  # a machine that is busy is late, and then the arm is stopped: that is as it should be
+        # Gains for any surface, proved before anything is known of it; what is said of the cell is kept in a file.
+        palpate(
+            "tune --arm cell.toml --stiffness 1e3:1e5 --force 20 --out cautious.toml --json", "cautious.json"
+        )
+        keep = f"--gains cautious.toml --normal 0,0,-1 {LIMITS} --save-options ur.toml"
+        palpate(f"press --wire {wire} --force 20:N {keep} --dry-run")
+        moved = f"press --wire {wire} --force 20:N --options ur.toml --yes --ordinary-priority --seconds 3 --probe 0.2"
+        if palpate(f"{moved} --record first"):
+            # A machine that is busy is late, and then the arm is stopped: that is as it should be.
             print("the press ended before it was done, as said above")
+        # What it touched, and gains for that.
         palpate("identify first/record.parquet --robot-stiffness 50000:2000 --json", "found.json")
         print(Path("found.json").read_text()[:200], "...")
+        if palpate("tune found.json --arm cell.toml --force 20 --out gains.toml --json", "tuned.json") == 0:
+            palpate(f"{moved} --gains gains.toml --record second")
     finally:
         arm.kill()

@@ -6,7 +6,8 @@ import pytest
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.press.loops import gains_for, loop_of
 from palpate.press.pilots import Cautious
-from palpate.press.pressing import Plan, press
+from palpate.press.plan import Plan
+from palpate.press.pressing import press
 from palpate.press.setting import cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.robots import SerialArm

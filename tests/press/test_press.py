@@ -12,8 +12,9 @@ from palpate import read_log
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.press.pilots import Cautious
+from palpate.press.plan import Plan
 from palpate.press.prepare import Question, arm_of, prepared, surface_of
-from palpate.press.pressing import Plan, press
+from palpate.press.pressing import press
 from palpate.press.protocol import Command
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm

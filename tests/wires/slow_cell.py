@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import select
 import socket
 import subprocess
@@ -18,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.force import load_arm, tune
+from palpate.force import load_arm
+from palpate.press.loops import gains_for
 from palpate.wires.recording import UNITS
 
 ARM = """
@@ -41,48 +43,68 @@ full_scale = 100
 speed = 0.25
 stiffness = 1e4
 """
-WORDS = ("--force", "10:N", "--direction", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",
+ALONE = (
+    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
+    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
+)
+"""Of DDS, which is kept on the loopback."""
+DOMAIN = 20 + os.getpid() % 180
+PATIENCE = 20.0
+"""For which a process may take to start, or to end [s]."""
+WORDS = ("--force", "10:N", "--normal", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",
          "--travel-limit", "30:mm", "--time-limit", "20:s", "--ordinary-priority")  # fmt: skip
 
 
-def cell(folder: Path) -> Path:
-    """Arm and gains as files; returns the gains' path."""
-    (folder / "arm.toml").write_text(ARM)
-    told = tune(load_arm(str(folder / "arm.toml")), force=10.0, cap=1e4, prove_adapting=False)
-    (folder / "gains.toml").write_text(told.gains.to_toml())
+def cell(folder: Path, **changed: float) -> Path:
+    """Arm and gains as files, with some numbers of the arm changed; returns the gains' path."""
+    text = ARM
+    for name, value in changed.items():
+        text = re.sub(rf"(?m)^{name} = .*$", f"{name} = {value}", text)
+    (folder / "arm.toml").write_text(text)
+    gains = gains_for(load_arm(str(folder / "arm.toml")), 10.0)
+    (folder / "gains.toml").write_text(gains.to_toml())
     return folder / "gains.toml"
 
 
 @contextmanager
-def arm(folder: Path, *words: str):
-    """The arm's process; yields it and its address."""
-    command = [
-        sys.executable,
-        "-m",
-        "palpate.wires.sim_arm",
-        "--arm",
-        str(folder / "arm.toml"),
-        "--seconds",
-        "60",
-        *words,
-    ]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+def child(*words: str, **environment: str):
+    """A Python process of its own; yields it and its first line, and ends it."""
+    command = [sys.executable, *map(str, words)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", **environment}
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
         try:
+            ready, _, _ = select.select([process.stdout], [], [], PATIENCE)
+            assert ready, f"{words} says nothing"
             yield process, process.stdout.readline().strip()
         finally:
             process.kill()
 
 
+def arm(folder: Path, *words: str):
+    """The arm's process and its address."""
+    return child("-m", "palpate.wires.sim_arm", "--arm", str(folder / "arm.toml"), "--seconds", "60", *words)
+
+
 def wait_for_rows(path, rows=40):
-    """Until a press in another process has kept so many."""
-    for _ in range(2000):
+    """Until a press has kept so many."""
+    for _ in range(round(2.0 * PATIENCE / 0.02)):
         if path.exists():
             numbers = np.fromfile(path)
             if np.count_nonzero(numbers[1 :: len(UNITS)]) >= rows:
                 return
         time.sleep(0.02)
     raise AssertionError("the press keeps no rows")
+
+
+def killed_when_it_moves(process, rows: Path) -> None:
+    """Kill a process as soon as a press keeps rows there."""
+
+    def die():
+        wait_for_rows(rows)
+        process.kill()
+
+    threading.Thread(target=die, daemon=True).start()
 
 
 class Relay(threading.Thread):
@@ -139,4 +161,4 @@ def relayed(address: str, fault):
         yield relay
     finally:
         relay.done.set()
-        relay.join()
+        relay.join(PATIENCE)

@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-import threading
 from contextlib import contextmanager
-from pathlib import Path
 
+import numpy as np
 import pytest
 
 from palpate.cli import main
+from palpate.errors import InputError
 from palpate.logs import read_record
-from wires.slow_cell import WORDS, cell, wait_for_rows
+from wires.slow_cell import ALONE, DOMAIN, WORDS, cell, child, killed_when_it_moves
 
 pytest.importorskip("cyclonedds", reason="cyclonedds has no wheel for this system")
-
-ALONE = (
-    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
-    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
-)
-DOMAIN = 20 + os.getpid() % 180
 
 
 @pytest.fixture(scope="module")
@@ -41,56 +31,52 @@ def here(tmp_path, monkeypatch):
 
 
 @contextmanager
-def node(folder, stiffness=4000.0, gap=0.002, kind="twist"):
-    script = Path(__file__).parent / "ros2_cell.py"
-    command = [
-        sys.executable,
-        str(script),
-        str(DOMAIN),
-        str(folder / "arm.toml"),
-        str(stiffness),
-        str(gap),
-        kind,
-        "60",
-    ]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "CYCLONEDDS_URI": ALONE}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        try:
-            assert process.stdout.readline().strip() == "ready"
-            yield process
-        finally:
-            process.kill()
+def node(folder, *words):
+    where = ("--domain", DOMAIN, "--arm", folder / "arm.toml", "--stiffness", 4000, "--seconds", 60)
+    with child("-m", "palpate.wires.ros2_arm", *where, *words, CYCLONEDDS_URI=ALONE) as (process, line):
+        assert line == f"ros2:{DOMAIN}"
+        yield process
 
 
-def words_of(folder, *more, kind="twist", command="/command"):
+def words_of(folder, *more, kind="twist", command="/command", place="pose=/tcp/pose"):
     where = (
-        f"ros2:{DOMAIN}?wrench=/ft/wrench&pose=/tcp/pose&command={command}&as={kind}"
+        f"ros2:{DOMAIN}?wrench=/ft/wrench&{place}&command={command}&as={kind}"
         "&wrench-frame=tool&force-sign=reaction"
     )
-    return ["press-wire", "--wire", where, "--gains", str(folder / "gains.toml"), *WORDS, "--json", *more]
+    return ["press", "--wire", where, "--gains", str(folder / "gains.toml"), *WORDS, "--json", *more]
+
+
+JOINTS = "joints=/joint_states&arm=ur5e"
 
 
 @pytest.mark.parametrize(
-    "kind", ["twist", *(pytest.param(k, marks=pytest.mark.long) for k in ("pose", "array"))]
+    ("kind", "place"),
+    [
+        ("twist", JOINTS),
+        pytest.param("joint-speeds", JOINTS, marks=pytest.mark.long),
+        *(
+            pytest.param(kind, "pose=/tcp/pose", marks=pytest.mark.long)
+            for kind in ("twist", "pose", "array")
+        ),
+    ],
 )
-def test_it_presses_with_the_force_asked_for(folder, here, capsys, kind):
-    with node(folder, kind=kind):
-        code = main(words_of(folder, "--yes", "--record", "rec", "--hold", "2.5:s", kind=kind))
+def test_it_presses_with_the_force_asked_for(folder, here, capsys, kind, place):
+    with node(folder, "--as", kind, *(["--joints"] if place == JOINTS else [])):
+        code = main(words_of(folder, "--yes", "--record", "rec", "--seconds", "2.5", kind=kind, place=place))
         told = json.loads(capsys.readouterr().out)
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
-    assert len(read_record(here / "rec" / "record.parquet")) == told["lateness"]["ticks"] > 150
+    record = read_record(here / "rec" / "record.parquet")
+    assert len(record) == told["lateness"]["ticks"] > 150
+    if place == JOINTS:  # its tip points down before a UR5e at home
+        assert record["quaternion_w"] == pytest.approx(0.0, abs=1e-4)
+        assert np.ptp(record["position_x"]) < 1e-4
 
 
 def test_a_node_that_dies_ends_the_press(folder, here, capsys):
-    with node(folder, gap=0.05) as process:
-
-        def die():
-            wait_for_rows(here / "rec" / "rows.f64")
-            process.kill()
-
-        threading.Thread(target=die, daemon=True).start()
-        code = main(words_of(folder, "--yes", "--record", "rec", "--hold", "10:s"))
+    with node(folder, "--gap", 0.05) as process:
+        killed_when_it_moves(process, here / "rec" / "rows.f64")
+        code = main(words_of(folder, "--yes", "--record", "rec", "--seconds", "10"))
         told = json.loads(capsys.readouterr().out)
     assert code == 1
     assert "no reading at /ft/wrench" in told["ended"]
@@ -125,6 +111,15 @@ def test_a_second_master_is_refused(folder, here, capsys):
         ("ros2:0?wrench=/a&pose=/b", "missing required field `command`"),
         ("ros2:0?wrench=/a&pose=/b&command=/c&as=joint&wrench-frame=tool&force-sign=action", "as"),
         ("ros2:0?wrench=/a&pose=/b&command=/c&as=twist&wrench-frame=tool&force-sign=action&x=1", "x"),
+        ("ros2:0?wrench=/a&command=/c&as=twist&wrench-frame=tool&force-sign=action", "joints=TOPIC&arm=ARM"),
+        (
+            "ros2:0?wrench=/a&joints=/b&command=/c&as=twist&wrench-frame=tool&force-sign=action",
+            "belong together",
+        ),
+        (
+            "ros2:0?wrench=/a&pose=/b&command=/c&as=joint-speeds&wrench-frame=tool&force-sign=action",
+            "speeds of joints are of an arm",
+        ),
     ],
 )
 def test_a_wrong_address_is_refused(folder, here, capsys, where, says):
@@ -136,30 +131,47 @@ def test_a_wrong_address_is_refused(folder, here, capsys, where, says):
     assert err.count("\n") == 1
 
 
-def test_the_bytes_are_those_of_ros_2():
-    from rosbags.typesys import Stores, get_typestore
-
+def messages():
+    """One of each kind that comes or goes."""
     from palpate.wires import ros2_messages as m
 
+    head = m.header(7 * 10**9 + 8, "tool0")
+    yield m.wrench(head, (1, 2, 3), (4, 5, 6))
+    yield m.pose(head, (1, 2, 3), (0, 0, 0, 1))
+    yield m.twist(head, (1, 2, 3))
+    yield m.joints(head, ["elbow_joint", "wrist"], [0.1, -0.2])
+    yield m.numbers([1.0, -2.0, 3.5])
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_the_bytes_are_those_of_ros_2(number):
+    """Those of rosbags, which knows no DDS, read what cyclonedds writes and write the same."""
+    from rosbags.typesys import Stores, get_typestore
+
+    ours = list(messages())[number]
     store = get_typestore(Stores.ROS2_HUMBLE)
-    T = store.types
-    ours = m.Header(m.Time(7, 8), "tool0")
-    header = T["std_msgs/msg/Header"](T["builtin_interfaces/msg/Time"](7, 8), "tool0")
-    V, W = T["geometry_msgs/msg/Vector3"], T["geometry_msgs/msg/Wrench"]
-    wrench = T["geometry_msgs/msg/WrenchStamped"](header, W(V(1.0, 2.0, 3.0), V(4.0, 5.0, 6.0)))
-    mine = m.WrenchStamped(ours, m.Wrench(m.Vector3(1.0, 2.0, 3.0), m.Vector3(4.0, 5.0, 6.0)))
-    assert same(mine.serialize(), store.serialize_cdr(wrench, "geometry_msgs/msg/WrenchStamped"))
-    P, Q = T["geometry_msgs/msg/Point"], T["geometry_msgs/msg/Quaternion"]
-    pose = T["geometry_msgs/msg/PoseStamped"](
-        header, T["geometry_msgs/msg/Pose"](P(1.0, 2.0, 3.0), Q(0.0, 0.0, 0.0, 1.0))
-    )
-    mine = m.PoseStamped(ours, m.Pose(m.Point(1.0, 2.0, 3.0), m.Turn(0.0, 0.0, 0.0, 1.0)))
-    assert same(mine.serialize(), store.serialize_cdr(pose, "geometry_msgs/msg/PoseStamped"))
-    twist = T["geometry_msgs/msg/TwistStamped"](
-        header, T["geometry_msgs/msg/Twist"](V(1.0, 2.0, 3.0), V(0.0, 0.0, 0.0))
-    )
-    mine = m.TwistStamped(ours, m.Twist(m.Vector3(1.0, 2.0, 3.0), m.Vector3(0.0, 0.0, 0.0)))
-    assert same(mine.serialize(), store.serialize_cdr(twist, "geometry_msgs/msg/TwistStamped"))
+    package, kind, short = type(ours).__idl__.idl_transformed_typename.split("::", 2)
+    name = f"{package}/{kind}/{short.removeprefix('dds_::').removesuffix('_')}"
+    written = ours.serialize()
+    read = store.deserialize_cdr(bytes(written), name)
+    assert same(written, store.serialize_cdr(read, name))
+    assert str(type(ours).deserialize(bytes(store.serialize_cdr(read, name)))) == str(ours)
+
+
+def test_joints_are_found_by_name_and_never_by_place():
+    from palpate.wires.ros2_tool import order_of
+
+    names = ("shoulder_pan", "elbow", "wrist_1")
+    assert order_of(names, ["elbow_joint", "left_shoulder_pan_joint", "wrist_1_joint", "finger"]) == [1, 0, 2]
+    assert order_of(("joint1", "joint2"), ["joint2", "joint1", "fr3_joint1"]) == [1, 0]
+    assert order_of(names, ["finger"]) == []
+    for there in (
+        ["elbow", "wrist_1"],
+        ["elbow", "shoulder_pan"],
+        ["elbow_a", "elbow_b", "shoulder_pan", "wrist_1"],
+    ):
+        with pytest.raises(InputError, match="joint"):
+            order_of(names, there)
 
 
 def same(ours, theirs):

@@ -16,9 +16,9 @@ import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from palpate.wires import open_wire
+from palpate.wires import Command, open_wire
 from palpate.wires.turns import from_rotation_vector, turned
-from wires.slow_cell import WORDS, cell, wait_for_rows
+from wires.slow_cell import WORDS, cell, child, killed_when_it_moves, wait_for_rows
 
 pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
 
@@ -44,20 +44,15 @@ def address():
 
 @contextmanager
 def controller(folder, address, *words):
-    command = [sys.executable, "-m", "palpate.wires.rtde_arm", "--address", address, "--arm", str(folder / "arm.toml"),
-               "--seconds", "60", *words]  # fmt: skip
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
-        try:
-            assert process.stdout.readline().strip() == f"rtde:{address}"
-            yield process
-        finally:
-            process.kill()
+    where = ("--address", address, "--arm", folder / "arm.toml", "--seconds", "60")
+    with child("-m", "palpate.wires.rtde_arm", *where, *words) as (process, line):
+        assert line == f"rtde:{address}"
+        yield process
 
 
 def words_of(folder, address, *more):
     return [
-        "press-wire",
+        "press",
         "--wire",
         f"rtde:{address}",
         "--gains",
@@ -68,9 +63,10 @@ def words_of(folder, address, *more):
     ]
 
 
-def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
+@pytest.mark.parametrize("way", ["", pytest.param("?as=servo", marks=pytest.mark.long)])
+def test_it_presses_with_the_force_asked_for(folder, here, capsys, address, way):
     with controller(folder, address, "--stiffness", "4000"):
-        code = main(words_of(folder, address, "--yes", "--record", "rec", "--hold", "2.5:s"))
+        code = main(words_of(folder, address + way, "--yes", "--record", "rec", "--seconds", "2.5"))
         told = json.loads(capsys.readouterr().out)
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
@@ -85,13 +81,8 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
 
 def test_a_controller_that_falls_silent_ends_the_press_and_stops_the_arm(folder, here, capsys, address):
     with controller(folder, address, "--gap", "0.05") as process:
-
-        def die():
-            wait_for_rows(here / "rec" / "rows.f64")
-            process.kill()
-
-        threading.Thread(target=die, daemon=True).start()
-        code = main(words_of(folder, address, "--yes", "--record", "rec", "--hold", "10:s"))
+        killed_when_it_moves(process, here / "rec" / "rows.f64")
+        code = main(words_of(folder, address, "--yes", "--record", "rec", "--seconds", "10"))
         told = json.loads(capsys.readouterr().out)
     assert code == 1
     assert "no reading for" in told["ended"] or "could not be sent" in told["ended"]
@@ -102,7 +93,7 @@ def test_the_controller_stops_the_arm_where_its_master_dies(folder, here, addres
     with controller(folder, address, "--gap", "0.05"):
         words = [
             w
-            for w in words_of(folder, address, "--yes", "--record", "rec", "--hold", "10:s")
+            for w in words_of(folder, address, "--yes", "--record", "rec", "--seconds", "10")
             if w != "--json"
         ]
         with subprocess.Popen([sys.executable, "-m", "palpate", *words], stdout=subprocess.DEVNULL) as master:
@@ -122,6 +113,12 @@ def test_a_second_master_is_refused(folder, here, capsys, address):
         assert main(words_of(folder, address, "--yes")) == 2
         assert "with no other master" in capsys.readouterr().err
         first.close()
+        second = open_wire(f"rtde:{address}")  # when the first has gone, it is taken over
+        second.begin()
+        for _ in range(10):
+            second.read(1.0)
+            second.write(Command((0.0, 0.0, -0.001), (0.0, 0.0, 0.0)))
+        second.close()
 
 
 def test_nothing_at_the_address_and_another_protocol_are_named(folder, here, capsys, address):
@@ -143,6 +140,11 @@ def test_nothing_at_the_address_and_another_protocol_are_named(folder, here, cap
         err = capsys.readouterr().err
     assert "no UR answers" in err
     assert "Traceback" not in err
+
+
+def test_another_way_to_move_is_refused(folder, here, capsys):
+    assert main(words_of(folder, "127.0.0.1?as=force", "--dry-run")) == 2
+    assert "rtde:ADDRESS?as=servo" in capsys.readouterr().err
 
 
 def test_turns_are_those_of_a_library():

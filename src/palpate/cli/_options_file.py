@@ -19,11 +19,17 @@ if TYPE_CHECKING:
     from cyclopts import App
 
 _SAID = {"--options": "options", "--preset": "preset"}
-_NEVER = {"options", "preset", "save-options", "figure", "no-figure", "report", "json", "out", "replace"}
-"""What is of one call and not of a cell."""
-_PATHS = {"payload", "robot-stiffness-from"}
+_NEVER = {
+    "options", "preset", "save-options", "figure", "no-figure", "report", "json", "out", "replace",
+    "wire", "yes", "dry-run", "record", "recover",
+}  # fmt: skip
+"""What is of one call and not of a cell; above all what moves an arm."""
+_TYPED = {"press": {"force", "position", "seconds"}}
+"""By command, what is of a call there, though the same word is of the cell elsewhere."""
+_PATHS = {"payload", "robot-stiffness-from", "gains", "certificate"}
 """Options that name a file: beside the options' own file, unless the path is absolute."""
-_KNOWN_BY = "identify"
+_KNOWN_BY = ("identify", "press")
+"""Commands that take one file together: what one of them knows is no mistake to the other."""
 _LARGEST = 1 << 16
 
 
@@ -58,7 +64,8 @@ class CellOptions:
             parts: dataclasses of options.
         """
         if self.save_options is not None:
-            write_text(self.save_options, _toml(said(parts)))
+            kept = {name: value for name, value in said(parts).items() if name not in _NEVER}
+            write_text(self.save_options, _toml(kept))
 
 
 def said(parts: Iterable[Any]) -> dict[str, Any]:
@@ -89,14 +96,15 @@ def expanded(argv: Sequence[str], app: App) -> list[str]:
     flags = _flags(app, words[0])
     if "options" not in flags:
         return words
-    known = set(flags) | set(_flags(app, _KNOWN_BY))
+    known = set(flags).union(*(_flags(app, name) for name in _KNOWN_BY))
     kept: dict[str, Any] = {}
     if given["preset"] is not None:
         kept |= _preset(given["preset"], known)
     if given["options"] is not None:
         kept |= _file(Path(given["options"]), known)
     typed = {word.partition("=")[0] for word in words if word.startswith("--")}
-    kept = {key: value for key, value in kept.items() if key in flags and not typed & set(flags[key])}
+    own = set(flags) - _TYPED.get(words[0], set())
+    kept = {key: value for key, value in kept.items() if key in own and not typed & set(flags[key])}
     return [*words, *(word for key, value in kept.items() for word in _written(key, value))]
 
 

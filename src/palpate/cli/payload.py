@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from palpate.cli._arm_options import FrameOptions
+from palpate.cli._flags import FLAG, check_new
 from palpate.cli._log_options import LogOptions, read
 from palpate.cli._options_file import CellOptions
 from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
@@ -17,10 +19,36 @@ from palpate.files import check_place
 if TYPE_CHECKING:
     from palpate.contact_frame import Weighed
 
-_FLAG = Parameter(negative=())
+
+@Parameter(name="*", group=Group("What is written", sort_key=6))
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions:
+    """Where results go.
+
+    Parameters
+    ----------
+    out
+        Where to write the payload, a TOML file for --payload.
+    replace
+        Replace what stands at --out.
+    report
+        Where to write a page with everything, an HTML file.
+    json
+        Print one JSON object and nothing else.
+    """
+
+    out: Path | None = None
+    replace: Annotated[bool, FLAG] = False
+    report: Path | None = None
+    json: Annotated[bool, FLAG] = False
+
+    def check(self) -> None:
+        """Refuse a place before any work is done."""
+        check_new(self.out, "--out", replace=self.replace, ending=".toml")
+        if self.report is not None:
+            check_place(self.report, "--report", ending=".html")
 
 
-# More than seven arguments: each is a flag of the command.
 def payload(
     log: Path,
     /,
@@ -29,10 +57,7 @@ def payload(
     frame: FrameOptions | None = None,
     cell: CellOptions | None = None,
     tolerance: float = 0.25,
-    out: Path | None = None,
-    replace: Annotated[bool, _FLAG] = False,
-    report: Path | None = None,
-    json: Annotated[bool, _FLAG] = False,
+    output: OutputOptions | None = None,
 ) -> int:
     """Weigh a tool by a log of free motion: mass, centre, the sensor's bias and drift.
 
@@ -52,23 +77,10 @@ def payload(
         A log of wrench and pose, as palpate identify takes it.
     tolerance
         Largest half-width of the mass' 95 % interval, as a share of its value.
-    out
-        Where to write the payload, a TOML file for --payload.
-    replace
-        Replace what stands at --out.
-    report
-        Where to write a page with everything, an HTML file.
-    json
-        Print one JSON object and nothing else.
     """
-    cell = cell or CellOptions()
+    cell, output = cell or CellOptions(), output or OutputOptions()
     cell.check()
-    if out is not None:
-        check_place(out, "--out", ending=".toml")
-        if out.exists() and not replace:
-            raise InputError(f"{out} exists; choose another place, or add --replace")
-    if report is not None:
-        check_place(report, "--report", ending=".html")
+    output.check()
     if not 0.0 < tolerance <= 1.0:
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
     from palpate.contact_frame import ContactFrame, weigh
@@ -80,13 +92,16 @@ def payload(
             f"{log}: a tool is weighed by a wrench and a pose in three dimensions; name them with --wrench and --pose"
         )
     found = weigh(record, (frame or FrameOptions()).frame() or ContactFrame(), tolerance)
-    if out is not None and found.payload is not None:
-        found.payload.save(out)
-    if report is not None:
+    written = []
+    if output.out is not None and found.payload is not None:
+        found.payload.save(output.out)
+        written.append(output.out)
+    if output.report is not None:
         from palpate.report.payload import write_page
 
-        write_page(found, log.name, report)
-    _print(found, log, [p for p in (out if found.payload else None, report) if p is not None], json)
+        write_page(found, log.name, output.report)
+        written.append(output.report)
+    _print(found, log, written, output.json)
     return 0 if found.payload is not None else 1
 
 

@@ -1,4 +1,4 @@
-"""`palpate press`: any serial arm presses on a surface, to a folder of results."""
+"""`palpate press`: an arm presses with the force asked for, a simulated one or a real one over its wire."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
-
+from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
+from palpate.cli._options_file import CellOptions
+from palpate.cli._press_options import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
 from palpate.cli._program import command
-from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
-from palpate.cli.run import whole_number
-from palpate.errors import InputError
+from palpate.cli._terminal import STYLE, console, head, place, print_json, print_lines, show_table
 from palpate.files import fresh_folder, signed, write_json
 from palpate.text import shown
 
@@ -22,86 +21,65 @@ if TYPE_CHECKING:
     from palpate.press.prepare import Pressing
     from palpate.records import Record
 
-_FLAG = Parameter(negative=())
-_TEXT = Parameter(allow_leading_hyphen=True)
 
-
-# More than seven arguments: each is a flag of the command.
 def press(
     *,
-    arm: str,
-    force: Annotated[str, _TEXT],
-    surface: str,
-    out: Path | None = None,
-    replace: Annotated[bool, _FLAG] = False,
-    site: str | None = None,
-    mode: str | None = None,
-    physics: str = "own",
-    controller: str = "cautious",
-    gains: Path | None = None,
-    at: Annotated[str | None, _TEXT] = None,
-    normal: Annotated[str | None, _TEXT] = None,
-    seconds: Annotated[float, _TEXT] = 6.0,
-    probe: Annotated[float, _TEXT] = 0.2,
-    seed: Annotated[int, Parameter(converter=whole_number)] = 0,
-    json: Annotated[bool, _FLAG] = False,
+    asked: AskOptions | None = None,
+    simulated: SimulatedOptions | None = None,
+    wire: WireOptions | None = None,
+    limits: LimitOptions | None = None,
+    cell: CellOptions | None = None,
+    json: Annotated[bool, FLAG] = False,
 ) -> int:
-    """Press on a surface with any serial arm, in simulation.
+    """Press on a surface with the force asked for: with a simulated arm, or with a real one over its wire.
 
-    The arm approaches, touches, presses with the force asked for, lowers it now and then, and what it touched is
-    identified from what its encoders and its force sensor measured:
+    A simulated arm approaches, touches, presses, lowers the force now and then, and what it touched is identified from
+    what its encoders and its force sensor measured:
 
     palpate press --arm fr3 --force 20:N --surface K=5000,B=50 --out runs/press
 
+    A real arm is first looked at, and it is said what would be done; --dry-run moves nothing:
+
+    palpate press --dry-run --wire rtde:192.168.0.10 --gains gains.toml --force 20:N --normal 0,0,-1 --force-limit 40:N
+    --speed-limit 20:mm/s --travel-limit 10:mm --time-limit 20:s --save-options my-cell.toml
+
+    The same without --dry-run moves it, after it has asked; options that were saved need not be typed again:
+
+    palpate press --wire rtde:192.168.0.10 --force 20:N --options my-cell.toml --record first
+
+    Keep a hand on the emergency stop: nothing of this was tried on hardware. The arm stops at each limit, on lost or
+    late readings, and on Ctrl-C. Exit code 1 says that the press ended before it was done.
+
     Parameters
     ----------
-    arm
-        ur5e, fr3, panda, iiwa14, or a file: .toml, .xml (MJCF), .urdf.
-    force
-        Desired force, N, or with a unit as 20:N.
-    surface
-        What is touched: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass.
-    out
-        Folder for record.parquet, summary.json, figures, film and report.html; runs/press-ARM-SEED when left out.
-    replace
-        Replace the results that stand at --out.
-    site
-        The tip, of a file: a site or a body of MJCF, a link of URDF.
-    mode
-        torque or position: how the arm is driven; its own way when left out.
-    physics
-        own or mujoco (extra: arms).
-    controller
-        cautious (with gains for any surface), or of torques: hybrid, proportional-integral, impedance.
-    gains
-        Gains from palpate tune, a TOML file; made for the arm and its pose when left out.
-    at
-        Point of the surface in the base's axes, x,y,z or x,y,z:mm; before the tip at home when left out.
-    normal
-        Direction into the surface, x,y,z; where the tip points at home when left out.
-    seconds
-        From the touch on.
-    probe
-        Share of the force by which it is lowered now and then, so that the surface shows what it is.
-    seed
-        Of the noise; the same seed gives the same numbers.
     json
-        Print the summary as JSON and nothing else.
+        Print one JSON object and nothing else; of a real arm it needs --yes or --dry-run.
     """
-    from palpate.bench.ending import DONE, INTERRUPTED
-    from palpate.cli._values import vector
-    from palpate.excitation.quantities import quantity
-    from palpate.press.prepare import Question, prepared, surface_of
+    asked, simulated = asked or AskOptions(), simulated or SimulatedOptions()
+    wire, limits, cell = wire or WireOptions(), limits or LimitOptions(), cell or CellOptions()
+    cell.check()
+    cell.save((asked, simulated, wire, limits))
+    if wire.recover is not None:
+        from palpate.wires import recover
 
-    question = Question(
-        arm=arm, force=quantity("--force", force, "force"), surface=surface_of(surface), site=site, mode=mode,
-        physics=physics, controller=controller, gains=gains, at=vector("at", at, "length"),
-        normal=vector("normal", normal, "number"), seconds=seconds, probe=probe, seed=seed,
-    )  # fmt: skip
-    if not question.force > 0.0:
-        raise InputError(f"--force must be above 0 N (it presses), got {question.force:g} N")
-    folder = out if out is not None else Path("runs") / f"press-{Path(arm).stem}-{seed}"
-    with noticed() as interrupted, fresh_folder(folder, force=replace) as fresh:
+        print_lines(f"written: {recover(wire.recover)}")
+        return 0
+    if wire.wire is None:
+        for part in (wire, limits):
+            only(part, "a real arm, and no --wire leads to one")
+        return _simulated(asked, simulated, json)
+    only(simulated, "a simulated arm, and --wire leads to a real one")
+    from palpate.cli._press_wire import press_over
+
+    return press_over(asked, wire, limits, json=json)
+
+
+def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
+    from palpate.bench.ending import DONE, INTERRUPTED
+    from palpate.press.prepare import prepared
+
+    question, folder = simulated.question(asked), simulated.folder
+    with noticed() as interrupted, fresh_folder(folder, force=simulated.replace) as fresh:
         pressing = prepared(question)
         record = _record(console(stderr=json), pressing, interrupted)
         summary = _written(record, pressing, fresh)

@@ -15,7 +15,7 @@ FACTORS: dict[str, dict[str, float]] = {
     "force rate": {"N/s": 1.0, "kN/s": 1e3},
     **{
         kind: {symbol: unit.factor for symbol, unit in UNITS.items() if unit.quantity == kind}
-        for kind in ("force", "length", "time")
+        for kind in ("force", "length", "time", "velocity")
     },
 }
 """Units by quantity, and their factors into SI."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -32,11 +32,22 @@ def read_run(path: Path, **options: Any) -> Record:
     about = stored_about(path)
     if about is not None and "wire" in about.meta:
         fact = "a press over a wire: force and position along its direction, the force less what it was in the air"
-        meta = {**record.meta, "facts": [fact], "position_from": "joints"}
+        meta = {**record.meta, "facts": [fact], "position_from": "joints", **_tool(path, about.meta["wire"])}
         return Record(record.columns, record.units, meta)
     fact = f"a run's record: {RUN['position']} and {RUN['force']}, measured as the record itself says"
     no_tool = {"tool_mass_kg": (0.0, 0.0)}  # the bench's force is that on the surface itself
     return Record(record.columns, record.units, {**record.meta, **no_tool, "facts": [fact]})
+
+
+def _tool(path: Path, wire: Any) -> dict[str, Any]:
+    """The mass beyond the sensor and its std [kg], where the press was told what hangs there."""
+    told = wire.get("tool_mass_kg") if isinstance(wire, dict) else None
+    if told is None:
+        return {}
+    try:
+        return {"tool_mass_kg": msgspec.convert(told, tuple[_Kilograms, _Kilograms])}
+    except msgspec.ValidationError as error:
+        raise InputError(f"{path}: what it says of its tool is spoiled ({error}); press again") from None
 
 
 def measured_by(path: Path) -> dict[str, Any]:
@@ -59,6 +70,9 @@ def measured_by(path: Path) -> dict[str, Any]:
     low_pass = LowPass.parse(found.force.filter)
     lag = low_pass.lag + found.force.delay_s - found.position.lag_s
     return {"lag": lag, "force_filter": found.force.filter if low_pass.roll_off else None}
+
+
+_Kilograms = Annotated[float, msgspec.Meta(ge=0, le=1e3)]
 
 
 class _Force(msgspec.Struct, frozen=True):

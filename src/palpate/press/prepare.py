@@ -14,7 +14,8 @@ from palpate.force.gains import Gains, load_gains
 from palpate.press.engines import ENGINES
 from palpate.press.loops import MODES, check_mode, gains_for, loop_of, usual_mode
 from palpate.press.pilots import CAUTIOUS, CONTROLLERS, pilot_of
-from palpate.press.pressing import Plan, Progress, plan_for, press
+from palpate.press.plan import Plan, plan_for
+from palpate.press.pressing import Progress, press
 from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import Asked

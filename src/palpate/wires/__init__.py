@@ -1,7 +1,7 @@
 """Wires to real arms: readings in, commands out, each by the arm's own library."""
 
 from palpate.wires.opening import KINDS, open_wire
-from palpate.wires.press import Air, Limits, Outcome, Task, checked, look, press
+from palpate.wires.press import Air, Limits, Order, Outcome, Task, checked, look, press
 from palpate.wires.protocol import Command, LostError, Sense, Wire
 from palpate.wires.recording import Rows, recover
 
@@ -11,6 +11,7 @@ __all__ = [
     "Command",
     "Limits",
     "LostError",
+    "Order",
     "Outcome",
     "Rows",
     "Sense",

@@ -6,7 +6,7 @@ from palpate.errors import InputError, unknown
 from palpate.wires.protocol import Wire
 from palpate.wires.ros2 import FORM
 
-KINDS = {"sim": "sim:HOST:PORT", "rtde": "rtde:ADDRESS", "ros2": FORM}
+KINDS = {"sim": "sim:HOST:PORT", "rtde": "rtde:ADDRESS", "franka": "franka:ADDRESS", "ros2": FORM}
 
 
 def open_wire(address: str) -> Wire:
@@ -46,4 +46,10 @@ def _ros2(where: str) -> Wire:
     return Ros2Wire(*topics_of(where))
 
 
-_OPENERS = {"ros2": _ros2, "sim": _sim, "rtde": _rtde}
+def _franka(where: str) -> Wire:
+    from palpate.wires.franka import FrankaWire
+
+    return FrankaWire(where)
+
+
+_OPENERS = {"franka": _franka, "ros2": _ros2, "sim": _sim, "rtde": _rtde}

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.force import ForceLoop
+from palpate.press.plan import Plan
 from palpate.wires.lateness import Lateness, Stopwatch
 from palpate.wires.protocol import Command, LostError, Sense, Triple, Wire
 from palpate.wires.recording import Rows
@@ -69,12 +70,25 @@ class Task:
         direction: into the surface, of unit length in the base.
         hold: how long to press after the touch [s].
         retreat: way back afterwards [m].
+        probe: share of the force by which it is lowered now and then.
+
+    Raises:
+        InputError: a probe that is no share, a hold that is no time.
     """
 
     force: float
     direction: Triple
     hold: float
     retreat: float
+    probe: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.plan  # noqa: B018 - it refuses what it cannot be
+
+    @property
+    def plan(self) -> Plan:
+        """The force at each time since the touch."""
+        return Plan(self.force, self.hold, self.probe)
 
 
 @dataclass(frozen=True)
@@ -104,7 +118,7 @@ class Outcome:
         ended: why, in words.
         ok: it pressed for as long as was asked.
         touched: the surface was met.
-        force: mean over the last half of the hold [N]; None if it was not reached.
+        force: mean over the last third of the hold [N]; None if it was not reached.
         settled: seconds from the touch until the force was within 5 % for good; None if it was not.
         stiffness: what the loop found of the surface, as the position feels it, and its std [N/m]; None if nothing.
         lateness: of the loop.
@@ -136,18 +150,38 @@ class Outcome:
         }
 
 
+@dataclass(frozen=True)
+class Order:
+    """A press that was checked: what to do with which gains, within which limits.
+
+    Args:
+        loop: of the arm, its desired force set.
+        task: what to do, the direction of unit length.
+        limits: what ends it.
+    """
+
+    loop: ForceLoop
+    task: Task
+    limits: Limits
+
+    @property
+    def most(self) -> int:
+        """Readings that there may be: a fifth more than the time limit's, for an arm that runs a little fast."""
+        return int(1.2 * self.limits.seconds * self.loop.gains.arm.rate) + 1000
+
+
 class _EndedError(Exception):
     """The press ends; the text says why."""
 
 
-def look(wire: Wire, loop: ForceLoop, task: Task, limits: Limits) -> Air:
+def look(wire: Wire, order: Order) -> Air:
     """Read an arm at rest in the air, and refuse what no press should begin with.
 
     Raises:
         InputError: another rate than the gains', an arm that moves, a sensor that is saturated, untared or too noisy.
         LostError: no readings.
     """
-    gains = loop.gains
+    gains = order.loop.gains
     sensed = [wire.read(1.0)]
     while sensed[-1].received - sensed[0].received < TARE:
         sensed.append(wire.read(max(gains.theta, 0.1)))
@@ -163,14 +197,15 @@ def look(wire: Wire, loop: ForceLoop, task: Task, limits: Limits) -> Air:
     force, place = np.array([s.force for s in sensed]), np.array([s.position for s in sensed])
     if not (np.isfinite(force).all() and np.isfinite(place).all()):
         raise InputError("the arm gives readings that are no numbers; is its sensor switched on?")
-    bias, along = force.mean(axis=0), force @ np.array(task.direction)
+    bias, along = force.mean(axis=0), force @ np.array(order.task.direction)
     air = Air(place[-1], bias, float(along.std()), rate, sensed[-1])
-    _check_air(air, float(np.ptp(place, axis=0).max()), loop, task, limits)
+    _check_air(air, float(np.ptp(place, axis=0).max()), order)
     return air
 
 
-def _check_air(air: Air, moved: float, loop: ForceLoop, task: Task, limits: Limits) -> None:
-    arm, gains = loop.gains.arm, loop.gains
+def _check_air(air: Air, moved: float, order: Order) -> None:
+    task, limits, gains = order.task, order.limits, order.loop.gains
+    arm = gains.arm
     largest = float(np.abs(air.bias).max())
     if largest >= 0.99 * arm.sensor.full_scale:
         raise InputError(
@@ -183,22 +218,19 @@ def _check_air(air: Air, moved: float, loop: ForceLoop, task: Task, limits: Limi
         )
     if moved > max(gains.approach * TARE, 1e-5):
         raise InputError(f"the arm moved by {1e3 * moved:.3g} mm in {TARE:g} s; let it rest first")
-    if 8.0 * air.noise > task.force:
+    lowest = task.force * (1.0 - task.probe)
+    if 8.0 * air.noise > lowest:
         raise InputError(
-            f"the force's noise is {air.noise:.2g} N in the air: {task.force:g} N is below 8 standard deviations of it"
+            f"the force's noise is {air.noise:.2g} N in the air: {lowest:g} N is below 8 standard deviations of it"
         )
 
 
-def press(
-    wire: Wire, loop: ForceLoop, task: Task, limits: Limits, rows: Rows, asked_to_stop: Callable[[], bool]
-) -> Outcome:
+def press(wire: Wire, order: Order, rows: Rows, asked_to_stop: Callable[[], bool]) -> Outcome:
     """Press as told; the arm rests when this returns or raises.
 
     Args:
         wire: to an arm at rest in the air.
-        loop: of this arm.
-        task: what to do.
-        limits: what ends it.
+        order: what to do with it, from `checked`.
         rows: keeps everything.
         asked_to_stop: whether the user wants it to end.
 
@@ -207,9 +239,7 @@ def press(
     """
     try:
         wire.tare()
-        air = look(wire, loop, task, limits)
-        loop.desired = task.force
-        running = Running(wire, loop, task, limits, rows, asked_to_stop, air)
+        running = Running(wire, order, rows, asked_to_stop, look(wire, order))
         wire.begin()
         return running.run()
     finally:
@@ -221,25 +251,20 @@ class Running:
 
     Args:
         wire: see `press`.
-        loop: see `press`.
-        task: see `press`.
-        limits: see `press`.
+        order: see `press`.
         rows: see `press`.
         asked_to_stop: see `press`.
         air: what was seen at rest.
     """
 
-    def __init__(
-        self, wire: Wire, loop: ForceLoop, task: Task, limits: Limits, rows: Rows,
-        asked_to_stop: Callable[[], bool], air: Air,
-    ):  # fmt: skip
-        self.wire, self.loop, self.task, self.limits = wire, loop, task, limits
-        self.rows, self.asked_to_stop, self.air = rows, asked_to_stop, air
+    def __init__(self, wire: Wire, order: Order, rows: Rows, asked_to_stop: Callable[[], bool], air: Air):
+        self.wire, self.rows, self.asked_to_stop, self.air = wire, rows, asked_to_stop, air
+        self.loop, self.task, self.limits = order.loop, order.task, order.limits
+        loop, self.plan = order.loop, order.task.plan
         self.tick = loop.gains.arm.tick
         allowed = _jitter(loop)
-        most = int(1.2 * limits.seconds * loop.gains.arm.rate) + 1000
-        self.watch = Stopwatch(self.tick, None if allowed is None else allowed * self.tick, most)
-        self.direction = np.array(task.direction)
+        self.watch = Stopwatch(self.tick, None if allowed is None else allowed * self.tick, order.most)
+        self.direction = np.array(self.task.direction)
         self.x_command, self.begun = 0.0, air.last.stamp
         self.touched: float | None = None
         self.last, self.depth = air.last, 0.0
@@ -282,6 +307,8 @@ class Running:
         )
         self._check(sense, force, (self.depth - before) / max(ticks, 1.0) / self.tick)
         self.last = sense
+        if self.touched is not None and not self._held():
+            self.loop.desired = self.plan.desired(sense.stamp - self.touched)
         speed = min(max(law(force, self.depth, float(missed)), -self.limits.speed), self.limits.speed)
         self.x_command += self.tick * speed
         self.wire.write(
@@ -305,7 +332,7 @@ class Running:
             raise _EndedError(f"the force is {largest:.3g} N, above the limit of {limits.force:g} N")
         if force < -max(self.task.force, 8.0 * self.air.noise) / 2.0:
             raise _EndedError(
-                f"the force is {force:.3g} N against the press: is its sign, or --direction, right?"
+                f"the force is {force:.3g} N against the press: is its sign, or --normal, right?"
             )
         if not abs(self.depth) <= limits.travel:
             raise _EndedError(
@@ -341,7 +368,10 @@ class Running:
 
     def _told(self, ended: str, ok: bool) -> Outcome:
         times, forces = np.array(self.forces or [(0.0, 0.0)]).T
-        late = forces[times > times[-1] / 2.0]
+        late = forces[times > 2.0 / 3.0 * times[-1]]
+        mean = float(late.mean()) if ok and len(late) else None
+        if self.task.probe:  # until it is lowered for the first time
+            times, forces = times[times < times[-1] / 3.0], forces[times < times[-1] / 3.0]
         # Of a mean over a whole lag: noise of single readings is not the force.
         width = max(round(self.loop.gains.theta / self.tick), 1)
         smooth = np.convolve(forces, np.full(width, 1.0 / width), "valid") if len(forces) > width else forces
@@ -349,7 +379,7 @@ class Running:
         inside = ok and (not len(outside) or outside[-1] < len(smooth) - 1)
         settled = float(times[outside[-1] + 1]) if inside and len(outside) else (0.0 if inside else None)
         return Outcome(
-            ended, ok, self.touched is not None, float(late.mean()) if ok and len(late) else None, settled,
+            ended, ok, self.touched is not None, mean, settled,
             self.stiffness, self.watch.told(), self.air,
         )  # fmt: skip
 
@@ -364,8 +394,8 @@ def _triple(vector: Array) -> Triple:
     return float(vector[0]), float(vector[1]), float(vector[2])
 
 
-def checked(task: Task, limits: Limits, loop: ForceLoop) -> Task:
-    """The task with a direction of unit length, refused where it does not fit the gains.
+def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
+    """What was asked as an order, its direction of unit length; refused where it does not fit the gains.
 
     Raises:
         InputError: what does not fit, and what to do.
@@ -374,7 +404,7 @@ def checked(task: Task, limits: Limits, loop: ForceLoop) -> Task:
     size = float(np.linalg.norm(task.direction))
     if not (math.isfinite(size) and size > 0.0):
         raise InputError(
-            "--direction must have a length; it points into the surface in the base's axes, as 0,0,-1"
+            "--normal must have a length; it points into the surface in the base's axes, as 0,0,-1"
         )
     if not task.force < limits.force <= gains.arm.sensor.full_scale:
         raise InputError(
@@ -388,9 +418,9 @@ def checked(task: Task, limits: Limits, loop: ForceLoop) -> Task:
         )
     if not (task.hold > 0.0 and task.hold + TARE < limits.seconds):
         raise InputError(
-            f"--hold must be above 0 and leave time for the approach within {limits.seconds:g} s"
+            f"--seconds must be above 0 and leave time for the approach within the limit of {limits.seconds:g} s"
         )
     if not 0.0 <= task.retreat <= limits.travel:
         raise InputError(f"--retreat must be from 0 to the travel limit of {1e3 * limits.travel:g} mm")
     loop.desired = task.force
-    return replace(task, direction=_triple(np.array(task.direction) / size))
+    return Order(loop, replace(task, direction=_triple(np.array(task.direction) / size)), limits)

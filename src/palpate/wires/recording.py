@@ -78,11 +78,12 @@ class Rows:
         return _record(np.array(self._rows[: self.count]), self.about)
 
     def finish(self, outcome: dict[str, Any]) -> Path | None:
-        """Make the record, and say how it ended; returns where it is."""
+        """Make the record, and say how it ended; returns where it is, None where nothing came."""
         if self.folder is None:
             return None
         self._rows.flush()
-        return _finished(self.folder, self.record(), {**self.about, **outcome})
+        path = _finished(self.folder, self.record(), {**self.about, **outcome})
+        return path if self.count else None
 
 
 def recover(folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""The wire to an arm under ROS 2, by cyclonedds alone: wrench and pose in, a twist, a pose or an array out."""
+"""The wire to an arm under ROS 2, by cyclonedds alone: wrench, pose or joints in; a twist, pose or array out."""
 
 from __future__ import annotations
 
@@ -11,32 +11,60 @@ import msgspec
 
 from palpate.errors import InputError
 from palpate.wires.protocol import Command, LostError, Sense, Triple
+from palpate.wires.ros2_tool import JointTool, PoseTool, Tool, seconds
 from palpate.wires.turns import turned
 
 FORM = "ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=reaction"
 _KEPT = 32
 _PATIENCE = 2.0
 """For which topics may take to be found [s]."""
+SENT = {
+    "twist": "geometry_msgs/msg/TwistStamped",
+    "pose": "geometry_msgs/msg/PoseStamped",
+    "array": "std_msgs/msg/Float64MultiArray",
+    "joint-speeds": "std_msgs/msg/Float64MultiArray",
+}
+"""What is sent, by what `as` says."""
 
 
 class Topics(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a wire to ROS 2 has to be told; nothing of it has a default.
+    """What a wire to ROS 2 has to be told; nothing of it is guessed.
 
     Args:
         wrench: topic of a WrenchStamped.
-        pose: topic of a PoseStamped, of the tool in the arm's base.
+        pose: topic of a PoseStamped, of the tool in the arm's base; or instead
+        joints: topic of a JointState, and
+        arm: whose joints they are, as `palpate press --arm` takes it, and
+        site: the tip of a file.
         command: topic that a controller listens at.
-        kind: `twist` (TwistStamped), `pose` (PoseStamped) or `array` (Float64MultiArray of a twist's six numbers).
+        kind: `twist` (TwistStamped), `pose` (PoseStamped), `array` (Float64MultiArray of a twist's six numbers), or
+            `joint-speeds` (Float64MultiArray of a speed for each of the arm's joints, in the order of its file).
         wrench_frame: axes of the wrench: the arm's `base` or the `tool`.
         force_sign: `action` for what the tool exerts on the surface, `reaction` for the opposite.
     """
 
     wrench: str
-    pose: str
+    pose: str | None = None
+    joints: str | None = None
+    arm: str | None = None
+    site: str | None = None
     command: str
-    kind: Literal["twist", "pose", "array"] = msgspec.field(name="as")
+    kind: Literal["twist", "pose", "array", "joint-speeds"] = msgspec.field(name="as")
     wrench_frame: Literal["base", "tool"] = msgspec.field(name="wrench-frame")
     force_sign: Literal["action", "reaction"] = msgspec.field(name="force-sign")
+
+    def __post_init__(self) -> None:
+        if (self.pose is None) == (self.joints is None):
+            raise ValueError("needs pose=TOPIC, or joints=TOPIC&arm=ARM, and not both")
+        if (self.joints is None) != (self.arm is None):
+            raise ValueError("joints=TOPIC and arm=ARM belong together")
+        if self.kind == "joint-speeds" and self.joints is None:
+            raise ValueError("as=joint-speeds needs joints=TOPIC&arm=ARM: speeds of joints are of an arm")
+
+    @property
+    def place(self) -> str:
+        """The topic that says where the tool is."""
+        return str(self.pose or self.joints)
 
 
 def topics_of(where: str) -> tuple[int, Topics]:
@@ -59,7 +87,7 @@ class _Ends:
     """What a participant reads and writes."""
 
     wrench: Any
-    pose: Any
+    place: Any
     command: Any
     writers: Any
     waiting: Any
@@ -83,9 +111,9 @@ class Ros2Wire:
             raise InputError("this wire needs cyclonedds: pip install 'palpate[ros2]'") from None
         self._messages: Any = ros2_messages
         self._topics, self._domain = topics, domain
+        self._tool: Tool = JointTool(topics.arm, topics.site) if topics.arm else PoseTool()
         self._ends = _opened(domain, topics, ros2_messages)
         self._last, self._begun = -1.0, False
-        self._pose: Any = None
         try:
             self.read(_PATIENCE)
         except LostError as error:
@@ -95,7 +123,7 @@ class Ros2Wire:
     def title(self) -> str:
         """What it leads to."""
         t = self._topics
-        return f"an arm in ROS domain {self._domain}, {t.wrench} and {t.pose} in, {t.kind} to {t.command}"
+        return f"an arm in ROS domain {self._domain}, {t.wrench} and {t.place} in, {t.kind} to {t.command}"
 
     @property
     def watchdog(self) -> str:
@@ -105,37 +133,35 @@ class Ros2Wire:
         )
 
     def read(self, timeout: float) -> Sense:
-        """The next wrench, with the newest pose."""
+        """The next wrench, with the newest place of the tool."""
         end = time.monotonic() + timeout
         while (left := end - time.monotonic()) > 0:
             self._ends.waiting.wait(max(int(1e9 * left), 1))
             wrenches = self._ends.wrench.take(_KEPT)
-            for sample in self._ends.pose.take(_KEPT):
-                if hasattr(sample, "pose"):
-                    self._pose = sample
+            for sample in self._ends.place.take(_KEPT):
+                if hasattr(sample, "header"):  # not one that a writer leaves as it goes
+                    self._tool.take(sample)
             fresh = [sample for sample in wrenches if hasattr(sample, "wrench")]
-            if fresh and self._pose is not None:
+            if fresh and self._tool.stamp is not None:
                 sense = self._sense(fresh[-1], timeout)
                 if sense is not None:
                     return sense
-        lacking = self._topics.wrench if self._pose is not None else self._topics.pose
+        lacking = self._topics.wrench if self._tool.stamp is not None else self._topics.place
         raise LostError(f"no reading at {lacking} for {1e3 * timeout:.3g} ms")
 
     def _sense(self, sample: Any, timeout: float) -> Sense | None:
-        received, stamp = time.monotonic(), _seconds(sample.header.stamp)
-        pose = self._pose
+        received, stamp = time.monotonic(), seconds(sample.header.stamp)
         if not stamp > self._last:
             return None
-        if stamp - _seconds(pose.header.stamp) > timeout:
-            raise LostError(f"the pose at {self._topics.pose} is older than {1e3 * timeout:.3g} ms")
+        if stamp - self._tool.stamp > timeout:  # type: ignore[operator]
+            raise LostError(f"what came at {self._topics.place} is older than {1e3 * timeout:.3g} ms")
         self._last = stamp
-        p, o = pose.pose.position, pose.pose.orientation
-        quaternion = (o.x, o.y, o.z, o.w)
+        position, quaternion = self._tool.place()
         sign = 1.0 if self._topics.force_sign == "action" else -1.0
         f, m = ((sign * v.x, sign * v.y, sign * v.z) for v in (sample.wrench.force, sample.wrench.torque))
         if self._topics.wrench_frame == "tool":
             f, m = turned(quaternion, f), turned(quaternion, m)
-        return Sense(received, stamp, f, m, (p.x, p.y, p.z), quaternion)
+        return Sense(received, stamp, f, m, position, quaternion)
 
     def tare(self) -> None:
         """ROS 2 has no one way to zero a sensor."""
@@ -164,26 +190,25 @@ class Ros2Wire:
             raise LostError(f"a command could not be sent: {error}") from None
 
     def _message(self, velocity: Triple, position: Triple) -> Any:
-        m = self._messages
-        now = time.time_ns()
-        frame = self._pose.header.frame_id if self._pose is not None else ""
-        header = m.Header(m.Time(now // 10**9, now % 10**9), frame)
-        if self._topics.kind == "pose":
-            turn = self._pose.pose.orientation
-            return m.PoseStamped(header, m.Pose(m.Point(*position), turn))
-        if self._topics.kind == "array":
-            return m.Float64MultiArray(m.Layout([], 0), [*velocity, 0.0, 0.0, 0.0])
-        return m.TwistStamped(header, m.Twist(m.Vector3(*velocity), m.Vector3(0.0, 0.0, 0.0)))
+        m, kind = self._messages, self._topics.kind
+        if kind == "array":
+            return m.numbers([*velocity, 0.0, 0.0, 0.0])
+        if kind == "joint-speeds":
+            return m.numbers(self._tool.speeds(velocity))
+        head = m.header(time.time_ns(), self._tool.frame)
+        if kind == "pose":
+            return m.pose(head, position, self._tool.place()[1])
+        return m.twist(head, velocity)
 
     def stop(self) -> None:
         """Speed 0, or the place where the tool is; said three times."""
         if not self._begun:
             return
         self._begun = False
-        p = self._pose.pose.position
+        position, _ = self._tool.place()
         for _ in range(3):
             try:
-                self.write(Command((0.0, 0.0, 0.0), (p.x, p.y, p.z)))
+                self.write(Command((0.0, 0.0, 0.0), position))
             except LostError:
                 return
             time.sleep(0.002)
@@ -192,10 +217,6 @@ class Ros2Wire:
         """Leave the domain."""
         self.stop()
         self._ends = None  # type: ignore[assignment]
-
-
-def _seconds(stamp: Any) -> float:
-    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
 def _opened(domain: int, topics: Topics, messages: Any) -> _Ends:
@@ -209,15 +230,15 @@ def _opened(domain: int, topics: Topics, messages: Any) -> _Ends:
     participant = DomainParticipant(domain)
     into = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(_KEPT))
     out = Qos(Policy.Reliability.Reliable(10**8), Policy.History.KeepLast(1))
-    kinds = {"twist": "TwistStamped", "pose": "PoseStamped", "array": "Float64MultiArray"}
 
     def topic(name: str, kind: str) -> Any:
-        return Topic(participant, f"rt{name}", getattr(messages, kind))
+        return Topic(participant, f"rt{name}", messages.message(kind))
 
-    wrench = DataReader(participant, topic(topics.wrench, "WrenchStamped"), qos=into)
-    pose = DataReader(participant, topic(topics.pose, "PoseStamped"), qos=into)
-    command = DataWriter(participant, topic(topics.command, kinds[topics.kind]), qos=out)
+    of_place = "geometry_msgs/msg/PoseStamped" if topics.pose else "sensor_msgs/msg/JointState"
+    wrench = DataReader(participant, topic(topics.wrench, "geometry_msgs/msg/WrenchStamped"), qos=into)
+    place = DataReader(participant, topic(topics.place, of_place), qos=into)
+    command = DataWriter(participant, topic(topics.command, SENT[topics.kind]), qos=out)
     waiting = WaitSet(participant)
     waiting.attach(ReadCondition(wrench, ViewState.Any | InstanceState.Alive | SampleState.NotRead))
     writers = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
-    return _Ends(wrench, pose, command, writers, waiting)
+    return _Ends(wrench, place, command, writers, waiting)

@@ -1,123 +1,90 @@
-"""Messages of ROS 2 as DDS types, byte for byte as ROS 2 itself sends them; needs cyclonedds."""
+"""Messages of ROS 2 as DDS types, byte for byte as ROS 2 itself sends them.
+
+Their fields are those of the definitions that rosbags carries; here stands only how a definition becomes a DDS type.
+Needs cyclonedds and rosbags.
+"""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from types import new_class
+from typing import Any
 
-from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float64, int32, sequence, uint32
+from cyclonedds.idl import IdlStruct, types
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_typestore
 
-
-@dataclass
-class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
-    """A stamp."""
-
-    sec: int32
-    nanosec: uint32
-
-
-@dataclass
-class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
-    """A stamp and the frame that it is of."""
-
-    stamp: Time
-    frame_id: str
+_BASES = {"string": str, "float64": types.float64, "int32": types.int32, "uint32": types.uint32}
+"""Those that the messages of arms are made of."""
 
 
-@dataclass
-class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+@cache
+def message(name: str) -> Any:
+    """The class of a message, such as `geometry_msgs/msg/WrenchStamped`; its fields are its arguments, in order."""
+    package, kind, short = name.split("/")
+    _, fields = _definitions()[name]
+    typed = {field: _type(told) for field, told in fields}
+    made = new_class(
+        short,
+        (IdlStruct,),
+        {"typename": f"{package}::{kind}::dds_::{short}_"},
+        lambda body: body.update(__annotations__=typed, __module__=__name__),
+    )
+    return dataclass(made)
+
+
+@cache
+def _definitions() -> Any:
+    return get_typestore(Stores.ROS2_HUMBLE).fielddefs
+
+
+def _type(told: Any) -> Any:
+    kind, what = told
+    if kind == Nodetype.BASE:
+        return _BASES[what[0]]
+    if kind == Nodetype.NAME:
+        return message(what)
+    assert kind == Nodetype.SEQUENCE, told
+    return types.sequence[_type(what[0])]
+
+
+def header(nanoseconds: int, frame: str) -> Any:
+    """A header of a time since 1970 and a frame."""
+    stamp = message("builtin_interfaces/msg/Time")(*divmod(nanoseconds, 10**9))
+    return message("std_msgs/msg/Header")(stamp, frame)
+
+
+def vector(values: Any) -> Any:
     """Three numbers."""
-
-    x: float64
-    y: float64
-    z: float64
+    return message("geometry_msgs/msg/Vector3")(*map(float, values))
 
 
-@dataclass
-class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
-    """A place [m]."""
-
-    x: float64
-    y: float64
-    z: float64
+def wrench(head: Any, force: Any, torque: Any) -> Any:
+    """A WrenchStamped of a force [N] and a torque [N m]."""
+    own = message("geometry_msgs/msg/Wrench")(vector(force), vector(torque))
+    return message("geometry_msgs/msg/WrenchStamped")(head, own)
 
 
-@dataclass
-class Turn(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
-    """An orientation."""
-
-    x: float64
-    y: float64
-    z: float64
-    w: float64
+def pose(head: Any, position: Any, quaternion: Any) -> Any:
+    """A PoseStamped of a position [m] and a quaternion x, y, z, w."""
+    point = message("geometry_msgs/msg/Point")(*map(float, position))
+    turn = message("geometry_msgs/msg/Quaternion")(*map(float, quaternion))
+    return message("geometry_msgs/msg/PoseStamped")(head, message("geometry_msgs/msg/Pose")(point, turn))
 
 
-@dataclass
-class Wrench(IdlStruct, typename="geometry_msgs::msg::dds_::Wrench_"):
-    """Force [N] and torque [N m]."""
-
-    force: Vector3
-    torque: Vector3
+def twist(head: Any, velocity: Any) -> Any:
+    """A TwistStamped of a speed [m/s] that does not turn."""
+    own = message("geometry_msgs/msg/Twist")(vector(velocity), vector((0.0, 0.0, 0.0)))
+    return message("geometry_msgs/msg/TwistStamped")(head, own)
 
 
-@dataclass
-class WrenchStamped(IdlStruct, typename="geometry_msgs::msg::dds_::WrenchStamped_"):
-    """A wrench with its header."""
-
-    header: Header
-    wrench: Wrench
+def joints(head: Any, names: list[str], positions: Any) -> Any:
+    """A JointState of positions alone [rad, or m where a joint slides]."""
+    return message("sensor_msgs/msg/JointState")(head, names, [float(q) for q in positions], [], [])
 
 
-@dataclass
-class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
-    """Place and orientation."""
-
-    position: Point
-    orientation: Turn
-
-
-@dataclass
-class PoseStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseStamped_"):
-    """A pose with its header."""
-
-    header: Header
-    pose: Pose
-
-
-@dataclass
-class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
-    """Speed [m/s] and rate of turning [rad/s]."""
-
-    linear: Vector3
-    angular: Vector3
-
-
-@dataclass
-class TwistStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TwistStamped_"):
-    """A twist with its header."""
-
-    header: Header
-    twist: Twist
-
-
-@dataclass
-class Dimension(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayDimension_"):
-    """One dimension of an array."""
-
-    label: str
-    size: uint32
-    stride: uint32
-
-
-@dataclass
-class Layout(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayLayout_"):
-    """How an array lies."""
-
-    dim: sequence[Dimension]
-    data_offset: uint32
-
-
-@dataclass
-class Float64MultiArray(IdlStruct, typename="std_msgs::msg::dds_::Float64MultiArray_"):
-    """Numbers."""
-
-    layout: Layout
-    data: sequence[float64]
+def numbers(values: Any) -> Any:
+    """A Float64MultiArray of numbers without a layout."""
+    layout = message("std_msgs/msg/MultiArrayLayout")([], 0)
+    return message("std_msgs/msg/Float64MultiArray")(layout, [float(v) for v in values])

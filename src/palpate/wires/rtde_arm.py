@@ -1,30 +1,26 @@
 """A simulated arm that speaks as a UR does, to rehearse with: RTDE, dashboard and script port, on a loopback address.
 
-`python -m palpate.wires.rtde_arm --address 127.0.0.9`. It knows of ur-rtde's control script what a press needs: speedL
-and its stop, zeroFtSensor, the watchdog, the end; to all else it answers as a script that has done it.
+`python -m palpate.wires.rtde_arm --address 127.0.0.9`. It knows of ur-rtde's control script what a press needs: speedL,
+servoL and their stops, zeroFtSensor, the watchdog, the end; to all else it answers as a script that has done it.
 """
 
 from __future__ import annotations
 
-import argparse
 import selectors
 import socket
 import struct
-import sys
 import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from palpate.force.arm import load_arm
-from palpate.force.worlds import surface
-from palpate.wires.sim_arm import OneDirection
+from palpate.wires.rehearsal import START, OneDirection, arm_of, loopback, ready, words_of
 
 RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
 _VERSION = (5, 15, 0, 0)
 _RUNNING, _STOPPED = 2, 1
 READY, DONE = 1, 2
 # Numbers of ur-rtde's commands.
-NOTHING, ZERO, SPEEDL, SPEED_STOP, WATCHDOG, STOP = 0, 8, 10, 15, 35, 255
+NOTHING, ZERO, SPEEDL, SPEED_STOP, SERVO_STOP, SERVOL, WATCHDOG, STOP = 0, 8, 10, 15, 16, 24, 35, 255
 _SIX = {"actual_TCP_pose", "actual_TCP_force", "actual_TCP_speed", "actual_q", "actual_qd"}
 _DASHBOARD = {
     "PolyscopeVersion": "URSoftware 5.15.0.1202319 (Aug 22 2023)",
@@ -81,9 +77,15 @@ class Controller:
         self.arm = arm
         self.running, self.state = False, READY
         self.speed, self.zero = 0.0, 0.0
+        self.height: float | None = None
         self.least, self.heard = 0.0, 0.0
         self.commands: list[int] = []
         self.master: Client | None = None
+
+    def uploaded(self) -> None:
+        """A control script has come, and runs."""
+        self.running, self.state = True, READY
+        self.least, self.heard, self.speed, self.height = 0.0, self.arm.time, 0.0, None
 
     def obey(self, numbers: dict[str, Any]) -> None:
         """A packet of registers."""
@@ -96,11 +98,11 @@ class Controller:
             return
         self.commands.append(command)
         value = [float(numbers.get(f"input_double_register_{i}", 0.0)) for i in range(8)]
-        if command == SPEEDL:
-            self.speed = -value[2]
+        if command in {SPEEDL, SERVOL}:
+            self.speed, self.height = -value[2], (value[2] if command == SERVOL else None)
             return
-        if command in {SPEED_STOP, STOP}:
-            self.speed = 0.0
+        if command in {SPEED_STOP, SERVO_STOP, STOP}:
+            self.speed, self.height = 0.0, None
         if command == ZERO:
             self.zero = self.arm.reading()[2]
         if command == WATCHDOG:
@@ -112,7 +114,9 @@ class Controller:
     def tick(self) -> None:
         """Go on by one tick."""
         if self.least and self.arm.time - self.heard > 1.0 / self.least:
-            self.speed, self.running = 0.0, False
+            self.speed, self.height, self.running = 0.0, None, False
+        if self.height is not None:
+            self.speed = (START - self.height - self.arm.command) / self.arm.world.tick
         self.arm.tick(self.speed)
 
     def value(self, name: str) -> Any:
@@ -194,13 +198,13 @@ class Server:
         elif port == DASHBOARD:
             self._dashboard(one, data)
         else:
-            self.controller.running, self.controller.state = True, READY  # a script is uploaded and runs
+            self.controller.uploaded()
 
     def _gone(self, one: socket.socket) -> None:
         self.selector.unregister(one)
         client = self.clients.pop(one, None)
         if client is not None and client is self.controller.master:
-            self.controller.master, self.controller.speed = None, 0.0
+            self.controller.master, self.controller.speed, self.controller.height = None, 0.0, None
         one.close()
 
     def _dashboard(self, one: socket.socket, data: bytes) -> None:
@@ -264,22 +268,13 @@ class Server:
 
 def main() -> None:
     """Read the words, bind, say where, and serve."""
-    words = argparse.ArgumentParser(prog="python -m palpate.wires.rtde_arm", description=__doc__)
+    words = words_of("rtde_arm", __doc__)
     words.add_argument("--address", default="127.0.0.9", help="of the loopback")
-    words.add_argument("--arm", default="ur5e", help="ur5e or a TOML file")
-    words.add_argument("--stiffness", type=float, default=5000.0, help="of the surface, N/m")
-    words.add_argument("--damping", type=float, default=20.0, help="of the surface, N s/m")
-    words.add_argument("--gap", type=float, default=0.002, help="between tool and surface, m")
-    words.add_argument("--seconds", type=float, default=600.0, help="after which it ends")
     told = words.parse_args()
-    if not told.address.startswith("127."):
-        words.error(f"--address must be one of the loopback, 127.*, got {told.address}")
-    arm = OneDirection(
-        load_arm(told.arm), surface(told.stiffness, told.damping), told.gap, (0.0, 0.0, 3.0), 0
-    )
-    server = Server(told.address, Controller(arm))
-    sys.stdout.write(f"rtde:{told.address}\n")
-    sys.stdout.flush()
+    address = loopback(words, told.address)
+    arm = arm_of(told, (0.0, 0.0, 3.0))
+    server = Server(address, Controller(arm))
+    ready(f"rtde:{address}")
     server.serve(told.seconds)
 
 

@@ -16,6 +16,28 @@ def from_rotation_vector(vector: Sequence[float]) -> Quaternion:
     return share * x, share * y, share * z, math.cos(angle / 2.0)
 
 
+def from_matrix_by_columns(m: Sequence[float]) -> Quaternion:
+    """The quaternion x, y, z, w of a homogeneous matrix of 4 x 4 that is written by columns.
+
+    From the largest of its four squares, so that nothing small divides (Shepperd, J. Guidance and Control 1 (1978)
+    223).
+    """
+    a, b, c = float(m[0]), float(m[5]), float(m[10])
+    squares = (1.0 + a - b - c, 1.0 - a + b - c, 1.0 - a - b + c, 1.0 + a + b + c)
+    most = max(range(4), key=squares.__getitem__)
+    xy, xz, yz = m[4] + m[1], m[8] + m[2], m[9] + m[6]
+    xw, yw, zw = m[6] - m[9], m[8] - m[2], m[1] - m[4]
+    row = (
+        (squares[0], xy, xz, xw),
+        (xy, squares[1], yz, yw),
+        (xz, yz, squares[2], zw),
+        (xw, yw, zw, squares[3]),
+    )[most]
+    size = math.sqrt(sum(part * part for part in row))
+    x, y, z, w = (float(part) / size for part in row)
+    return x, y, z, w
+
+
 def turned(q: Quaternion, v: Sequence[float]) -> tuple[float, float, float]:
     """A vector in the tool's axes turned into the base's."""
     x, y, z, w = q

@@ -1,4 +1,4 @@
-"""The wire to a Universal Robots arm, by ur-rtde: it reads over RTDE, and moves the tool by speedL."""
+"""The wire to a Universal Robots arm, by ur-rtde: it reads over RTDE, and moves the tool by speedL or servoL."""
 
 from __future__ import annotations
 
@@ -21,6 +21,10 @@ _ACCELERATION = 1.0
 """Of the tool towards a commanded speed, and of the stop [m/s^2]."""
 _WATCHDOG = 10.0
 """Commands a second below which the controller stops the arm by itself [Hz]."""
+_LOOKAHEAD, _GAIN = 0.03, 300.0
+"""Of servoL: the shortest lookahead that the controller takes [s], and the gain of URScript where none is said."""
+_WAYS = ("", "as=speed", "as=servo")
+FORM = "rtde:ADDRESS"
 _PATIENCE = 2.0
 """For which a call to stop may take [s]."""
 _ANSWER = 8.0
@@ -34,13 +38,17 @@ class UrWire:
     told of. `begin` and `tare` upload ur-rtde's control script, which ends whatever program ran.
 
     Args:
-        address: of the controller.
+        where: address of the controller; with `?as=servo` behind it the tool follows a place by servoL, and not a speed
+            by speedL.
 
     Raises:
         InputError: ur-rtde is missing, or nothing at the address speaks RTDE.
     """
 
-    def __init__(self, address: str):
+    def __init__(self, where: str):
+        address, _, way = where.partition("?")
+        if not address or way not in _WAYS:
+            raise InputError(f"--wire needs {FORM} or {FORM}?as=servo (or speed), got 'rtde:{where}'")
         try:
             from rtde_receive import RTDEReceiveInterface
         except ImportError:
@@ -49,7 +57,9 @@ class UrWire:
             ) from None
         self._address = address
         self._control: Any = None
-        self._last = -1.0
+        self._servo = way == "as=servo"
+        self._last, self._tick = -1.0, 0.008
+        self._turn: list[float] = []
         _check_protocol(address)
         self._receive: Any = _in_time(
             lambda: RTDEReceiveInterface(address, -1.0, _READ),
@@ -60,7 +70,7 @@ class UrWire:
     @property
     def title(self) -> str:
         """What it leads to."""
-        return f"a UR at {self._address}, over RTDE"
+        return f"a UR at {self._address}, over RTDE, moved by {'servoL' if self._servo else 'speedL'}"
 
     @property
     def watchdog(self) -> str:
@@ -87,7 +97,9 @@ class UrWire:
         received = time.monotonic()
         if receive.isProtectiveStopped() or receive.isEmergencyStopped():
             raise LostError("the controller has stopped the arm (protective or emergency stop)")
-        self._last = stamp
+        if 0.0 < stamp - self._last < 0.1:
+            self._tick = stamp - self._last
+        self._last, self._turn = stamp, self._turn or list(pose[3:])
         x, y, z = pose[:3]
         # The controller gives what the surface exerts on the tool.
         a, b, c, d, e, f = (-value for value in force)
@@ -114,9 +126,13 @@ class UrWire:
         return self._control
 
     def write(self, command: Command) -> None:
-        """speedL."""
+        """speedL, or servoL with the orientation that the tool had at first."""
         try:
-            sent = self._control.speedL([*command.velocity, 0.0, 0.0, 0.0], _ACCELERATION, 0.0)
+            if self._servo:
+                pose = [*command.position, *self._turn]
+                sent = self._control.servoL(pose, 0.0, 0.0, self._tick, _LOOKAHEAD, _GAIN)
+            else:
+                sent = self._control.speedL([*command.velocity, 0.0, 0.0, 0.0], _ACCELERATION, 0.0)
         except RuntimeError as error:
             raise LostError(f"a command could not be sent: {error}") from None
         if not sent:
@@ -129,7 +145,7 @@ class UrWire:
             return
 
         def rest() -> None:
-            control.speedStop(_ACCELERATION)
+            control.servoStop(_ACCELERATION) if self._servo else control.speedStop(_ACCELERATION)
             control.stopScript()
             control.disconnect()
 

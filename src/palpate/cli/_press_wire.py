@@ -1,0 +1,168 @@
+"""The part of `palpate press` that moves a real arm, over its wire."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.cli import _interrupts
+from palpate.cli._press_options import AskOptions, LimitOptions, WireOptions, task_of
+from palpate.cli._program import command
+from palpate.cli._terminal import print_json, print_lines, say
+from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from palpate.contact_frame import Payload
+    from palpate.wires import Air, Order, Outcome, Rows, Wire
+
+_WORD = "press"
+
+
+def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *, json: bool) -> int:
+    """Press with a real arm, or only look at it.
+
+    Returns:
+        0 if it pressed for as long as was asked, 1 if not.
+
+    Raises:
+        InputError: whatever is wrong before the arm moves.
+    """
+    task, most = task_of(asked, options, limits)
+    if json and not (options.yes or options.dry_run):
+        raise InputError("--json asks nothing, so it needs --yes or --dry-run")
+    if options.record is not None and options.record.exists():
+        raise InputError(f"{options.record} exists; choose another place for --record")
+    from palpate.force import ForceLoop
+    from palpate.wires import Rows, look, open_wire
+    from palpate.wires.press import checked
+
+    assert asked.gains is not None
+    order = checked(ForceLoop.load(asked.gains, options.certificate), task, most)
+    tool = _tool(options.payload)
+    arm = open_wire(str(options.wire))
+    try:
+        plan = _plan(arm, order, options.record)
+        if not json:
+            print_lines(*plan)
+        if options.dry_run or tool is not None:
+            air = look(arm, order)
+            notes = [] if tool is None else _compared(tool, air)
+            if options.dry_run:
+                return _looked(air, [*plan, *notes], notes, json)
+            if not json:
+                print_lines(*notes)
+        _ask(options.yes)
+        about = {
+            "command": command(),
+            "title": arm.title,
+            "normal": list(order.task.direction),
+            "desired_N": asked.desired,
+        }
+        if tool is not None and tool.beyond is not None:
+            about["tool_mass_kg"] = list(tool.beyond)
+        rows = Rows(options.record, order.most, about)
+        outcome, words = _pressed(arm, order, rows, options.ordinary_priority)
+    finally:
+        arm.close()
+    where = rows.finish(outcome.to_json() | {"priority": words})
+    return _print(outcome, words, where, json)
+
+
+def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
+    """What the record says of the press, as plain values."""
+    task = order.task
+    known = {
+        "command": command(),
+        "title": arm.title,
+        "normal": list(task.direction),
+        "desired_N": task.force,
+    }
+    beyond = None if tool is None else tool.beyond
+    return known if beyond is None else {**known, "tool_mass_kg": list(beyond)}
+
+
+def _tool(path: Path | None) -> Payload | None:
+    from palpate.contact_frame import load_payload
+
+    return None if path is None else load_payload(path)
+
+
+def _compared(tool: Payload, air: Air) -> list[str]:
+    from palpate.wires.tool import unlike
+
+    note = unlike(tool, air)
+    return ["the sensor shows the tool as it was weighed" if note is None else note]
+
+
+def _pressed(arm: Wire, order: Order, rows: Rows, ordinary: bool) -> tuple[Outcome, str]:
+    from palpate.wires import press
+    from palpate.wires.realtime import hurried
+
+    try:
+        with _interrupts.noticed() as came, hurried(not ordinary) as words:
+            return press(arm, order, rows, came), words
+    except BaseException as error:
+        if rows.count or rows.folder is not None:
+            rows.finish({"ended": str(error) or type(error).__name__, "ok": False})
+        raise
+
+
+def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
+    task, limits, gains = order.task, order.limits, order.loop.gains
+    x, y, z = task.direction
+    lowered = f" (lowered by {100.0 * task.probe:g} % three times)" if task.probe else ""
+    last = 1e3 * (gains.theta + gains.arm.tick)
+    does = (
+        f"rests 0.5 s in the air and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
+        f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s{lowered}, goes"
+        f" back {1e3 * task.retreat:g} mm, rests"
+    )
+    stops = (
+        f"stops at {limits.force:g} N, {1e3 * limits.speed:g} mm/s, {1e3 * limits.travel:g} mm from here, after"
+        f" {limits.seconds:g} s, on Ctrl-C, and {last:.3g} ms after the last reading at the latest"
+    )
+    kept = f"record: {record}" if record is not None else "no record is kept (--record DIR keeps one)"
+    arms = f"arm: {arm.title}; gains for {gains.arm.title}"
+    return [arms, does, stops, f"if this process dies: {arm.watchdog}", kept]
+
+
+def _ask(yes: bool) -> None:
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise InputError(
+            "the arm would move, and nobody can be asked here; look with --dry-run first, then add --yes"
+        )
+    say(f"the arm will move; type {_WORD} to go on")
+    if sys.stdin.readline().strip() != _WORD:
+        raise InputError("nothing was moved, as nobody said so")
+
+
+def _looked(air: Air, plan: list[str], notes: list[str], json: bool) -> int:
+    found = f"in the air: bias {', '.join(f'{b:.3g}' for b in air.bias)} N, noise {air.noise:.2g} N, {air.rate:.4g} Hz"
+    if json:
+        print_json({"plan": plan, "bias_N": air.bias.tolist(), "noise_N": air.noise, "rate_Hz": air.rate})
+    else:
+        print_lines(found, *notes, "dry run: nothing was moved")
+    return 0
+
+
+def _print(outcome: Outcome, words: str, where: Path | None, json: bool) -> int:
+    if json:
+        print_json(outcome.to_json() | {"priority": words, "record": None if where is None else str(where)})
+        return 0 if outcome.ok else 1
+    lines = [f"ended: {outcome.ended}; the arm rests"]
+    if outcome.force is not None:
+        settled = (
+            f"within 5 % after {outcome.settled:.2g} s" if outcome.settled is not None else "never within 5 %"
+        )
+        lines.append(f"force {outcome.force:.4g} N, {settled}")
+    if outcome.stiffness is not None:
+        value, std = outcome.stiffness
+        lines.append(f"stiffness as the arm feels it {value:.4g} N/m (std {std:.2g})")
+    lines += [*outcome.lateness.told(), words]
+    if where is not None:
+        lines.append(f"written: {where}; palpate identify {where} reads it")
+    print_lines(*lines)
+    return 0 if outcome.ok else 1
