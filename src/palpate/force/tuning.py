@@ -13,10 +13,9 @@ import numpy as np
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop
 from palpate.force.certificate import FORM, Certificate, certify, exact_interval
-from palpate.force.gains import ALPHA, Gains, approach_speed
-from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
+from palpate.force.gains import Gains, gains_for, known_lag
+from palpate.force.lag import SOFTEST, sum_of_lags
 from palpate.force.peak import peak_bound
-from palpate.force.sensitivity import relief_of
 from palpate.force.steps import Margins, Step, margins, step_of
 from palpate.results import Result
 
@@ -259,13 +258,10 @@ def tune(
         InputError: numbers that cannot be met, with what can.
     """
     _check(force, known, cap)
-    theta = lag_of(arm)
+    theta = known_lag(arm)
     stiffest = _cap(arm, known, cap, theta)
     limit = arm.sensor.full_scale if peak is None else min(peak, arm.sensor.full_scale)
-    gains = Gains(
-        arm=arm, force=force, theta=theta, cap=stiffest, force_limit=limit,
-        approach=approach_speed(arm, force, theta, stiffest), relief=relief_of(arm, theta, ALPHA),
-    )  # fmt: skip
+    gains = gains_for(arm, force, cap=stiffest, theta=theta, limit=limit)
     soft = min(known.stiffness[0] if known else SOFTEST, stiffest)
     felt = arm.seen(soft) if arm.kind == "position" else soft
     steps = step_of(gains, felt), step_of(gains, gains.seen_cap)
