@@ -15,15 +15,9 @@ from force.gained import gains_of
 from palpate.errors import InputError
 from palpate.force.boundary import radius
 from palpate.force.cells import Box, Prover, curved
-from palpate.force.certificate import (
-    FORM,
-    Certificate,
-    adapting_claims,
-    certify,
-    exact_interval,
-    held_claim,
-    proved_claim,
-)
+from palpate.force.certificate import FORM, Certificate
+from palpate.force.certifying import certify, exact_interval, proved_claim
+from palpate.force.claims import adapting_claims, held_claim
 from palpate.force.gains import approach_speed
 from palpate.force.lag import lag_of
 from palpate.force.lyapunov import common

@@ -32,8 +32,8 @@ def stable_intervals(
     """All intervals of one number within low ... high in which the loop is stable, the smallest first.
 
     No grid: the range is covered by cells, as small as the loop's matrices ask for, in which one norm contracts or a
-    mode grows, and by boundaries between them, a ten-thousandth wide; see `stability_cells`. The tip stays where it is: the wall is put so
-    that the surface, pressed, reaches it.
+    mode grows, and by boundaries between them, a ten-thousandth wide; see `stability_cells`. The tip stays where it is:
+    the wall is put so that the surface, pressed, reaches it.
 
     Args:
         of: all other numbers; an experiment, or a bench.

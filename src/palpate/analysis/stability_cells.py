@@ -23,10 +23,12 @@ Period = Callable[[float], Array]
 
 EXACT = 1e-4
 """Width of a cell at which it counts as a boundary, in a coordinate whose unit is the number's own size."""
+FIRST = 4
+"""Cells at the start, of five values each."""
 MISSED = 1.1
 """What a quadratic misses at most, over what it misses halfway between its values: 1.03 for a cubic's remainder."""
 SMOOTH = 1e-3
-"""Of a period's size, that its quadratic may miss where the quartic through all five is taken for it: that misses 1e-5."""
+"""Of a period's size, that its quadratic may miss where the quartic through all five stands for it, and misses 1e-5."""
 
 
 @dataclass(frozen=True)
@@ -80,15 +82,19 @@ def stable_pieces(period: Period, low: float, high: float) -> list[tuple[float, 
 
     Args:
         period: d x(a period later)/d x at a value of the coordinate, scaled, shape (n, n).
-        low, high: of the coordinate.
+        low: of the coordinate.
+        high: of it.
     """
-    nodes = tuple(period(float(s)) for s in np.linspace(low, high, 5))
+    places = np.linspace(low, high, 4 * FIRST + 1).tolist()
+    known = [period(s) for s in places]
     found: list[tuple[float, float]] = []
-    for cell in _stable(Cell(low, high, nodes), period):  # type: ignore[arg-type]
-        if found and found[-1][1] == cell.low:
-            found[-1] = (found[-1][0], cell.high)
-        else:
-            found.append((cell.low, cell.high))
+    for i in range(0, 4 * FIRST, 4):
+        a, p, m, q, b = known[i : i + 5]
+        for cell in _stable(Cell(places[i], places[i + 4], (a, p, m, q, b)), period):
+            if found and found[-1][1] == cell.low:
+                found[-1] = (found[-1][0], cell.high)
+            else:
+                found.append((cell.low, cell.high))
     return found
 
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop
-from palpate.force.certificate import FORM, Certificate, certify, exact_interval
+from palpate.force.certificate import FORM, Certificate
+from palpate.force.certifying import certify, exact_interval
 from palpate.force.gains import Gains, gains_for, known_lag
 from palpate.force.lag import SOFTEST, sum_of_lags
 from palpate.force.peak import peak_bound

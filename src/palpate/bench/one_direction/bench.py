@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate._jit import kernel, law
 from palpate.bench.ending import DONE, NO_CONTACT
 from palpate.bench.one_direction.tables import OneDirection, TouchedSurface
 from palpate.bench.sequence import APPROACH, CONTACT, LOST
@@ -38,6 +39,16 @@ AHEAD = 0.3
 """Time that the approach takes at the law's own speed [s]."""
 FIRM = 0.5
 """Of the desired force: contact that had it and has no force is lost; before, a touch may bounce."""
+
+
+@law
+def wanted(schedule, tick, touch, out):
+    """Desired force at each tick, its clock starting at the touch; what is asked for first, before."""
+    for k in range(len(out)):
+        out[k] = schedule.force(max(k - touch, 0) * tick)
+
+
+_compiled_wanted = kernel(wanted)
 
 
 @dataclass(frozen=True)
@@ -85,7 +96,8 @@ class OneDirectionBench:
         n = longest if press is None else min(longest, touch + round(press / tick))
         if progress is not None:
             progress(touch * tick, "approach")
-        desired = self._desired(n, touch)
+        desired = np.empty(n)
+        _compiled_wanted(self.schedule, self.arm.tick, touch, desired)
         rows = self._rows(desired, seed, touch * tick + self.change)
         if progress is not None:
             progress(n * tick, "contact")
@@ -101,11 +113,6 @@ class OneDirectionBench:
             if n == longest:
                 return None
             n = min(longest, 4 * n)
-
-    def _desired(self, n: int, touch: int) -> Array:
-        since = self.arm.tick * (np.arange(n) - touch)
-        late: list[float] = [self.schedule.force(t) for t in since[touch:].tolist()]
-        return np.concatenate([np.full(touch, self.schedule.first), late])
 
     def _rows(
         self, desired: Array, seed: int, change: float, waiting: Callable[[], None] | None = None
