@@ -14,6 +14,7 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import certify, exact_interval
+from palpate.force.expected import OVERSHOOT, RISES, rise, settling_bound, softest
 from palpate.force.gains import Gains, gains_for, known_lag
 from palpate.force.lag import SOFTEST, sum_of_lags
 from palpate.force.peak import peak_bound
@@ -103,6 +104,15 @@ class Tuning(Result, shown_by="palpate.report.tuning"):
         """The surfaces without damping on which the loop with K_u = cap is stable [N/m]; exact for a position arm."""
         return self._own(*exact_interval(self.gains))
 
+    @property
+    def domain(self) -> tuple[float, float] | None:
+        """Surfaces on which more than 99.9 % of first touches stay below `expected.OVERSHOOT` [N/m]; None for none.
+
+        More than 99 % settle there in `expected.settling_bound`, its last term left out.
+        """
+        low = softest(self.gains)
+        return (low, self.gains.cap) if low < self.gains.cap else None
+
     def _own(self, low: float, high: float) -> tuple[float, float]:
         arm = self.gains.arm
         if arm.kind == "torque":
@@ -154,6 +164,13 @@ class Tuning(Result, shown_by="palpate.report.tuning"):
                 },
             },
             "exact": {"stiffness": list(self.exact)},
+            "domain": None
+            if self.domain is None
+            else {
+                "stiffness": list(self.domain),
+                "overshoot": OVERSHOOT,
+                "settling_s": [settling_bound(gains, K) - RISES * rise(gains, K) for K in self.domain],
+            },
             "estimate": None
             if known is None
             else {
