@@ -109,6 +109,7 @@ def test_it_is_refused_for_other_gains(proof):
         (gains_of("fr3"), "rate"),
         (msgspec.structs.replace(gains, arm=msgspec.structs.replace(arm, title="mine")), "arm"),
         (msgspec.structs.replace(gains, theta=0.05), "theta"),
+        (msgspec.structs.replace(gains, relief=0.1), "relief"),
         (msgspec.structs.replace(gains, cap=2e6), "cap"),
     ):
         with pytest.raises(InputError, match=f"another {says}"):
