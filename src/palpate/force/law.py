@@ -22,10 +22,11 @@ PLAIN = 2.0
 
 Measured by benchmarks/force/first_touches.py: with 1.5 noise passes for a soft surface (37 % over), 2.5 is slower.
 """
-DOUBTED = 1.0
-"""Evidence up to which a contact may still begin later: odds of e^2, seven to one.
+DOUBTED = 1.5
+"""Evidence up to which a contact may still begin later: odds of e^3, twenty to one.
 
-From the first reading that was no evidence against, noise would count as contact (42 % over, first_touches.py).
+With less, noise before the touch counts as contact, and a surface as too soft: once in 10 000 touches 21 % over with 1,
+42 % with 0 (benchmarks/force/first_touches.py).
 """
 CONTACT = 7.0
 """Evidence of a contact, a cumulative sum: white noise in the air comes to it once in e^14/2 theta, some six hours."""
