@@ -35,16 +35,22 @@ def main() -> None:
     parser.add_argument("--controllers", nargs="+", default=CONTROLLERS)
     told = parser.parse_args()
     seeds = range(200, 200 + told.seeds)
-    print(f"{'':<16}{'':<30}  lost   most over   rms of the last second   kept")
+    print(f"{'':<50}  lost   most over   rms of the last second   kept")
     for name in told.controllers:
-        for what, cases in (("sways", SWAYS), ("changes", CHANGES)):
-            runs = [(case, seed) for case in cases for seed in seeds]
-            found = [one(name, what, case, seed) for case, seed in track(runs, name, transient=True)]
+        for what, case in [*(("sways", c) for c in SWAYS), *(("changes", c) for c in CHANGES)]:
+            found = [one(name, what, case, seed) for seed in track(seeds, name, transient=True)]
             lost, over, rms, kept = np.array(found).T
             print(
-                f"{name:<16}{what:<30}{int(lost.sum()):3d} of {len(runs)}{100.0 * over.max():8.1f} %"
+                f"{name:<16}{words(what, case):<34}{int(lost.sum()):3d} of {len(seeds)}{100.0 * over.max():8.1f} %"
                 f"{np.median(rms):12.2f} N, most {rms.max():.2f}{int(kept.sum()):8d}"
             )
+
+
+def words(what: str, case: tuple[float, ...]) -> str:
+    """A case in words."""
+    if what == "sways":
+        return f"{case[0] / 1e3:g} kN/m, {1e3 * case[1]:g} mm at {case[2]:g} Hz"
+    return f"{case[0] / 1e3:g} -> {case[1] / 1e3:g} kN/m"
 
 
 def one(name: str, what: str, case: tuple[float, ...], seed: int) -> tuple[float, float, float, float]:
