@@ -47,7 +47,7 @@ def _of_force(key: str) -> Metric:
 
 def _settles(look: Look) -> Value:
     force = look.summary["force"]
-    return 0.0 if force is None else float(force["settling_s"] is not None)
+    return None if force is None else float(force["settling_s"] is not None)
 
 
 def _overshoot_share(look: Look) -> Value:
