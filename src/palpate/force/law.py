@@ -20,8 +20,8 @@ AIR, LEARNING, LOCKED = 0.0, 1.0, 2.0
 PLAIN = 2.5
 """Standard deviations above which a stiffness, or a damping, is a surface and not noise in the air.
 
-Measured by benchmarks/force/first_touches.py: with 2 noise passes for a soft surface once in some thousand touches (22 %
-over, --arms ur5e --touches 1000 --seed 2), and with 1.5 more is as wrong (37 %).
+Measured by benchmarks/force/first_touches.py: with 2 noise passes for a soft surface once in some thousand touches
+(22 % over, --arms ur5e --touches 1000 --seed 2), with 1.5 oftener (37 %).
 """
 DOUBTED = 1.5
 """Evidence up to which a contact may still begin later: odds of e^3, twenty to one.
