@@ -113,6 +113,12 @@ class Tuning(Result, shown_by="palpate.report.tuning"):
         low = softest(self.gains)
         return (low, self.gains.cap) if low < self.gains.cap else None
 
+    def _domain_json(self) -> dict[str, Any] | None:
+        if self.domain is None:
+            return None
+        seconds = [settling_bound(self.gains, K) - RISES * rise(self.gains, K) for K in self.domain]
+        return {"stiffness": list(self.domain), "overshoot": OVERSHOOT, "settling_s": seconds}
+
     def _own(self, low: float, high: float) -> tuple[float, float]:
         arm = self.gains.arm
         if arm.kind == "torque":
@@ -164,13 +170,7 @@ class Tuning(Result, shown_by="palpate.report.tuning"):
                 },
             },
             "exact": {"stiffness": list(self.exact)},
-            "domain": None
-            if self.domain is None
-            else {
-                "stiffness": list(self.domain),
-                "overshoot": OVERSHOOT,
-                "settling_s": [settling_bound(gains, K) - RISES * rise(gains, K) for K in self.domain],
-            },
+            "domain": self._domain_json(),
             "estimate": None
             if known is None
             else {
