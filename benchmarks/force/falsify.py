@@ -15,7 +15,7 @@ import numpy as np
 from rich.progress import track
 from touches import Rig
 
-from palpate.force.certificate import certify, exact_interval
+from palpate.force.certifying import certify, exact_interval
 from palpate.force.sampled_loop import Law
 
 BATCH = 2000

@@ -15,6 +15,8 @@ import numpy as np
 from rich.progress import track
 from touches import Rig, share
 
+from palpate.force.expected import OVERSHOOT, RISES, rise, settling_bound, softest
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -35,8 +37,12 @@ def report(name: str, touches: int, noise: tuple[float, float], seed: int) -> No
         control = gains.cautious()
         judged = rig.judge(draw, rig.run(draw, control, [seed, i, 1], approach=gains.approach))
         rows.append((judged.settling, judged.overshoot, judged.lost, judged.least))
-        draws.append((rig.travel(draw), draw.B / draw.K))
-    (settling, over, lost, least), (travel, damping) = np.array(rows).T, np.array(draws).T
+        told = settling_bound(gains, draw.K, draw.B)
+        draws.append((rig.travel(draw), draw.B / draw.K, told, softest(gains) <= draw.K, rise(gains, draw.K)))
+    (settling, over, lost, least), (travel, damping, told, inside, rises) = (
+        np.array(rows).T,
+        np.array(draws).T,
+    )
     quick = travel + damping < 0.1
     bound = 4.0 * rig.added + travel + 4.0 * damping
     p = np.nanpercentile
@@ -52,12 +58,19 @@ def report(name: str, touches: int, noise: tuple[float, float], seed: int) -> No
     print(
         f"  within 4 lags + travel + 4 B/K       {share(within.mean())}; elsewhere {share(within[~quick].mean())}"
     )
+    inside = inside > 0.0
+    early, late = settling <= told - RISES * rises, settling <= told
+    print(
+        f"  within what tune says                {share(late.mean())} of all, {share(early[inside].mean())} of"
+    )
+    print(f"    {inside.sum()} in its domain; those over 10 % over: {(over[inside] > OVERSHOOT).sum()}")
     print(
         f"  overshoot p50, p99, most             {share(p(over, 50))}, {share(p(over, 99))}, {share(over.max())}"
     )
     print(f"  overshoot above 10 %                 {(over > 0.1).sum()} of {touches}")
     print(f"  contact lost                         {(lost > 0).sum()} of {touches}")
-    print(f"  smallest K_eff(K_u)/K_eff             {np.nanmin(least):.3f}")
+    low = (least < 0.5).sum()
+    print(f"  smallest K_eff(K_u)/K_eff             {np.nanmin(least):.3f}; below 0.5 in {low} of {touches}")
 
 
 if __name__ == "__main__":

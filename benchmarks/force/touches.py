@@ -8,9 +8,8 @@ import msgspec
 import numpy as np
 
 from palpate.force.arm import load_arm
-from palpate.force.gains import ALPHA, Gains, approach_speed
-from palpate.force.lag import lag_of, sum_of_lags
-from palpate.force.sensitivity import relief_of
+from palpate.force.gains import Gains, gains_for, known_lag
+from palpate.force.lag import sum_of_lags
 from palpate.force.worlds import pressed, surface, world_of
 
 SECONDS = 4.0
@@ -45,8 +44,7 @@ class Rig:
 
     def __init__(self, name: str):
         self.arm = load_arm(name)
-        self.theta, self.added = lag_of(self.arm), sum_of_lags(self.arm)
-        self.relief = relief_of(self.arm, self.theta, ALPHA)
+        self.theta, self.added = known_lag(self.arm), sum_of_lags(self.arm)
 
     def draw(self, rng, stiffness=(1e2, 1e6), noise=(0.05, 0.2)) -> Draw:
         """Stiffness, damping ratio and noise even in their logarithms; force and phase even."""
@@ -59,12 +57,8 @@ class Rig:
 
     def gains(self, force, noise, cap=None, theta=None) -> Gains:
         """For this press; cap and theta may be wrong on purpose."""
-        cap, theta = cap or self.arm.limits.stiffness, theta or self.theta
         arm = msgspec.structs.replace(self.arm, sensor=msgspec.structs.replace(self.arm.sensor, noise=noise))
-        return Gains(
-            arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale, relief=self.relief,
-            approach=approach_speed(arm, force, theta, cap),
-        )  # fmt: skip
+        return gains_for(arm, force, cap=cap, theta=theta)
 
     def run(self, draw, control, seed, seconds=SECONDS, desired=None, approach=0.002, **others):
         """The rows of a press with any law."""

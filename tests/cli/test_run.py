@@ -17,6 +17,7 @@ import pytest
 import palpate.logs
 from palpate.bench import bench as running
 from palpate.bench import names, simulation, source
+from palpate.bench.any_experiment import FILES as EXPERIMENTS
 from palpate.bench.row import COLUMNS
 from palpate.cli import main
 from palpate.logs import read_record
@@ -198,7 +199,8 @@ def test_interrupted_at_once_there_is_still_a_folder(mine, monkeypatch):
 def test_the_list_is_a_name_a_line_and_what_it_does(capsys):
     assert main(["run", "--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == names()
+    assert [line.split()[0] for line in lines] == EXPERIMENTS.names()
+    assert set(names()) < set(EXPERIMENTS.names())
     assert all(len(line.split()) > 2 for line in lines)
 
 
@@ -206,6 +208,26 @@ def test_the_list_is_a_name_a_line_and_what_it_does(capsys):
 def test_print_shows_a_file_that_can_be_run(name, capsys):
     assert main(["run", name, "--print"]) == 0
     assert capsys.readouterr().out == source(name)
+
+
+def test_a_press_along_one_direction_has_its_own_page(tmp_path, capsys):
+    out = tmp_path / "results"
+    assert main(["run", "ur5e-touch", "--out", str(out)]) == 0
+    assert {p.name for p in out.iterdir()} == {
+        "record.parquet",
+        "summary.json",
+        "report.html",
+        "force.png",
+        "bound.png",
+    }
+    assert "settling to 5 %" in capsys.readouterr().out
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "First touch of an unknown surface" in page
+    assert "stiffness of the surface" in page
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["force"]["settling_s"] < 0.3
+    assert summary["saturated"] == {}
+    assert read_record(out / "record.parquet").units["bound"] == "N/m"
 
 
 def test_without_a_name_it_says_what_to_do(capsys):

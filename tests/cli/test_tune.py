@@ -66,6 +66,9 @@ def test_the_contract_of_json(capsys, elsewhere):
     assert told["proved"]["jitter_ticks"] == 1
     assert told["margins"]["gain"] > 3.0
     assert 0.0 < told["overshoot"] < 0.1
+    assert told["domain"]["overshoot"] == 0.1
+    assert 1e2 < told["domain"]["stiffness"][0] < 1e3
+    assert told["domain"]["stiffness"][1] == 1e6
     page = (elsewhere / "page.html").read_text(encoding="utf-8")
     assert "Nyquist" in page
     assert "not covered" in page.lower()

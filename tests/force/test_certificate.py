@@ -15,15 +15,9 @@ from force.gained import gains_of
 from palpate.errors import InputError
 from palpate.force.boundary import radius
 from palpate.force.cells import Box, Prover, curved
-from palpate.force.certificate import (
-    FORM,
-    Certificate,
-    adapting_claims,
-    certify,
-    exact_interval,
-    held_claim,
-    proved_claim,
-)
+from palpate.force.certificate import FORM, Certificate
+from palpate.force.certifying import certify, exact_interval, proved_claim
+from palpate.force.claims import adapting_claims, held_claim
 from palpate.force.gains import approach_speed
 from palpate.force.lag import lag_of
 from palpate.force.lyapunov import common
@@ -115,6 +109,7 @@ def test_it_is_refused_for_other_gains(proof):
         (gains_of("fr3"), "rate"),
         (msgspec.structs.replace(gains, arm=msgspec.structs.replace(arm, title="mine")), "arm"),
         (msgspec.structs.replace(gains, theta=0.05), "theta"),
+        (msgspec.structs.replace(gains, relief=0.1), "relief"),
         (msgspec.structs.replace(gains, cap=2e6), "cap"),
     ):
         with pytest.raises(InputError, match=f"another {says}"):

@@ -93,6 +93,19 @@ def test_saturation_and_the_force_limit_withdraw(loop):
     )  # a reading that pulls with full scale says nothing of where to go
 
 
+@pytest.mark.parametrize("force", [-3.0, -40.0])
+def test_a_force_of_the_wrong_sign_or_untared_holds_the_tip(loop, force):
+    for k in range(50):
+        loop.update(0.01 * (k % 3), 1e-5 * k)
+    speeds = [loop.update(force + 0.01 * (k % 3), 5e-4 + 1e-5 * k) for k in range(100)]
+    assert "sign" in loop.trouble
+    assert speeds[-60:] == [0.0] * 60
+    loop.update(0.02, 1.5e-3)
+    for k in range(100):
+        loop.update(0.01 * (k % 3), 1.5e-3)
+    assert loop.trouble == ""
+
+
 def test_a_lost_contact_is_approached_anew(loop):
     press(loop, 1500)
     rng = np.random.default_rng(5)

@@ -37,7 +37,7 @@ def test_compiled_and_plain_are_one_law():
     noise = np.random.default_rng(3).standard_normal(8 * 151)
     outs = []
     compiled = pressed(world, surface(5e3, 20.0), gains.cautious(), 1e-4, desired, 3)
-    plain = np.zeros((150, 4))
+    plain = np.zeros((150, 5))
     touch(
         world, surface(5e3, 20.0), gains.cautious(), -1e-4, desired, noise, np.zeros(world.delay + 1), plain
     )

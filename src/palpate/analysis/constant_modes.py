@@ -33,7 +33,7 @@ def moving(transition: Array, steps: Array) -> tuple[Complex, Complex]:
         transition: what a period makes of the state, shape (n, n).
         steps: units of the state's elements that make it well scaled, shape (n,).
     """
-    kept = _heeded(transition)
+    kept = heeded(transition)
     scaled = (transition / steps[:, None] * steps)[np.ix_(kept, kept)]
     into, _, _ = change(scaled)
     values, inside = np.linalg.eig(into.T @ scaled @ into)
@@ -42,7 +42,7 @@ def moving(transition: Array, steps: Array) -> tuple[Complex, Complex]:
     return values.astype(complex), vectors
 
 
-def _heeded(transition: Array) -> NDArray[np.intp]:
+def heeded(transition: Array) -> NDArray[np.intp]:
     """Indices of what anything else depends on, or what goes back by itself: not of integrals that nothing reads."""
     others = transition - np.diag(np.diag(transition))
     return np.flatnonzero(others.any(axis=0) | (np.abs(np.diag(transition) - 1.0) > CONSTANT))

@@ -92,12 +92,12 @@ def run(
         Of the noise; the same seed gives the same numbers.
     """
     known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or DrawnOptions()
-    from palpate.bench.experiments import tables as experiments
+    from palpate.bench.any_experiment import FILES, load_any
 
     if known.list_:
-        listed(experiments.FILES, lambda one: experiments.load(one).title)
+        listed(FILES, lambda one: load_any(one).title)
         return 0
-    source = source_of(experiments.FILES, name, "run", known.print_)
+    source = source_of(FILES, name, "run", known.print_)
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
@@ -123,6 +123,7 @@ class _Ran:
     summary: dict[str, Any]
     found: Identification | None
     undrawn: str
+    record: Record
 
 
 def _run(
@@ -136,19 +137,18 @@ def _run(
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise
-    from palpate.bench.experiments.tables import parse
+    from palpate.bench.any_experiment import parse_any
+    from palpate.bench.one_direction.tables import OneDirection
     from palpate.logs import write_record
-    from palpate.report.identification.source import sha256_of
-    from palpate.report.run.figures import draw
-    from palpate.report.run.page import Told, run_page
 
     with fresh_folder(folder, force=output.force) as fresh:
-        experiment = parse(source, name)
+        experiment = parse_any(source, name)
         command = shown(f"palpate run {shlex.quote(name)} --seed {seed}")
         record = _record(console(stderr=output.json), name, experiment, seed, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / "record.parquet")
-        found, why = _identified(fresh / "record.parquet")
+        alone = isinstance(experiment, OneDirection)  # nothing excites it, and no estimator watches
+        found, why = (None, "") if alone else _identified(fresh / "record.parquet")
         said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
         about = {"experiment": shown(Path(name).stem), "command": command}
         summary = signed({**about, **summarise(record), **said})
@@ -156,17 +156,39 @@ def _run(
         undrawn = ""
         try:
             if len(record):
-                draw(record, fresh, drawn.endings, drawn.dpi)
-                sha256 = sha256_of(fresh / "record.parquet")
-                told = Told(experiment.title, experiment.about, source, summary, found, why, sha256)
-                write_text(fresh / "report.html", run_page(record, told))
-                if drawn.movie:
-                    from palpate.report.run.movie import write_movie
-
-                    write_movie(record, fresh / "arm.gif")
+                _draw(record, fresh, summary, found, source, drawn)
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
             undrawn = f"there was not enough room to draw it ({shown(str(error)) or type(error).__name__})"
-    return _Ran(experiment.title, summary, found, undrawn)
+    return _Ran(experiment.title, summary, found, undrawn, record)
+
+
+def _draw(
+    record: Record,
+    folder: Path,
+    summary: dict[str, Any],
+    found: Identification | None,
+    source: str,
+    drawn: DrawnOptions,
+) -> None:
+    """Figures, page and film of a run."""
+    about = record.meta["experiment"]
+    if "loop" in record.meta:
+        from palpate.report.one_direction_page import write_one_direction
+
+        write_one_direction(record, folder, summary, source, drawn.endings, drawn.dpi)
+        return
+    from palpate.report.identification.source import sha256_of
+    from palpate.report.run.figures import draw
+    from palpate.report.run.page import Told, run_page
+
+    draw(record, folder, drawn.endings, drawn.dpi)
+    sha256, why = sha256_of(folder / "record.parquet"), summary["not_identified"]
+    told = Told(about["title"], about["about"], source, summary, found, why, sha256)
+    write_text(folder / "report.html", run_page(record, told))
+    if drawn.movie:
+        from palpate.report.run.movie import write_movie
+
+        write_movie(record, folder / "arm.gif")
 
 
 def _identified(record: Path) -> tuple[Identification | None, str]:
@@ -189,11 +211,11 @@ def _record(
 ) -> Record:
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from palpate.bench import build
+    from palpate.bench.any_experiment import build_any
     from palpate.cli._waiting import COMPILING
 
     try:
-        bench = build(experiment)
+        bench = build_any(experiment)
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
@@ -224,7 +246,13 @@ def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
         return
     screen = console()
     head(screen, ran.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
-    for content in tables(summary, ran.found):
+    if "loop" in ran.record.meta:
+        from palpate.report.one_direction_page import one_direction_tables
+
+        shown_tables = one_direction_tables(ran.record, summary)
+    else:
+        shown_tables = tables(summary, ran.found)
+    for content in shown_tables:
         show_table(screen, content)
     for note in notes(summary):
         screen.print(note, style=STYLE)

@@ -6,10 +6,8 @@ from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, clip
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.force.arm import Arm, Limits, TorqueLoop, load_arm
-from palpate.force.gains import ALPHA, Gains, approach_speed
-from palpate.force.lag import lag_of
+from palpate.force.gains import gains_for
 from palpate.force.law import Cautious, CautiousState
-from palpate.force.sensitivity import relief_of
 from palpate.signals.parameters import triple
 from palpate.signals.tables import NotNegativeTriple, Positive, PositiveTriple
 
@@ -119,8 +117,4 @@ def gains_on_bench(tick, spring, damping, force, cap):
     )
     limits = Limits(speed=own.limits.speed, stiffness=float(cap))
     arm = Arm(title=own.title, rate=1.0 / tick, inner=inner, sensor=own.sensor, limits=limits)
-    theta = lag_of(arm)
-    return Gains(
-        arm=arm, force=float(force), theta=theta, cap=float(cap), force_limit=own.sensor.full_scale,
-        approach=approach_speed(arm, float(force), theta, float(cap)), relief=relief_of(arm, theta, ALPHA),
-    )  # fmt: skip
+    return gains_for(arm, float(force))

@@ -1,7 +1,8 @@
 """Force control that certifies itself: gains, the proof of where they are stable, and a law that stays inside."""
 
 from palpate.force.arm import Arm, load_arm
-from palpate.force.certificate import Certificate, certify
+from palpate.force.certificate import Certificate
+from palpate.force.certifying import certify
 from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains, load_gains
 from palpate.force.tuning import Known, Tuning, known_from, tune

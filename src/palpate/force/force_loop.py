@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PHASES = {AIR: "air", LEARNING: "learning", LOCKED: "locked"}
-FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0
+FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED, PULLED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
 TROUBLES = {
     FINE: "",
     BLIND: "a reading was no number: the tip was held",
@@ -47,9 +47,13 @@ TROUBLES = {
     LATE: "ticks were missed: nothing was learned from them",
     UNREACHED: "the force asked for cannot be reached: the command went three times as far as that takes; "
     "a motor is at its limit, or something blocks the tip: it was held",
+    PULLED: "the force is negative beyond its noise: its sign is turned, or the sensor was not tared in the air; "
+    "the tip was held",
 }
 FARTHEST = 3.0
 """Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer."""
+LEAST = 8.0
+"""Standard deviations of the noise: the least force that may be asked for, and the least that counts as a pull."""
 NEAR = 0.05
 """Of F_d: an error that counts, and a change of the force that starts the count anew."""
 # Behind the law's own state: ticks without a good reading, ticks since the reading changed, the trouble of this tick,
@@ -79,6 +83,8 @@ def safe_step(numbers, state, desired, force, position, missed):
         trouble, speed = SATURATED, -control.approach if force > 0.0 else 0.0
     elif force > control.force_limit:
         trouble, speed = LIMITED, min(speed, -control.approach)
+    elif after.watch.mean < -LEAST * control.noise:
+        trouble, speed = PULLED, 0.0
     elif state[_UNCHANGED] > max(lag, 5.0 * control.period / control.tick):
         trouble, speed = STALE, 0.0
     elif in_vain(control, state, after, desired, speed) > FARTHEST * desired:
@@ -141,7 +147,8 @@ class ForceLoop:
     What it does where something is wrong is the same each time, and `trouble` names it: a reading that is no number,
     or has not changed for longer than the loop's lag: the tip is held. Readings missing for longer than the lag:
     all but the sensor's noise is forgotten, as in the air. A saturated sensor, or a force above its limit: the tip
-    withdraws at least at the speed of the approach. Contact lost: back to the speed of the approach.
+    withdraws at least at the speed of the approach. A force that pulls: the tip is held. Contact lost: back to the
+    speed of the approach.
 
     Args:
         gains: from `palpate tune`.
@@ -190,7 +197,7 @@ class ForceLoop:
     @desired.setter
     def desired(self, force: float) -> None:
         value = float(force)
-        least, most = 8.0 * self.gains.arm.sensor.noise, self.gains.force_limit
+        least, most = LEAST * self.gains.arm.sensor.noise, self.gains.force_limit
         if not least <= value < most:
             raise InputError(
                 f"the desired force must be from {least:g} N (8 standard deviations of the noise) to below the force "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from palpate._vector import Mat3, Vec3
 from palpate.errors import InputError
 from palpate.force.arm import Arm, Positive, Table, TorqueLoop, from_toml, read_small
+from palpate.force.lag import lag_of
 from palpate.force.law import Cautious
 from palpate.force.sampled_loop import filter_of
+from palpate.force.sensitivity import relief_of
 
 Array = NDArray[np.float64]
 
@@ -92,11 +94,6 @@ class Gains(Table):
         return 0.0 if self.arm.kind == "position" else 1.0 / self.arm.series
 
     @property
-    def highest_gain(self) -> float:
-        """g on the softest surface that the law heeds; `gain` is that on the stiffest [m/(s N)]."""
-        return self.gain_at(self.floor)
-
-    @property
     def gain(self) -> float:
         """g at K_u = cap [m/(s N)]."""
         return self.gain_at(self.seen_cap)
@@ -146,6 +143,55 @@ def load_gains(path: Path) -> Gains:
         InputError: no such file, another law, a number out of range.
     """
     return from_toml(read_small(path, "gains"), str(path), Gains)
+
+
+def gains_for(
+    arm: Arm,
+    force: float,
+    *,
+    cap: float | None = None,
+    theta: float | None = None,
+    limit: float | None = None,
+) -> Gains:
+    """The law's gains for an arm that presses with a force.
+
+    Args:
+        arm: what moves.
+        force: F_d, the smallest that will be asked for [N].
+        cap: stiffest surface that there may be, K + B/theta [N/m]; the arm's limit if left out.
+        theta: whole lag of the loop [s]; the arm's own if left out.
+        limit: force above which the tip withdraws [N]; the sensor's full scale if left out.
+
+    Raises:
+        InputError: numbers that no loop can be tuned for.
+    """
+    theta = known_lag(arm) if theta is None else theta
+    cap = arm.limits.stiffness if cap is None else cap
+    return Gains(
+        arm=arm, force=force, theta=theta, cap=cap, relief=_known_relief(_any_noise(arm), theta),
+        force_limit=arm.sensor.full_scale if limit is None else limit,
+        approach=approach_speed(arm, force, theta, cap),
+    )  # fmt: skip
+
+
+def known_lag(arm: Arm) -> float:
+    """theta of an arm [s], worked out once."""
+    return _known_lag(_any_noise(arm))
+
+
+@lru_cache(maxsize=64)
+def _known_lag(arm: Arm) -> float:
+    return lag_of(arm)
+
+
+@lru_cache(maxsize=64)
+def _known_relief(arm: Arm, theta: float) -> float:
+    return relief_of(arm, theta, ALPHA)
+
+
+def _any_noise(arm: Arm) -> Arm:
+    """The arm but for its noise, which no lag depends on."""
+    return msgspec.structs.replace(arm, sensor=msgspec.structs.replace(arm.sensor, noise=1.0))
 
 
 def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: float = ALPHA) -> float:

@@ -60,17 +60,6 @@ class Margins:
     delay: float
 
 
-def felt_surface(gains: Gains, bound: float, damping_time: float = 0.0) -> tuple[float, float]:
-    """K and B as the measured position feels them, of a surface with this K + B/theta."""
-    K = bound / (1.0 + damping_time / gains.theta)
-    return K, damping_time * K
-
-
-def gain_at(gains: Gains, bound: float) -> float:
-    """g for K_u = bound [m/(s N)]."""
-    return gains.gain_at(bound)
-
-
 def step_of(gains: Gains, bound: float, held: float | None = None) -> Step:
     """The force on a surface without damping of this stiffness, as felt.
 
@@ -80,11 +69,11 @@ def step_of(gains: Gains, bound: float, held: float | None = None) -> Step:
         held: K_u in use; the surface's own K if left out [N/m].
     """
     loop = SampledLoop(gains.arm)
-    g = gain_at(gains, bound if held is None else held)
+    g = gains.gain_at(bound if held is None else held)
     Phi = loop.phi(bound, 0.0, Law(g))
     reading = np.zeros(loop.size)
     reading[0] = bound / loop.force_unit
-    slowest = gains.theta / gains.alpha * max(gain_at(gains, bound) / g, 1.0)
+    slowest = gains.theta / gains.alpha * max(gains.gain_at(bound) / g, 1.0)
     n = int(min(12.0 * slowest * gains.arm.rate, 20000.0))
     # About the state of rest under F_d: it starts from no force, all else at rest.
     x = np.zeros(loop.size)
@@ -110,7 +99,7 @@ def frequency_response(gains: Gains, bound: float) -> tuple[Array, NDArray[np.co
     """Frequencies [Hz] and the open loop on a surface of this stiffness, K_u being just that."""
     loop = SampledLoop(gains.arm)
     start = loop.phi(bound, 0.0, Law(0.0))
-    b, c = rank_one(loop.phi(bound, 0.0, Law(gain_at(gains, bound))) - start)
+    b, c = rank_one(loop.phi(bound, 0.0, Law(gains.gain_at(bound))) - start)
     low, high = 0.01 / gains.theta / (2.0 * pi), 0.5 * gains.arm.rate
     frequencies = np.geomspace(low, high, 2000)
     z = np.exp(2j * pi * frequencies / gains.arm.rate)
@@ -122,7 +111,7 @@ def margins(gains: Gains, bound: float) -> Margins:
     """Of the loop on a surface of this stiffness, K_u being just that."""
     most = ultimate_gain(SampledLoop(gains.arm), bound)
     seen = bound if gains.arm.kind == "position" else gains.arm.seen(bound)
-    gain = most / (gain_at(gains, bound) * seen)
+    gain = most / (gains.gain_at(bound) * seen)
     frequencies, L = frequency_response(gains, bound)
     above = np.abs(L) >= 1.0
     crossing = np.flatnonzero(above[:-1] & ~above[1:])

@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from palpate.force.certificate import Certificate, Claim, Verdict
+from palpate.force.certificate import Certificate, Verdict
+from palpate.force.claims import Claim
 
 UNCOVERED = (
     "the backstop, the feed-forward of dF_d/dt",

@@ -150,7 +150,7 @@ def moved(world, surface, body, held, t, h, noise, at):
 
 @law
 def touch(world, surface, control, start, desired, noise, line, out):
-    """A run from the air: row k of `out` is force on the surface (mean of the tick), K_u, position, command's speed.
+    """A run from the air: row k of `out` is force on the surface (mean of the tick), K_u, position, speed, reading.
 
     Args:
         world: arm and sensor.
@@ -160,7 +160,7 @@ def touch(world, surface, control, start, desired, noise, line, out):
         desired: F_d at each tick [N], shape (n,).
         noise: standard normal numbers, shape (8 (n + 1),).
         line: room for what is on its way, zeros, shape (delay + 1,).
-        out: shape (n, 4).
+        out: shape (n, 5).
     """
     state = control.start()
     body = BodyState(start, 0.0, 0.0, 0.0, ZERO3, world.noise * noise[0], 0.0)
@@ -168,7 +168,8 @@ def touch(world, surface, control, start, desired, noise, line, out):
     line[:] = start if world.torque == 0.0 else 0.0
     for k in range(len(desired)):
         seen = body.x if world.step == 0.0 else world.step * round(body.x / world.step)
-        speed, state = control.step(state, desired[k], body.reading, seen)
+        felt = body.reading
+        speed, state = control.step(state, desired[k], felt, seen)
         speed = min(max(speed, -world.speed), world.speed)
         command += world.tick * speed
         into = command
@@ -184,6 +185,7 @@ def touch(world, surface, control, start, desired, noise, line, out):
             body = moved(world, surface, body, held, (k * world.steps + j) * h, h, noise, 8 * k)
             mean += body.force
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = mean / world.steps, control.told(state), body.x, speed
+        out[k, 4] = felt
 
 
 compiled_touch = kernel(touch)

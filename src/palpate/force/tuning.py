@@ -12,11 +12,12 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop
-from palpate.force.certificate import FORM, Certificate, certify, exact_interval
-from palpate.force.gains import ALPHA, Gains, approach_speed
-from palpate.force.lag import SOFTEST, lag_of, sum_of_lags
+from palpate.force.certificate import FORM, Certificate
+from palpate.force.certifying import certify, exact_interval
+from palpate.force.expected import OVERSHOOT, RISES, rise, settling_bound, softest
+from palpate.force.gains import Gains, gains_for, known_lag
+from palpate.force.lag import SOFTEST, sum_of_lags
 from palpate.force.peak import peak_bound
-from palpate.force.sensitivity import relief_of
 from palpate.force.steps import Margins, Step, margins, step_of
 from palpate.results import Result
 
@@ -103,6 +104,21 @@ class Tuning(Result, shown_by="palpate.report.tuning"):
         """The surfaces without damping on which the loop with K_u = cap is stable [N/m]; exact for a position arm."""
         return self._own(*exact_interval(self.gains))
 
+    @property
+    def domain(self) -> tuple[float, float] | None:
+        """Surfaces on which more than 99.9 % of first touches stay below `expected.OVERSHOOT` [N/m]; None for none.
+
+        More than 99 % settle there in `expected.settling_bound`, its last term left out.
+        """
+        low = softest(self.gains)
+        return (low, self.gains.cap) if low < self.gains.cap else None
+
+    def _domain_json(self) -> dict[str, Any] | None:
+        if self.domain is None:
+            return None
+        seconds = [settling_bound(self.gains, K) - RISES * rise(self.gains, K) for K in self.domain]
+        return {"stiffness": list(self.domain), "overshoot": OVERSHOOT, "settling_s": seconds}
+
     def _own(self, low: float, high: float) -> tuple[float, float]:
         arm = self.gains.arm
         if arm.kind == "torque":
@@ -154,6 +170,7 @@ class Tuning(Result, shown_by="palpate.report.tuning"):
                 },
             },
             "exact": {"stiffness": list(self.exact)},
+            "domain": self._domain_json(),
             "estimate": None
             if known is None
             else {
@@ -259,13 +276,10 @@ def tune(
         InputError: numbers that cannot be met, with what can.
     """
     _check(force, known, cap)
-    theta = lag_of(arm)
+    theta = known_lag(arm)
     stiffest = _cap(arm, known, cap, theta)
     limit = arm.sensor.full_scale if peak is None else min(peak, arm.sensor.full_scale)
-    gains = Gains(
-        arm=arm, force=force, theta=theta, cap=stiffest, force_limit=limit,
-        approach=approach_speed(arm, force, theta, stiffest), relief=relief_of(arm, theta, ALPHA),
-    )  # fmt: skip
+    gains = gains_for(arm, force, cap=stiffest, theta=theta, limit=limit)
     soft = min(known.stiffness[0] if known else SOFTEST, stiffest)
     felt = arm.seen(soft) if arm.kind == "position" else soft
     steps = step_of(gains, felt), step_of(gains, gains.seen_cap)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,17 @@ def surface(stiffness: float, damping: float = 0.0, **others: float) -> Surface:
     return Surface(float(stiffness), float(damping), **{k: float(v) for k, v in numbers.items()})
 
 
-def pressed(world: World, touched: Surface, control: Any, gap: float, desired: Array, seed: Any) -> Array:
-    """A run from the air: force on the surface (mean of each tick), K_u, position and commanded speed, shape (n, 4).
+# More than seven arguments: who waits for the compiler is told.
+def pressed(
+    world: World,
+    touched: Surface,
+    control: Any,
+    gap: float,
+    desired: Array,
+    seed: Any,
+    waiting: Callable[[], None] | None = None,
+) -> Array:
+    """A run from the air: force on the surface (mean of each tick), K_u, position, speed and reading, shape (n, 5).
 
     Args:
         world: arm and sensor.
@@ -80,11 +90,12 @@ def pressed(world: World, touched: Surface, control: Any, gap: float, desired: A
         gap: between tip and surface at the start [m].
         desired: F_d at each tick [N], shape (n,).
         seed: of the noise.
+        waiting: called when the loop has to be compiled first.
     """
     n = len(desired)
-    out = np.zeros((n, 4))
+    out = np.zeros((n, 5))
     noise = np.random.default_rng(seed).standard_normal(8 * (n + 1))
-    compiled_touch(world, touched, control, -gap, desired, noise, np.zeros(world.delay + 1), out)
+    compiled_touch.run(waiting, world, touched, control, -gap, desired, noise, np.zeros(world.delay + 1), out)
     return out
 
 

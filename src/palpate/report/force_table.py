@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from palpate.force.expected import OVERSHOOT, settling_bound
 from palpate.force.telling import UNCOVERED, sentence
 from palpate.force.tuning import Tuning
 
@@ -33,11 +34,23 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
         ),
         ("stable, exact", f"{low:.4g} to {high:.4g} N/m, gain held, B = 0"),
     ]
+    found.append(("first touches", _domain(told)))
     if told.known is not None:
         a, b = told.known.stiffness
         found.append(("surface", f"{a:.4g} to {b:.4g} N/m ({told.known.source})"))
     found += [("proved", sentence(c, arm.kind)) for c in told.certificate.claims] or [("proved", "nothing")]
     return found
+
+
+def _domain(told: Tuning) -> str:
+    if told.domain is None:
+        return "noise hides a touch at the approach's speed: overshoot and settling are not said"
+    low, high = told.domain
+    seconds = settling_bound(told.gains, high)
+    return (
+        f"{low:.4g} to {high:.4g} N/m: 99.9 % below {100.0 * OVERSHOOT:g} % over, 99 % settle in {seconds:.3g} s "
+        "+ F/(K v_max) + 4 B/K; softer ones take longer to rise out of the noise"
+    )
 
 
 def _peak(told: Tuning) -> str:

@@ -8,18 +8,19 @@ from typing import Any
 
 import msgspec
 
-from palpate.bench import Experiment, changed
+from palpate.bench import changed
+from palpate.bench.any_experiment import AnyExperiment
 from palpate.errors import InputError
 
 Tables = dict[str, Any]
 
 
-def tables_of(experiment: Experiment) -> Tables:
+def tables_of(experiment: AnyExperiment) -> Tables:
     """An experiment as nested tables that may be changed; lists in place of tuples."""
     return _thawed(msgspec.to_builtins(experiment))
 
 
-def experiment_of(base: Experiment, tables: Tables) -> Experiment:
+def experiment_of(base: AnyExperiment, tables: Tables) -> AnyExperiment:
     """The experiment with these tables.
 
     Raises:
@@ -95,7 +96,7 @@ def paths(tables: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
             yield f"{prefix}{key}"
     if not prefix:
         yield "seed"
-        yield from NETWORK
+        yield from NETWORK if "controller" in tables else ()
 
 
 LAYERS = "controller.layers"
@@ -107,6 +108,8 @@ NETWORK: dict[str, tuple[Callable[[list[int]], int], Callable[[list[int], int], 
 
 
 def _layers(tables: Tables, path: str) -> list[int]:
+    if "controller" not in tables:
+        raise _unknown(path, tables)
     layers = tables["controller"].get("layers")
     if not layers:
         raise InputError(

@@ -177,7 +177,10 @@ def _guessed(job: Job) -> float:
     if job.setting.experiment is None:
         return 1e-5
     run = job.setting.experiment.run
-    return TICK * run.rate * min(run.press, run.duration)
+    rate = getattr(
+        run, "rate", 1000
+    )  # of one direction the arm has it, and a run is a matter of milliseconds
+    return TICK * rate * min(run.press, run.duration)
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from palpate.bench import build
+from palpate.bench.any_experiment import AnyExperiment, build_any
 from palpate.bench.speed import cores
 from palpate.errors import InputError
 from palpate.studies.plan import Plan
@@ -37,16 +37,16 @@ def seconds_a_run(plan: Plan, waiting: Callable[[], None] | None = None) -> floa
         if setting.experiment is None:
             continue
         try:
-            build(setting.experiment).run(0.1, press=0.1, waiting=waiting)  # compiled now, if it was not
+            build_any(setting.experiment).run(0.1, press=0.1, waiting=waiting)  # compiled now, if it was not
             return _timed(setting.experiment, setting.seed)
         except InputError:
             continue
     return 0.0
 
 
-def _timed(experiment: object, seed: int) -> float:
-    bench = build(experiment)  # type: ignore[arg-type]
-    run = experiment.run  # type: ignore[attr-defined]
+def _timed(experiment: AnyExperiment, seed: int) -> float:
+    bench = build_any(experiment)
+    run = experiment.run
     begun, reached = time.perf_counter(), [0.0]
 
     def progress(at: float, _: str) -> None:

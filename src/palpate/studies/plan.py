@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from palpate.bench import Experiment, build, load
+from palpate.bench.any_experiment import AnyExperiment, build_any, load_any
 from palpate.errors import InputError, unknown
 from palpate.studies.applying import Tables, experiment_of, put, tables_of
 from palpate.studies.parameters import Axis, Label, axis, label
@@ -40,7 +40,7 @@ class Setting:
 
     run: int
     at: dict[str, Label]
-    experiment: Experiment | None
+    experiment: AnyExperiment | None
     seed: int
     refused: str = ""
 
@@ -59,7 +59,7 @@ class Part:
     """
 
     name: str
-    bases: Mapping[str, Experiment]
+    bases: Mapping[str, AnyExperiment]
     axes: tuple[Axis, ...]
     seeds: tuple[int, ...]
     samples: int
@@ -99,7 +99,7 @@ class Part:
             found |= {a.name: a.between(s) for a, s in zip(self.drawn, shares, strict=True)}
         return {a.name: found[a.name] for a in self.axes}
 
-    def experiment(self, values: Mapping[str, Any]) -> Experiment:
+    def experiment(self, values: Mapping[str, Any]) -> AnyExperiment:
         """What these values make of the experiment.
 
         Raises:
@@ -229,11 +229,11 @@ def _part(study: Study, name: str, of: Against, seeds: tuple[int, ...], folder: 
     return found
 
 
-def _loaded(name: str, folder: Path) -> Experiment:
-    return load(str(folder / name) if name.endswith(".toml") else name)
+def _loaded(name: str, folder: Path) -> AnyExperiment:
+    return load_any(str(folder / name) if name.endswith(".toml") else name)
 
 
-def _fixed(base: Experiment, fixed: Mapping[str, Any], name: str) -> Experiment:
+def _fixed(base: AnyExperiment, fixed: Mapping[str, Any], name: str) -> AnyExperiment:
     """An experiment with what does not vary."""
     tables = tables_of(base)
     try:
@@ -244,7 +244,7 @@ def _fixed(base: Experiment, fixed: Mapping[str, Any], name: str) -> Experiment:
         raise InputError(f"[fixed] does not fit the experiment {name}: {error}") from error
 
 
-def _some(bases: Mapping[str, Experiment], cases: Sequence[Parameter]) -> list[Tables]:
+def _some(bases: Mapping[str, AnyExperiment], cases: Sequence[Parameter]) -> list[Tables]:
     """The tables of every experiment that a parameter may have to change: each base, and each case."""
     found = [tables_of(base) for base in bases.values()]
     for one in cases:
@@ -266,7 +266,7 @@ def _check_values(part: Part, planned: bool) -> None:
     trouble: InputError | None = None
     for values in islice(_samples(part), TRIED):
         try:
-            build(part.experiment(values))
+            build_any(part.experiment(values))
         except InputError as error:
             trouble = trouble or error
         else:

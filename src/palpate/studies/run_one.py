@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from palpate.bench import Experiment, build
+from palpate.bench.any_experiment import AnyExperiment, build_any
 from palpate.bench.metrics import METRICS, Look
 from palpate.errors import InputError
 from palpate.records import Record
@@ -98,11 +98,11 @@ def run_one(
 
 
 def _record(
-    experiment: Experiment, seed: int, stopped: Callable[[], bool], waiting: Callable[[], None] | None
+    experiment: AnyExperiment, seed: int, stopped: Callable[[], bool], waiting: Callable[[], None] | None
 ) -> Record:
     def progress(_: float, __: str) -> None:
         if stopped():
             raise Stopped
 
     run = experiment.run
-    return build(experiment).run(run.duration, seed, press=run.press, progress=progress, waiting=waiting)
+    return build_any(experiment).run(run.duration, seed, press=run.press, progress=progress, waiting=waiting)

@@ -13,6 +13,7 @@ OF_A_RUN = (
     "bench",
     "controllers",
     "environments",
+    "force",
     "friction.py",
     "identifiers",
     "instruments",

@@ -17,7 +17,7 @@ T = TypeVar("T")
 VALUES = frozenset(Parameter.__struct_fields__)
 
 
-FILES = TomlFiles("study", "a", "palpate.studies", "shipped")
+FILES = TomlFiles("study", "a", "palpate.studies", ("shipped",))
 names, source = FILES.names, FILES.source
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 import msgspec
 from msgspec import Meta
@@ -22,6 +22,8 @@ from palpate.signals.tables import (
     Triple,
     any_of,
 )
+
+T = TypeVar("T")
 
 if TYPE_CHECKING:
     AnyController: TypeAlias = Any  # which fields it has depends on its kind
@@ -195,7 +197,7 @@ class Experiment(Table, kw_only=True):
     identification: Identification = Identification()
 
 
-FILES = TomlFiles("experiment", "an", "palpate.bench", "experiments")
+FILES = TomlFiles("experiment", "an", "palpate.bench", ("experiments",))
 names, source = FILES.names, FILES.source
 
 
@@ -210,10 +212,10 @@ def load(name: str) -> Experiment:
 
 def parse(text: str, where: str) -> Experiment:
     """An experiment from TOML; `where` names the text in errors."""
-    return _converted(decoded(text, where), where)
+    return converted(decoded(text, where), where, Experiment)
 
 
-def changed(experiment: Experiment, changes: Mapping[str, Any]) -> Experiment:
+def changed(experiment: T, changes: Mapping[str, Any]) -> T:
     """The experiment with other values: {"friction.coulomb": (6.0, 0.5, 0.06), "run.press": 20.0}.
 
     Raises:
@@ -228,14 +230,19 @@ def changed(experiment: Experiment, changes: Mapping[str, Any]) -> Experiment:
                 table[name] = {}
             table = table[name]
         table[key] = msgspec.to_builtins(value)
-    return _converted(tables, ", ".join(changes))
+    return converted(tables, ", ".join(changes), type(experiment))
 
 
-def _converted(tables: dict[str, Any], where: str) -> Experiment:
+def converted(tables: dict[str, Any], where: str, kind: type[T]) -> T:
+    """The tables as an experiment of this kind; `where` names them in errors.
+
+    Raises:
+        InputError: a key that does not exist, or a value out of range.
+    """
     bad = not_finite(tables)
     if bad is not None:
         raise InputError(f"{where}: {bad}")
     try:
-        return msgspec.convert(tables, Experiment)
+        return msgspec.convert(tables, kind)
     except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {explained(str(error), tables, Experiment)}") from error
+        raise InputError(f"{where}: {explained(str(error), tables, kind)}") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -59,18 +60,23 @@ class TomlFiles:
     Args:
         kind: what one of them is, as `experiment`.
         article: of that word.
-        package, folder: that hold those of palpate.
+        package: that holds those of palpate.
+        folders: of it.
     """
 
     kind: str
     article: str
     package: str
-    folder: str
+    folders: tuple[str, ...]
 
     def names(self) -> list[str]:
         """Those that come with palpate."""
-        files = (resources.files(self.package) / self.folder).iterdir()
-        return sorted(p.name.removesuffix(".toml") for p in files if p.name.endswith(".toml"))
+        return sorted(self._shipped())
+
+    def _shipped(self) -> dict[str, Traversable]:
+        """File of each name."""
+        files = [p for f in self.folders for p in (resources.files(self.package) / f).iterdir()]
+        return {p.name.removesuffix(".toml"): p for p in files if p.name.endswith(".toml")}
 
     def source(self, name: str) -> str:
         """The text of one that comes with palpate, or of a TOML file of the user's.
@@ -78,8 +84,9 @@ class TomlFiles:
         Raises:
             InputError: no such name, no such file, or not a text.
         """
-        if name in self.names():
-            return (resources.files(self.package) / self.folder / f"{name}.toml").read_text("utf-8")
+        shipped = self._shipped()
+        if name in shipped:
+            return shipped[name].read_text("utf-8")
         path = Path(name)
         if path.suffix != ".toml" and not path.exists():
             raise unknown(self.kind, name, self.names())

@@ -45,6 +45,18 @@ def _of_force(key: str) -> Metric:
     return Metric(name, unit, text, of)
 
 
+def _settles(look: Look) -> Value:
+    force = look.summary["force"]
+    return None if force is None else float(force["settling_s"] is not None)
+
+
+def _overshoot_share(look: Look) -> Value:
+    force = look.summary["force"]
+    if force is None or force["overshoot_N"] is None:
+        return None
+    return float(force["overshoot_N"]) / float(look.record["force_desired"][look.pressing][0])
+
+
 def _peak(look: Look) -> Value:
     return float(np.max(look["force"])) if len(look.error) else None
 
@@ -73,6 +85,14 @@ FOLLOWING = (
     Metric("peak_force", "N", "largest true force", _peak),
     _of_force("settling_s"),
     _of_force("overshoot_N"),
+    Metric(
+        "settles",
+        "1",
+        "whether the force comes to stay within 5 % of the first one desired",
+        _settles,
+        ("no", "yes"),
+    ),
+    Metric("overshoot_share", "1", "overshoot as a share of the first force desired", _overshoot_share),
     Metric(
         "integral_gain",
         "1/s",

@@ -14,12 +14,18 @@ BAND = 0.05
 """Settled: within this share of the desired force."""
 WINDOW = 1.0
 """Steady figures are means over the last so many seconds [s]."""
+JOINTS = (1, 2, 3)
+JOINED = "saturated1"
+"""A column that only the thesis' arm has, with its pose and its estimators: an arm of one direction has no joints."""
 FRONT_ENDS = ("thesis", "raw", "matched")
 PARAMETERS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
 def summarise(record: Record) -> dict[str, Any]:
-    """Plain JSON values: how the run went, the force, the motor limits, what was identified, and the truth."""
+    """Plain JSON values: how the run went, the force, the motor limits, what was identified, and the truth.
+
+    Of a press along one direction there are neither limits of motors nor estimators that watch.
+    """
     pressing = record["phase"] == CONTACT
     t = record["t"]
     summary: dict[str, Any] = {
@@ -31,13 +37,16 @@ def summarise(record: Record) -> dict[str, Any]:
         "contacts_lost": losses(record),
         "force": None,
         "tip": None,
-        "saturated": {f"joint{i}": _share(record[f"saturated{i}"]) for i in (1, 2, 3)},
+        "saturated": {
+            f"joint{i}": _share(record[f"saturated{i}"]) for i in JOINTS if JOINED in record.columns
+        },
         "identified": None,
         "truth": record.meta["truth"],
     }
     if pressing.any():
         last = pressing & (t > t[pressing][-1] - WINDOW)
         summary["force"] = force_figures(record, pressing, last)
+    if pressing.any() and JOINED in record.columns:
         summary["tip"] = {
             "y_error_mm": 1e3 * float(np.mean((record["y"] - record["y_desired"])[last])),
             "phi_error_deg": float(np.degrees(np.mean((record["phi"] - record["phi_desired"])[last]))),

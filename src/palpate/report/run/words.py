@@ -54,7 +54,7 @@ def alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
         found.append(
             {"tone": "fail", "title": "Contact was lost", "text": text, "advice": _ADVICE["lost contact"]}
         )
-    worst, share = max(summary["saturated"].items(), key=lambda item: item[1])
+    worst, share = max(summary["saturated"].items(), key=lambda item: item[1], default=("", 0.0))
     if share > 0.01:
         text = f"in {100 * share:.1f} % of the ticks."
         title = f"The motor of {worst} was at its torque limit"

@@ -76,6 +76,8 @@ def _growing(part: Part, name: str, fixed: Mapping[str, Any]) -> Growing:
             experiment = part.experiment({**middle, name: value})
         except InputError:
             return None
+        if not isinstance(experiment, Experiment):
+            return None
         # Friction is not in the linear model: panels that differ in it alone share their boundary.
         return _growth(changed(equivalent(experiment), {"friction": {}}))
 

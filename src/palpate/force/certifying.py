@@ -1,0 +1,162 @@
+"""The search for a proof: which claims are tried of a tuned loop, and the cells that prove them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from math import ceil
+
+import msgspec
+import numpy as np
+
+from palpate.force.arm import PositionLoop
+from palpate.force.cells import Box
+from palpate.force.certificate import FORM, Certificate, with_inner
+from palpate.force.claims import Claim, ProvedCell, adapting_claims, held_claim, one_sided_claim
+from palpate.force.cover import Cell, covered
+from palpate.force.gains import Gains
+from palpate.force.lag import ultimate_gain
+from palpate.force.sampled_loop import SampledLoop
+
+SOFTEST = 1e-3
+"""Of the cap: as far down as a held gain is proved by default."""
+EXACT_SHARE = 0.99
+"""Of the exact interval of a held gain: as far up as it is proved by default."""
+PART = 0.06
+"""Relative width of w^2 and of 2 z w that one norm is asked to serve."""
+
+
+def exact_interval(gains: Gains, damping_time: float = 0.0) -> tuple[float, float]:
+    """K + B/theta, as felt, on which the loop with K_u = cap is stable, for B/K of this size [N/m].
+
+    Exact for a position arm. For a torque arm the upper end is the cap: its gain is chosen for all below it.
+    """
+    if gains.arm.kind == "torque":
+        return 0.0, gains.seen_cap
+    cap = gains.seen_cap
+    K = cap / (1.0 + damping_time / gains.theta)
+    corners = gains.arm.inner.corners if isinstance(gains.arm.inner, PositionLoop) else []
+    most = min(ultimate_gain(SampledLoop(gains.arm, inner=c), K, damping_time * K) for c in corners)
+    return 0.0, cap * most / (gains.gain * K)  # `most` is g K at the boundary
+
+
+# More than seven arguments: each is a claim of the certificate, and may be left out.
+def certify(
+    gains: Gains,
+    stiffness: tuple[float, float] | None = None,
+    damping_time: float | None = None,
+    jitter: int = 1,
+    margin: float = 1.0,
+    *,
+    adapting: bool = True,
+    measured: PositionLoop | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Certificate:
+    """Proves what can be proved of a tuned loop.
+
+    Args:
+        gains: of the loop.
+        stiffness: of the surfaces, lowest and highest K + B/theta, their own [N/m]; by default from a thousandth of
+            the cap to 99 % of what is stable at all.
+        damping_time: longest B/K [s]; theta by default, 0 for the adapting law of a torque arm.
+        jitter: ticks by which the age of a reading may change from tick to tick while the law adapts.
+        margin: factor that all gains may grow by.
+        adapting: prove the adapting law too.
+        measured: the inner loop as a log told it, instead of the arm's own.
+        progress: told what is being proved.
+
+    Returns:
+        The claims that were proved; those that were not are left out.
+    """
+    own_gains, gains = gains, gains if measured is None else with_inner(gains, measured)
+    position = gains.arm.kind == "position"
+    most = gains.theta if damping_time is None else damping_time
+    low, high = _felt(gains, stiffness, most, margin)
+    wanted = [[held_claim(gains, low, high, most, 0, margin)]]
+    if position:
+        wanted.append([one_sided_claim(gains, most, margin)])
+    if adapting:
+        softest = max(low, SOFTEST * gains.seen_cap)
+        own = most if position or damping_time is not None else 0.0
+        wanted += adapting_claims(gains, softest, own, jitter, margin)
+    parts = _parts(gains)
+    if parts > 0:  # an inner loop known to intervals: what spans all surfaces in one norm, and no more
+        wanted = [wanted[1], *(tries[1:] for tries in wanted[3:])]
+        wanted = [[msgspec.structs.replace(c, parts=parts) for c in tries] for tries in wanted]
+    claims = (_first_proved(gains, tries, progress) for tries in wanted)
+    proved = tuple(claim for claim in claims if claim is not None)
+    return Certificate(form=FORM, gains=own_gains, claims=proved, measured=measured)
+
+
+def _parts(gains: Gains) -> int:
+    """Into how many parts what the inner loop may be is cut each way; 0 where it is known."""
+    inner = gains.arm.inner
+    if not isinstance(inner, PositionLoop) or (len(inner.corners) == 1 and gains.arm.unsure_ticks == 0):
+        return 0
+    corners = np.array(inner.corners)
+    widest = float((np.ptp(corners, axis=0) / corners.mean(axis=0)).max())
+    return max(ceil(widest / PART), 1)
+
+
+def _first_proved(
+    gains: Gains, tries: Sequence[Claim], progress: Callable[[str], None] | None
+) -> Claim | None:
+    for claim in tries:
+        if progress is not None:
+            progress(f"the {claim.kind} law, gains of {claim.shares[0]:g} to {claim.shares[1]:g}")
+        found = proved_claim(gains, claim)
+        if found is not None:
+            return found
+    return None
+
+
+def _felt(
+    gains: Gains, stiffness: tuple[float, float] | None, most: float, margin: float
+) -> tuple[float, float]:
+    if stiffness is not None:
+        low, high = stiffness
+        if gains.arm.kind == "position":
+            return gains.arm.seen(low), gains.arm.seen(high)
+        return low, high
+    cap = gains.seen_cap
+    ends = [exact_interval(gains, t)[1] for t in np.linspace(0.0, most, 9).tolist()]
+    share = 1.0 if gains.arm.kind == "torque" else EXACT_SHARE / margin
+    return SOFTEST * cap, float(share * min(ends))
+
+
+def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None) -> Claim | None:
+    """The claim with the cells that prove it; None if some of it cannot be proved.
+
+    Args:
+        gains: of the loop.
+        claim: without cells.
+        starts: boxes that tile it, from which the search for cells begins.
+    """
+    prover = claim.prover(gains)
+    cells: list[Cell] = []
+    whole = claim.boxes(gains)
+    for start in starts or (whole if prover.fading else [s for box in whole for s in _starts(box)]):
+        found, left = covered(prover, start)
+        if left:
+            return None
+        cells += found
+    proved = tuple(
+        ProvedCell(
+            low=c.box.low, high=c.box.high, least=c.box.least, most=c.box.most,
+            norm=tuple(tuple(map(float, row)) for row in c.L), part=c.box.part, loss=c.box.loss,
+        )
+        for c in cells
+    )  # fmt: skip
+    return msgspec.structs.replace(claim, cells=proved)
+
+
+def _starts(box: Box) -> list[Box]:
+    """The box, its bounds cut into decades from above: a norm seldom serves more."""
+    edges = [box.high]
+    while edges[-1] / 10.0 > box.low:
+        edges.append(edges[-1] / 10.0)
+    edges.append(box.low)
+    if box.low == box.high:
+        return [box]
+    return [replace(box, low=a, high=b) for b, a in pairwise(edges)]

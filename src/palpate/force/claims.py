@@ -1,0 +1,183 @@
+"""What is claimed of a tuned loop: kinds of statements, the surfaces each is of, and the cells that prove it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta
+
+from palpate.force.arm import Table
+from palpate.force.cells import Box, Prover
+from palpate.force.cover import Cell
+from palpate.force.gains import Gains
+from palpate.force.sampled_loop import SampledLoop
+
+SHARES = {
+    "position": ((0.05, (2.0, 1.5, 1.2), 0), (1e-4, (1.5, 1.2), 1)),
+    "torque": ((0.05, (2.0, 1.5, 1.2), 0),),
+}
+"""g theta K_eff/alpha from and to which the adapting law is proved, the first upper end that can be; further jitter.
+
+Down to next to nothing, Popov's and the circle criterion end at theta/(alpha times the sum of all lags), which is 2.0
+for the UR5e without jitter: hence two claims.
+"""
+MOST_JITTER = 10
+FADED = 0.01
+"""Share below which the gain of a claim counts as one that may fade."""
+GONE = 1e-4
+"""Of the cap: what is left of a surface that the tip has left, see `one_sided_claim`."""
+Finite = Annotated[float, Meta(ge=-1e300, le=1e300)]
+Number = Annotated[float, Meta(ge=0, le=1e300)]
+
+
+class ProvedCell(Table):
+    """A box of surfaces and L, row by row, with |L^T Phi L^-T| < 1 at every tick."""
+
+    low: Number
+    high: Number
+    least: Number
+    most: Number
+    norm: tuple[tuple[Finite, ...], ...]
+    part: Annotated[int, Meta(ge=0, le=10_000)] = 0
+    loss: Annotated[int, Meta(ge=0, le=100)] = 0
+
+    @property
+    def cell(self) -> Cell:
+        """As `cover` has it."""
+        return Cell(
+            Box(self.low, self.high, self.least, self.most, self.part, self.loss), np.array(self.norm)
+        )
+
+
+class Claim(Table):
+    """One statement about the loop in contact.
+
+    `held`: with g held, every surface whose K + B/theta is within low ... high [N/m] and whose B/K is within
+    least ... most [s] is pressed on stably. K and B may change within a cell from tick to tick. `adapting`: the same
+    for every constant surface while g theta K_eff/alpha goes anywhere within the shares, from tick to tick; for a
+    position arm that holds for every stiffness, since only the product counts. `one-sided`: as held, while K and B
+    together go anywhere within low ... high, from tick to tick, as where contact is lost and found again.
+    """
+
+    kind: Literal["held", "adapting", "one-sided"]
+    low: Number
+    high: Number
+    least: Number
+    most: Number
+    shares: tuple[Number, Number]
+    jitter: Annotated[int, Meta(ge=0, le=MOST_JITTER)]
+    parts: Annotated[int, Meta(ge=1, le=100)] = 1
+    cells: tuple[ProvedCell, ...] = ()
+
+    def boxes(self, gains: Gains) -> list[Box]:
+        """What its cells have to cover: the surfaces, for each part of the inner loop and each delay it may have."""
+        losses = range(gains.arm.unsure_ticks + 1) if self.kind != "adapting" else (0,)
+        return [
+            Box(self.low, self.high, self.least, self.most, part, loss)
+            for part in range(self.parts**2)
+            for loss in losses
+        ]
+
+    def prover(self, gains: Gains) -> Prover:
+        """What has to contract."""
+        own = gains.seen_cap if gains.arm.kind == "position" else _between(gains)
+        loop = SampledLoop(gains.arm, self.jitter, own)
+        unit = gains.alpha if self.kind == "adapting" else gains.gain
+        ends = self.shares[0] * unit, self.shares[1] * unit
+        younger = self.jitter + gains.arm.unsure_ticks
+        fading: Literal["", "gain", "surface"] = "surface" if self.kind == "one-sided" else ""
+        if self.kind == "adapting" and gains.arm.kind == "position" and self.shares[0] < FADED:
+            fading = "gain"
+        relative = self.kind == "adapting"
+        return Prover(loop, gains.theta, ends, younger, relative=relative, fading=fading, parts=self.parts)
+
+    def tiled(self, box: Box) -> bool:
+        """Whether the cells cover one of its boxes: every rectangle between two neighbouring edges lies in a cell."""
+        own = [c for c in self.cells if (c.part, c.loss) == (box.part, box.loss)]
+        if not own:
+            return False
+        edges = np.array([[c.low, c.high, c.least, c.most] for c in own])
+        if self.kind == "one-sided" and not (
+            (edges[:, 0] <= self.low).all() and (edges[:, 1] >= self.high).all()
+        ):
+            return False  # one norm for the surface and for what is left of it
+        bounds = _cuts(edges[:, :2], self.low, self.high)
+        times = _cuts(edges[:, 2:], self.least, self.most)
+        for a, b in bounds:
+            across = edges[(edges[:, 0] <= a) & (edges[:, 1] >= b)]
+            if not all(((across[:, 2] <= s) & (across[:, 3] >= t)).any() for s, t in times):
+                return False
+        return True
+
+
+def _cuts(ends: np.ndarray, low: float, high: float) -> list[tuple[float, float]]:
+    if low == high:
+        return [(low, high)]
+    inside = np.unique(np.clip(ends, low, high))
+    all_of = np.unique(np.concatenate([inside, [low, high]]))
+    return [(a, b) for a, b in pairwise(all_of.tolist())]
+
+
+def held_claim(
+    gains: Gains, low: float, high: float, most: float, jitter: int = 0, margin: float = 1.0
+) -> Claim:
+    """That the loop with K_u = cap is stable on surfaces as the measured position feels them.
+
+    Args:
+        gains: of the loop.
+        low: K + B/theta from [N/m].
+        high: to [N/m].
+        most: longest B/K [s].
+        jitter: ticks.
+        margin: factor that all gains may grow by.
+    """
+    return Claim(kind="held", low=low, high=high, least=0.0, most=most, shares=(1.0, margin), jitter=jitter)
+
+
+def adapting_claims(
+    gains: Gains, low: float, most: float, jitter: int = 0, margin: float = 1.0
+) -> list[list[Claim]]:
+    """That the loop is stable whatever the estimator does; of each list, the first that can be proved.
+
+    Args:
+        gains: of the loop.
+        low: for a torque arm, the softest surface [N/m]; a position arm's proof is of all.
+        most: longest B/K [s].
+        jitter: ticks.
+        margin: factor that all gains may grow by.
+    """
+    high = gains.seen_cap
+    low = high if gains.arm.kind == "position" else low
+    return [
+        [
+            Claim(
+                kind="adapting", low=low, high=high, least=0.0, most=most, shares=(least, top * margin),
+                jitter=min(jitter + more, MOST_JITTER),
+            )
+            for top in tops
+        ]
+        for least, tops, more in SHARES[gains.arm.kind]
+    ]  # fmt: skip
+
+
+def one_sided_claim(gains: Gains, most: float, margin: float = 1.0) -> Claim:
+    """That a position arm's loop with K_u = cap is stable also where contact is lost and found again.
+
+    About the state of rest under F_d, a force max(K x + B xdot, 0) is k (K x~ + B xdot~) with k between 0 and 1: a
+    sector. It is F_d/(F_d + K gap) at least, over a gap to the surface.
+
+    Args:
+        gains: of the loop.
+        most: longest B/K [s].
+        margin: factor that all gains may grow by.
+    """
+    cap = gains.seen_cap
+    ends = (1.0, margin)
+    return Claim(kind="one-sided", low=GONE * cap, high=cap, least=0.0, most=most, shares=ends, jitter=0)
+
+
+def _between(gains: Gains) -> float:
+    """A unit of stiffness for a torque arm, in which neither its spring nor a soft surface is out of size [N/m]."""
+    return float(np.sqrt(gains.arm.series * min(gains.cap, gains.arm.series)))
