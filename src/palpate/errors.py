@@ -19,7 +19,16 @@ class InputError(PalpateError, ValueError):
 
 
 class PartError(PalpateError, TypeError):
-    """A part of the user's cannot run in a loop; the text says where it fails, or what it may not do."""
+    """A part of the user's cannot run in a loop; the text says in one line where it fails, or what it may not do.
+
+    Args:
+        text: that line.
+        compiler: the compiler's own account, which is long; "" where it has none.
+    """
+
+    def __init__(self, text: str, compiler: str = ""):
+        super().__init__(text)
+        self.compiler = compiler
 
 
 _LISTED = 60

@@ -190,10 +190,12 @@ def _record(
     from rich.progress import BarColumn, Progress, TextColumn
 
     from palpate.bench import build
+    from palpate.bench.part_check import check_parts
     from palpate.cli._waiting import COMPILING
 
     try:
         bench = build(experiment)
+        check_parts(bench, lambda: screen.print(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")

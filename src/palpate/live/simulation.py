@@ -13,6 +13,7 @@ from palpate.bench.build import build
 from palpate.bench.ending import StopCondition
 from palpate.bench.experiments.tables import Experiment, changed
 from palpate.bench.given_motion import rest_for
+from palpate.bench.part_check import check_parts
 from palpate.bench.row import COLUMNS as ROW
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.bench.tick import LoopState, compiled_march, start_at
@@ -70,6 +71,7 @@ class Simulation:
         self._experiment, self._whole, self._waiting = experiment, whole, waiting
         self.state = State(seed=seed)
         bench = build(experiment)
+        check_parts(bench, waiting)
         self._rate = experiment.run.rate
         self._stride = max(1, round(STRIDE * self._rate))
         sliders = sliders_of(experiment)

@@ -14,6 +14,7 @@ import msgspec
 
 from palpate.bench import Experiment, build, load
 from palpate.errors import InputError, unknown
+from palpate.plugins import Plugin, is_plugin, plugin
 from palpate.studies.applying import Tables, experiment_of, put, tables_of
 from palpate.studies.parameters import Axis, Label, axis, label
 from palpate.studies.sobol import Sobol
@@ -162,6 +163,13 @@ class Plan:
         first = number * len(part.seeds)
         return [part.setting(first + i, values, seed, False) for i, seed in enumerate(part.seeds)]
 
+    @cached_property
+    def plugins(self) -> tuple[Plugin, ...]:
+        """The user's own parts and metrics that the study names."""
+        bases = [msgspec.to_builtins(e) for part in self.parts for e in part.bases.values()]
+        named = {*filter(is_plugin, self.study.metrics), *_kinds([msgspec.to_builtins(self.study), bases])}
+        return tuple(plugin(name) for name in sorted(named))
+
     @property
     def columns(self) -> dict[str, type]:
         """Name and type (int, float, bool or str) of each column that tells a run apart."""
@@ -172,6 +180,26 @@ class Plan:
                 found.setdefault(one.name, set()).update(kinds)
         found["seed"] = {int}
         return {name: _common(kinds) for name, kinds in found.items()}
+
+
+def _kinds(value: Any) -> Iterator[str]:
+    """Every plug-in that is named as the kind of a table, or set as one."""
+    if isinstance(value, Mapping):
+        for key, one in value.items():
+            if key.rpartition(".")[2] == "kind":
+                yield from (kind for kind in _texts(one) if is_plugin(kind))
+            yield from _kinds(one)
+    elif isinstance(value, list | tuple):
+        for one in value:
+            yield from _kinds(one)
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping | list | tuple):
+        for one in value.values() if isinstance(value, Mapping) else value:
+            yield from _texts(one)
 
 
 def _common(kinds: set[type]) -> type:
@@ -264,7 +292,7 @@ def _check_values(part: Part, planned: bool) -> None:
     if not planned:
         return
     trouble: InputError | None = None
-    for values in islice(_samples(part), TRIED):
+    for values in islice(samples(part), TRIED):
         try:
             build(part.experiment(values))
         except InputError as error:
@@ -275,7 +303,7 @@ def _check_values(part: Part, planned: bool) -> None:
         raise InputError(f"none of the parameters' values make an experiment: {trouble}")
 
 
-def _samples(part: Part) -> Iterator[dict[str, Any]]:
+def samples(part: Part) -> Iterator[dict[str, Any]]:
     """All first values, all last ones, and each value of each parameter with all others at their first or last."""
     every = {a.name: a.settings or (a.between(0.0), a.between(1.0)) for a in part.axes}
     ends = [{name: values[i] for name, values in every.items()} for i in (0, -1)]
@@ -292,6 +320,7 @@ def resolved(plan: Plan) -> bytes:
         if study.search is None
         else {"title", "about", "maps", "curves"}
     )
+    stamps = {one.name: one.stamp for one in plan.plugins}
     decides = {key: value for key, value in msgspec.to_builtins(study).items() if key not in shown}
     bases = [{name: msgspec.to_builtins(e) for name, e in sorted(part.bases.items())} for part in plan.parts]
-    return msgspec.json.encode([decides, bases], order="sorted")
+    return msgspec.json.encode([decides, bases, *([stamps] if stamps else [])], order="sorted")

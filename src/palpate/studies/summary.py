@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench.ending import DONE
-from palpate.bench.metrics import METRICS
+from palpate.bench.metrics import metric_of
 from palpate.files import signed, write_json, write_text
 from palpate.report.page import Table
 from palpate.report.study.page import study_page
@@ -159,7 +159,7 @@ def overall_table(frame: DataFrame, plan: Plan) -> Table:
 
 
 def _overall(values: Sequence[float], name: str) -> str:
-    metric = METRICS[name]
+    metric = metric_of(name)
     if not values:
         return NONE
     if metric.words:
@@ -222,7 +222,7 @@ def _heads(plan: Plan, part: str, at: Mapping[str, Any]) -> list[str]:
 
 def _ranked_by(plan: Plan) -> str:
     best = plan.study.best
-    return with_unit(METRICS[best.metric]) if best else ""
+    return with_unit(metric_of(best.metric)) if best else ""
 
 
 def _results(frame: DataFrame) -> Table:
@@ -231,7 +231,7 @@ def _results(frame: DataFrame) -> Table:
 
 
 def _told(name: str) -> str:
-    metric = METRICS[name]
+    metric = metric_of(name)
     return metric.text if metric.unit == "1" else f"{metric.text} [{metric.unit}]"
 
 

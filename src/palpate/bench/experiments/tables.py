@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta
 
 from palpate.bench.experiments.error_messages import explained, not_finite
+from palpate.bench.experiments.own_parts import ROLES, table_of
 from palpate.bench.experiments.toml_files import TomlFiles, decoded
 from palpate.controllers import ControllerTable, HybridController
 from palpate.environments import SurfaceTable
 from palpate.errors import InputError
+from palpate.identifiers import IdentifierTable
+from palpate.plugins import is_plugin, look_in
 from palpate.signals.tables import (
     NotNegative,
     NotNegativeTriple,
@@ -21,13 +25,17 @@ from palpate.signals.tables import (
     Table,
     Triple,
     any_of,
+    example,
+    kinds,
 )
 
 if TYPE_CHECKING:
     AnyController: TypeAlias = Any  # which fields it has depends on its kind
     AnySurface: TypeAlias = Any
+    AnyIdentifier: TypeAlias = Any
 else:
     AnyController, AnySurface = any_of(ControllerTable), any_of(SurfaceTable)
+    AnyIdentifier = any_of(IdentifierTable)
 
 
 class Run(Table):
@@ -193,6 +201,8 @@ class Experiment(Table, kw_only=True):
     controller: AnyController = HybridController()
     compensation: Compensation = Compensation()
     identification: Identification = Identification()
+    identifier: AnyIdentifier | None = None
+    """One more that watches, on the channels of the matched estimator; its numbers are columns of the record."""
 
 
 FILES = TomlFiles("experiment", "an", "palpate.bench", "experiments")
@@ -209,7 +219,9 @@ def load(name: str) -> Experiment:
 
 
 def parse(text: str, where: str) -> Experiment:
-    """An experiment from TOML; `where` names the text in errors."""
+    """An experiment from TOML; `where` names the text in errors, and parts of the user's lie beside it."""
+    if where.endswith(".toml"):
+        look_in(Path(where).parent)
     return _converted(decoded(text, where), where)
 
 
@@ -236,6 +248,37 @@ def _converted(tables: dict[str, Any], where: str) -> Experiment:
     if bad is not None:
         raise InputError(f"{where}: {bad}")
     try:
-        return msgspec.convert(tables, Experiment)
+        own = _own_parts(tables)
+        experiment = _as(Experiment, {**tables, **{key: _STAND_INS[key] for key in own}})
+        return msgspec.structs.replace(experiment, **own) if own else experiment
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+
+
+_STAND_INS = {
+    key: msgspec.to_builtins(example(kinds(base)[0]))
+    for key, base in (
+        ("controller", ControllerTable),
+        ("surface", SurfaceTable),
+        ("identifier", IdentifierTable),
+    )
+}
+"""Tables in whose place those of the user's parts are put: their types are known only when they are named."""
+
+
+def _own_parts(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables that name a plug-in, each of the type that its part gives it."""
+    found = {}
+    for key, role in ROLES.items():
+        table = tables.get(key)
+        if isinstance(table, dict) and is_plugin(table.get("kind")):
+            holder = msgspec.defstruct("Holder", [(key, table_of(role, table["kind"]))])
+            found[key] = getattr(_as(holder, {key: table}), key)
+    return found
+
+
+def _as(kind: Any, tables: dict[str, Any]) -> Any:
+    try:
+        return msgspec.convert(tables, kind)
     except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {explained(str(error), tables, Experiment)}") from error
+        raise InputError(explained(str(error), tables, kind)) from error

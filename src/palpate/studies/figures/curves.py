@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench.ending import DONE
-from palpate.bench.metrics import METRICS
+from palpate.bench.metrics import metric_of
 from palpate.report.study.axes import Scale, decades
 from palpate.report.study.lines import Curve, Line, curves_figure
 from palpate.studies.figures.rows import FEW, Drawn, Rows, restricted_to, sentence, short, with_unit
@@ -24,7 +24,7 @@ ALWAYS = frozenset({"time_in_contact", "time_to_loss", "contacts_lost"})
 
 def curves_of(table: Rows, asked: Curves, number: int) -> Drawn:
     """Curves that a study asks for."""
-    metric, x = METRICS[asked.metric], table.scale(asked.x)
+    metric, x = metric_of(asked.metric), table.scale(asked.x)
 
     def made() -> Figure:
         panels = []

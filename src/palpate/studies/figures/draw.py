@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from palpate.bench.metrics import METRICS
+from palpate.bench.metrics import metric_of
 from palpate.report import style
 from palpate.report.study.axes import Scale
 from palpate.studies.figures.curves import curves_of
@@ -34,7 +34,7 @@ def figures(frame: DataFrame, plan: Plan) -> Iterator[Drawn]:
     drawn = any(a.drawn for a in plan.parts[0].axes)
     if drawn:
         for name in [plan.study.best.metric] if plan.study.best else plan.study.metrics:
-            yield clouds_of(own, METRICS[name])
+            yield clouds_of(own, metric_of(name))
     maps, curves = plan.study.maps, plan.study.curves
     if not maps and not curves and not drawn:
         maps, curves = _suggested(plan)
@@ -49,5 +49,5 @@ def _suggested(plan: Plan) -> tuple[list[Map], list[Curves]]:
     metrics = [plan.study.best.metric] if plan.study.best else plan.study.metrics
     maps = [Map(axes[0], axes[1], name) for name in metrics] if len(axes) > 1 else []
     second = next((a.name for a in by_size[1:] if len(a.settings) <= FEW), "")
-    curves = [Curves(axes[0], name, second) for name in metrics if not METRICS[name].words] if axes else []
+    curves = [Curves(axes[0], name, second) for name in metrics if not metric_of(name).words] if axes else []
     return maps, curves

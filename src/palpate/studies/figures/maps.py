@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench.ending import DONE
-from palpate.bench.metrics import METRICS, Metric
+from palpate.bench.metrics import Metric, metric_of
 from palpate.report.study.axes import Scale
 from palpate.report.study.maps import Heat, heat_figure
 from palpate.studies.figures.rows import Drawn, Rows, restricted_to, sentence, with_unit
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def map_of(table: Rows, asked: Map, number: int) -> Drawn:
     """A map that a study asks for."""
-    metric, x, y = METRICS[asked.metric], table.scale(asked.x), table.scale(asked.y)
+    metric, x, y = metric_of(asked.metric), table.scale(asked.x), table.scale(asked.y)
 
     def made() -> Figure:
         from palpate.studies.figures.stability_boundary import bounds
