@@ -185,7 +185,7 @@ def _check_search(study: Study) -> None:
 
 
 def _check_figures(study: Study) -> None:
-    for name in study.best.each if study.best else ():
+    for name in (*study.best.each, *study.best.over) if study.best else ():
         if name not in study.parameters:
             raise unknown("parameter", name, study.parameters)
     drawn: list[Map | Curves] = [*study.maps, *study.curves]

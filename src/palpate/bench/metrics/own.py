@@ -22,7 +22,9 @@ def own_metric(name: str) -> Metric:
     """
     found = plugin(name).value()
     if isinstance(found, Metric):
-        return Metric(name, found.unit, found.text, _where_there_is_something(found.of), found.words)
+        return Metric(
+            name, found.unit, found.text, _where_there_is_something(found.of), found.words, found.better
+        )
     if not callable(found) or inspect.isclass(found):
         raise InputError(f"{name} is a {type(found).__name__}; a metric is a function of a Look, or a Metric")
     try:

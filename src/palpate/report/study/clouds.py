@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.report import style
-from palpate.report.study.axes import COLORS, Array, Scale, decades, grid
+from palpate.report.study.axes import COLORS, Array, Scale, bounded, grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,8 +60,8 @@ def clouds_figure(panels: Sequence[Cloud], label: str) -> Figure:
         panel.x.dress(axis.xaxis, axis)
         if panel.words:
             axis.set_yticks(range(len(panel.words)), panel.words)
-        elif decades(every):
-            axis.set_yscale("log")
+        else:
+            bounded(axis, every)
         axis.set_ylabel(label)
         if len(panel.kinds) > 1:
             axis.legend(fontsize=8, frameon=True, framealpha=0.85, edgecolor="none")
@@ -72,6 +72,11 @@ def _cloud(points: Points, axis: Axes, color: str, aside: float) -> None:
     """Points and their means; those of words, which would lie on each other, are moved apart."""
     apart = aside * np.linspace(-1.0, 1.0, len(points.y)) if aside else 0.0
     axis.scatter(points.x, points.y + apart, color=color, s=9, alpha=0.35, linewidths=0)
+    middle = means(points)
+    axis.plot(middle[:, 0], middle[:, 1], color=color, linewidth=1.8, label=points.label)
+
+
+def means(points: Points) -> Array:
+    """Of each eighth of a cloud the middle of the parameter and the mean of the metric, shape (8, 2) or fewer rows."""
     parts = np.array_split(np.argsort(points.x, kind="stable"), min(EIGHTHS, len(points.x)))
-    means = np.array([(np.median(points.x[part]), np.mean(points.y[part])) for part in parts])
-    axis.plot(means[:, 0], means[:, 1], color=color, linewidth=1.8, label=points.label)
+    return np.array([(np.median(points.x[part]), np.mean(points.y[part])) for part in parts])

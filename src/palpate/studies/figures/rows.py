@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -32,12 +32,20 @@ class Drawn:
     Args:
         name: of its file.
         caption: what is seen.
-        draw: makes it.
+        metric: what is drawn.
+        panels: makes its panels, all of one kind.
+        figure: draws them, with what stands at their axis.
     """
 
     name: str
     caption: str
-    draw: Callable[[], Figure]
+    metric: Metric
+    panels: Callable[[], Sequence[Any]]
+    figure: Callable[[Sequence[Any], str], Figure]
+
+    def draw(self) -> Figure:
+        """The figure."""
+        return self.figure(self.panels(), with_unit(self.metric))
 
 
 class Rows:
