@@ -66,7 +66,15 @@ def comparison_table(comparison: Comparison) -> Table:
     label = with_unit(metric_of(comparison.metric))
     place = "".join(f", {name} {short(value)}" for name, value in comparison.of.items())
     title = f"On the same surfaces: {label}{place}, 95 % intervals"
-    head = ("", "median", "worst tenth", "less the best's", "better than the best on", "mean rank", "failed")
+    head = (
+        "setting",
+        "median",
+        "worst tenth",
+        "less the best's",
+        "better than the best on",
+        "mean rank",
+        "failed or without it",
+    )
     return Table(title, head, rows)
 
 

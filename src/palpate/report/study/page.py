@@ -22,6 +22,7 @@ class StudyPage:
         sentence: the answer.
         notes: what a reader must not miss.
         tables: in the order to be read.
+        below: tables that stand below the figures.
         charts: plain values from which the page draws; empty where there is nothing to draw.
         figures: the same as PNG files with a caption each, for a browser that runs no scripts.
         command: that makes it.
@@ -34,6 +35,7 @@ class StudyPage:
     sentence: str
     notes: Sequence[str]
     tables: Sequence[Table]
+    below: Sequence[Table]
     charts: Mapping[str, Any]
     figures: Mapping[Path, str]
     command: str
@@ -54,6 +56,7 @@ def study_page(of: StudyPage) -> str:
         sentence=of.sentence,
         notes=of.notes,
         tables=of.tables,
+        below=of.below,
         charts=data(of.charts) if worth else "",
         figures=captioned(of.figures),
         command=of.command,

@@ -248,7 +248,7 @@
       const sorted = all[k].map(([d]) => d).sort((a, b) => a - b), pair = entrant.pairs[reference];
       if (pair && pair.median != null) {
         const at = (d) => clipped(p.sx(d), p.inner[0] + 4, p.inner[1] - 4), y = top + 56;
-        const decided = pair.low != null && (pair.low > 0 || pair.high < 0), tone = decided ? "decided" : "open";
+        const decided = pair.low != null && (pair.low > 0 || pair.high < 0), tone = !decided ? "open" : (pair.low > 0) === most ? "better" : "worse";
         if (pair.low != null && pair.high != null) put(p.ink, "line", { class: `interval ${tone}`, x1: at(pair.low), x2: at(pair.high), y1: y, y2: y });
         dot(p, at(pair.median), y, 4.5, { class: `median ${tone}` }, `${entrant.name}: median ${signed(pair.median)}${pair.low == null ? "" : ` (95 %: ${signed(pair.low)} to ${signed(pair.high)})`}`);
       }
@@ -304,7 +304,7 @@
       const title = Object.entries(comparison.of).map(([name, value]) => `${name} ${value}`).join(", ");
       const left = make("div"), right = make("div");
       versus.append(make("h2", {}, `Surface by surface${title ? `: ${title}` : ""}`),
-        make("p", { class: "small" }, `Each dot is one surface: ${metric.text} on it, less that of the reference on the same surface. Below the dots the median with its 95 % interval, green where it excludes zero. A cross is a run that failed.`),
+        make("p", { class: "small" }, `Each dot is one surface: ${metric.text} on it, less that of the reference on the same surface. Below the dots the median with its 95 % interval: green where it is better beyond doubt, red where it is worse. A cross is a run that failed.`),
         make("div", { class: "grid two" }, left, right));
       const reference = Math.min(state.reference, comparison.entrants.length - 1);
       strips(left, comparison, reference); bars(right, comparison, reference); matrix(right, comparison);
