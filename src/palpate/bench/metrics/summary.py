@@ -15,6 +15,8 @@ BAND = 0.05
 WINDOW = 1.0
 """Steady figures are means over the last so many seconds [s]."""
 FRONT_ENDS = ("thesis", "raw", "matched")
+IDENTIFIER = "identifier"
+"""The one that an experiment asks for besides."""
 PARAMETERS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
@@ -50,6 +52,10 @@ def losses(record: Record) -> int:
     """How often contact was lost."""
     phase = record["phase"]
     return int(np.sum((phase[1:] == LOST) & (phase[:-1] == CONTACT)))
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _share(flags: NDArray[np.float64]) -> float:
@@ -100,6 +106,9 @@ def _identified(record: Record, last: NDArray[np.bool_]) -> dict[str, Any]:
     found: dict[str, Any] = {
         front: {p: float(record[f"{p}_{front}"][end]) for p in PARAMETERS} for front in FRONT_ENDS
     }
+    if "K_identifier" in record.columns:
+        found[IDENTIFIER] = {p: _known(record[f"{p}_{IDENTIFIER}"][end]) for p in PARAMETERS}
+        found[f"{IDENTIFIER}_std"] = {p: _known(record[f"{p}_{IDENTIFIER}_std"][end]) for p in PARAMETERS}
     found["matched_std"] = {p: float(record[f"{p}_matched_std"][end]) for p in PARAMETERS}
     displacement = float(np.mean(record["displacement"][last]))
     force = float(np.mean(record["force_measured"][last]))
