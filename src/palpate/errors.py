@@ -18,6 +18,10 @@ class InputError(PalpateError, ValueError):
     """
 
 
+class PluginError(InputError):
+    """Code of the user's that a file names cannot be used: whatever the file's numbers are, nothing can be run."""
+
+
 class PartError(PalpateError, TypeError):
     """A part of the user's cannot run in a loop; the text says in one line where it fails, or what it may not do.
 

@@ -62,7 +62,7 @@ class Plugin:
 
 def is_plugin(name: object) -> bool:
     """Whether a word names code of the user's rather than something that comes with palpate."""
-    return isinstance(name, str) and ":" in name
+    return isinstance(name, str) and ":" in name and not any(letter.isspace() for letter in name)
 
 
 def look_in(folder: Path) -> None:

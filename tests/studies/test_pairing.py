@@ -17,7 +17,7 @@ from studies.small import planned, text
 N = 64
 RANDOM = text(
     '"surface.stiffness" = { log = [1000.0, 50000.0], random = true }\n'
-    '[parameters.law.cases]\nA = { "controller.ki" = 1.0 }\nB = { "controller.ki" = 2.0 }\nC = { "controller.ki" = 3.0 }',
+    '[parameters.law.cases]\nA = {}\nB = { "controller.ki" = 2.0 }\nC = { "controller.ki" = 3.0 }',
     head=f'samples = {N}\nbest = {{ least = "force_rms" }}',
     metrics='["force_rms", "overshoot", "K_matched"]',
 )

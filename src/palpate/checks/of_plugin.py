@@ -6,14 +6,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from palpate.bench.experiments.own_parts import CONTROLLER, IDENTIFIER, SURFACE, Role, table_of
+from palpate.bench.experiments.own_parts import CONTROLLER, IDENTIFIER, SURFACE, Role, role_of, table_of
 from palpate.bench.experiments.tables import Experiment, load
 from palpate.checks.check import Check
 from palpate.checks.controllers import TICK, WALL, controller_checks
 from palpate.checks.identifiers import identifier_checks
 from palpate.checks.surfaces import surface_checks
 from palpate.errors import InputError
-from palpate.plugins import is_plugin, plugin
+from palpate.plugins import is_plugin
 
 
 def checks_of(name: str) -> dict[str, list[Check]]:
@@ -31,7 +31,7 @@ def checks_of(name: str) -> dict[str, list[Check]]:
         raise InputError(
             f"{name!r} is neither module:Class nor a TOML file of an experiment; give one of them"
         )
-    role = _role(name)
+    role = role_of(name)
     kind = table_of(role, name)
     try:
         table = kind()
@@ -54,19 +54,6 @@ def _of_experiment(name: str) -> dict[str, list[Check]]:
     if not found:
         raise InputError(f"{name} has no part of your own; name one as kind = 'module:Class' in it")
     return found
-
-
-def _role(name: str) -> Role:
-    """What a class is, by what it can do."""
-    value: Any = plugin(name).value()
-    marks = {"controller": {"step"}, "identifier": {"update"}, "surface": {"force", "relax"}}
-    for role in (CONTROLLER, IDENTIFIER, SURFACE):
-        if marks[role.key] <= set(dir(value)):
-            return role
-    raise InputError(
-        f"{name} is no part: a controller has start and step, a surface start, force, relax and free, an identifier "
-        "update and estimate"
-    )
 
 
 def _checks(role: Role, table: Any, tick: float, wall: float) -> list[Check]:

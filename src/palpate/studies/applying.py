@@ -30,7 +30,7 @@ def experiment_of(base: Experiment, tables: Tables) -> Experiment:
     try:
         return changed(base, changes)
     except InputError as error:
-        raise InputError(str(error).removeprefix(f"{', '.join(changes)}: ")) from error
+        raise type(error)(str(error).removeprefix(f"{', '.join(changes)}: ")) from error
 
 
 def value_at(tables: Tables, path: str) -> Any:

@@ -9,7 +9,7 @@ from palpate.bench import Experiment, build
 from palpate.bench.metrics import Look, metric_of
 from palpate.bench.metrics.own import tried
 from palpate.bench.part_check import check_parts
-from palpate.errors import InputError
+from palpate.errors import InputError, PluginError
 from palpate.plugins import is_plugin
 from palpate.studies.plan import TRIED, Plan, samples
 
@@ -50,6 +50,8 @@ def _combinations(plan: Plan) -> Iterator[Experiment]:
             try:
                 experiment = part.experiment(values)
                 build(experiment)
+            except PluginError:
+                raise
             except InputError:  # a value that is refused is a row of its own
                 continue
             kinds = tuple(map(type, (experiment.controller, experiment.surface, experiment.identifier)))

@@ -13,7 +13,8 @@ from typing import Any
 import msgspec
 
 from palpate.bench import Experiment, build, load
-from palpate.errors import InputError, unknown
+from palpate.bench.experiments.own_parts import ROLES
+from palpate.errors import InputError, PluginError, unknown
 from palpate.plugins import Plugin, is_plugin, plugin
 from palpate.studies.applying import Tables, experiment_of, put, tables_of
 from palpate.studies.parameters import Axis, Label, axis, label
@@ -166,9 +167,13 @@ class Plan:
     @cached_property
     def plugins(self) -> tuple[Plugin, ...]:
         """The user's own parts and metrics that the study names."""
+        study = self.study
+        own = [(study.fixed, study.parameters), *((a.fixed, a.parameters) for a in study.against.values())]
+        set_to = [[fixed, *((p.values, p.cases) for p in parameters.values())] for fixed, parameters in own]
         bases = [msgspec.to_builtins(e) for part in self.parts for e in part.bases.values()]
-        named = {*filter(is_plugin, self.study.metrics), *_kinds([msgspec.to_builtins(self.study), bases])}
-        return tuple(plugin(name) for name in sorted(named))
+        tables = [base[key] for base in bases for key in ROLES if base[key] is not None]
+        named = {*study.metrics, *_texts(set_to), *(table["kind"] for table in tables)}
+        return tuple(plugin(name) for name in sorted(filter(is_plugin, named)))
 
     @property
     def columns(self) -> dict[str, type]:
@@ -180,18 +185,6 @@ class Plan:
                 found.setdefault(one.name, set()).update(kinds)
         found["seed"] = {int}
         return {name: _common(kinds) for name, kinds in found.items()}
-
-
-def _kinds(value: Any) -> Iterator[str]:
-    """Every plug-in that is named as the kind of a table, or set as one."""
-    if isinstance(value, Mapping):
-        for key, one in value.items():
-            if key.rpartition(".")[2] == "kind":
-                yield from (kind for kind in _texts(one) if is_plugin(kind))
-            yield from _kinds(one)
-    elif isinstance(value, list | tuple):
-        for one in value:
-            yield from _kinds(one)
 
 
 def _texts(value: Any) -> Iterator[str]:
@@ -269,7 +262,7 @@ def _fixed(base: Experiment, fixed: Mapping[str, Any], name: str) -> Experiment:
             put(tables, path, value)
         return experiment_of(base, tables)
     except InputError as error:
-        raise InputError(f"[fixed] does not fit the experiment {name}: {error}") from error
+        raise type(error)(f"[fixed] does not fit the experiment {name}: {error}") from error
 
 
 def _some(bases: Mapping[str, Experiment], cases: Sequence[Parameter]) -> list[Tables]:
@@ -295,6 +288,8 @@ def _check_values(part: Part, planned: bool) -> None:
     for values in islice(samples(part), TRIED):
         try:
             build(part.experiment(values))
+        except PluginError:
+            raise
         except InputError as error:
             trouble = trouble or error
         else:

@@ -134,6 +134,22 @@ def _table_of(key: str, known: Plugin) -> Any:
     )
 
 
+def role_of(name: str) -> Role:
+    """What a plug-in is, by what it can do.
+
+    Raises:
+        InputError: it cannot be imported, or is no part.
+    """
+    can = set(dir(plugin(name).value()))
+    for role, marks in ((CONTROLLER, {"step"}), (IDENTIFIER, {"update"}), (SURFACE, {"relax"})):
+        if marks <= can:
+            return role
+    raise InputError(
+        f"{name} is no part: a controller has start and step, a surface start, force, relax and free, an identifier "
+        "update and estimate"
+    )
+
+
 def check_protocol(role: Role, part: Any, name: str) -> None:
     """Refuses what is no part of this role, before it is made.
 

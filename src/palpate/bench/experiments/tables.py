@@ -14,7 +14,7 @@ from palpate.bench.experiments.own_parts import ROLES, table_of
 from palpate.bench.experiments.toml_files import TomlFiles, decoded
 from palpate.controllers import ControllerTable, HybridController
 from palpate.environments import SurfaceTable
-from palpate.errors import InputError
+from palpate.errors import InputError, PluginError
 from palpate.identifiers import IdentifierTable
 from palpate.plugins import is_plugin, look_in
 from palpate.signals.tables import (
@@ -252,7 +252,7 @@ def _converted(tables: dict[str, Any], where: str) -> Experiment:
         experiment = _as(Experiment, {**tables, **{key: _STAND_INS[key] for key in own}})
         return msgspec.structs.replace(experiment, **own) if own else experiment
     except InputError as error:
-        raise InputError(f"{where}: {error}") from error
+        raise type(error)(f"{where}: {error}") from error
 
 
 _STAND_INS = {
@@ -272,7 +272,11 @@ def _own_parts(tables: Mapping[str, Any]) -> dict[str, Any]:
     for key, role in ROLES.items():
         table = tables.get(key)
         if isinstance(table, dict) and is_plugin(table.get("kind")):
-            holder = msgspec.defstruct("Holder", [(key, table_of(role, table["kind"]))])
+            try:
+                kind = table_of(role, table["kind"])
+            except InputError as error:
+                raise PluginError(str(error)) from error
+            holder = msgspec.defstruct("Holder", [(key, kind)])
             found[key] = getattr(_as(holder, {key: table}), key)
     return found
 
