@@ -279,7 +279,7 @@ def _of(part: str) -> str:
 
 
 def _heads(plan: Plan, part: str, at: Mapping[str, Any]) -> list[str]:
-    axes = {a.name: a.parameter.label or a.name for p in plan.parts if p.name == part for a in p.axes}
+    axes = {a.name: a.title for p in plan.parts if p.name == part for a in p.axes}
     return [axes[name] for name in at]
 
 

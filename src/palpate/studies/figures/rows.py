@@ -67,7 +67,7 @@ class Rows:
     def scale(self, name: str) -> Scale:
         """The axis of a figure that a parameter makes."""
         axis = self.axis(name)
-        return Scale(axis.parameter.label or name, axis.labels(), logarithmic(axis))
+        return Scale(axis.title, axis.labels(), logarithmic(axis))
 
     def where(self, rows: DataFrame, asked: Map | Curves) -> DataFrame:
         """Those of the rows that a figure is about; a part without such a parameter is left whole.
@@ -94,7 +94,7 @@ class Rows:
         name, rows = asked.panels, self.where(self.part(), asked)
         if not name:
             return [("", None, rows)]
-        told = self.axis(name).parameter.label or name
+        told = self.axis(name).title
         return [
             (f"{told}: {short(v)}", v, rows.filter(polars.col(name) == v))
             for v in self.axis(name).labels()[:FEW]

@@ -23,7 +23,7 @@ def clouds_of(table: Rows, metric: Metric) -> Drawn:
     def made() -> list[Cloud]:
         return [
             Cloud(
-                Scale(a.parameter.label or a.name, (a.between(0.0), a.between(1.0)), logarithmic(a)),
+                Scale(a.title, (a.between(0.0), a.between(1.0)), logarithmic(a)),
                 list(points(table, metric, a.name, kinds)),
                 metric.words,
             )
