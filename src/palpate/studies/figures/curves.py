@@ -49,7 +49,9 @@ def lines(table: Rows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[Lin
         return
     axis = table.axis(asked.lines)
     for value in axis.labels()[:FEW]:
-        label = f"{axis.title} {short(value)}" if not isinstance(value, str) else value
+        label = (
+            f"{axis.parameter.label or asked.lines} {short(value)}" if not isinstance(value, str) else value
+        )
         yield _line(rows.filter(polars.col(asked.lines) == value), asked, x, label, False)
 
 
