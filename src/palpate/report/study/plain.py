@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.report.study.axes import Array, Scale, decades
-from palpate.report.study.clouds import Cloud, Points, means
+from palpate.report.study.clouds import Cloud, Points, middles
 from palpate.report.study.lines import Curve, Line
 from palpate.report.study.maps import WORDS, Heat
 
@@ -47,18 +47,18 @@ def cloud(one: Cloud) -> dict[str, Any]:
         "x": scale(one.x),
         "words": list(one.words),
         "log": not one.words and decades(every),
-        "series": [_points(p) for p in one.kinds],
+        "series": [_points(p, one.words) for p in one.kinds],
     }
 
 
-def _points(one: Points) -> dict[str, Any]:
+def _points(one: Points, words: Sequence[str]) -> dict[str, Any]:
     rows = np.unique(np.linspace(0, len(one.x) - 1, min(MOST, len(one.x))).astype(int))
-    middle = means(one)
+    middle = middles(one, words)
     return {
         "label": one.label,
         "x": numbers(one.x[rows]),
         "y": numbers(one.y[rows]),
-        "mean": [numbers(middle[:, 0]), numbers(middle[:, 1])],
+        "middle": [numbers(middle[:, 0]), numbers(middle[:, 1])],
     }
 
 

@@ -143,7 +143,7 @@
             dot(p, p.sx(x), clipped(p.sy(v), p.inner[3], p.inner[2]) + 3 * aside, 2, { class: `cloud ${tone}` }, `${s.label ? `${s.label}: ` : ""}${figure(x)}, ${words.length ? words[Math.round(v)] : figure(v)}`);
           });
         });
-        one.series.forEach((s, k) => path(p, s.mean[0], s.mean[1], { class: `line s${k % 6}` }));
+        one.series.forEach((s, k) => path(p, s.middle[0], s.middle[1], { class: `line s${k % 6}` }));
         beyond(p, out);
       }
       const names = panels.length ? panels[0].series.map((s, k) => [s.label, `s${k % 6}`]) : [];

@@ -30,7 +30,8 @@ def clouds_of(table: Rows, metric: Metric) -> Drawn:
             for a in drawn[:CLOUDS]
         ]
 
-    caption = f"{sentence(metric)}: every run, and the mean over each eighth of them."
+    middle = "mean" if metric.words else "median"
+    caption = f"{sentence(metric)}: every run, and the {middle} of each eighth of them."
     return Drawn(f"clouds-{metric.name.replace(':', '-')}", caption, metric, made, clouds_figure)
 
 
