@@ -205,7 +205,7 @@ def test_values_that_go_by_factors_are_drawn_so(values, logarithmic):
 def test_the_tables_have_the_best_for_each_surface_and_of_what_it_is_compared_with(plan):
     frame = results(plan, lost)
     own, pure, came = tables(frame, plan, rankings(frame, plan, MAIN))
-    assert own.head[:4] == ("world", "K_i [1/s]", "surface.damping", "force_rms [N]")
+    assert own.head[:4] == ("world", "K_i [1/s]", "surface.damping [N s/m]", "force_rms [N]")
     assert [row[:2] for row in own.rows] == [("foam", "1"), ("rubber", "1")]
     assert own.rows[0][-1] == "2"  # settings with a failed run
     assert [row[0] for row in pure.rows] == ["foam", "rubber"]

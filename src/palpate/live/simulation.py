@@ -284,14 +284,17 @@ def _notes(experiment: Experiment, name: str) -> tuple[str, ...]:
 def sliders_of(experiment: Experiment) -> tuple[Slider, ...]:
     """What can be changed of an experiment while it runs."""
     force, surface = float(experiment.force.first), experiment.surface
-    K, B = float(surface.stiffness), float(surface.damping)
+    K, B = (
+        float(getattr(surface, name, 0.0)) for name in ("stiffness", "damping")
+    )  # a user's may have neither
     linear = type(surface).__name__ != "HuntCrossleySurface"
     units = ("N/m", "N s/m") if linear else ("N/m^n", "N s/m^(n+1)")
     found = [Slider("force.first", "desired force", "N", min(1.0, force), max(40.0, 2.0 * force), force)]
     gain = getattr(experiment.controller, "kf", None)
     if isinstance(gain, int | float) and gain > 0:
         found.append(Slider("controller.kf", "force gain", "", 0.05 * gain, 20.0 * gain, float(gain), True))
-    found.append(Slider("surface.stiffness", "surface K", units[0], K / 20, 20 * K, K, True, "K"))
+    if K > 0:
+        found.append(Slider("surface.stiffness", "surface K", units[0], K / 20, 20 * K, K, True, "K"))
     if B > 0:
         found.append(Slider("surface.damping", "surface B", units[1], B / 20, 20 * B, B, True, "B"))
     return tuple(found)
