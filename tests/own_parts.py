@@ -49,6 +49,25 @@ class Spring(NamedTuple):
         return 0.5 * self.stiffness * state.deflection**2
 
 
+class Rigid(NamedTuple):
+    """A spring whose number has another name."""
+
+    k: float = 1e5
+    mass: float = 0.0
+
+    def start(self):
+        return UNTOUCHED
+
+    def force(self, state, p, v):
+        return self.k * p
+
+    def relax(self, state, p, v, dt):
+        return SurfaceState(p, v, 0.0, 1.0)
+
+    def free(self, state, dt):
+        return SurfaceState(0.0, 0.0, 0.0, 0.0)
+
+
 class Normal:
     """Least squares by the normal equations."""
 
