@@ -7,7 +7,7 @@ import pytest
 
 import palpate.identifiers as room
 from palpate.checks import identifiers as laws
-from palpate.checks.identifiers import NOISE, TRUTH, told
+from palpate.checks.identifiers import NOISE, TRUTH, answers
 from palpate.checks.identifiers import foam as press
 from palpate.errors import InputError
 from palpate.identifiers import (
@@ -71,7 +71,7 @@ def test_of_many_samples_the_bad_one_is_named_and_those_before_are_in(make):
     with pytest.raises(InputError, match="sample 20 is not finite"):
         bad.update_many(broken, force)
     good.update_many(phi[:20], force[:20])
-    np.testing.assert_array_equal(told(bad), told(good))
+    np.testing.assert_array_equal(answers(bad), answers(good))
 
 
 @linear
@@ -124,7 +124,7 @@ def test_the_covariance_stays_one_through_any_rest(make, rest):
                 scaled = C / np.sqrt(np.outer(np.diag(VAGUE), np.diag(VAGUE)))
                 assert np.linalg.eigvalsh(scaled)[0] > -1e-15
             assert (np.diag(estimator.covariance) < 3.1 * np.diag(VAGUE)).all()
-            assert np.isfinite(told(estimator)).all()
+            assert np.isfinite(answers(estimator)).all()
     estimator.update_many(phi, force)
     assert estimator.theta[2] == pytest.approx(TRUTH[2], rel=0.05)
 
@@ -183,11 +183,11 @@ def test_the_stated_interval_covers_the_truth_at_its_rate(make, pole, least):
 @linear
 def test_what_is_given_back_is_a_copy(make):
     estimator = make()
-    before = told(estimator)
+    before = answers(estimator)
     estimator.theta[:] = 7.0
     estimator.covariance[:] = 7.0
     estimator.estimate().covariance[:] = 7.0
-    np.testing.assert_array_equal(told(estimator), before)
+    np.testing.assert_array_equal(answers(estimator), before)
 
 
 @linear

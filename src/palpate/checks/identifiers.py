@@ -60,7 +60,7 @@ def foam(samples: int, seed: int = 0, noise: float = NOISE) -> tuple[Array, Arra
     return phi, phi @ TRUTH + random.normal(0.0, noise, samples)
 
 
-def told(identifier: Any) -> Array:
+def answers(identifier: Any) -> Array:
     """All that an identifier says."""
     estimate = identifier.estimate()
     return np.concatenate([estimate.theta, np.ravel(estimate.covariance), [estimate.samples]])
@@ -111,8 +111,8 @@ def many_updates_are_updates_one_by_one(make: Callable[[], Any]) -> None:
     mixed.update_many(phi[:100].tolist(), force[:100].tolist())
     mixed.update(list(phi[100]), force[100])
     mixed.update_many(np.asfortranarray(phi[101:]), force[101:])
-    require(_same(told(many), told(one)), "update_many is not many updates")
-    require(_same(told(mixed), told(one)), "update and update_many in turns are not many updates")
+    require(_same(answers(many), answers(one)), "update_many is not many updates")
+    require(_same(answers(mixed), answers(one)), "update and update_many in turns are not many updates")
 
 
 def a_regressor_may_be_any_sequence_of_numbers(make: Callable[[], Any]) -> None:
@@ -127,7 +127,7 @@ def a_regressor_may_be_any_sequence_of_numbers(make: Callable[[], Any]) -> None:
         ("of integers", phi.astype(int)),
     ):
         require(
-            _same(told(fed(make(), [row], [4.0])), told(plain)),
+            _same(answers(fed(make(), [row], [4.0])), answers(plain)),
             f"a regressor {kind} counts otherwise",
         )
 
@@ -136,7 +136,7 @@ def the_same_samples_give_the_same_estimate(make: Callable[[], Any]) -> None:
     """It has no memory outside itself, and draws no random number of its own."""
     phi, force = foam(200)
     first, second = fed(make(), phi, force), fed(make(), phi, force)
-    require(_same(told(first), told(second)), "two of a kind differ after the same samples")
+    require(_same(answers(first), answers(second)), "two of a kind differ after the same samples")
 
 
 def a_bad_sample_is_refused_and_changes_nothing(make: Callable[[], Any]) -> None:
@@ -155,7 +155,7 @@ def refuses(make: Callable[[], Any], kind: str, sample: tuple[Any, Any]) -> None
         pass
     else:
         raise AssertionError(f"a sample that is {kind}, {sample}, is taken; raise a ValueError")
-    same = _same(told(fed(bad, phi[60:], force[60:])), told(fed(good, phi[60:], force[60:])))
+    same = _same(answers(fed(bad, phi[60:], force[60:])), answers(fed(good, phi[60:], force[60:])))
     require(same, f"a sample that is {kind} leaves something behind")
 
 
@@ -164,11 +164,11 @@ def a_copy_goes_its_own_way_and_a_pickle_goes_on(make: Callable[[], Any]) -> Non
     phi, force = foam(200)
     identifier = fed(make(), phi[:100], force[:100])
     copied, thawed = copy.deepcopy(identifier), pickle.loads(pickle.dumps(identifier))  # noqa: S301 - its own
-    before = told(identifier)
+    before = answers(identifier)
     fed(copied, phi[100:], force[100:])
-    require(_same(told(identifier), before), "what a copy learns, the original knows")
+    require(_same(answers(identifier), before), "what a copy learns, the original knows")
     require(
-        _same(told(fed(thawed, phi[100:], force[100:])), told(copied)),
+        _same(answers(fed(thawed, phi[100:], force[100:])), answers(copied)),
         "a pickle does not go on alike",
     )
 
