@@ -18,8 +18,21 @@ class InputError(PalpateError, ValueError):
     """
 
 
+class PluginError(InputError):
+    """Code of the user's that a file names cannot be used: whatever the file's numbers are, nothing can be run."""
+
+
 class PartError(PalpateError, TypeError):
-    """A part of the user's cannot run in a loop; the text says where it fails, or what it may not do."""
+    """A part of the user's cannot run in a loop; the text says in one line where it fails, or what it may not do.
+
+    Args:
+        text: that line.
+        compiler: the compiler's own account, which is long; "" where it has none.
+    """
+
+    def __init__(self, text: str, compiler: str = ""):
+        super().__init__(text)
+        self.compiler = compiler
 
 
 _LISTED = 60

@@ -17,8 +17,7 @@ from studies.small import NEAR, SMALL, text
 
 MANY = SMALL.replace("points = 3", "points = 60")
 FILES = {
-    "curves1.png",
-    "map1.png",
+    *(f"{kind}{number}.png" for kind in ("curves", "map") for number in (1, 2, 3)),
     "report.html",
     "results.parquet",
     "runs.jsonl",

@@ -1,5 +1,6 @@
 """A study on a Dask cluster of real processes: the same table as here, whatever dies on the way."""
 
+import pickle
 import shutil
 import subprocess
 import threading
@@ -137,8 +138,8 @@ def jobs(count):
 
 def test_a_worker_with_other_sources_refuses():
     with pytest.raises(InputError, match="another version of palpate"):
-        run_batch(jobs(1), "0123456789abcdef")
-    assert len(run_batch(jobs(2), sources())) == 2
+        run_batch(pickle.dumps(jobs(1)), "0123456789abcdef")
+    assert len(run_batch(pickle.dumps(jobs(2)), sources())) == 2
 
 
 class Deadly:

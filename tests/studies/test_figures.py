@@ -81,7 +81,7 @@ def lost(at):
 
 
 def test_every_figure_that_is_asked_for_is_drawn_and_none_is_left_open(plan, tmp_path):
-    files = draw.draw(results(plan, lost), plan, tmp_path)
+    files = draw.draw(list(draw.figures(results(plan, lost), plan)), tmp_path)
     assert [path.name for path in files] == ["map1.png", "map2.png", "curves1.png"]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in files)
     assert all(caption.endswith(".") for caption in files.values())
@@ -135,7 +135,7 @@ def test_points_that_were_drawn_make_clouds(tmp_path):
     )
     drawn = planned(source)
     frame = results(drawn)
-    assert [f.name for f in draw.draw(frame, drawn, tmp_path)] == [
+    assert [f.name for f in draw.draw(list(draw.figures(frame, drawn)), tmp_path)] == [
         "clouds-force_rms.png",
         "clouds-outcome.png",
     ]
@@ -149,7 +149,7 @@ def test_points_that_were_drawn_make_clouds(tmp_path):
 def test_figures_are_suggested_where_none_are_asked_for(plan, tmp_path):
     plain = planned(GRID[: GRID.index("[[maps]]")] + GRID[GRID.index("[parameters]") :])
     names = [one.name for one in draw.figures(results(plain), plain)]
-    assert names == ["map1", "curves1"]
+    assert names == ["map1", "map2", "curves1"]  # a map of each metric; curves of quantities only
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_values_that_go_by_factors_are_drawn_so(values, logarithmic):
 def test_the_tables_have_the_best_for_each_surface_and_of_what_it_is_compared_with(plan):
     frame = results(plan, lost)
     own, pure, came = tables(frame, plan, rankings(frame, plan, MAIN))
-    assert own.head[:4] == ("world", "K_i [1/s]", "surface.damping", "force_rms [N]")
+    assert own.head[:4] == ("world", "K_i [1/s]", "surface.damping [N s/m]", "force_rms [N]")
     assert [row[:2] for row in own.rows] == [("foam", "1"), ("rubber", "1")]
     assert own.rows[0][-1] == "2"  # settings with a failed run
     assert [row[0] for row in pure.rows] == ["foam", "rubber"]

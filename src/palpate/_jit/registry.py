@@ -12,6 +12,8 @@ C = TypeVar("C", bound=type)
 laws: list[Callable[..., Any]] = []
 foreign_laws: list[Callable[..., Any]] = []
 parts: dict[type, None] = {}
+foreign_files: set[Path] = set()
+"""Sources of the user's plug-ins, and what they import from beside them."""
 PACKAGE = Path(__file__).resolve().parent.parent
 # Division as NumPy's: no branch and no exception inside a loop.
 OPTIONS = {"error_model": "numpy", "nogil": True}

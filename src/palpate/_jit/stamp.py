@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from palpate._jit.registry import PACKAGE, foreign_laws, parts
+from palpate._jit.registry import PACKAGE, foreign_files, foreign_laws, parts
 
 _IMPORT = re.compile(r"^\s*from (palpate[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
@@ -53,9 +53,11 @@ def stamp_of(function: Callable[..., Any], types_of_arguments: tuple[Any, ...]) 
     if any(cls.__module__ == "__main__" for cls in classes):
         return None
     things = {function, *classes}
+    beside: set[Path] = set()
     if any(PACKAGE not in home_of(x).parents for x in things):
         things |= {*foreign_laws, *parts}
-    files = {home_of(x) for x in things}
+        beside = foreign_files
+    files = {home_of(x) for x in things} | beside
     return sources_stamp(*files) if all(f.is_file() for f in files) else None
 
 

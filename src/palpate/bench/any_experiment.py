@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.experiments.tables import Experiment, converted
+from palpate.bench.experiments.tables import Experiment, converted, parse
 from palpate.bench.experiments.toml_files import TomlFiles, decoded
 from palpate.bench.one_direction.bench import OneDirectionBench, build_one_direction
 from palpate.bench.one_direction.tables import OneDirection
@@ -29,7 +29,7 @@ def load_any(name: str) -> AnyExperiment:
 def parse_any(text: str, where: str) -> AnyExperiment:
     """An experiment from TOML; `where` names the text in errors."""
     tables = decoded(text, where)
-    return converted(tables, where, OneDirection) if ARM in tables else converted(tables, where, Experiment)
+    return converted(tables, where, OneDirection) if ARM in tables else parse(text, where)
 
 
 def build_any(experiment: AnyExperiment) -> Bench | OneDirectionBench:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from palpate._vector import Vec3
 from palpate.bench.ending import DONE, INTERRUPTED, NO_CONTACT, Ending, StopCondition
+from palpate.bench.identifier_watch import Identifier, watched
 from palpate.bench.row import COLUMNS
 from palpate.bench.simulation import Simulation
 from palpate.bench.tick import Loop, start_at
@@ -33,12 +34,14 @@ class Bench:
         q: joint angles at the start [rad].
         meta: what the record is to carry along.
         losses: of contact after which a run ends; 0 lets it go on whatever happens, short of numbers that are none.
+        identifier: makes the identifier that watches a run, a new one for each; None for none.
     """
 
     loop: Loop
     q: Vec3
     meta: dict[str, Any] = field(default_factory=dict)
     losses: int = 0
+    identifier: Callable[[], Identifier] | None = None
 
     def __post_init__(self) -> None:
         controller(type(self.loop.controller))  # a user's own may have only start and step
@@ -56,6 +59,15 @@ class Bench:
     def with_controller(self, controller: Any) -> Bench:
         """The same bench with another controller in contact: a part with ``start()`` and ``step``."""
         return replace(self, loop=self.loop._replace(controller=controller))
+
+    def with_identifier(self, identifier: Callable[[], Identifier]) -> Bench:
+        """The same bench with an identifier that watches; the record has its numbers as ``K_identifier`` and so on.
+
+        Args:
+            identifier: makes one at its start, as a class of `palpate.identifiers` or of your own does: it has
+                ``update(regressor, force)`` and ``estimate()`` of the parameters (M, B, K).
+        """
+        return replace(self, identifier=identifier)
 
     def with_wave(self, wave: ArrayLike) -> Bench:
         """The same bench, asked for this force on top of its levels and its sine.
@@ -115,9 +127,11 @@ class Bench:
                 "position": {"lag_s": self.loop.encoder.lag},
             }
         }
-        return Record(
-            columns, COLUMNS, {**self.meta, **told, "seed": seed, "end": ending.end, "why": ending.why}
-        )
+        meta = {**self.meta, **told, "seed": seed, "end": ending.end, "why": ending.why}
+        record = Record(columns, COLUMNS, meta)
+        if self.identifier is None:
+            return record
+        return watched(record, self.identifier(), self.loop.estimators, compiled=compiled)
 
     def simulation(
         self, seed: int = 0, *, compiled: bool = True, waiting: Callable[[], None] | None = None

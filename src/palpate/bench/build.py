@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -20,7 +21,7 @@ from palpate.bench.plant import Plant
 from palpate.bench.sequence import Sequence
 from palpate.bench.tick import Loop
 from palpate.controllers import ResolvedAcceleration, controller_of
-from palpate.environments import StickSlip, join
+from palpate.environments import StickSlip, surface_of
 from palpate.errors import InputError
 from palpate.friction import Coulomb, LuGre
 from palpate.identifiers.kernels.least_squares import LeastSquares
@@ -63,7 +64,9 @@ def build(experiment: Experiment) -> Bench:
         steps=e.run.steps,
     )
     meta = {"experiment": msgspec.to_builtins(e), "truth": _truth(loop)}
-    return Bench(loop, q, meta, e.run.losses)
+    return Bench(
+        loop, q, meta, e.run.losses, None if e.identifier is None else partial(e.identifier.made, tick)
+    )
 
 
 def _start(arm: Arm3, e: Experiment) -> Vec3:
@@ -91,9 +94,8 @@ def _plant(arm: Arm3, e: Experiment) -> Plant:
         triple(f.static),
         triple(f.stribeck),
     ).checked()
-    surface = e.surface.made()
     side = StickSlip(e.wall.side_stiffness, e.wall.side_damping, e.wall.side_friction)
-    return Plant(arm.with_rotors(), friction, join(surface), side, float(e.wall.x))
+    return Plant(arm.with_rotors(), friction, surface_of(e.surface), side, float(e.wall.x))
 
 
 def _force_input(e: Experiment) -> ForceInput:
@@ -149,4 +151,6 @@ def _estimators(e: Experiment, rate: float, late: float) -> Estimators:
 
 def _truth(loop: Loop) -> dict[str, dict[str, object]]:
     surface = loop.plant.surface
+    if not hasattr(surface, "truth"):  # one of the user's that does not say it
+        return {}
     return {name: {"value": value, "unit": unit} for name, (value, unit) in surface.truth().items()}

@@ -2,10 +2,23 @@
 
 from typing import NamedTuple
 
-from palpate._jit import part
+from palpate._jit import law, part
 from palpate._vector import Vec3
 from palpate.bench.matched_channels import Centring, CentringState, Matched, MatchedState
 from palpate.identifiers.kernels.least_squares import LeastSquares, LeastSquaresState
+
+
+@law
+def listened(listening, pressing, smooth_force, touch):
+    """1 while the matched channels are data, from touch to loss; `listening` is what it was a tick ago.
+
+    Latched: samples picked by their own noisy force would be picked for their noise, and bias the fit.
+    """
+    if listening == 0.0 and (pressing or smooth_force > touch):
+        return 1.0
+    if not pressing and smooth_force < 0.0:
+        return 0.0
+    return listening
 
 
 @part
@@ -59,13 +72,10 @@ class Estimators(NamedTuple):
             phi = Vec3(signals.acceleration, signals.velocity, x - x0)
             _, raw = self.raw.step(raw, phi, signals.force)
         (phi, force), front = self.front.step(state.front, x, signals.force)
-        # Latched: samples picked by their own noisy force would be picked for their noise, and bias the fit.
-        if listening == 0.0 and (pressing or smooth_force > self.touch):
-            # Anew at each touch: what noise alone once took for a touch is no data.
-            listening, matched, centring = 1.0, self.matched.start(), self.centring.start()
-        elif not pressing and smooth_force < 0.0:
-            listening = 0.0
+        before, listening = listening, listened(listening, pressing, smooth_force, self.touch)
         if listening == 1.0:
+            if before == 0.0:  # anew at each touch: what noise alone once took for a touch is no data
+                matched, centring = self.matched.start(), self.centring.start()
             (phi, force), centring = self.centring.step(centring, phi, force)
             _, matched = self.matched.step(matched, phi, force)
         return EstimatorsState(thesis, raw, matched, front, centring, listening)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -67,10 +68,20 @@ class Simulation:
             self.state = _march_plain(self.loop, self.state, self.ticks, noise, out)
             return
         try:
-            self.state = compiled_march.run(self.waiting, self.loop, self.state, self.ticks, noise, out)
+            self.state = compiled_march.run(
+                self.waiting or _compiling, self.loop, self.state, self.ticks, noise, out
+            )
         except NotCompiled as error:
             found = diagnosed(self.loop, self.state)
-            raise found from found.__cause__ or error.__cause__
+            found.compiler = str(error.__cause__)
+            # The compiler's account is a hundred lines on palpate's own code: whoever wants it asks for it.
+            raise found from found.__cause__
+
+
+def _compiling() -> None:
+    """Says why nothing happens for a while, to whoever watches a script."""
+    if sys.stderr.isatty():
+        sys.stderr.write("palpate: compiling the loop: some ten seconds, once after installation\n")
 
 
 def _march_plain(

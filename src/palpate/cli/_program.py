@@ -29,6 +29,7 @@ COMMANDS = {
     "run": "Run an experiment: the arm approaches, touches, presses.",
     "live": "Show an arm that presses, or a log, in a page of the browser.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
+    "checks": "Check a controller, surface or identifier of your own.",
     "thesis": "Measure every figure and every claim of the thesis again.",
     "speed": "Measure what one tick of the closed loop costs here.",
     "completion": "Print what makes a shell complete commands, options and files.",

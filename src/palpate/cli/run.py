@@ -212,10 +212,12 @@ def _record(
     from rich.progress import BarColumn, Progress, TextColumn
 
     from palpate.bench.any_experiment import build_any
+    from palpate.bench.part_check import check_parts
     from palpate.cli._waiting import COMPILING
 
     try:
         bench = build_any(experiment)
+        check_parts(bench, lambda: screen.print(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
     columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")

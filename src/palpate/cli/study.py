@@ -111,6 +111,8 @@ def study(
 
 def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
+    from palpate.cli._waiting import COMPILING
+    from palpate.studies.part_check import check_parts_of
     from palpate.studies.plan import plan
     from palpate.studies.run_study import Work, begun
     from palpate.studies.study import parse
@@ -119,6 +121,7 @@ def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool
     screen = console(stderr=True)
     try:
         planned = plan(parse(source, name), name)
+        check_parts_of(planned, lambda: screen.print(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
     if not yes and (force or not begun(folder)):

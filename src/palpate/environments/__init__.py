@@ -4,7 +4,7 @@ from palpate.environments.hunt_crossley import HuntCrossley, HuntCrossleySurface
 from palpate.environments.kelvin_voigt import KelvinVoigt, KelvinVoigtSurface
 from palpate.environments.standard_linear_solid import StandardLinearSolid, StandardLinearSolidSurface
 from palpate.environments.stick_slip import StickSlip, StickSlipState
-from palpate.environments.surface import Surface, join
+from palpate.environments.surface import Surface, join, surface_of
 from palpate.environments.surface_state import SurfaceState, contact_force, impact, part_from, touch
 from palpate.environments.surface_table import SurfaceTable
 
@@ -24,5 +24,6 @@ __all__ = [
     "impact",
     "join",
     "part_from",
+    "surface_of",
     "touch",
 ]

@@ -80,6 +80,12 @@ def join(one: Any) -> Surface:
     return joined
 
 
+def surface_of(table: Any) -> Any:
+    """The surface of a table: those that come with palpate in their one type, a user's own as it is."""
+    one = table.made()
+    return join(one) if isinstance(table, SurfaceTable) else one
+
+
 def alone(surface: Any) -> Any:
     """The surface that is meant, taken out of what `join` made."""
     while isinstance(surface, Surface):

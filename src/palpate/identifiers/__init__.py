@@ -16,20 +16,27 @@ and the verdict that each parameter deserves. Whoever has a position and a force
 
 from palpate.identifiers.contact_identifier import ContactIdentifier
 from palpate.identifiers.forgetting import Directional, Exponential, SIFt
-from palpate.identifiers.kalman_filter import KalmanFilter
+from palpate.identifiers.identifier_table import IdentifierTable
+from palpate.identifiers.kalman_filter import KalmanFilter, KalmanIdentifier
 from palpate.identifiers.neural_probe import NeuralProbe, Probed
-from palpate.identifiers.recursive_least_squares import RecursiveLeastSquares
+from palpate.identifiers.recursive_least_squares import LeastSquaresIdentifier, RecursiveLeastSquares
 from palpate.identifiers.replay import watch
-from palpate.identifiers.restarting import RestartingLeastSquares
+from palpate.identifiers.restarting import RestartingIdentifier, RestartingLeastSquares
+from palpate.signals.types import Estimate
 
 __all__ = [
     "ContactIdentifier",
     "Directional",
+    "Estimate",
     "Exponential",
+    "IdentifierTable",
     "KalmanFilter",
+    "KalmanIdentifier",
+    "LeastSquaresIdentifier",
     "NeuralProbe",
     "Probed",
     "RecursiveLeastSquares",
+    "RestartingIdentifier",
     "RestartingLeastSquares",
     "SIFt",
     "watch",

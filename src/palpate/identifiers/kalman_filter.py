@@ -11,6 +11,7 @@ from palpate._jit import Kernel, kernel, law, part
 from palpate._vector import sqrt
 from palpate.errors import InputError
 from palpate.identifiers.estimator import HUGE, Streaming, checked
+from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
 from palpate.identifiers.kernels.dimension import AnyNumber
 from palpate.identifiers.kernels.error_covariance import carried
 from palpate.identifiers.kernels.square_root import drifted, measured
@@ -23,6 +24,7 @@ from palpate.identifiers.kernels.state_layout import (
     put,
     statistics_at,
 )
+from palpate.signals.tables import NotNegativeTriple
 from palpate.signals.types import Estimate
 
 MEMORY = 10_000.0
@@ -160,3 +162,14 @@ def _many(state, phi, y, noise, size):
         if not _absorb(state, phi[i], y[i], noise, size):
             return i
     return len(y)
+
+
+class KalmanIdentifier(IdentifierTable, tag="kalman-filter"):
+    """A Kalman filter whose parameters go a random walk."""
+
+    drift: NotNegativeTriple = (0.0, 0.0, 0.0)
+    """Of M [kg], B [N s/m] and K [N/m] per root second."""
+
+    def made(self, tick: float) -> KalmanFilter:
+        """The estimator at its start."""
+        return KalmanFilter(np.zeros(3), np.diag(np.square(VAGUE)), self.drift, tick, names=NAMES)

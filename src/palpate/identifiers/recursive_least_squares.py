@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from palpate._jit import Kernel, kernel, law
 from palpate.identifiers.estimator import HUGE, Streaming, checked
-from palpate.identifiers.forgetting import Forgetting, policy_of
+from palpate.identifiers.forgetting import Directional, Exponential, Forgetting, SIFt, policy_of
+from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
 from palpate.identifiers.kernels.dimension import AnyNumber
 from palpate.identifiers.kernels.least_squares import learned
 from palpate.identifiers.kernels.state_layout import (
@@ -114,3 +117,17 @@ def _many(state, phi, y, forgetting, size):
         if not absorb(state, phi[i], y[i], forgetting, size)[1] > 0.0:
             return i
     return len(y)
+
+
+class LeastSquaresIdentifier(IdentifierTable, tag="least-squares"):
+    """Recursive least squares that forget what is told them to forget."""
+
+    keep: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    """Forgetting factor; 1 forgets nothing."""
+    forgetting: Literal["exponential", "directional", "sift"] = "exponential"
+
+    def made(self, tick: float) -> RecursiveLeastSquares:
+        """The estimator at its start."""
+        policy = {"exponential": Exponential, "directional": Directional, "sift": SIFt}[self.forgetting]
+        forgetting: Any = policy(self.keep) if self.keep < 1.0 else 1.0
+        return RecursiveLeastSquares(np.zeros(3), np.diag(np.square(VAGUE)), forgetting, NAMES)

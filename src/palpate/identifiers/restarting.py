@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from palpate._jit import Kernel, kernel, law
 from palpate.errors import InputError
 from palpate.identifiers.estimator import checked
 from palpate.identifiers.forgetting import Forgetting, policy_of
+from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
 from palpate.identifiers.kernels.change_detection import (
     COUNTERS,
     EXTRA,
@@ -19,6 +23,7 @@ from palpate.identifiers.kernels.change_detection import (
 )
 from palpate.identifiers.kernels.state_layout import known_first, length, statistics_at
 from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorb
+from palpate.signals.tables import Positive
 
 
 class RestartingLeastSquares(LeastSquaresEstimator):
@@ -106,3 +111,17 @@ def _many(state, phi, y, watch, size):
         if not _absorb(state, phi[i], y[i], watch, size):
             return i
     return len(y)
+
+
+class RestartingIdentifier(IdentifierTable, tag="restarting-least-squares"):
+    """Least squares that notice when the surface becomes another one."""
+
+    memory: Annotated[int, Meta(ge=4, le=100_000)] = 480
+    """Samples that it looks back over."""
+    evidence: Positive = 20.0
+    """Log-likelihood ratio from which the surface has changed."""
+
+    def made(self, tick: float) -> RestartingLeastSquares:
+        """The estimator at its start."""
+        P = np.diag(np.square(VAGUE))
+        return RestartingLeastSquares(np.zeros(3), P, 1.0, self.memory, self.evidence, NAMES)

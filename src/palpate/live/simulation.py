@@ -13,6 +13,7 @@ from palpate.bench.build import build
 from palpate.bench.ending import StopCondition
 from palpate.bench.experiments.tables import Experiment, changed
 from palpate.bench.given_motion import rest_for
+from palpate.bench.part_check import check_parts
 from palpate.bench.row import COLUMNS as ROW
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.bench.tick import LoopState, compiled_march, start_at
@@ -81,6 +82,7 @@ class Simulation:
         self._experiment, self._whole, self._waiting = experiment, whole, waiting
         self.state = State(seed=seed)
         bench = build(experiment)
+        check_parts(bench, waiting)
         self._rate = experiment.run.rate
         self._stride = max(1, round(STRIDE * self._rate))
         sliders = sliders_of(experiment)
@@ -287,14 +289,17 @@ def _notes(experiment: Experiment, name: str) -> tuple[str, ...]:
 def sliders_of(experiment: Experiment) -> tuple[Slider, ...]:
     """What can be changed of an experiment while it runs."""
     force, surface = float(experiment.force.first), experiment.surface
-    K, B = float(surface.stiffness), float(surface.damping)
+    K, B = (
+        float(getattr(surface, name, 0.0)) for name in ("stiffness", "damping")
+    )  # a user's may have neither
     linear = type(surface).__name__ != "HuntCrossleySurface"
     units = ("N/m", "N s/m") if linear else ("N/m^n", "N s/m^(n+1)")
     found = [Slider("force.first", "desired force", "N", min(1.0, force), max(40.0, 2.0 * force), force)]
     gain = getattr(experiment.controller, "kf", None)
     if isinstance(gain, int | float) and gain > 0:
         found.append(Slider("controller.kf", "force gain", "", 0.05 * gain, 20.0 * gain, float(gain), True))
-    found.append(Slider("surface.stiffness", "surface K", units[0], K / 20, 20 * K, K, True, "K"))
+    if K > 0:
+        found.append(Slider("surface.stiffness", "surface K", units[0], K / 20, 20 * K, K, True, "K"))
     if B > 0:
         found.append(Slider("surface.damping", "surface B", units[1], B / 20, 20 * B, B, True, "B"))
     return tuple(found)

@@ -21,7 +21,7 @@ import msgspec
 from palpate.bench.experiments.tables import Experiment
 from palpate.controllers import CautiousController
 from palpate.errors import InputError, PalpateError
-from palpate.force.certificate import Claim
+from palpate.force.claims import Claim
 from palpate.force.gains import Gains
 from palpate.report.numbers import plain, quantity
 

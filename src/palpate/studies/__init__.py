@@ -6,8 +6,8 @@ frame = run(text_of_a_study, "runs/mine")
 
 from __future__ import annotations
 
-from palpate.bench.metrics import METRICS, Metric
+from palpate.bench.metrics import METRICS, Look, Metric
 from palpate.studies.local import Local
 from palpate.studies.run_study import run
 
-__all__ = ["METRICS", "Local", "Metric", "run"]
+__all__ = ["METRICS", "Local", "Look", "Metric", "run"]

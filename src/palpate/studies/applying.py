@@ -31,7 +31,7 @@ def experiment_of(base: AnyExperiment, tables: Tables) -> AnyExperiment:
     try:
         return changed(base, changes)
     except InputError as error:
-        raise InputError(str(error).removeprefix(f"{', '.join(changes)}: ")) from error
+        raise type(error)(str(error).removeprefix(f"{', '.join(changes)}: ")) from error
 
 
 def value_at(tables: Tables, path: str) -> Any:

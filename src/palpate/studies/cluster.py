@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import pickle
 import socket
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,6 +15,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from palpate.errors import InputError
+from palpate.plugins import Plugin
 from palpate.studies.run_one import FAILED, Done, Job, Row, run_one
 from palpate.studies.sources import sources
 
@@ -32,18 +34,28 @@ CONNECT = 10.0
 POLL = 1.0
 
 
-def run_batch(jobs: Sequence[Job], stamp: str) -> list[Done]:
+def run_batch(packed: bytes, stamp: str, plugins: Sequence[Plugin] = ()) -> list[Done]:
     """Runs some jobs; this is what a worker does.
 
+    Args:
+        packed: the jobs, as a pickle.
+        stamp: of palpate's sources.
+        plugins: that the jobs need; they are imported first, so that one that is missing is told as such.
+
     Raises:
-        InputError: this worker has other sources than the study.
+        InputError: this worker has other sources than the study, or lacks a plug-in.
     """
     if sources() != stamp:
         raise InputError(
             f"a worker of the cluster has another version of palpate (sources {sources()}, here {stamp}); install the "
             "same on all machines"
         )
-    return [run_one(job) for job in jobs]
+    for one in plugins:
+        try:
+            one.value()
+        except InputError as error:
+            raise InputError(f"a worker of the cluster cannot use a plug-in: {error}") from error
+    return [run_one(job) for job in pickle.loads(packed)]  # noqa: S301 - of the client, which it works for
 
 
 @dataclass(frozen=True)
@@ -225,10 +237,13 @@ class _Hand:
             except StopIteration:
                 return False
             try:
-                self._pending[self.client.submit(run_batch, jobs, sources(), pure=False)] = jobs
+                self._pending[self._submitted(jobs)] = jobs
             except Exception as error:
                 raise self._gone(error) from error
         return True
+
+    def _submitted(self, jobs: list[Job]) -> Any:
+        return self.client.submit(run_batch, pickle.dumps(jobs), sources(), jobs[0].plugins, pure=False)
 
     def _done(self) -> list[Any]:
         """The batches that are done, after a while of waiting."""

@@ -18,6 +18,21 @@ Label = float | int | bool | str
 """A value as it stands in a table of results."""
 
 
+UNITS = {
+    **dict.fromkeys(("surface.stiffness", "surface.branch_stiffness", "wall.side_stiffness"), "N/m"),
+    **dict.fromkeys(("surface.damping", "wall.side_damping"), "N s/m"),
+    **dict.fromkeys(
+        ("force.first", "force.second", "force.amplitude", "force_sensor.noise", "approach.switch"), "N"
+    ),
+    **dict.fromkeys(("force_sensor.cutoff", "filters.motion", "filters.force", "force.frequency"), "Hz"),
+    **dict.fromkeys(("force.period", "surface.branch_time", "run.press"), "s"),
+    "surface.mass": "kg",
+    "wall.x": "m",
+    "approach.step": "m",
+}
+"""Of parameters that stand for a quantity whatever the experiment is; gains have another unit in each law."""
+
+
 @dataclass(frozen=True)
 class Axis:
     """One parameter of a study.
@@ -38,6 +53,12 @@ class Axis:
     def drawn(self) -> bool:
         """Whether its values come from a range without points: by Sobol's sequence, or in a search."""
         return not self.settings
+
+    @property
+    def title(self) -> str:
+        """What figures and tables call it: its label, or its name with the unit that it is known to have."""
+        unit = UNITS.get(self.name, "")
+        return self.parameter.label or (f"{self.name} [{unit}]" if unit else self.name)
 
     def labels(self) -> tuple[Label, ...]:
         """The values as they stand in a table."""

@@ -13,7 +13,9 @@ from typing import Any
 import msgspec
 
 from palpate.bench.any_experiment import AnyExperiment, build_any, load_any
-from palpate.errors import InputError, unknown
+from palpate.bench.experiments.own_parts import ROLES
+from palpate.errors import InputError, PluginError, unknown
+from palpate.plugins import Plugin, is_plugin, plugin
 from palpate.studies.applying import Tables, experiment_of, put, tables_of
 from palpate.studies.parameters import Axis, Label, axis, label
 from palpate.studies.sobol import Sobol
@@ -162,6 +164,17 @@ class Plan:
         first = number * len(part.seeds)
         return [part.setting(first + i, values, seed, False) for i, seed in enumerate(part.seeds)]
 
+    @cached_property
+    def plugins(self) -> tuple[Plugin, ...]:
+        """The user's own parts and metrics that the study names."""
+        study = self.study
+        own = [(study.fixed, study.parameters), *((a.fixed, a.parameters) for a in study.against.values())]
+        set_to = [[fixed, *((p.values, p.cases) for p in parameters.values())] for fixed, parameters in own]
+        bases = [msgspec.to_builtins(e) for part in self.parts for e in part.bases.values()]
+        tables = [base[key] for base in bases for key in ROLES if base[key] is not None]
+        named = {*study.metrics, *_texts(set_to), *(table["kind"] for table in tables)}
+        return tuple(plugin(name) for name in sorted(filter(is_plugin, named)))
+
     @property
     def columns(self) -> dict[str, type]:
         """Name and type (int, float, bool or str) of each column that tells a run apart."""
@@ -172,6 +185,14 @@ class Plan:
                 found.setdefault(one.name, set()).update(kinds)
         found["seed"] = {int}
         return {name: _common(kinds) for name, kinds in found.items()}
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping | list | tuple):
+        for one in value.values() if isinstance(value, Mapping) else value:
+            yield from _texts(one)
 
 
 def _common(kinds: set[type]) -> type:
@@ -241,7 +262,7 @@ def _fixed(base: AnyExperiment, fixed: Mapping[str, Any], name: str) -> AnyExper
             put(tables, path, value)
         return experiment_of(base, tables)
     except InputError as error:
-        raise InputError(f"[fixed] does not fit the experiment {name}: {error}") from error
+        raise type(error)(f"[fixed] does not fit the experiment {name}: {error}") from error
 
 
 def _some(bases: Mapping[str, AnyExperiment], cases: Sequence[Parameter]) -> list[Tables]:
@@ -264,9 +285,11 @@ def _check_values(part: Part, planned: bool) -> None:
     if not planned:
         return
     trouble: InputError | None = None
-    for values in islice(_samples(part), TRIED):
+    for values in islice(samples(part), TRIED):
         try:
             build_any(part.experiment(values))
+        except PluginError:
+            raise
         except InputError as error:
             trouble = trouble or error
         else:
@@ -275,7 +298,7 @@ def _check_values(part: Part, planned: bool) -> None:
         raise InputError(f"none of the parameters' values make an experiment: {trouble}")
 
 
-def _samples(part: Part) -> Iterator[dict[str, Any]]:
+def samples(part: Part) -> Iterator[dict[str, Any]]:
     """All first values, all last ones, and each value of each parameter with all others at their first or last."""
     every = {a.name: a.settings or (a.between(0.0), a.between(1.0)) for a in part.axes}
     ends = [{name: values[i] for name, values in every.items()} for i in (0, -1)]
@@ -292,6 +315,7 @@ def resolved(plan: Plan) -> bytes:
         if study.search is None
         else {"title", "about", "maps", "curves"}
     )
+    stamps = {one.name: one.stamp for one in plan.plugins}
     decides = {key: value for key, value in msgspec.to_builtins(study).items() if key not in shown}
     bases = [{name: msgspec.to_builtins(e) for name, e in sorted(part.bases.items())} for part in plan.parts]
-    return msgspec.json.encode([decides, bases], order="sorted")
+    return msgspec.json.encode([decides, bases, *([stamps] if stamps else [])], order="sorted")

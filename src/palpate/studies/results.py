@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from palpate.bench.metrics import METRICS
+from palpate.bench.metrics import metric_of
 from palpate.errors import InputError
 from palpate.logs.store import write_parquet
 from palpate.studies.plan import Plan
@@ -39,7 +39,9 @@ def write(frame: DataFrame, plan: Plan, path: Path) -> None:
     Raises:
         InputError: the disk is full.
     """
-    metrics = {name: {"unit": METRICS[name].unit, "text": METRICS[name].text} for name in plan.study.metrics}
+    metrics = {
+        name: {"unit": metric_of(name).unit, "text": metric_of(name).text} for name in plan.study.metrics
+    }
     about = msgspec.json.encode({"title": plan.study.title, "metrics": metrics}).decode()
     try:
         write_parquet(frame, about, path)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import msgspec
 
 from palpate.bench.any_experiment import AnyExperiment, build_any
-from palpate.bench.metrics import METRICS, Look
+from palpate.bench.metrics import Look, metric_of
 from palpate.errors import InputError
+from palpate.plugins import Plugin
 from palpate.records import Record
 from palpate.studies.parameters import Label
 from palpate.studies.plan import Setting
@@ -58,6 +59,8 @@ class Job:
     metrics: tuple[str, ...]
     window: tuple[float, float] | None
     keep: bool
+    plugins: tuple[Plugin, ...] = ()
+    """The user's own parts and metrics, which a worker has to have as well."""
 
 
 Done = tuple[Row, Record | None]
@@ -87,7 +90,7 @@ def run_one(
     try:
         record = _record(setting.experiment, setting.seed, stopped, waiting)
         look = Look(record, job.window)
-        metrics = tuple(METRICS[name].measured(look) for name in job.metrics)
+        metrics = tuple(metric_of(name).measured(look) for name in job.metrics)
     except Stopped:
         raise
     except InputError as error:

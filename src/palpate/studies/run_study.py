@@ -13,6 +13,7 @@ from palpate.logs import write_record
 from palpate.studies import journal, results, search
 from palpate.studies.journal import Head, Journal
 from palpate.studies.local import Local
+from palpate.studies.part_check import check_parts_of
 from palpate.studies.plan import Plan, Setting, plan, resolved
 from palpate.studies.run_one import Done, Job
 from palpate.studies.sources import sources
@@ -79,7 +80,7 @@ class Work:
         study = self.plan.study
         metrics = tuple(study.metrics)
         for row, record in self.runner.run(
-            Job(s, metrics, study.window, study.keep_records) for s in settings
+            Job(s, metrics, study.window, study.keep_records, self.plan.plugins) for s in settings
         ):
             if record is not None:
                 write_record(record, self.record(row.run))
@@ -120,7 +121,9 @@ def run(text: str, out: str | Path, *, where: str = "study", runner: Runner | No
     Raises:
         InputError: what `palpate study` would refuse.
     """
-    return Work(plan(parse(text, where), where), text, Path(out), runner or Local()).done()
+    planned = plan(parse(text, where), where)
+    check_parts_of(planned)
+    return Work(planned, text, Path(out), runner or Local()).done()
 
 
 def begun(folder: Path) -> bool:

@@ -18,6 +18,7 @@ OF_A_RUN = (
     "identifiers",
     "instruments",
     "networks",
+    "plugins.py",
     "references",
     "robots",
     "signals",

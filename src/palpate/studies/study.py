@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
 from palpate.bench.experiments.error_messages import explained, not_finite
 from palpate.bench.experiments.toml_files import TomlFiles, decoded
-from palpate.bench.metrics import METRICS
+from palpate.bench.metrics import metric_of
 from palpate.errors import InputError, unknown
+from palpate.plugins import look_in
 from palpate.studies.tables import Against, Curves, Map, Parameter, Study
 
 T = TypeVar("T")
@@ -31,7 +33,9 @@ def load(name: str) -> Study:
 
 
 def parse(text: str, where: str) -> Study:
-    """A study from TOML; `where` names the text in errors."""
+    """A study from TOML; `where` names the text in errors, and the user's own parts and metrics lie beside it."""
+    if where.endswith(".toml"):
+        look_in(Path(where).parent)
     tables = decoded(text, where)
     try:
         study = _converted(tables)
@@ -141,8 +145,7 @@ def _check_metrics(study: Study) -> None:
         *([best.metric] if best else []),
     ]
     for name in (*study.metrics, *used):
-        if name not in METRICS:
-            raise unknown("metric", name, METRICS)
+        metric_of(name)
     for name in used:
         if name not in study.metrics:
             raise InputError(f"{name!r} is drawn or ranked by, and is not among the metrics; add it there")
@@ -182,7 +185,7 @@ def _check_search(study: Study) -> None:
 
 
 def _check_figures(study: Study) -> None:
-    for name in study.best.each if study.best else ():
+    for name in (*study.best.each, *study.best.over) if study.best else ():
         if name not in study.parameters:
             raise unknown("parameter", name, study.parameters)
     drawn: list[Map | Curves] = [*study.maps, *study.curves]

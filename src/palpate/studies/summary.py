@@ -11,12 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench.ending import DONE
-from palpate.bench.metrics import METRICS
+from palpate.bench.metrics import metric_of
 from palpate.files import signed, write_json, write_text
 from palpate.report.page import Table
-from palpate.report.study.page import study_page
-from palpate.studies.figures.draw import draw
+from palpate.report.study.page import StudyPage, study_page
+from palpate.studies import comparison_table
+from palpate.studies.charts import charts
+from palpate.studies.figures.draw import draw, figures
 from palpate.studies.figures.rows import short, with_unit
+from palpate.studies.pairing import Comparison, comparisons
 from palpate.studies.plan import MAIN, Plan
 from palpate.studies.ranking import Mean, Ranked, Ranking, rankings
 
@@ -48,26 +51,65 @@ class Findings:
 
 def present(frame: DataFrame, plan: Plan, folder: Path, source: str, command: str) -> Findings:
     """Writes figures, page and summary into the folder."""
-    ranked = rankings(frame, plan)
-    told = signed({"command": command, **summary(frame, plan, ranked)})
-    found = Findings(told, tables(frame, plan, ranked), notes(frame, plan, ranked))
+    compared = comparisons(frame, plan)
+    ranked = [] if compared else rankings(frame, plan)
+    told = signed({"command": command, **summary(frame, plan, ranked, compared)})
+    found = Findings(told, tables(frame, plan, ranked, compared), notes(frame, plan, ranked, compared))
+    drawn = list(figures(frame, plan))
     described = Table("What is measured", ("metric", "is"), [(m, _told(m)) for m in plan.study.metrics])
-    page = study_page(
+    page = StudyPage(
         title=plan.study.title,
         about=plan.study.about,
+        sentence=headline(frame, plan, ranked, compared),
         notes=found.notes,
-        tables=[*found.tables, described],
-        figures=draw(frame, plan, folder),
+        tables=found.tables[:-1],
+        below=[found.tables[-1], described],
+        charts=charts(plan, compared, drawn),
+        figures=draw(drawn, folder),
         command=command,
         study=source,
+        origin=[
+            ("runs", str(len(plan))),
+            ("seeds", _seeds(plan)),
+            *((p.name, f"sources {p.stamp}") for p in plan.plugins),
+        ],
     )
-    write_text(folder / PAGE, page)
+    write_text(folder / PAGE, study_page(page))
     write_json(folder / SUMMARY, found.summary)
     return found
 
 
-def summary(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking]) -> dict[str, Any]:
-    """What a study came to: runs, results, and the best settings of each ranking."""
+def headline(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison]) -> str:
+    """The answer in a sentence."""
+    best = plan.study.best
+    if compared:
+        return comparison_table.sentence(compared[0])
+    if best is not None and len(ranked) == 1 and ranked[0].settings:
+        one = ranked[0].settings[0]
+        at = ", ".join(f"{name} {short(value)}" for name, value in one.at.items())
+        side = "least" if best.least else "most"
+        return f"The {side} {with_unit(metric_of(best.metric))} is {interval(one.metric)}, with {at}."
+    done = sum(result == DONE for result in frame["result"].to_list())
+    return f"{done} of {len(frame)} runs came to their end."
+
+
+def _origin(plan: Plan) -> list[tuple[str, str]]:
+    """What the page's foot says of the runs."""
+    own = [(one.name, f"sources {one.stamp}") for one in plan.plugins]
+    return [("runs", str(len(plan))), ("seeds", _seeds(plan)), *own]
+
+
+def _seeds(plan: Plan) -> str:
+    seeds = plan.parts[0].seeds
+    return (
+        ", ".join(map(str, seeds)) if len(seeds) <= 8 else f"{seeds[0]} to {seeds[-1]}, {len(seeds)} of them"
+    )
+
+
+def summary(
+    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison] = ()
+) -> dict[str, Any]:
+    """What a study came to: runs, results, and the best settings of each ranking, or those on the same surfaces."""
     best = plan.study.best
     return {
         "study": plan.study.title,
@@ -82,6 +124,7 @@ def summary(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking]) -> dict[str
             }
             for one in ranked
         ],
+        "compared": comparison_table.as_json(compared),
     }
 
 
@@ -90,11 +133,15 @@ def _span(values: Sequence[Any]) -> list[Any]:
     return [values[0], values[-1]] if all(isinstance(v, int | float) for v in values) else list(values)
 
 
-def tables(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking]) -> list[Table]:
+def tables(
+    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison] = ()
+) -> list[Table]:
     """The best settings, the best of what the study is compared with, and results."""
     best = plan.study.best
     found = []
-    if best is not None and best.each:
+    if compared:
+        found += [comparison_table.comparison_table(one) for one in compared]
+    elif best is not None and best.each:
         found += [each_table(plan, MAIN, ranked)]
         found += [each_table(plan, p.name, rankings(frame, plan, p.name)) for p in plan.parts[1:]]
     elif best is not None:
@@ -159,7 +206,7 @@ def overall_table(frame: DataFrame, plan: Plan) -> Table:
 
 
 def _overall(values: Sequence[float], name: str) -> str:
-    metric = METRICS[name]
+    metric = metric_of(name)
     if not values:
         return NONE
     if metric.words:
@@ -171,7 +218,9 @@ def _overall(values: Sequence[float], name: str) -> str:
     return f"{middle:.3g} ({low:.3g} to {high:.3g})"
 
 
-def notes(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking]) -> list[str]:
+def notes(
+    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison] = ()
+) -> list[str]:
     """What a reader must not miss."""
     found = []
     for result, count in Counter(frame["result"].to_list()).most_common():
@@ -180,6 +229,8 @@ def notes(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking]) -> list[str]:
             more = "; ..." if len(why) > EXAMPLES else ""
             found.append(f"{count} of {len(frame)} runs: {result} ({'; '.join(list(why)[:EXAMPLES])}{more}).")
     settings = [s for one in ranked for s in one.settings]
+    if compared:
+        return [*found, *_of_pairs(compared[0], plan)]
     if plan.study.best is None:
         return found
     if not settings:
@@ -195,6 +246,18 @@ def notes(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking]) -> list[str]:
         found.append(
             f"{failed} settings had a run that was not done, or is without this number, and are not ranked."
         )
+    return found
+
+
+def _of_pairs(one: Comparison, plan: Plan) -> list[str]:
+    """What a comparison counts and what it does not."""
+    failed = {e.name: int(e.failed.sum()) for e in one.entrants if e.failed.any()}
+    found = []
+    if failed:
+        told = ", ".join(f"{count} of {name}" for name, count in failed.items())
+        found.append(f"A run that failed counts as worse than any that was done: {told}.")
+    if len(plan.parts[0].seeds) == 1:
+        found.append("One seed on each surface: its noise is the same for all settings, and is not averaged.")
     return found
 
 
@@ -216,13 +279,13 @@ def _of(part: str) -> str:
 
 
 def _heads(plan: Plan, part: str, at: Mapping[str, Any]) -> list[str]:
-    axes = {a.name: a.parameter.label or a.name for p in plan.parts if p.name == part for a in p.axes}
+    axes = {a.name: a.title for p in plan.parts if p.name == part for a in p.axes}
     return [axes[name] for name in at]
 
 
 def _ranked_by(plan: Plan) -> str:
     best = plan.study.best
-    return with_unit(METRICS[best.metric]) if best else ""
+    return with_unit(metric_of(best.metric)) if best else ""
 
 
 def _results(frame: DataFrame) -> Table:
@@ -231,7 +294,7 @@ def _results(frame: DataFrame) -> Table:
 
 
 def _told(name: str) -> str:
-    metric = METRICS[name]
+    metric = metric_of(name)
     return metric.text if metric.unit == "1" else f"{metric.text} [{metric.unit}]"
 
 

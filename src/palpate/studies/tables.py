@@ -50,7 +50,10 @@ class Best(Table, frozen=True):
     least: str = ""
     most: str = ""
     each: list[str] = msgspec.field(default_factory=list)
-    """Parameters that are not chosen but given, as the surface is: the best setting for each of their values."""
+    """Parameters for whose values there is a best setting each."""
+    over: list[str] = msgspec.field(default_factory=list)
+    """Parameters that are not chosen but met, as a surface is: settings are compared for each of their values, and so
+    they are for every parameter that is drawn at random."""
 
     @property
     def metric(self) -> str:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 import msgspec
 from msgspec import Meta
 
 from palpate.bench.experiments.error_messages import explained, not_finite
+from palpate.bench.experiments.own_parts import ROLES, table_of
 from palpate.bench.experiments.toml_files import TomlFiles, decoded
 from palpate.controllers import ControllerTable, HybridController
 from palpate.environments import SurfaceTable
-from palpate.errors import InputError
+from palpate.errors import InputError, PluginError
+from palpate.identifiers import IdentifierTable
+from palpate.plugins import is_plugin, look_in
 from palpate.signals.tables import (
     NotNegative,
     NotNegativeTriple,
@@ -21,6 +25,8 @@ from palpate.signals.tables import (
     Table,
     Triple,
     any_of,
+    example,
+    kinds,
 )
 
 T = TypeVar("T")
@@ -28,8 +34,10 @@ T = TypeVar("T")
 if TYPE_CHECKING:
     AnyController: TypeAlias = Any  # which fields it has depends on its kind
     AnySurface: TypeAlias = Any
+    AnyIdentifier: TypeAlias = Any
 else:
     AnyController, AnySurface = any_of(ControllerTable), any_of(SurfaceTable)
+    AnyIdentifier = any_of(IdentifierTable)
 
 
 class Run(Table):
@@ -195,6 +203,8 @@ class Experiment(Table, kw_only=True):
     controller: AnyController = HybridController()
     compensation: Compensation = Compensation()
     identification: Identification = Identification()
+    identifier: AnyIdentifier | None = None
+    """One more that watches, on the channels of the matched estimator; its numbers are columns of the record."""
 
 
 FILES = TomlFiles("experiment", "an", "palpate.bench", ("experiments",))
@@ -211,7 +221,9 @@ def load(name: str) -> Experiment:
 
 
 def parse(text: str, where: str) -> Experiment:
-    """An experiment from TOML; `where` names the text in errors."""
+    """An experiment from TOML; `where` names the text in errors, and parts of the user's lie beside it."""
+    if where.endswith(".toml"):
+        look_in(Path(where).parent)
     return converted(decoded(text, where), where, Experiment)
 
 
@@ -243,6 +255,41 @@ def converted(tables: dict[str, Any], where: str, kind: type[T]) -> T:
     if bad is not None:
         raise InputError(f"{where}: {bad}")
     try:
+        own = _own_parts(tables) if kind is Experiment else {}
+        experiment = _as(kind, {**tables, **{key: _STAND_INS[key] for key in own}})
+        return msgspec.structs.replace(experiment, **own) if own else experiment
+    except InputError as error:
+        raise type(error)(f"{where}: {error}") from error
+
+
+_STAND_INS = {
+    key: msgspec.to_builtins(example(kinds(base)[0]))
+    for key, base in (
+        ("controller", ControllerTable),
+        ("surface", SurfaceTable),
+        ("identifier", IdentifierTable),
+    )
+}
+"""Tables in whose place those of the user's parts are put: their types are known only when they are named."""
+
+
+def _own_parts(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables that name a plug-in, each of the type that its part gives it."""
+    found = {}
+    for key, role in ROLES.items():
+        table = tables.get(key)
+        if isinstance(table, dict) and is_plugin(table.get("kind")):
+            try:
+                kind = table_of(role, table["kind"])
+            except InputError as error:
+                raise PluginError(str(error)) from error
+            holder = msgspec.defstruct("Holder", [(key, kind)])
+            found[key] = getattr(_as(holder, {key: table}), key)
+    return found
+
+
+def _as(kind: Any, tables: dict[str, Any]) -> Any:
+    try:
         return msgspec.convert(tables, kind)
     except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {explained(str(error), tables, kind)}") from error
+        raise InputError(explained(str(error), tables, kind)) from error

@@ -4,11 +4,28 @@ from __future__ import annotations
 
 from palpate.bench.metrics.contact import CONTACT_METRICS
 from palpate.bench.metrics.following import FOLLOWING
+from palpate.bench.metrics.own import own_metric
 from palpate.bench.metrics.surface import SURFACE
 from palpate.bench.metrics.verdicts import CLAIMS
 from palpate.bench.metrics.window import Look, Metric, Value
+from palpate.errors import unknown
+from palpate.plugins import is_plugin
 
 METRICS: dict[str, Metric] = {m.name: m for m in (*FOLLOWING, *CONTACT_METRICS, *SURFACE, *CLAIMS)}
 """All metrics by name, in the order of the documentation."""
 
-__all__ = ["METRICS", "Look", "Metric", "Value"]
+
+def metric_of(name: str) -> Metric:
+    """A metric by its name, or the user's own as ``module:name``.
+
+    Raises:
+        InputError: there is none of this name.
+    """
+    if is_plugin(name):
+        return own_metric(name)
+    if name not in METRICS:
+        raise unknown("metric", name, METRICS)
+    return METRICS[name]
+
+
+__all__ = ["METRICS", "Look", "Metric", "Value", "metric_of"]

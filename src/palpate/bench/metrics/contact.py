@@ -51,14 +51,27 @@ def _off(column: str, scale: float) -> Callable[[Look], Value]:
 
 CONTACT_METRICS = (
     Metric("contact_at", "s", "when the surface is first felt", lambda look: look.summary["contact_at_s"]),
-    Metric("contacts_lost", "1", "how often contact is lost", lambda look: float(losses(look.record))),
+    Metric(
+        "contacts_lost",
+        "1",
+        "how often contact is lost",
+        lambda look: float(losses(look.record)),
+        better="least",
+    ),
     Metric("time_to_loss", "s", "from the first contact to its first loss; none if it is kept", time_to_loss),
-    Metric("time_in_contact", "s", "from the first contact to its first loss, or to the end", _kept),
+    Metric(
+        "time_in_contact",
+        "s",
+        "from the first contact to its first loss, or to the end",
+        _kept,
+        better="most",
+    ),
     Metric(
         "saturation",
         "1",
         "share of the time that a motor is at its limit, the worst one",
         _saturated(*JOINTS),
+        better="least",
     ),
     *(
         Metric(f"saturation{j}", "1", f"share of the time that motor {j} is at its limit", _saturated(j))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from palpate.bench.metrics.window import SETTLE, Look, Metric, Value, rms
 
 LIMIT = 1.5
 """Largest RMS error of a force that follows [N]: 10 % of 15 N, which is what is asked for on average."""
+LEAST: Literal["least"] = "least"
 SHARE = 0.10
 """Largest mean error in the last second of an interval, as a share of the desired force there."""
 
@@ -42,7 +45,7 @@ def _of_force(key: str) -> Metric:
         force = look.summary["force"]
         return None if force is None else force[key]
 
-    return Metric(name, unit, text, of)
+    return Metric(name, unit, text, of, better=LEAST)
 
 
 def _settles(look: Look) -> Value:
@@ -72,17 +75,30 @@ def _bandwidth(look: Look) -> Value:
 
 
 FOLLOWING = (
-    Metric("force_rms", "N", "RMS of the true force's error, steps included", lambda look: rms(look.error)),
-    Metric("force_rms_settled", "N", f"the same without the first {SETTLE:g} s after each step", settled_rms),
+    Metric(
+        "force_rms",
+        "N",
+        "RMS of the true force's error, steps included",
+        lambda look: rms(look.error),
+        better=LEAST,
+    ),
+    Metric(
+        "force_rms_settled",
+        "N",
+        f"the same without the first {SETTLE:g} s after each step",
+        settled_rms,
+        better=LEAST,
+    ),
     Metric("force_error", "N", "mean error of the true force", _mean_error),
-    Metric("force_std", "N", "standard deviation of that error", _std),
+    Metric("force_std", "N", "standard deviation of that error", _std, better=LEAST),
     Metric(
         "interval_error",
         "1",
         "largest mean error in the last second of an interval between steps, as a share of the desired force",
         interval_error,
+        better=LEAST,
     ),
-    Metric("peak_force", "N", "largest true force", _peak),
+    Metric("peak_force", "N", "largest true force", _peak, better=LEAST),
     _of_force("settling_s"),
     _of_force("overshoot_N"),
     Metric(

@@ -18,6 +18,8 @@ JOINTS = (1, 2, 3)
 JOINED = "saturated1"
 """A column that only the thesis' arm has, with its pose and its estimators: an arm of one direction has no joints."""
 FRONT_ENDS = ("thesis", "raw", "matched")
+IDENTIFIER = "identifier"
+"""The one that an experiment asks for besides."""
 PARAMETERS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
@@ -59,6 +61,10 @@ def losses(record: Record) -> int:
     """How often contact was lost."""
     phase = record["phase"]
     return int(np.sum((phase[1:] == LOST) & (phase[:-1] == CONTACT)))
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _share(flags: NDArray[np.float64]) -> float:
@@ -109,6 +115,9 @@ def _identified(record: Record, last: NDArray[np.bool_]) -> dict[str, Any]:
     found: dict[str, Any] = {
         front: {p: float(record[f"{p}_{front}"][end]) for p in PARAMETERS} for front in FRONT_ENDS
     }
+    if "K_identifier" in record.columns:
+        found[IDENTIFIER] = {p: _known(record[f"{p}_{IDENTIFIER}"][end]) for p in PARAMETERS}
+        found[f"{IDENTIFIER}_std"] = {p: _known(record[f"{p}_{IDENTIFIER}_std"][end]) for p in PARAMETERS}
     found["matched_std"] = {p: float(record[f"{p}_matched_std"][end]) for p in PARAMETERS}
     displacement = float(np.mean(record["displacement"][last]))
     force = float(np.mean(record["force_measured"][last]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from palpate.bench.metrics.summary import FRONT_ENDS, PARAMETERS
+from palpate.bench.metrics.summary import FRONT_ENDS, IDENTIFIER, PARAMETERS
 from palpate.bench.metrics.window import Look, Metric, Value
 
 QUOTIENT = "force_over_displacement"
@@ -12,6 +12,7 @@ TOLD = {
     "thesis": "recursive least squares on the thesis' signals",
     "raw": "recursive least squares on raw signals",
     "matched": "recursive least squares on channels of equal lag",
+    IDENTIFIER: "the experiment's [identifier]",
     QUOTIENT: "force over displacement",
 }
 
@@ -21,7 +22,7 @@ def estimate(front: str, parameter: str) -> Callable[[Look], Value]:
 
     def of(look: Look) -> Value:
         found = look.summary["identified"]
-        return None if found is None else found[front].get(parameter)
+        return None if found is None else found.get(front, {}).get(parameter)
 
     return of
 
@@ -50,7 +51,7 @@ def _pair(front: str, parameter: str, unit: str) -> tuple[Metric, Metric]:
 SURFACE = (
     *(
         m
-        for front in FRONT_ENDS
+        for front in (*FRONT_ENDS, IDENTIFIER)
         for parameter, unit in PARAMETERS.items()
         for m in _pair(front, parameter, unit)
     ),

@@ -89,6 +89,7 @@ CLAIMS = (
         f"more than {100 * SHARE:.0f} % off",
         _follows,
         YES_OR_NO,
+        "most",
     ),
     Metric(
         "outcome",
@@ -103,12 +104,14 @@ CLAIMS = (
         f"whether contact is kept and the force's standard deviation is at most {100 * QUIET:.0f} % of the desired one",
         _steady,
         YES_OR_NO,
+        "most",
     ),
     Metric(
         "adaptation_time",
         "s",
         "from the first contact on until no interval between steps ends more than 10 % off any more",
         adaptation_time,
+        better="least",
     ),
     Metric(
         "K_agrees",

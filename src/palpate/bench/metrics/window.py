@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ class Metric:
         text: what it is, in a line.
         of: from a look at a record; None where the run does not have it.
         words: what its whole numbers mean, from 0 on; empty where it is a quantity.
+        better: whether the least or the most of it is better; "" where neither is.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Metric:
     text: str
     of: Callable[[Look], Value]
     words: tuple[str, ...] = ()
+    better: Literal["", "least", "most"] = ""
 
     def measured(self, look: Look) -> Value:
         """The number, or None where there is none or it is not finite."""

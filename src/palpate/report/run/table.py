@@ -67,20 +67,30 @@ def thesis_table(summary: dict[str, Any]) -> Table:
     found, truth = summary["identified"], summary["truth"]
     names = {"K": "K [N/m]", "B": "B [N s/m]", "M": "M [kg]"}
     ratio = found["force_over_displacement"]
+    own = found.get("identifier")
     rows = [
         (
             label,
             plain(found["thesis"][name]),
             plain(found["raw"][name]),
             with_half(found["matched"][name], 1.96 * found["matched_std"][name]),
+            *([] if own is None else [_own(own[name], found["identifier_std"][name])]),
             plain(ratio.get(name)),
             plain(truth[name]["value"]) if name in truth else NONE,
         )
         for name, label in names.items()
     ]
-    head = ("", "thesis", "raw", "matched, 95 %", "f / x", "truth")
+    more = () if own is None else ("[identifier], 95 %",)
+    head = ("", "thesis", "raw", "matched, 95 %", *more, "f / x", "truth")
     return Table(
         "On line, if it is a spring: least squares on the thesis' signals, raw, and matched in lag",
         head,
         rows,
     )
+
+
+def _own(value: float | None, std: float | None) -> str:
+    """What the experiment's own identifier says."""
+    if value is None or std is None:
+        return plain(value)
+    return with_half(value, 1.96 * std)

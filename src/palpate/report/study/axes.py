@@ -96,7 +96,34 @@ def grid(count: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
     return drawing, axes[:count]
 
 
+def bounded(axis: Axes, values: Array) -> None:
+    """Where a metric is drawn: its bulk, so that the few from far away leave room for it; how many is said."""
+    good = values[np.isfinite(values)]
+    if not len(good):
+        return
+    if decades(good):
+        axis.set_yscale("log")
+        return
+    low, high = bulk(good)
+    axis.set_ylim(low, high)
+    beyond = int(((good < low) | (good > high)).sum())
+    if beyond:
+        axis.annotate(
+            f"{beyond} beyond", (1.0, 1.0), xycoords="axes fraction", ha="right", va="bottom", fontsize=8
+        )
+
+
+def bulk(values: Array) -> tuple[float, float]:
+    """A range that holds the middle 98 % of finite values, or all where they lie not far beyond."""
+    low, high = np.quantile(values, (0.01, 0.99))
+    room = (high - low) or abs(high) or 1.0
+    least, most = values.min(), values.max()
+    low = least if least >= low - 0.5 * room else low
+    high = most if most <= high + 0.5 * room else high
+    return float(low - 0.05 * room), float(high + 0.05 * room)
+
+
 def decades(values: Array) -> bool:
     """Whether values are better drawn by the logarithm."""
     good = values[np.isfinite(values)]
-    return bool(len(good)) and good.min() > 0.0 and good.max() > WIDE * good.min()
+    return bool(len(good) and good.min() > 0.0 and good.max() > WIDE * good.min())

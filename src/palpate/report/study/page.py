@@ -1,42 +1,67 @@
-"""The page of a study: what was run, the best settings, maps and curves, and the study's own file."""
+"""The page of a study: the answer, what failed, settings against each other, every metric, and the study's own file."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
+from palpate.report.look.assets import TABLES, data, scripts
 from palpate.report.page import Table, captioned, render
 
 
-def study_page(
-    *,
-    title: str,
-    about: str,
-    notes: Sequence[str],
-    tables: Sequence[Table],
-    figures: Mapping[Path, str],
-    command: str,
-    study: str,
-) -> str:
-    """The page as HTML.
+@dataclass(frozen=True)
+class StudyPage:
+    """What the page is of.
 
     Args:
-        title: of the study.
-        about: what it asks.
+        title, about: of the study.
+        sentence: the answer.
         notes: what a reader must not miss.
         tables: in the order to be read.
-        figures: PNG files with a caption each, put into the page.
+        below: tables that stand below the figures.
+        charts: plain values from which the page draws; empty where there is nothing to draw.
+        figures: the same as PNG files with a caption each, for a browser that runs no scripts.
         command: that makes it.
         study: its file.
+        origin: lines of its foot, name and text.
     """
+
+    title: str
+    about: str
+    sentence: str
+    notes: Sequence[str]
+    tables: Sequence[Table]
+    below: Sequence[Table]
+    charts: Mapping[str, Any]
+    figures: Mapping[Path, str]
+    command: str
+    study: str
+    origin: Sequence[tuple[str, str]]
+
+
+def study_page(of: StudyPage) -> str:
+    """The page as HTML."""
+    worth = bool(of.charts.get("figures") or of.charts.get("comparisons"))
+    own = (resources.files("palpate.report.study") / "study.js").read_text(encoding="utf-8")
     return render(
         "study.html",
+        "palpate.report.study",
         room="study",
-        title=title,
-        about=about,
-        notes=notes,
-        tables=tables,
-        figures=captioned(figures),
-        command=command,
-        study=study,
+        title=of.title,
+        about=of.about,
+        sentence=of.sentence,
+        notes=of.notes,
+        tables=of.tables,
+        below=of.below,
+        charts=data(of.charts) if worth else "",
+        figures=captioned(of.figures),
+        command=of.command,
+        study=of.study,
+        origin=of.origin,
+        scripts=(*scripts(*TABLES), own) if worth else scripts(*TABLES),
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
     )

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench.ending import DONE
-from palpate.bench.metrics import METRICS
+from palpate.bench.metrics import metric_of
 from palpate.report.study.axes import Scale, decades
 from palpate.report.study.lines import Curve, Line, curves_figure
-from palpate.studies.figures.rows import FEW, Drawn, Rows, restricted_to, sentence, short, with_unit
+from palpate.studies.figures.rows import FEW, Drawn, Rows, restricted_to, sentence, short
 from palpate.studies.tables import Curves
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from polars import DataFrame
 
 ALWAYS = frozenset({"time_in_contact", "time_to_loss", "contacts_lost"})
@@ -24,21 +23,21 @@ ALWAYS = frozenset({"time_in_contact", "time_to_loss", "contacts_lost"})
 
 def curves_of(table: Rows, asked: Curves, number: int) -> Drawn:
     """Curves that a study asks for."""
-    metric, x = METRICS[asked.metric], table.scale(asked.x)
+    metric, x = metric_of(asked.metric), table.scale(asked.x)
 
-    def made() -> Figure:
+    def made() -> list[Curve]:
         panels = []
         for title, value, rows in table.panels(asked):
             drawn = [*lines(table, rows, asked, x), *references(table, asked, x, value)]
             panels.append(Curve(title, x, drawn, decades(np.concatenate([one.middle for one in drawn]))))
-        return curves_figure(panels, with_unit(metric))
+        return panels
 
     against = " Dashed: what it is compared with." if table.plan.study.against else ""
     caption = (
         f"{sentence(metric)}, over {x.label}{restricted_to(asked)}: median, and the range over the seeds and "
         f"whatever else varies. Settings with a run that did not come to its end have no point.{against}"
     )
-    return Drawn(f"curves{number}", caption, made)
+    return Drawn(f"curves{number}", caption, metric, made, curves_figure)
 
 
 def lines(table: Rows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[Line]:

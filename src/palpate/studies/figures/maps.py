@@ -11,22 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench.ending import DONE
-from palpate.bench.metrics import METRICS, Metric
+from palpate.bench.metrics import Metric, metric_of
 from palpate.report.study.axes import Scale
 from palpate.report.study.maps import Heat, heat_figure
-from palpate.studies.figures.rows import Drawn, Rows, restricted_to, sentence, with_unit
+from palpate.studies.figures.rows import Drawn, Rows, restricted_to, sentence
 from palpate.studies.tables import Map
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from polars import DataFrame
 
 
 def map_of(table: Rows, asked: Map, number: int) -> Drawn:
     """A map that a study asks for."""
-    metric, x, y = METRICS[asked.metric], table.scale(asked.x), table.scale(asked.y)
+    metric, x, y = metric_of(asked.metric), table.scale(asked.x), table.scale(asked.y)
 
-    def made() -> Figure:
+    def made() -> list[Heat]:
         from palpate.studies.figures.stability_boundary import bounds
 
         panels = []
@@ -34,7 +33,7 @@ def map_of(table: Rows, asked: Map, number: int) -> Drawn:
             values, failed = cells(rows, asked, metric, x, y)
             lines = bounds(table.plan.parts[0], asked, value, x, y) if asked.bound else []
             panels.append(Heat(title, x, y, values, failed, lines))
-        return heat_figure(panels, with_unit(metric))
+        return panels
 
     what = (
         "What most runs came to"
@@ -44,7 +43,7 @@ def map_of(table: Rows, asked: Map, number: int) -> Drawn:
     line = " The line is where the linear model of the loop loses its stability." if asked.bound else ""
     over = f"over {x.label} and {y.label}{restricted_to(asked)}"
     caption = f"{what}, {over}. Crosses: most runs did not come to their end.{line}"
-    return Drawn(f"map{number}", caption, made)
+    return Drawn(f"map{number}", caption, metric, made, heat_figure)
 
 
 def cells(

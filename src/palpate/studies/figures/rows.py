@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -32,12 +32,20 @@ class Drawn:
     Args:
         name: of its file.
         caption: what is seen.
-        draw: makes it.
+        metric: what is drawn.
+        panels: makes its panels, all of one kind.
+        figure: draws them, with what stands at their axis.
     """
 
     name: str
     caption: str
-    draw: Callable[[], Figure]
+    metric: Metric
+    panels: Callable[[], Sequence[Any]]
+    figure: Callable[[Sequence[Any], str], Figure]
+
+    def draw(self) -> Figure:
+        """The figure."""
+        return self.figure(self.panels(), with_unit(self.metric))
 
 
 class Rows:
@@ -59,7 +67,7 @@ class Rows:
     def scale(self, name: str) -> Scale:
         """The axis of a figure that a parameter makes."""
         axis = self.axis(name)
-        return Scale(axis.parameter.label or name, axis.labels(), logarithmic(axis))
+        return Scale(axis.title, axis.labels(), logarithmic(axis))
 
     def where(self, rows: DataFrame, asked: Map | Curves) -> DataFrame:
         """Those of the rows that a figure is about; a part without such a parameter is left whole.
@@ -86,7 +94,7 @@ class Rows:
         name, rows = asked.panels, self.where(self.part(), asked)
         if not name:
             return [("", None, rows)]
-        told = self.axis(name).parameter.label or name
+        told = self.axis(name).title
         return [
             (f"{told}: {short(v)}", v, rows.filter(polars.col(name) == v))
             for v in self.axis(name).labels()[:FEW]

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from palpate.bench.metrics import Metric
 from palpate.report.study.axes import Scale
 from palpate.report.study.clouds import Cloud, Points, clouds_figure
-from palpate.studies.figures.rows import FEW, Drawn, Rows, logarithmic, sentence, with_unit
+from palpate.studies.figures.rows import FEW, Drawn, Rows, logarithmic, sentence
 from palpate.studies.parameters import Axis
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 CLOUDS = 9
 """Parameters that are drawn as clouds at most."""
@@ -24,19 +20,19 @@ def clouds_of(table: Rows, metric: Metric) -> Drawn:
     drawn, others = [a for a in axes if a.drawn], [a for a in axes if not a.drawn and len(a.settings) <= FEW]
     kinds = others[0] if others else None
 
-    def made() -> Figure:
-        clouds = [
+    def made() -> list[Cloud]:
+        return [
             Cloud(
-                Scale(a.parameter.label or a.name, (a.between(0.0), a.between(1.0)), logarithmic(a)),
+                Scale(a.title, (a.between(0.0), a.between(1.0)), logarithmic(a)),
                 list(points(table, metric, a.name, kinds)),
                 metric.words,
             )
             for a in drawn[:CLOUDS]
         ]
-        return clouds_figure(clouds, with_unit(metric))
 
-    caption = f"{sentence(metric)}: every run, and the mean over each eighth of them."
-    return Drawn(f"clouds-{metric.name}", caption, made)
+    middle = "mean" if metric.words else "median"
+    caption = f"{sentence(metric)}: every run, and the {middle} of each eighth of them."
+    return Drawn(f"clouds-{metric.name.replace(':', '-')}", caption, metric, made, clouds_figure)
 
 
 def points(table: Rows, metric: Metric, name: str, kinds: Axis | None) -> Iterator[Points]:

@@ -1,0 +1,218 @@
+"""The table of a part that the user brings, ``kind = "module:Class"``: its keys are the part's own fields."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, ClassVar, get_type_hints
+
+import msgspec
+
+from palpate._jit import part as registered
+from palpate._vector import Vec3
+from palpate.controllers.controller import controller as registered_controller
+from palpate.errors import InputError
+from palpate.plugins import Plugin, plugin, reason
+from palpate.signals.parameters import alike, triple
+from palpate.signals.tables import Table, Triple
+
+GIVEN = {"tick": "time between ticks [s]", "wall": "x of the surface [m]"}
+"""Fields of a part that the bench fills in; they are no keys of its table."""
+_FIELDS: dict[Any, Any] = {float: float, int: int, bool: bool, Vec3: float | Triple}
+
+
+@dataclass(frozen=True)
+class Role:
+    """What a part of the user's may be in an experiment.
+
+    Args:
+        key: its table.
+        methods: that it must have, each with the names of its arguments and what it returns.
+        compiled: whether it runs inside the compiled loop, and so is a NamedTuple.
+    """
+
+    key: str
+    methods: Mapping[str, tuple[str, str]]
+    compiled: bool = True
+    optional: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+
+CONTROLLER = Role(
+    "controller",
+    {"start": ("", "state"), "step": ("state, sense, task, model", "(torque, state)")},
+    optional={
+        "rest": ("state, sense", "state"),
+        "report": ("state", "(Vec3, Vec3)"),
+        "trouble": ("state", "text"),
+    },
+)
+SURFACE = Role(
+    "surface",
+    {
+        "start": ("", "SurfaceState"),
+        "force": ("state, p, v", "force"),
+        "relax": ("state, p, v, dt", "SurfaceState"),
+        "free": ("state, dt", "SurfaceState"),
+    },
+    optional={"stored": ("state", "energy"), "truth": ("", "{name: (value, unit)}")},
+)
+IDENTIFIER = Role(
+    "identifier", {"update": ("regressor, force", "None"), "estimate": ("", "Estimate")}, compiled=False
+)
+ROLES = {role.key: role for role in (CONTROLLER, SURFACE, IDENTIFIER)}
+
+
+class OwnTable(Table, frozen=True):
+    """A table of an experiment that asks for a part of the user's; one class for each plug-in is derived from it."""
+
+    plugin: ClassVar[Plugin]
+    role: ClassVar[Role]
+    part: ClassVar[Any]
+
+    shares_loop: ClassVar[bool] = False
+
+    def made(self, tick: float = 0.0, wall: float = 0.0) -> Any:
+        """The part, for a time between ticks [s] and a surface at x = `wall` [m].
+
+        Raises:
+            InputError: the part itself refuses its numbers.
+        """
+        given = {"tick": float(tick), "wall": float(wall)}
+        values = {
+            name: given[name] if name in given else _value(getattr(self, name), kind)
+            for name, kind in _kinds(self.part, self.role).items()
+        }
+        try:
+            return self.part(**values)
+        except Exception as error:
+            raise InputError(
+                f"{self.plugin.name} refuses what stands in [{self.role.key}]: {reason(error)}"
+            ) from error
+
+    def __reduce__(self) -> Any:
+        values = {f.name: getattr(self, f.name) for f in msgspec.structs.fields(self)}
+        return _restored, (self.role.key, self.plugin, values)
+
+
+def _restored(role: str, known: Plugin, values: dict[str, Any]) -> OwnTable:
+    """As it was pickled, in another process."""
+    known.value()
+    return table_of(ROLES[role], known.name)(**values)
+
+
+def table_of(role: Role, name: str) -> Any:
+    """The type of the table that asks for a plug-in.
+
+    Raises:
+        InputError: it cannot be imported, or is no such part.
+    """
+    return _table_of(role.key, plugin(name))
+
+
+@cache
+def _table_of(key: str, known: Plugin) -> Any:
+    role, part = ROLES[key], known.value()
+    check_protocol(role, part, known.name)
+    if role.compiled:
+        (registered_controller if role is CONTROLLER else registered)(part)
+    fields = [
+        (name, _field(known, name, kind), *_default(part, role, name))
+        for name, kind in _kinds(part, role).items()
+        if name not in GIVEN
+    ]
+    return msgspec.defstruct(
+        part.__name__,
+        sorted(fields, key=len),  # those without a default first
+        bases=(OwnTable,),
+        namespace={"plugin": known, "role": role, "part": part},
+        tag_field="kind",
+        tag=known.name,
+        frozen=True,
+        forbid_unknown_fields=True,
+    )
+
+
+def role_of(name: str) -> Role:
+    """What a plug-in is, by what it can do.
+
+    Raises:
+        InputError: it cannot be imported, or is no part.
+    """
+    can = set(dir(plugin(name).value()))
+    for role, marks in ((CONTROLLER, {"step"}), (IDENTIFIER, {"update"}), (SURFACE, {"relax"})):
+        if marks <= can:
+            return role
+    raise InputError(
+        f"{name} is no part: a controller has start and step, a surface start, force, relax and free, an identifier "
+        "update and estimate"
+    )
+
+
+def check_protocol(role: Role, part: Any, name: str) -> None:
+    """Refuses what is no part of this role, before it is made.
+
+    Args:
+        role: what it is to be.
+        part: a class.
+        name: by which the user knows it.
+
+    Raises:
+        InputError: not a class, not a NamedTuple where it is compiled, a method missing or with other arguments.
+    """
+    a = f"{'an' if role.key[0] in 'aei' else 'a'} {role.key}"
+    if not inspect.isclass(part):
+        raise InputError(f"{name} is a {type(part).__name__}; {a} is a class")
+    if role.compiled and not (issubclass(part, tuple) and hasattr(part, "_fields")):
+        raise InputError(f"{name} is no NamedTuple; {a} is one: class {part.__name__}(NamedTuple)")
+    if role is SURFACE and not hasattr(part, "mass"):
+        raise InputError(f"{name} has no mass [kg]; a surface states it: give it a field 'mass: float = 0.0'")
+    for method, (arguments, result) in {**role.methods, **role.optional}.items():
+        own, wanted = getattr(part, method, None), f"{method}(self{', ' if arguments else ''}{arguments})"
+        if own is None:
+            if method in role.methods:
+                raise InputError(f"{name} has no method {method}; {a} has {wanted} -> {result}")
+            continue
+        try:
+            inspect.signature(own).bind(None, *filter(None, arguments.split(", ")))
+        except (TypeError, ValueError):
+            got = inspect.signature(own) if callable(own) else "no function"
+            raise InputError(f"{method} of {name} is {got}; it must be {wanted} -> {result}") from None
+
+
+def _kinds(part: Any, role: Role) -> dict[str, Any]:
+    """The fields of a part and their types."""
+    if role.compiled:
+        hints = get_type_hints(part)
+        return {name: hints.get(name, Any) for name in part._fields}
+    found = inspect.signature(part).parameters.values()
+    return {p.name: Any for p in found if p.kind in {p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY}}
+
+
+def _field(known: Plugin, name: str, kind: Any) -> Any:
+    if kind is Any:
+        return Any
+    if kind not in _FIELDS:
+        told = getattr(kind, "__name__", str(kind))
+        raise InputError(
+            f"the field {name} of {known.name} is of type {told}; it may be float, int, bool or Vec3"
+        )
+    return _FIELDS[kind]
+
+
+def _default(part: Any, role: Role, name: str) -> tuple[Any, ...]:
+    if not role.compiled:
+        value = inspect.signature(part).parameters[name].default
+        return () if value is inspect.Parameter.empty else (msgspec.field(default_factory=lambda: value),)
+    if name not in part._field_defaults:
+        return ()
+    value = part._field_defaults[name]
+    return (tuple(map(float, value)) if isinstance(value, Vec3) else value,)
+
+
+def _value(value: Any, kind: Any) -> Any:
+    """As the part takes it: an integer would be another type to the compiler."""
+    if kind is Vec3:
+        return alike(value) if isinstance(value, int | float) else triple(value)
+    return float(value) if kind is float else value

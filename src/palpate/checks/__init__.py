@@ -1,0 +1,18 @@
+"""What is true of every part: a suite that palpate's own parts pass, for you to run on yours.
+
+import pytest
+from palpate.checks import controller_checks
+
+@pytest.mark.parametrize("check", controller_checks(Damped(ki=3.0)), ids=str)
+def test_my_controller(check):
+    check()
+
+A check that fails raises an AssertionError that says what is not so. ``palpate checks module:Class`` runs them all.
+"""
+
+from palpate.checks.check import Check, Outcome, outcomes
+from palpate.checks.controllers import controller_checks
+from palpate.checks.identifiers import identifier_checks
+from palpate.checks.surfaces import surface_checks
+
+__all__ = ["Check", "Outcome", "controller_checks", "identifier_checks", "outcomes", "surface_checks"]

@@ -1,0 +1,65 @@
+"""One check of a part, and what becomes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from palpate.plugins import reason
+
+
+@dataclass(frozen=True)
+class Check:
+    """A sentence that must be true of a part; calling it raises an AssertionError if it is not.
+
+    Args:
+        law: a function of what is checked; its name is the sentence.
+        subject: what is checked: a part, or what makes an identifier.
+    """
+
+    law: Callable[[Any], None]
+    subject: Any
+
+    def __call__(self) -> None:
+        self.law(self.subject)
+
+    def __str__(self) -> str:
+        return self.law.__name__
+
+    @property
+    def sentence(self) -> str:
+        """In words."""
+        return self.law.__name__.replace("_", " ")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a check.
+
+    Args:
+        sentence: what must be true.
+        failed: why it is not; "" if it is.
+    """
+
+    sentence: str
+    failed: str
+
+
+def outcomes(checks: Iterable[Check]) -> Iterator[Outcome]:
+    """Runs checks one after another, whatever they raise."""
+    for one in checks:
+        try:
+            one()
+        except AssertionError as error:
+            yield Outcome(one.sentence, " ".join(str(error).split()) or "it is not so")
+        except Exception as error:  # noqa: BLE001 - whatever the user's own code raises
+            yield Outcome(one.sentence, reason(error))
+        else:
+            yield Outcome(one.sentence, "")
+
+
+def require(ok: object, why: str) -> None:
+    """Raises the AssertionError of a check; not by `assert`, which an optimising interpreter leaves out."""
+    if not ok:
+        raise AssertionError(why)

@@ -1,0 +1,46 @@
+"""`palpate checks`: the laws that every part obeys, run on one of the user's."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from palpate.cli._terminal import console, print_json, show_table
+from palpate.errors import InputError
+
+
+def checks(name: str | None = None, /, *, json: Annotated[bool, Parameter(negative="")] = False) -> int:
+    """Run the conformance suite of palpate's own parts on a controller, surface or identifier of yours.
+
+    Parameters
+    ----------
+    name
+        Your part, module:Class, or an experiment's TOML file that names some. The module is looked for among the
+        installed ones, beside the file and in the current folder; naming it imports it.
+    json
+        Print the outcomes as JSON and nothing else.
+    """
+    if name is None:
+        raise InputError("check what? Give module:Class, as in student:Damped, or an experiment's TOML file")
+    from palpate.checks.check import outcomes
+    from palpate.checks.of_plugin import checks_of
+
+    found = {subject: list(outcomes(some)) for subject, some in checks_of(name).items()}
+    failed = sum(bool(one.failed) for some in found.values() for one in some)
+    if json:
+        parts = {
+            subject: [{"check": one.sentence, "failed": one.failed or None} for one in some]
+            for subject, some in found.items()
+        }
+        print_json({"parts": parts, "failed": failed})
+        return 1 if failed else 0
+    from palpate.report.page import Table
+
+    screen = console()
+    for subject, some in found.items():
+        rows = [(one.sentence, one.failed or "holds") for one in some]
+        show_table(screen, Table(subject, ("", ""), rows), ["red" if one.failed else "green" for one in some])
+    total = sum(map(len, found.values()))
+    screen.print(f"{failed} of {total} checks failed" if failed else f"all {total} checks hold")
+    return 1 if failed else 0

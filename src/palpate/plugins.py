@@ -1,0 +1,226 @@
+"""Plug-ins: code of the user's that an experiment's or a study's file names as ``module:Name``.
+
+Who names it wants it run: naming it in a file or a flag imports the module. A record, a journal or a folder of results
+never does: they hold its name as a text, and nothing that reads them comes here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+import threading
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from palpate._jit.registry import PACKAGE, foreign_files
+from palpate.errors import InputError
+
+_FOLDERS: dict[Path, None] = {}
+"""Where the files lie that named plug-ins in this process; modules are the process' own, and so are these."""
+_IMPORTING = threading.RLock()
+_STAMPS: dict[str, str] = {}
+"""What the sources of each module were when it was imported."""
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """A name of the user's code, with what tells its sources from others; it may go to another process.
+
+    Args:
+        name: ``module:Name``.
+        folder: where the module was found; "" for one that is installed.
+        stamp: a hash of its sources.
+    """
+
+    name: str
+    folder: str
+    stamp: str
+
+    def value(self) -> Any:
+        """What the name stands for.
+
+        Raises:
+            InputError: it cannot be imported here, or has other sources here.
+        """
+        if self.folder:
+            look_in(Path(self.folder))
+        here = plugin(self.name)
+        if here.stamp != self.stamp:
+            raise InputError(
+                f"{self.name} has other sources here than where it was asked for; install the same on all machines"
+            )
+        return _attribute(*_parts(self.name))
+
+
+def is_plugin(name: object) -> bool:
+    """Whether a word names code of the user's rather than something that comes with palpate."""
+    return isinstance(name, str) and ":" in name and not any(letter.isspace() for letter in name)
+
+
+def look_in(folder: Path) -> None:
+    """Modules are looked for in this folder, too: that of the file that names them."""
+    _FOLDERS[folder.resolve()] = None
+
+
+def plugin(name: str) -> Plugin:
+    """Imports what a name stands for.
+
+    Modules that are installed come first, then those beside the file that names them, then the current folder's.
+
+    Raises:
+        InputError: no such module, no such name in it, or it raises when it is imported.
+    """
+    module_name, attribute = _parts(name)
+    with _IMPORTING, _findable():
+        module = _imported(module_name, name)
+        _attribute(module_name, attribute)
+    file = Path(getattr(module, "__file__", None) or "").resolve()
+    return Plugin(name, str(_top(module_name, file)), _STAMPS[module_name])
+
+
+def where_it_fails(error: BaseException) -> str:
+    """The user's own line that an error comes from, as ``student.py, line 12``; "" if none does."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{Path(error.filename).name}, line {error.lineno}"
+    frames = [
+        f for f in traceback.extract_tb(error.__traceback__) if _of_the_user(Path(f.filename).resolve())
+    ]
+    return f"{Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
+
+
+def _of_the_user(file: Path) -> bool:
+    """Whether a file is neither palpate's nor an installed library's."""
+    if file in foreign_files:
+        return True
+    libraries = {Path(path) for path in (sys.prefix, sys.base_prefix)}
+    return file.suffix == ".py" and PACKAGE not in file.parents and not libraries & set(file.parents)
+
+
+def reason(error: BaseException) -> str:
+    """An error of the user's code in one line: where, of which kind, and its own words."""
+    place = where_it_fails(error)
+    words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+    said = f"{type(error).__name__}: {words}" if words else type(error).__name__
+    return f"{place}: {said}" if place else said
+
+
+def _parts(name: str) -> tuple[str, str]:
+    module, _, attribute = name.partition(":")
+    if module.endswith(".py") or "/" in module or "\\" in module:
+        good = Path(module.replace("\\", "/")).name.removesuffix(".py")
+        raise InputError(f"{name!r}: a module is named without folder and .py; write '{good}:{attribute}'")
+    words = [*module.split("."), attribute]
+    if not all(word.isidentifier() for word in words):
+        raise InputError(f"{name!r} names no code: write module:Name, as in student:Damped")
+    return module, attribute
+
+
+@contextmanager
+def _findable() -> Iterator[None]:
+    """The folders at the end of the path, so that no file in them takes the place of an installed module."""
+    added = [folder for folder in map(str, _searched()) if folder not in sys.path]
+    sys.path.extend(added)
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        for folder in added:
+            if folder in sys.path:
+                sys.path.remove(folder)
+
+
+def _searched() -> Sequence[Path]:
+    return list(dict.fromkeys([*reversed(_FOLDERS), Path.cwd()]))
+
+
+def _imported(module: str, name: str) -> ModuleType:
+    before = set(sys.modules)
+    top = module.partition(".")[0]
+    beside = [
+        f
+        for folder in _searched()
+        for f in (folder / f"{top}.py", folder / top / "__init__.py")
+        if f.is_file()
+    ]
+    try:
+        with redirect_stdout(sys.stderr):  # what it prints is no part of a command's output
+            found = importlib.import_module(module)
+    except (Exception, SystemExit) as error:  # whatever the user's own code raises
+        missing = str(error.name) if isinstance(error, ModuleNotFoundError) else ""
+        if missing == module or (missing and module.startswith(f"{missing}.")):
+            raise InputError(_not_there(module, name)) from None
+        foreign_files.update(f.resolve() for f in beside)
+        raise InputError(f"{name} cannot be imported: {reason(error)}") from error
+    _check_place(top, beside)
+    if module not in _STAMPS:
+        files = _sources(module, found, before)
+        foreign_files.update(files)
+        _STAMPS[module] = _hash(files)
+    return found
+
+
+def _check_place(top: str, beside: Sequence[Path]) -> None:
+    """Refuses a module that another one of its name has taken the place of."""
+    got = Path(getattr(sys.modules[top], "__file__", None) or "").resolve()
+    if beside and got not in {f.resolve() for f in beside}:
+        raise InputError(f"{beside[0]} is hidden by another module of its name, {got}; give it another name")
+    if len(beside) > 1 and got != beside[0].resolve():
+        raise InputError(f"{beside[0]} is hidden by {got}, imported before it; give one of them another name")
+
+
+def _sources(module: str, found: ModuleType, before: set[str]) -> list[Path]:
+    """The file of a module, and those beside it that it imported."""
+    own = getattr(found, "__file__", None)
+    if own is None:
+        return []
+    folder = Path(own).resolve().parent
+    top = module.partition(".")[0]
+    files = {Path(own).resolve()}
+    for name, one in list(sys.modules.items()):
+        file = getattr(one, "__file__", None)
+        if file is None or (name in before and name.partition(".")[0] != top):
+            continue
+        if folder in Path(file).resolve().parents:
+            files.add(Path(file).resolve())
+    return sorted(files)
+
+
+def _hash(files: Sequence[Path]) -> str:
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _top(module: str, file: Path) -> Path | str:
+    """The folder that a module is imported from; "" where that is on the path anyway."""
+    for _ in range(module.count(".") + 1 if file.name != "__init__.py" else module.count(".") + 2):
+        file = file.parent
+    return "" if str(file) in sys.path else file
+
+
+def _attribute(module: str, attribute: str) -> Any:
+    found = sys.modules[module]
+    try:
+        return getattr(found, attribute)
+    except AttributeError:
+        own = sorted(k for k in vars(found) if not k.startswith("_"))
+        near = get_close_matches(attribute, own, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(own) or 'nothing'}"
+        raise InputError(f"the module {module!r} has no {attribute!r}; {hint}") from None
+
+
+def _not_there(module: str, name: str) -> str:
+    here = {f.stem for folder in _searched() for f in folder.glob("*.py")}
+    near = get_close_matches(module, sorted(here), n=1)
+    hint = f"did you mean '{near[0]}:{name.partition(':')[2]}'? " if near else ""
+    places = " and ".join(dict.fromkeys(map(str, _searched())))
+    return f"{name}: there is no module {module!r}; {hint}It is looked for among the installed ones, and in {places}"

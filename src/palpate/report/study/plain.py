@@ -1,0 +1,98 @@
+"""The panels of a study's figures as plain values, from which a page draws them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from palpate.report.study.axes import Array, Scale, decades
+from palpate.report.study.clouds import Cloud, Points, middles
+from palpate.report.study.lines import Curve, Line
+from palpate.report.study.maps import WORDS, Heat
+
+MOST = 1500
+"""Points of a cloud that lie in the page, evenly taken."""
+
+
+def plain_panels(panels: Sequence[Any]) -> list[dict[str, Any]]:
+    """Panels of one kind: clouds, curves or maps."""
+    return [_OF[type(one)](one) for one in panels]
+
+
+def numbers(values: Any) -> list[float | None]:
+    """Numbers in six digits, null where there is none."""
+    return [float(f"{v:.6g}") if math.isfinite(v) else None for v in np.asarray(values, float).tolist()]
+
+
+def scale(one: Scale) -> dict[str, Any]:
+    """An axis."""
+    shown = [f"{v:g}" if isinstance(v, float) else str(v) for v in one.values]
+    return {
+        "label": one.label,
+        "log": one.log and one.numeric,
+        "places": numbers(one.places),
+        "names": [] if one.numeric else shown,
+        "edges": numbers(one.edges()) if len(one.values) else [],
+    }
+
+
+def cloud(one: Cloud) -> dict[str, Any]:
+    """A metric over a parameter that was drawn."""
+    every: Array = np.concatenate([p.y for p in one.kinds]) if one.kinds else np.zeros(0)
+    return {
+        "kind": "cloud",
+        "x": scale(one.x),
+        "words": list(one.words),
+        "log": not one.words and decades(every),
+        "series": [_points(p, one.words) for p in one.kinds],
+    }
+
+
+def _points(one: Points, words: Sequence[str]) -> dict[str, Any]:
+    rows = np.unique(np.linspace(0, len(one.x) - 1, min(MOST, len(one.x))).astype(int))
+    middle = middles(one, words)
+    return {
+        "label": one.label,
+        "x": numbers(one.x[rows]),
+        "y": numbers(one.y[rows]),
+        "middle": [numbers(middle[:, 0]), numbers(middle[:, 1])],
+    }
+
+
+def curve(one: Curve) -> dict[str, Any]:
+    """Lines over a parameter."""
+    return {
+        "kind": "curve",
+        "title": one.title,
+        "x": scale(one.x),
+        "log": one.log,
+        "series": [_line(line) for line in one.lines],
+    }
+
+
+def _line(one: Line) -> dict[str, Any]:
+    rows = {"x": one.x, "y": one.middle, "low": one.low, "high": one.high}
+    return {"label": one.label, "reference": one.reference, **{k: numbers(v) for k, v in rows.items()}}
+
+
+def heat(one: Heat) -> dict[str, Any]:
+    """A map."""
+    words = one.values.dtype.kind in "US"
+    flat = one.values.ravel()
+    return {
+        "kind": "map",
+        "title": one.title,
+        "x": scale(one.x),
+        "y": scale(one.y),
+        "values": [str(v) for v in flat] if words else numbers(flat),
+        "log": not words and decades(np.asarray(flat, float)),
+        "failed": one.failed.ravel().astype(int).tolist(),
+        "bounds": [{"label": b.label, "x": numbers(b.x), "y": numbers(b.y)} for b in one.bounds],
+        "colours": {w: WORDS.get(w, "#ffffff") for w in sorted({str(v) for v in flat})} if words else None,
+    }
+
+
+_OF: dict[type, Any] = {Cloud: cloud, Curve: curve, Heat: heat}
