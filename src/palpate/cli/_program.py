@@ -31,6 +31,7 @@ COMMANDS = {
     "live": "Show an arm that presses, or a log, in a page of the browser.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "thesis": "Measure every figure and every claim of the thesis again.",
+    "laboratory": "Infer the thesis' laboratory from its own sentences; resumable.",
     "speed": "Measure what one tick of the closed loop costs here.",
     "completion": "Print what makes a shell complete commands, options and files.",
 }
