@@ -40,7 +40,7 @@ class Result:
         half: the posterior by the half that calibrates.
         all: by all sentences; None where only the half was asked for.
         bench: the hand-chosen laboratory, judged.
-        by_half, by_all: the laboratory with most sentences of the half that calibrates, and with most of all.
+        by_half, by_all: the laboratory of each posterior that misses fewest sentences, over ten seeds.
         table: verdicts of all laboratories that were tried.
     """
 
@@ -60,6 +60,11 @@ class Result:
     def better(self) -> bool:
         """Whether the laboratory by half is better than the bench on the half that was held out."""
         return self.by_half.count(judge.validation()) > self.bench.count(judge.validation())
+
+    @property
+    def largest(self) -> Judged:
+        """The laboratory with the largest set of sentences that hold at once over ten seeds."""
+        return max((self.by_all, self.by_half, self.bench), key=lambda j: j.count(sentences()))
 
     @property
     def never(self) -> list[Alone]:
@@ -107,7 +112,7 @@ def _told(result: Result) -> str:
     follows = "could take its place" if result.better else "stays the default"
     return (
         f"On the half that was held out, the laboratory inferred from the other half {better} the hand-chosen bench, "
-        f"which {follows}. The largest set of sentences found true at once has {result.by_all.count(sentences())} of "
+        f"which {follows}. The largest set of sentences found true at once has {result.largest.count(sentences())} of "
         f"{len(sentences())}."
     )
 

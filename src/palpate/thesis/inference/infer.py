@@ -15,15 +15,13 @@ from palpate.thesis.inference import archive, contradictions, judge, search
 from palpate.thesis.inference.contradictions import Table
 from palpate.thesis.inference.findings import Result, present
 from palpate.thesis.inference.judge import Judged, judged
-from palpate.thesis.inference.sampler import Array, Sample, Settings
+from palpate.thesis.inference.sampler import Sample, Settings
 from palpate.thesis.inference.search import Runner, Search
 from palpate.thesis.inference.sentences import searched, sentences
 from palpate.thesis.laboratory.files import text
 from palpate.thesis.laboratory.laboratory import CHOSEN, Laboratory, drawn
 
 STATE, ALL, HALF, JUDGED = "inference.json", "all.jsonl", "half.jsonl", "judged.json"
-CANDIDATES = 3
-"""Laboratories of each search that are judged: those that miss fewest sentences in it."""
 
 
 @dataclass(frozen=True)
@@ -92,26 +90,21 @@ class Inference:
     def _result(self, half: Sample, whole: Sample | None) -> Result:
         book = _Book(self.folder / JUDGED, self.threads, lambda n: self.told("over ten seeds", n))
         bench = book.judged(CHOSEN)
-        of_half = [book.judged(laboratory) for laboratory in best(half)]
-        of_all = [] if whole is None else [book.judged(laboratory) for laboratory in best(whole)]
+        by_half = book.judged(best(half))
+        by_all = by_half if whole is None else book.judged(best(whole))
         return Result(
             half,
             whole,
             bench,
-            max(of_half, key=lambda j: j.count(judge.calibration())),
-            max([*of_half, *of_all], key=lambda j: j.count(sentences())),
+            by_half,
+            by_all,
             self._table(),
         )
 
 
-def best(sample: Sample, count: int = CANDIDATES) -> list[Laboratory]:
-    """The laboratories of a posterior that miss fewest sentences, no two of them alike."""
-    order = np.argsort(-sample.likelihood, kind="stable")
-    seen: list[Array] = []
-    for point in sample.points[order]:
-        if not any(np.array_equal(point, other) for other in seen):
-            seen.append(point)
-    return [drawn(point.tolist()) for point in seen[:count]]
+def best(sample: Sample) -> Laboratory:
+    """The laboratory of a posterior that misses fewest sentences; the first of several."""
+    return drawn(sample.points[int(np.argmax(sample.likelihood))].tolist())
 
 
 class _Row(msgspec.Struct):
