@@ -64,8 +64,8 @@ trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put t
 leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
 	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
 
-laboratory: .venv/run.stamp ## infer the thesis' laboratory again, and ship it; half an hour, resumable
-	$(BIN)/palpate laboratory --particles 32 --seed 1 --out runs/laboratory
+laboratory: .venv/run.stamp ## infer the thesis' laboratory from half of its figures again, and ship it; resumable
+	$(BIN)/palpate laboratory --half --particles 32 --seed 1 --out runs/laboratory
 	cp runs/laboratory/inferred.toml src/palpate/thesis/laboratory/shipped/inferred.toml
 
 docs: .venv/dev.stamp ## build the documentation into site/

@@ -90,7 +90,7 @@ def present(result: Result, folder: Path, command: str) -> None:
             f"{len(UNKNOWNS)} unknowns under which most of them are true at once; a sentence is taken to be wrong "
             f"about its own laboratory with a probability of {100 * WRONG:g} %. No threshold of a claim is changed."
         ),
-        notes=[_told(result)],
+        notes=[_told(result), _worth(result.posterior)],
         tables=[
             _counts(result),
             _posterior(result),
@@ -114,6 +114,15 @@ def _told(result: Result) -> str:
         f"On the half that was held out, the laboratory inferred from the other half {better} the hand-chosen bench, "
         f"which {follows}. The largest set of sentences found true at once has {result.largest.count(sentences())} of "
         f"{len(sentences())}."
+    )
+
+
+def _worth(sample: Sample) -> str:
+    last = sample.stages[-1]
+    return (
+        f"The posterior is {len(sample.points)} particles, {last.distinct} of which differ; they come from "
+        f"{last.ancestors} points of the prior, and are worth at least so many independent laboratories. With few of "
+        "them a narrow range tells where the search went as much as what the thesis tells; more --particles are surer."
     )
 
 
@@ -206,13 +215,8 @@ def _searches(result: Result) -> Shown:
     samples = {"the calibration half": result.half, "all": result.all}
     rows = [[name, *_sizes(sample)] for name, sample in samples.items() if sample is not None]
     head = (
-        "by",
-        "particles",
-        "that differ",
-        "temperatures",
-        "moves accepted at the last",
-        "fewest misses",
-        "most",
+        *("by", "particles", "that differ", "ancestors in the prior"),
+        *("temperatures", "moves accepted at the last", "fewest misses", "most"),
     )
     return Shown("The searches", head, rows)
 
@@ -220,8 +224,7 @@ def _searches(result: Result) -> Shown:
 def _sizes(sample: Sample) -> Sequence[str]:
     misses = -sample.likelihood / MISS
     last = sample.stages[-1]
-    distinct = len(np.unique(sample.points, axis=0))
-    numbers = (len(sample.points), distinct, len(sample.stages))
+    numbers = (len(sample.points), last.distinct, last.ancestors, len(sample.stages))
     return (*map(str, numbers), f"{last.accepted:.0%}", f"{misses.min():.0f}", f"{misses.max():.0f}")
 
 

@@ -47,6 +47,7 @@ class Stage:
     effective: float  # points that the weights were worth before resampling
     accepted: float  # share of the moves
     distinct: int  # particles that differ, after the moves
+    ancestors: int  # points of the prior that they come from
 
 
 @dataclass(frozen=True)
@@ -74,17 +75,17 @@ def sample(evaluate: Evaluate, redrawn: NDArray[np.bool_], settings: Settings) -
     points = prior(settings, len(redrawn))
     likelihood = evaluate(points, np.full(len(points), -np.inf))
     stages: list[Stage] = []
-    beta = 0.0
+    beta, ancestor = 0.0, np.arange(len(points))
     while beta < 1.0:
         wanted = settings.particles if not stages else 0.5 * len(points)
         step = _step(likelihood, 1.0 - beta, wanted)
         beta, weights = beta + step, _weights(step * likelihood)
         effective = 1.0 / float(np.sum(weights**2))
         kept = _resampled(weights, settings.particles, rng)
-        points, likelihood = points[kept], likelihood[kept]
+        points, likelihood, ancestor = points[kept], likelihood[kept], ancestor[kept]
         accepted = [_swept(evaluate, points, likelihood, redrawn, beta, rng) for _ in range(settings.moves)]
         distinct = len(np.unique(points, axis=0))
-        stages.append(Stage(beta, effective, float(np.mean(accepted)), distinct))
+        stages.append(Stage(beta, effective, float(np.mean(accepted)), distinct, len(np.unique(ancestor))))
     return Sample(points, likelihood, tuple(stages))
 
 
