@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import os
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
-from typing import TypeVar
 
 import msgspec
 
 from palpate.errors import InputError
 from palpate.files import check_place
-
-S = TypeVar("S")
+from palpate.studies.journal import decoded, line_of
 
 
 class Head(msgspec.Struct, frozen=True):
@@ -64,7 +61,7 @@ class Archive:
         Raises:
             InputError: the disk is full, or cannot be written to.
         """
-        line, before = _line(tried), os.fstat(self._file.fileno()).st_size
+        line, before = line_of(msgspec.json.encode(tried)), os.fstat(self._file.fileno()).st_size
         try:
             written, why = self._file.write(line), "no space is left"
         except OSError as error:
@@ -93,7 +90,7 @@ def opened(path: Path, head: Head) -> Iterator[Archive]:
             )
         os.truncate(path, end)
     else:
-        path.write_bytes(_line(head))
+        path.write_bytes(line_of(msgspec.json.encode(head)))
         known = {}
     with path.open("ab", buffering=0) as file:
         yield Archive(known, file)
@@ -106,29 +103,14 @@ def read(path: Path) -> tuple[Head, dict[int, Tried], int]:
         InputError: it is no archive.
     """
     lines = path.read_bytes().splitlines(keepends=True)
-    head = _decoded(lines[0], Head) if lines else None
+    head = decoded(lines[0], Head) if lines else None
     if head is None:
         raise InputError(f"{path} is no archive of laboratories; choose another --out")
     known, end = {}, len(lines[0])
     for line in lines[1:]:
-        tried = _decoded(line, Tried)
+        tried = decoded(line, Tried)
         if tried is None:
             break
         known[tried.number] = tried
         end += len(line)
     return head, known, end
-
-
-def _line(value: msgspec.Struct) -> bytes:
-    text = msgspec.json.encode(value)
-    return b"%08x %s\n" % (zlib.crc32(text), text)
-
-
-def _decoded(line: bytes, kind: type[S]) -> S | None:
-    checksum, _, text = line.rstrip(b"\n").partition(b" ")
-    if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
-        return None
-    try:
-        return msgspec.json.decode(text, type=kind)
-    except msgspec.DecodeError:
-        return None
