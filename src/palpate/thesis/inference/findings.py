@@ -98,6 +98,7 @@ def present(result: Result, folder: Path, command: str) -> None:
             *_pairs(result),
             _sentences(result),
             _searches(result),
+            _ranges(),
         ],
         figures={
             folder / FIGURE: "The posterior of each unknown in shares of its prior (grey: the prior itself)."
@@ -148,11 +149,16 @@ def _counts(result: Result) -> Shown:
 
 def _posterior(result: Result) -> Shown:
     rows = [
-        [m.unknown.name.replace("_", " "), _prior(m.unknown), m.in_words(), m.verdict, m.unknown.reason]
+        [m.unknown.name.replace("_", " "), _prior(m.unknown), m.in_words(), m.verdict]
         for m in marginals(result.posterior.points)
     ]
-    head = ("unknown", "prior", "posterior: middle (5 to 95 %)", "the thesis tells it?", "why this range")
+    head = ("unknown", "prior", "posterior: middle (5 to 95 %)", "the thesis tells it?")
     return Shown("What the thesis tells of its laboratory", head, rows)
+
+
+def _ranges() -> Shown:
+    rows = [[unknown.name.replace("_", " "), unknown.reason] for unknown in UNKNOWNS]
+    return Shown("Why these unknowns, and these ranges", ("unknown", "reason"), rows)
 
 
 def _prior(unknown: Unknown) -> str:

@@ -48,7 +48,8 @@ class Marginal:
             return "any"
         if self.unknown.choices:
             return f"{named(self.unknown, self.middle)}{unit} ({100 * self.width:.0f} %)"
-        return f"{self.middle:.3g} ({self.low:.3g} to {self.high:.3g}){unit}"
+        low, middle, high = (f"{float(f'{v:.3g}'):g}" for v in (self.low, self.middle, self.high))
+        return f"{middle} ({low} to {high}){unit}"
 
 
 def named(unknown: Unknown, value: float) -> str:
