@@ -274,6 +274,12 @@ def test_verdicts_that_were_given_up_are_not_taken_for_no():
     assert [x.tried for x in contradictions.table(("a", "b"), rows).alone()] == [2, 1]
 
 
+def test_what_a_part_was_not_asked_is_not_known_of_it():
+    whole = contradictions.table(("a", "b"), {0: Tried(0, (0.5,), (True, False))})
+    both = contradictions.joined(whole, contradictions.table(("b",), {0: Tried(0, (0.5,), (True,))}))
+    assert [(x.id, x.true, x.tried) for x in both.alone()] == [("a", 1, 1), ("b", 1, 2)]
+
+
 def test_marginals_say_what_is_told():
     points = np.random.default_rng(1).random((400, len(UNKNOWNS)))
     points[:, 0] = 0.5 + 0.05 * (points[:, 0] - 0.5)
