@@ -115,7 +115,9 @@ class Cluster:
 
         futures = self._client.map(work, list(items), pure=False)
         try:
-            for _, found in _untyped(distributed).as_completed(futures, with_results=True):
+            for _, found in _untyped(distributed).as_completed(
+                futures, loop=self._client.loop, with_results=True
+            ):
                 yield found
         except (InputError, KeyboardInterrupt, GeneratorExit):
             raise
