@@ -48,8 +48,8 @@ def thesis(
     figure
         The number of one figure, "6.11", or the name of one explanation; all of them when left out.
     laboratory
-        "bench", chosen by hand; "inferred" from the thesis itself; or a TOML file as `palpate laboratory` writes. In any
-        but the first, only the figures that tell what the thesis' own laboratory showed.
+        "bench", chosen by hand; "inferred" from the thesis; or a TOML file as `palpate laboratory` writes. In any but
+        the first, only the figures that tell what the thesis' own laboratory showed.
     seeds
         Noise seeds for every measured claim.
     list_
