@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench live attack soak trust leaderboard docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench live attack soak trust leaderboard laboratory docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -63,6 +63,10 @@ trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put t
 
 leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
 	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
+
+laboratory: .venv/run.stamp ## infer the thesis' laboratory from half of its figures again, and ship it; resumable
+	$(BIN)/palpate laboratory --half --particles 32 --seed 1 --out runs/laboratory
+	cp runs/laboratory/inferred.toml src/palpate/thesis/laboratory/shipped/inferred.toml
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean --strict

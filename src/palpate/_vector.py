@@ -225,7 +225,9 @@ def sign(a):
     """-1.0, 0.0 or 1.0."""
     if isinstance(a, tuple):
         return a.map_sign()
-    return np.sign(a) if isinstance(a, np.ndarray) else float((a > 0.0) - (a < 0.0))
+    if isinstance(a, np.ndarray):
+        return np.sign(a)
+    return float(int(a > 0.0) - int(a < 0.0))
 
 
 def sin(a):

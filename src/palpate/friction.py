@@ -39,6 +39,7 @@ class LuGre(NamedTuple):
         coulomb: torque of steady sliding, without the viscous part [N m].
         static: torque at which it breaks away from rest [N m].
         stribeck: speed at which the one has largely become the other [rad/s].
+        asymmetry: by which share both levels are higher forward and lower backward; one for all joints.
     """
 
     sigma0: Vec3 = Vec3(15000.0, 1250.0, 150.0)
@@ -47,6 +48,7 @@ class LuGre(NamedTuple):
     coulomb: Vec3 = Vec3(3.0, 0.25, 0.03)
     static: Vec3 = Vec3(3.6, 0.3, 0.036)
     stribeck: Vec3 = Vec3(0.01, 0.01, 0.01)
+    asymmetry: float = 0.0
 
     def start(self):
         """The bristles at rest [rad]."""
@@ -62,7 +64,8 @@ class LuGre(NamedTuple):
     def level(self, v):
         """g(v), the dry friction of steady sliding [N m]."""
         r = v / self.stribeck
-        return self.coulomb + (self.static - self.coulomb) * exp(-(r * r))
+        dry = self.coulomb + (self.static - self.coulomb) * exp(-(r * r))
+        return dry * (1.0 + self.asymmetry * sign(v))
 
     def steady(self, v):
         """Torque of steady sliding at v [N m]."""
@@ -82,6 +85,7 @@ class LuGre(NamedTuple):
             k * self.coulomb,
             k * self.static,
             self.stribeck,
+            self.asymmetry,
         )
 
     def checked(self):
@@ -91,6 +95,7 @@ class LuGre(NamedTuple):
         for name in ("sigma0", "sigma1", "sigma2"):
             _require(name, getattr(self, name), "zero or positive", lambda v: v >= 0.0)
         _require("static - coulomb", self.static - self.coulomb, "zero or positive", lambda v: v >= 0.0)
+        _require("asymmetry", self.asymmetry, "between -1 and 1", lambda v: -1.0 < v < 1.0)
         return self
 
 

@@ -111,10 +111,10 @@ def test_variations_change_what_they_say_and_nothing_else():
 
 
 def test_ends_of_intervals_are_told_apart_by_level():
-    ends = fig_6_10._ends(pressed(lambda t, d: np.where(d == 20.0, 16.0, 12.5)))
+    ends = fig_6_10.ends_of(pressed(lambda t, d: np.where(d == 20.0, 16.0, 12.5)))
     assert (ends.high, ends.low) == pytest.approx((-4.0, 2.5))
-    assert fig_6_10._misses(ends)
-    assert not fig_6_10._misses(fig_6_10.Ends(-4.0, 0.5))
+    assert fig_6_10.misses(ends)
+    assert not fig_6_10.misses(fig_6_10.Ends(-4.0, 0.5))
 
 
 def test_the_course_of_the_error_ends_with_the_contact():
@@ -132,13 +132,15 @@ def test_an_error_that_changes_sign_is_still_an_error():
     record = pressed(lambda t, d: d, seconds=15.0)
     t = record["t"] - 0.2
     record.columns["y"][:] = np.where(np.floor(t / 2.5) % 2 == 0, 2e-3, -2e-3)
-    assert fig_6_15._errors(record).y == pytest.approx(2e-3)
+    assert fig_6_15.errors_of(record).y == pytest.approx(2e-3)
 
 
 @pytest.mark.parametrize("adapts", [1.0, 4.0])
 def test_the_time_of_adapting_is_found(adapts):
     record = pressed(lambda t, d: d - np.where(t < adapts, 5.0, 0.0), seconds=20.0)
-    assert fig_6_17._adapted(fig_6_17._away(record)) == pytest.approx(adapts, abs=fig_6_17.SMOOTHED)
+    assert fig_6_17.adapted_at(fig_6_17.away_from_settled(record)) == pytest.approx(
+        adapts, abs=fig_6_17.SMOOTHED
+    )
 
 
 def test_the_gain_of_an_integrator_is_found_under_noise():

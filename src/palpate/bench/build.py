@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from palpate._vector import Mat3, Vec3, diagonal
 from palpate.bench.bench import Bench
 from palpate.bench.conditioning import Conditioning
+from palpate.bench.elastic_mode import RIGID, elastic_mode
 from palpate.bench.estimators import Estimators
 from palpate.bench.experiments.consistency import check, matched_delay
 from palpate.bench.experiments.tables import Experiment
@@ -93,16 +94,20 @@ def _plant(arm: Arm3, e: Experiment) -> Plant:
         triple(f.coulomb),
         triple(f.static),
         triple(f.stribeck),
+        float(f.asymmetry),
     ).checked()
     side = StickSlip(e.wall.side_stiffness, e.wall.side_damping, e.wall.side_friction)
-    return Plant(arm.with_rotors(), friction, surface_of(e.surface), side, float(e.wall.x))
+    mode = RIGID if e.elastic is None else elastic_mode(**msgspec.structs.asdict(e.elastic))
+    beyond = float(e.force_sensor.beyond)
+    return Plant(arm.with_rotors(), friction, surface_of(e.surface), side, float(e.wall.x), mode, beyond)
 
 
 def _force_input(e: Experiment) -> ForceInput:
     s, physics = e.force_sensor, e.run.rate * e.run.steps
     sensor = force_sensor(s.cutoff, s.sampling, s.bits, s.full_scale, s.noise, physics, s.phase)
     analog = analog_filter_190(float(physics))
-    return ForceInput(sensor, analog, 1.0 if s.analog_filter else 0.0, Converter(16, 200.0))
+    filtered = 1.0 if s.analog_filter else 0.0
+    return ForceInput(sensor, analog, filtered, Converter(16, 200.0), float(s.roughness))
 
 
 def _sequence(e: Experiment, tick: float) -> Sequence:

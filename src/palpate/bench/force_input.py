@@ -23,12 +23,14 @@ class ForceInput(NamedTuple):
         analog: low-pass on the line from the sensor to the converter.
         filtered: 1.0 if the line goes through it (as for fig. 3.5), 0.0 if not (as in all other experiments).
         converter: the controller's.
+        roughness: by which share the sensor's noise grows for each m/s of the tip [s/m].
     """
 
     sensor: ForceSensor
     analog: Biquad
     filtered: float
     converter: Converter
+    roughness: float = 0.0
 
     def start(self):
         return ForceInputState(self.sensor.start(), self.analog.start(), 0.0)

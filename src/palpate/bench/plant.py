@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from palpate._jit import part
 from palpate._vector import Vec3, solve
+from palpate.bench.elastic_mode import RIGID, ElasticMode, ElasticState
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import Surface
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
@@ -18,6 +19,7 @@ class PlantState(NamedTuple):
     bristles: Vec3  # of the joints' friction [rad]
     surface: SurfaceState
     side: StickSlipState  # friction along the surface
+    bent: ElasticState  # of the arm along x
 
 
 @part
@@ -28,6 +30,8 @@ class Touch(NamedTuple):
     tangential: float  # along y [N]
     penetration: float  # of the tip [m], negative in the air
     friction: Vec3  # torque lost in the joints [N m]
+    inertial: float = 0.0  # force that what lies beyond the force sensor takes to be moved [N]
+    rate: float = 0.0  # of the tip along x [m/s]
 
 
 @part
@@ -40,6 +44,8 @@ class Plant(NamedTuple):
         surface: along its normal.
         side: friction along it.
         wall: x of the undeformed surface [m].
+        mode: in which the arm gives way along x, between its joints and its tip.
+        beyond: mass between force sensor and tip, part of the arm's own [kg].
     """
 
     arm: Arm3
@@ -47,10 +53,19 @@ class Plant(NamedTuple):
     surface: Surface
     side: StickSlip
     wall: float
+    mode: ElasticMode = RIGID
+    beyond: float = 0.0
 
     def start_at(self, q):
         """At rest in the air, at the joint angles q."""
-        return PlantState(q, 0.0 * q, self.friction.start(), self.surface.start(), self.side.start())
+        return PlantState(
+            q,
+            0.0 * q,
+            self.friction.start(),
+            self.surface.start(),
+            self.side.start(),
+            self.mode.start(),
+        )
 
     def advance(self, state, torque, dt):
         """The state after dt [s] under constant torque [N m], and what was felt; semi-implicit Euler, first order.
@@ -63,31 +78,37 @@ class Plant(NamedTuple):
         """
         model = self.arm.model(state.q, state.qd)
         normal, along = model.J.r1, model.J.r2
-        p = self.arm.pose(state.q).x - self.wall
+        bent = state.bent
+        p = self.arm.pose(state.q).x + bent.bend - self.wall
         friction, bristles = self.friction.step(state.bristles, state.qd, dt)
         drive = torque - model.h - friction
         per_normal = solve(model.M, normal)
-        tip_mass = 1.0 / (normal @ per_normal)
+        tip_mass = 1.0 / (normal @ per_normal + self.mode.mobility)
+        springs_back = self.mode.acceleration(bent)
         surface, side, force, slide = state.surface, state.side, 0.0, 0.0
         if surface.contact == 1.0:
             # The normal force before friction along the surface: its share in f is second order.
             elastic, opposed = opposing(
-                self.surface, surface, p, normal @ state.qd - 0.5 * dt * model.Jdqd.x, dt
+                self.surface, surface, p, normal @ state.qd + bent.rate - 0.5 * dt * model.Jdqd.x, dt
             )
-            a = normal @ solve(model.M, drive) + model.Jdqd.x
+            a = normal @ solve(model.M, drive) + model.Jdqd.x + springs_back
             force = contact_force(elastic, opposed, tip_mass, a)
             slide, side = self.side.slide(side, along @ state.qd, force, dt)
             drive += along * slide
-            a = normal @ solve(model.M, drive) + model.Jdqd.x
+            a = normal @ solve(model.M, drive) + model.Jdqd.x + springs_back
             force = contact_force(elastic, opposed, tip_mass, a)
         qdd = solve(model.M, drive) - per_normal * max(force, 0.0)
         qd = state.qd + dt * qdd
         q = state.q + dt * qd
-        p = self.arm.pose(q).x - self.wall
-        v = normal @ qd
+        bent = self.mode.step(bent, springs_back - self.mode.mobility * max(force, 0.0), dt)
+        p = self.arm.pose(q).x + bent.bend - self.wall
+        v = normal @ qd + bent.rate
         if force < 0.0:
             side = self.side.start()
         surface, impulse = follow(self.surface, surface, force, p, v, tip_mass, dt)
         qd -= per_normal * impulse
-        felt = Touch(max(force, 0.0) + impulse / dt, -slide, p, friction)
-        return PlantState(q, qd, bristles, surface, side), felt
+        bent = self.mode.struck(bent, impulse)
+        after = normal @ qd + bent.rate
+        inertial = self.beyond * ((after - normal @ state.qd - state.bent.rate) / dt + model.Jdqd.x)
+        felt = Touch(max(force, 0.0) + impulse / dt, -slide, p, friction, inertial, after)
+        return PlantState(q, qd, bristles, surface, side, bent), felt

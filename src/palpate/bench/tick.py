@@ -81,7 +81,7 @@ def start_at(loop, q):
     conditioning = loop.conditioning.start_at(seen)
     return LoopState(
         loop.plant.start_at(q),
-        Touch(0.0, 0.0, loop.plant.arm.pose(q).x - loop.plant.wall, ZERO3),
+        Touch(0.0, 0.0, loop.plant.arm.pose(q).x - loop.plant.wall, ZERO3, 0.0, 0.0),
         loop.force.start(),
         conditioning,
         loop.sequence.start(),
@@ -116,10 +116,11 @@ def think(loop, state, signals, sequence):
 def move(loop, plant, force, torque, k, noise):
     """Plant and force sensor through the steps up to the next tick."""
     dt = loop.tick / loop.steps
-    felt = Touch(0.0, 0.0, 0.0, ZERO3)
+    felt = Touch(0.0, 0.0, 0.0, ZERO3, 0.0, 0.0)
     for j in range(loop.steps):
         plant, felt = loop.plant.advance(plant, torque, dt)
-        force = loop.force.advance(force, felt.normal, k * loop.steps + j, noise)
+        rough = noise * (1.0 + loop.force.roughness * abs(felt.rate))
+        force = loop.force.advance(force, felt.normal + felt.inertial, k * loop.steps + j, rough)
     return plant, felt, force
 
 

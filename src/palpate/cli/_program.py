@@ -31,6 +31,7 @@ COMMANDS = {
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "checks": "Check a controller, surface or identifier of your own.",
     "thesis": "Measure every figure and every claim of the thesis again.",
+    "laboratory": "Infer the thesis' laboratory from its own sentences; resumable.",
     "speed": "Measure what one tick of the closed loop costs here.",
     "completion": "Print what makes a shell complete commands, options and files.",
 }

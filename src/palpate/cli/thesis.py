@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter, validators
 
 from palpate.cli._terminal import console, place, print_lines, say, show_table
+from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from palpate.thesis.claims import Done
     from palpate.thesis.figure import Study
+    from palpate.thesis.runs import Runs
 
 COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
 
@@ -29,6 +31,7 @@ def thesis(
     figure: str | None = None,
     /,
     *,
+    laboratory: Annotated[str, Parameter(group=_MEASURED)] = "bench",
     seeds: Annotated[int, Parameter(group=_MEASURED, validator=validators.Number(gte=10, lte=1000))] = 10,
     list_: Annotated[bool, Parameter(group=_MEASURED, name="--list", negative="")] = False,
     out: Annotated[Path | None, Parameter(group=_WRITTEN)] = None,
@@ -44,6 +47,9 @@ def thesis(
     ----------
     figure
         The number of one figure, "6.11", or the name of one explanation; all of them when left out.
+    laboratory
+        "bench", chosen by hand; "inferred" from the thesis; or a TOML file as `palpate laboratory` writes. In any but
+        the first, only the figures that tell what the thesis' own laboratory showed.
     seeds
         Noise seeds for every measured claim.
     list_
@@ -54,7 +60,9 @@ def thesis(
     force
         Replace the measurement that stands there already.
     """
-    from palpate.thesis.figure import studies, study
+    from palpate.thesis.figure import studies
+    from palpate.thesis.laboratory.files import named
+    from palpate.thesis.runs import Runs
 
     if list_:
         everything = studies()
@@ -62,23 +70,41 @@ def thesis(
         for known in everything:
             print_lines(f"{known.NUMBER:<{width}}{known.TITLE}")
         return 0
-    chosen = studies() if figure is None else [study(figure)]
-    folder = out if out is not None else Path("runs") / ("thesis" if figure is None else f"thesis-{figure}")
-    command = f"palpate thesis{'' if figure is None else ' ' + figure} --seeds {seeds}"
+    lab = named(laboratory)
+    chosen = _chosen(figure, laboratory, in_all=lab.chosen)
+    parts = ["thesis", figure, None if lab.chosen else Path(laboratory).stem]
+    folder = out if out is not None else Path("runs") / "-".join(part for part in parts if part)
+    where = "" if lab.chosen else f" --laboratory {laboratory}"
+    command = f"palpate thesis{'' if figure is None else ' ' + figure}{where} --seeds {seeds}"
     try:
-        _measure(chosen, folder, range(seeds), command, force)
+        _measure(chosen, folder, Runs(range(seeds), laboratory=lab), command, force)
     except KeyboardInterrupt:
         say(f"interrupted; what is measured is saved in {folder}, and the same command goes on from there")
         return 130
     return 0
 
 
-def _measure(chosen: Sequence[Study], folder: Path, seeds: Sequence[int], command: str, force: bool) -> None:
+def _chosen(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[Study]:
+    """The figures that are measured: all, or one; in another laboratory those that it was inferred from."""
+    from palpate.thesis.figure import studies, study
+    from palpate.thesis.inference.sentences import sentences
+
+    if in_all:
+        return studies() if figure is None else [study(figure)]
+    known = {sentence.figure for sentence in sentences()}
+    if figure is not None and study(figure).NUMBER not in known:
+        raise InputError(
+            f"figure {figure} tells nothing of the thesis' own laboratory; leave out --laboratory {laboratory}, or "
+            f"choose one of {', '.join(s.NUMBER for s in studies() if s.NUMBER in known)}"
+        )
+    return [s for s in studies() if s.NUMBER in known and figure in (None, s.NUMBER)]
+
+
+def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, command: str, force: bool) -> None:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from palpate.cli._waiting import COMPILING
     from palpate.thesis.measure import measure
-    from palpate.thesis.runs import Runs
 
     screen = console()
     columns = BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
@@ -94,20 +120,18 @@ def _measure(chosen: Sequence[Study], folder: Path, seeds: Sequence[int], comman
         def resumed(done: int) -> None:
             progress.console.print(f"going on in {folder}: {done} of {len(chosen)} are measured already")
 
-        runs = Runs(seeds, waiting)
+        runs = replace(runs, waiting=waiting)
         done = measure(chosen, runs, folder, command=command, force=force, started=started, resumed=resumed)
     _tell(screen, done, folder)
 
 
 def _tell(screen: Console, done: Sequence[Done], folder: Path) -> None:
     from palpate.report.page import Table
-    from palpate.thesis.claims import rows_of
+    from palpate.thesis.claims import count_in_words, rows_of
 
     claims = rows_of(done)
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
     table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
     show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
-    verdicts = Counter[str](claim.verdict for claim in claims)
-    told = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in COLORS)
-    screen.print(f"{len(claims)} claims: {told}")
+    screen.print(count_in_words(claims))
     place(screen, "page:", folder / "index.html")

@@ -7,17 +7,20 @@ import math
 import pickle
 import socket
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
 from palpate.errors import InputError
 from palpate.plugins import Plugin
 from palpate.studies.run_one import FAILED, Done, Job, Row, run_one
 from palpate.studies.sources import sources
+
+A = TypeVar("A")
+B = TypeVar("B")
 
 UNIT = 0.2
 """What a batch should take at least [s]: the scheduler's own work is then some hundredths of it."""
@@ -113,6 +116,31 @@ class Cluster:
     def close(self) -> None:
         """Takes leave of the scheduler."""
         self._client.close(timeout=2)
+
+    def map(self, work: Callable[[A], B], items: Iterable[A]) -> Iterator[B]:
+        """`work` of each item, in the order in which it is done; a function that the workers can import.
+
+        Raises:
+            InputError: the scheduler went away, or the workers cannot do it.
+        """
+        import distributed
+
+        futures = self._client.map(work, list(items), pure=False)
+        try:
+            for _, found in _untyped(distributed).as_completed(
+                futures, loop=self._client.loop, with_results=True
+            ):
+                yield found
+        except (InputError, KeyboardInterrupt, GeneratorExit):
+            raise
+        except Exception as error:
+            raise InputError(
+                f"the workers of {self.address} did not come to an end: {_line(error)}; what is done is saved, and the "
+                "same command goes on from there"
+            ) from error
+        finally:
+            if self._client.status == "running":
+                self._client.cancel(futures, force=True)
 
     def run(self, jobs: Iterable[Job]) -> Iterator[Done]:
         """What becomes of the jobs, in the order in which they are done.

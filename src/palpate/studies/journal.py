@@ -90,7 +90,7 @@ class Journal:
             return
         before = os.fstat(self._file.fileno()).st_size
         try:
-            self._write(_line(msgspec.json.encode(row)))
+            self._write(line_of(msgspec.json.encode(row)))
         except OSError as error:
             _cut(self.path, before)
             raise InputError(
@@ -146,7 +146,7 @@ def head_of(path: Path) -> Head | None:
     """The head of a journal; None where there is none, or a spoiled one."""
     try:
         with path.open("rb") as file:
-            return _decoded(file.readline(), Head)
+            return decoded(file.readline(), Head)
     except OSError:
         return None
 
@@ -172,18 +172,19 @@ def _check(path: Path, head: Head) -> None:
 def _begin(path: Path, head: Head) -> None:
     try:
         with whole(path) as draft, draft.open("wb") as file:
-            file.write(_line(msgspec.json.encode(head)))
+            file.write(line_of(msgspec.json.encode(head)))
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; free some space, or choose another --out") from error
 
 
-def _line(text: bytes) -> bytes:
+def line_of(text: bytes) -> bytes:
+    """A line of a journal: the text behind its checksum."""
     return b"%08x %s\n" % (zlib.crc32(text), text)
 
 
-def _decoded(line: bytes, kind: type[S]) -> S | None:
+def decoded(line: bytes, kind: type[S]) -> S | None:
     """What a line holds; None where it is torn or its checksum is another."""
     checksum, _, text = line.rstrip(b"\n").partition(b" ")
     if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
@@ -205,7 +206,7 @@ def _read(path: Path) -> Iterator[tuple[Row, int]]:
         end = len(file.readline())
         for line in file:
             end += len(line)
-            row = _decoded(line, Row)
+            row = decoded(line, Row)
             if row is not None:
                 yield row, end
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -26,6 +27,7 @@ class Claim:
         tolerance: the threshold that decides, stated before looking: "within 10 % of the value at 4 s by 0.12 s".
         verdict: reproduced, differs, or not checkable.
         note: one honest paragraph: why; what was chosen, and what follows from the choice; where it stops holding.
+        group: whether it only sums up the rows of its parts, and is no claim of its own when claims are counted.
     """
 
     id: str
@@ -36,6 +38,7 @@ class Claim:
     tolerance: str
     verdict: Verdict
     note: str
+    group: bool = False
 
 
 @dataclass
@@ -93,6 +96,19 @@ def with_wholes(claims: Sequence[Claim]) -> list[Claim]:
     return rows
 
 
+def counted(claims: Sequence[Claim]) -> Counter[str]:
+    """How many claims came to each verdict; rows that only sum up others are none."""
+    return Counter(claim.verdict for claim in claims if not claim.group)
+
+
+def count_in_words(claims: Sequence[Claim]) -> str:
+    """The count, the same wherever it is told: "87 claims measured: 48 reproduced, 38 differ, 1 not checkable"."""
+    found = counted(claims)
+    parts = [("reproduced", "reproduced"), ("differs", "differ"), ("not checkable", "not checkable")]
+    told = ", ".join(f"{found[verdict]} {word}" for verdict, word in parts)
+    return f"{found.total()} claims measured: {told}"
+
+
 def _name(claim: Claim) -> str:
     """The claim that this one is, or is a part of: "a" of "a.K"."""
     return claim.id.partition(".")[0]
@@ -112,4 +128,5 @@ def _whole(name: str, parts: Sequence[Claim]) -> Claim:
         verdict=verdict,
         note="One sentence of the thesis claims several things at once. They are measured one by one: see the rows "
         f"{', '.join(part.id for part in parts)}.",
+        group=True,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import msgspec
@@ -14,8 +14,9 @@ from palpate.errors import InputError
 from palpate.files import check_place, kept_folder, signed, write_json, write_text
 from palpate.report import style
 from palpate.report.page import png
-from palpate.thesis.claims import Done, rows_of
+from palpate.thesis.claims import Claim, Done, rows_of
 from palpate.thesis.figure import Study
+from palpate.thesis.laboratory.laboratory import values
 from palpate.thesis.page import index_page
 from palpate.thesis.runs import Runs
 
@@ -66,14 +67,26 @@ def measure(
 def _measured(study: Study, runs: Runs, folder: Path) -> Done:
     begun = time.perf_counter()
     data = study.run(runs)
-    claims = list(study.check(data))
+    claims = [_noted(claim, runs) for claim in study.check(data)]
     style.save(study.plot(data), folder / f"{study.NUMBER}.png")
     return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
 
 
+def _noted(claim: Claim, runs: Runs) -> Claim:
+    """A claim with a note that is true of the laboratory: those of the figures speak of the hand-chosen bench."""
+    if runs.laboratory.chosen:
+        return claim
+    told = ", ".join(f"{name} {value:.3g}" for name, value in values(runs.laboratory).items())
+    note = f"In this laboratory: {told}. Why it is so on the hand-chosen bench stands in that measurement."
+    return replace(claim, note=note)
+
+
 def _state(studies: Sequence[Study], runs: Runs, folder: Path, command: str) -> State:
     wanted = [s.NUMBER for s in studies]
-    stamp = f"{sources_stamp(*sorted(Path(__file__).parent.rglob('*.py')))} seeds {list(runs.seeds)}"
+    sources = sources_stamp(*sorted(Path(__file__).parent.rglob("*.py")))
+    stamp = f"{sources} seeds {list(runs.seeds)}"
+    if not runs.laboratory.chosen:
+        stamp += f" laboratory {values(runs.laboratory)}"
     if not (folder / STATE).exists():
         return State(stamp, wanted, command)
     old = _stored(folder)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib import resources
 from typing import Any
 
 from palpate.report.page import render
-from palpate.thesis.claims import Claim, Done, rows_of
+from palpate.thesis.claims import Done, counted
 
 TONES = {"reproduced": "ok", "differs": "warn", "not checkable": "none"}
 _CHAPTERS = (("2.", "Earlier schemes"), ("3.", "The bench"), ("4.", "The controllers"))
@@ -29,17 +28,16 @@ def index_page(
         missing: numbers of those still to come.
         command: that measures them.
     """
-    rows = rows_of(done)
-    own = {claim.id: one.number for one in done for claim in one.claims}
+    verdicts = counted([claim for one in done for claim in one.claims])
     return render(
         "index.html",
         "palpate.thesis",
         room="thesis",
         made=datetime.now(UTC).isoformat(timespec="seconds"),
         title="The thesis, measured again",
-        chapters=_chapters(done, rows, own),
-        count=len(rows),
-        verdicts=Counter(claim.verdict for claim in rows),
+        chapters=_chapters(done),
+        count=verdicts.total(),
+        verdicts=verdicts,
         tones=TONES,
         images=pictures,
         missing=missing,
@@ -49,20 +47,12 @@ def index_page(
     )
 
 
-def _chapters(done: Sequence[Done], rows: Sequence[Claim], own: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Studies by chapter, each with its rows; the row of a whole stands with its first part."""
+def _chapters(done: Sequence[Done]) -> list[dict[str, Any]]:
+    """Studies by chapter, each with its claims."""
     found: dict[str, list[dict[str, Any]]] = {}
     for one in done:
-        claims = [row for row in rows if _home(row, own) == one.number]
-        found.setdefault(chapter_of(one.number), []).append({"study": one, "claims": claims})
+        found.setdefault(chapter_of(one.number), []).append({"study": one, "claims": one.claims})
     return [{"title": title, "studies": studies} for title, studies in found.items()]
-
-
-def _home(row: Claim, own: Mapping[str, str]) -> str | None:
-    """The study under which a row stands."""
-    if row.id in own:
-        return own[row.id]
-    return next((number for name, number in own.items() if name.startswith(f"{row.id}.")), None)
 
 
 def chapter_of(number: str) -> str:

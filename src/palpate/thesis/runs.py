@@ -12,6 +12,7 @@ from palpate.bench import Experiment, build
 from palpate.bench.ending import INTERRUPTED
 from palpate.bench.speed import cores
 from palpate.records import Record
+from palpate.thesis.laboratory.laboratory import CHOSEN, Laboratory
 
 T = TypeVar("T")
 
@@ -23,17 +24,19 @@ class Runs:
     Args:
         seeds: every measured claim is looked at over all of them; at least ten.
         waiting: called when a loop has to be compiled first.
+        laboratory: in which every experiment is run.
     """
 
     seeds: Sequence[int] = tuple(range(10))
     waiting: Callable[[], None] | None = None
+    laboratory: Laboratory = CHOSEN
     _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
 
     def one(self, experiment: Experiment, seed: int | None = None) -> Record:
         """The record of one run, for a figure; of the first seed unless another is given."""
         number = self.seeds[0] if seed is None else seed
         run = experiment.run
-        record = build(experiment).run(
+        record = build(self.laboratory.of(experiment)).run(
             run.duration, number, press=run.press, waiting=self.waiting, progress=self._look
         )
         if record.meta["end"] == INTERRUPTED:  # a part of a run would be measured as if it were all of it

@@ -9,6 +9,8 @@ from palpate.signals.filters import butterworth3
 
 LONGEST_DELAY = 9.0
 """Ticks that the matched front-end's delay line holds."""
+SLOWER = 20.0
+"""Steps of the physics in a period of an elastic mode, at least: they resolve it, and stay stable."""
 
 
 def check(e: Experiment) -> None:
@@ -54,6 +56,12 @@ def _check_rates(e: Experiment) -> None:
         raise InputError(
             f"sampling in [force_sensor] must be at most {physics} Hz, rate times steps in [run], got "
             f"{e.force_sensor.sampling}"
+        )
+
+    if e.elastic is not None and e.elastic.frequency > physics / SLOWER:
+        raise InputError(
+            f"frequency in [elastic] must be at most {physics / SLOWER:g} Hz, rate times steps in [run] over "
+            f"{SLOWER:g}, got {e.elastic.frequency:g}; lower it or raise steps"
         )
 
 

@@ -75,6 +75,16 @@ class Friction(Table):
     bristle_stiffness: NotNegativeTriple = (15000.0, 1250.0, 150.0)
     bristle_damping: NotNegativeTriple = (120.0, 11.0, 0.65)
     viscous: NotNegativeTriple = (0.0, 0.0, 0.0)
+    asymmetry: Annotated[float, Meta(gt=-1, lt=1)] = 0.0
+    """By which share both levels are higher forward and lower backward."""
+
+
+class ElasticTable(Table):
+    """The arm gives way along x at its tip, unseen by the encoders: stiffness [N/m], frequency [Hz], damping ratio."""
+
+    stiffness: Positive
+    frequency: Positive
+    damping: NotNegative = 0.02
 
 
 class Wall(Table):
@@ -105,6 +115,10 @@ class ForceSensor(Table):
     full_scale: Positive = 200.0
     analog_filter: bool = False
     """The 190 Hz low-pass of fig. 3.6 between sensor and controller."""
+    beyond: NotNegative = 0.0
+    """Mass between sensor and tip, whose inertia is read as force [kg]."""
+    roughness: NotNegative = 0.0
+    """By which share the noise grows for each m/s of the tip [s/m]."""
 
 
 class Filters(Table):
@@ -194,6 +208,7 @@ class Experiment(Table, kw_only=True):
     run: Run = Run()
     robot: Robot = Robot()
     friction: Friction = Friction()
+    elastic: ElasticTable | None = None
     wall: Wall = Wall()
     encoders: Encoders = Encoders()
     force_sensor: ForceSensor = ForceSensor()

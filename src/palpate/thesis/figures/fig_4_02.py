@@ -77,9 +77,9 @@ def run(runs: Runs) -> Data:
     varied = {name: [(e, s) for s in few] for name, e in press_runs.conditions(foam).items()}
     return Data(
         shown={name: _around(runs.one(e)) for name, e in PARAMETERS.items()},
-        switches={name: runs.over_seeds(e, _switch) for name, e in PARAMETERS.items()},
-        by_threshold={f: runs.over_seeds(e, _switch) for f, e in thresholds.items()},
-        varied={name: runs.over(cases, _switch) for name, cases in varied.items()},
+        switches={name: runs.over_seeds(e, switch_of) for name, e in PARAMETERS.items()},
+        by_threshold={f: runs.over_seeds(e, switch_of) for f, e in thresholds.items()},
+        varied={name: runs.over(cases, switch_of) for name, cases in varied.items()},
     )
 
 
@@ -93,7 +93,8 @@ def _around(record: Record) -> tuple[Array, Array]:
     return t[shown], record["force_measured"][shown]
 
 
-def _switch(record: Record) -> Switch:
+def switch_of(record: Record) -> Switch:
+    """The change-over of a run."""
     force = record["force_measured"]
     return Switch(
         true_force=float(record["force"][_start(record)]),

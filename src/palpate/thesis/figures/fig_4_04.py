@@ -44,7 +44,7 @@ class Data:
 def run(runs: Runs) -> Data:
     """One steady press a seed."""
     t, sampled, filtered = _steady(runs.one(PARAMETERS))
-    ranges = runs.over_seeds(PARAMETERS, _half_ranges)
+    ranges = runs.over_seeds(PARAMETERS, half_ranges)
     return Data(t, sampled, filtered, [r[0] for r in ranges], [r[1] for r in ranges])
 
 
@@ -87,6 +87,7 @@ def _steady(record: Record) -> tuple[NDArray[np.float64], NDArray[np.float64], N
     return t[last], record["force_sampled"][last], record["force_measured"][last]
 
 
-def _half_ranges(record: Record) -> tuple[float, float]:
+def half_ranges(record: Record) -> tuple[float, float]:
+    """Half of peak-to-peak of the sampled and of the filtered force at the end of a run [N]."""
     _, sampled, filtered = _steady(record)
     return float(np.ptp(sampled)) / 2, float(np.ptp(filtered)) / 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,7 @@ from palpate.thesis.claims import Claim, decided, often, spread
 from palpate.thesis.least_squares import panels
 from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.neural_identifier import network
-from palpate.thesis.neural_identifier.network import STARTS, Answer, Choice, Press
+from palpate.thesis.neural_identifier.network import Answer, Press
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -45,31 +45,34 @@ class Data:
     curves: dict[float, Array]  # K, B, M and error by rate, of the first press and start
     found: dict[float, dict[float, list[Answer]]]  # by amplitude and rate, a press and a start for each seed
     varied: dict[str, dict[float, list[Answer]]]  # by condition and rate
+    amplitude: float  # of the network as chosen [N]
 
 
 def run(runs: Runs) -> Data:
     """One press a seed, learned at every rate and several amplitudes; conditions with two noise seeds each."""
     some = network.presses(runs, PARAMETERS, "foam")
-    curves = {rate: network.learned(some[0], Choice(rate=rate), 0)[1] for rate in SHOWN}
-    found = {a: _by_rate(runs, some, a, RATES) for a in (Choice().amplitude, *OTHERS)}
+    own = network.chosen(runs)
+    starts = network.starts(runs)
+    curves = {rate: network.learned(some[0], replace(own, rate=rate), starts[0])[1] for rate in SHOWN}
+    found = {a: _by_rate(runs, some, a, RATES) for a in (own.amplitude, *OTHERS)}
     conditions = network.varied_presses(runs, PARAMETERS, "foam")
     varied = {
-        name: {rate: network.answers(runs, few, Choice(rate=rate), STARTS[:FEW]) for rate in SMALLER}
+        name: {rate: network.answers(runs, few, replace(own, rate=rate), starts[:FEW]) for rate in SMALLER}
         for name, few in conditions.items()
     }
-    return Data(some[0], curves, found, varied)
+    return Data(some[0], curves, found, varied, own.amplitude)
 
 
 def _by_rate(
     runs: Runs, some: Sequence[Press], amplitude: float, rates: Sequence[float]
 ) -> dict[float, list[Answer]]:
-    choices = [Choice(amplitude, rate=rate) for rate in rates]
+    choices = [replace(network.chosen(runs), amplitude=amplitude, rate=rate) for rate in rates]
     return {choice.rate: found for choice, found in network.swept(runs, some, choices).items()}
 
 
 def check(data: Data) -> Sequence[Claim]:
     """Smaller takes longer; too large never converges."""
-    found = data.found[Choice().amplitude]
+    found = data.found[data.amplitude]
     return [_slower(data, found), _too_large(data, found)]
 
 
@@ -119,13 +122,13 @@ def _too_large(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
         thesis="in words",
         measured=f"stuck from rate {told}; at {RATES[-1]:g} in {sum(map(stuck, largest))} of {len(largest)} runs",
         tolerance="from some rate up to 1e-1 on, in 9 of 10 runs the error is still above 1 N at the end of the 4 s",
-        verdict=decided(bool(np.isfinite(first[Choice().amplitude]))),
+        verdict=decided(bool(np.isfinite(first[data.amplitude]))),
         note=(
             "One step then changes the output by more than the error it is to remove. The weights are "
             "thrown to where the sigmoid is flat, and there its slope, with which every step is "
             "multiplied, is nearly zero: the output stays at its largest value and learning does not come "
             "back. From which rate on depends on the output amplitude, which the thesis does not give; "
-            f"with the chosen one it is {first[Choice().amplitude] / 1e-4:.0f} times its 1e-4."
+            f"with the chosen one it is {first[data.amplitude] / 1e-4:.0f} times its 1e-4."
         ),
     )
 

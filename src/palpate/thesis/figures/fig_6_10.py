@@ -52,14 +52,14 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Fifteen seconds of contact; the same on rubber and under the variations."""
-    nominal = runs.over_seeds(PARAMETERS, _ends)
+    nominal = runs.over_seeds(PARAMETERS, ends_of)
     seeds = runs.seeds[:VARIED_SEEDS]
     cases = [(name, e, seed) for seed in seeds for name, e in variations(PARAMETERS, seed).items()]
     varied: dict[str, list[Ends]] = {"as\nchosen": nominal}
-    for (name, _, _), ends in zip(cases, runs.over([(e, s) for _, e, s in cases], _ends), strict=True):
+    for (name, _, _), ends in zip(cases, runs.over([(e, s) for _, e, s in cases], ends_of), strict=True):
         varied.setdefault(name, []).append(ends)
     rubber = changed(RUBBER, {**HYBRID, "run.press": 15.0})
-    varied["rubber"] = runs.over_seeds(rubber, _ends)
+    varied["rubber"] = runs.over_seeds(rubber, ends_of)
     return Data(slot(runs.one(PARAMETERS), *SHOWN), nominal, varied, varied["rubber"])
 
 
@@ -80,13 +80,13 @@ def check(data: Data) -> Sequence[Claim]:
                 "in 9 of 10 runs: the true force's mean over the last second of the intervals is off by "
                 f"more than {SHARE:.0%} of the desired force, at 20 N and at 10 N"
             ),
-            verdict=decided(often(map(_misses, data.nominal))),
+            verdict=decided(often(map(misses, data.nominal))),
             note=(
                 "Too little at 20 N and too much at 10 N: what is missing is the friction of the joints, "
                 "which holds against the motion and which the gain of 1 + K_fp = 1.25 leaves almost as it "
                 "is. The levels of friction are chosen; the claim hangs on them and on the surface, since "
                 "on stiff rubber the tip hardly moves and friction stays elastic. "
-                f"{stops_holding(data.varied, _misses)}"
+                f"{stops_holding(data.varied, misses)}"
             ),
         )
     ]
@@ -100,7 +100,7 @@ def plot(data: Data) -> Figure:
         dots,
         data.varied,
         lambda e: abs(e.high),
-        _misses,
+        misses,
         limit=20.0 * SHARE,
         label="error at 20 N [N]",
         title="end of the 20 N intervals, each dot a run: green if it misses both levels, as claimed; dashed: 10 %",
@@ -108,11 +108,13 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def _misses(ends: Ends) -> bool:
+def misses(ends: Ends) -> bool:
+    """Whether both levels are missed by more than a tenth."""
     return abs(ends.high) > 20.0 * SHARE and abs(ends.low) > 10.0 * SHARE
 
 
-def _ends(record: Record) -> Ends:
+def ends_of(record: Record) -> Ends:
+    """Where the intervals of a run end."""
     t = since_contact(record)
     late = (t >= FROM) & (np.mod(t + 5e-7, 2.5) >= 1.5)
     error, desired = record["force"] - record["force_desired"], record["force_desired"]

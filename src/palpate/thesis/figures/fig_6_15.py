@@ -73,10 +73,10 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """The whole approach and fifteen seconds of contact; then with one cause changed at a time."""
-    varied = {"as\nchosen": runs.over_seeds(PARAMETERS, _errors)}
+    varied = {"as\nchosen": runs.over_seeds(PARAMETERS, errors_of)}
     for name, changes in CAUSES.items():
         e = changed(PARAMETERS, changes)
-        varied[name] = runs.over([(e, seed) for seed in runs.seeds[:VARIED_SEEDS]], _errors)
+        varied[name] = runs.over([(e, seed) for seed in runs.seeds[:VARIED_SEEDS]], errors_of)
     return Data(slot(runs.one(PARAMETERS), *SHOWN), varied)
 
 
@@ -99,7 +99,7 @@ def _not_zero(data: Data) -> Claim:
             f"in 9 of 10 runs: the RMS over 10 to 15 s after contact is more than {1e3 * VISIBLE[0]:g} "
             f"mm and more than {np.degrees(VISIBLE[1]):g} degrees"
         ),
-        verdict=decided(often(map(_visible, nominal))),
+        verdict=decided(often(map(visible, nominal))),
         note=(
             "Friction of the joints, and gains too soft to overcome it: an error of y by 3 mm asks "
             "motor 1 for about the torque that its friction withholds, so it stays. With half the "
@@ -167,7 +167,7 @@ def plot(data: Data) -> Figure:
         dots,
         data.varied,
         lambda e: 1e3 * e.y,
-        _visible,
+        visible,
         limit=1e3 * VISIBLE[0],
         label="RMS of y [mm]",
         title="10 to 15 s after contact, each dot a run: green if y and angle are visibly not zero; dashed: visible",
@@ -180,7 +180,8 @@ def _signal(axis: Axes, t: Any, values: Any, label: str, color: str) -> None:
     axis.set(ylabel=label, xlim=SHOWN)
 
 
-def _visible(e: Errors) -> bool:
+def visible(e: Errors) -> bool:
+    """Whether both errors are."""
     return e.y > VISIBLE[0] and e.phi > VISIBLE[1]
 
 
@@ -188,7 +189,8 @@ def _y(errors: Sequence[Errors]) -> list[float]:
     return [1e3 * e.y for e in errors]
 
 
-def _errors(record: Record) -> Errors:
+def errors_of(record: Record) -> Errors:
+    """The errors of a run of fifteen seconds of contact."""
     t = since_contact(record)
     first = int(np.argmax(t >= 0.0))
     inside = (t >= JUDGED[0]) & (t < JUDGED[1])

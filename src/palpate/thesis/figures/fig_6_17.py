@@ -59,8 +59,8 @@ class Data:
 def run(runs: Runs) -> Data:
     """Four cycles; the last two are what the first is compared with."""
     found = tracked(runs, PARAMETERS, SHOWN, JUDGED)
-    away = runs.over_seeds(PARAMETERS, _away)
-    times = [_adapted(one) for one in away]
+    away = runs.over_seeds(PARAMETERS, away_from_settled)
+    times = [adapted_at(one) for one in away]
     return Data(
         found, np.array(1e-3 * np.arange(len(away[0])) + SMOOTHED / 2, dtype=np.float64), away[0], times
     )
@@ -127,7 +127,7 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def _away(record: Record) -> NDArray[np.float64]:
+def away_from_settled(record: Record) -> NDArray[np.float64]:
     """Smoothed distance of the force from the mean of the last two cycles, from contact on [N]."""
     force = record["force"][since_contact(record) >= 0.0]
     ticks = round(CYCLE * 1000)
@@ -139,7 +139,7 @@ def _away(record: Record) -> NDArray[np.float64]:
     return smoothed
 
 
-def _adapted(away: NDArray[np.float64]) -> float:
+def adapted_at(away: NDArray[np.float64]) -> float:
     """When the distance has come below the limit for good [s]."""
     beyond = np.nonzero(away > LIMIT)[0]
     return SMOOTHED + (float(beyond[-1]) * 1e-3 if len(beyond) else 0.0)

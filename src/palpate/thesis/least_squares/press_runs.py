@@ -12,6 +12,7 @@ from palpate.bench import Experiment, changed, load
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 from palpate.thesis.conditions import moved
+from palpate.thesis.laboratory.surfaces import own_damping
 from palpate.thesis.runs import Runs
 
 Array = NDArray[np.float64]
@@ -151,7 +152,7 @@ class Found:
     settled_B: float
     settled_K: float
     early_apart: float  # K at 4 s against f/x of the second before it, as a share
-    true_B: float  # of the surface; of one that relaxes, its dashpot's [N s/m]
+    true_B: float  # of the surface; of one that relaxes, its dashpot's, of one that stiffens, that at 20 N [N s/m]
 
     @property
     def apart(self) -> float:
@@ -171,7 +172,7 @@ def found(record: Record) -> Found:
     values = {name: at(press, f"{name}_thesis", end) for name in "MBK"}
     raw = {f"{name}_raw": at(press, f"{name}_raw", end) for name in "MBK"}
     settled = {f"settled_{name}": settled_after(press[f"{name}_thesis"]) for name in "MBK"}
-    damping = float(record.meta["experiment"]["surface"]["damping"])
+    damping = own_damping(record.meta["experiment"]["surface"])
     early = at(press, "K_thesis", FIRST) / ratio(press, (FIRST - 1.0, FIRST)) - 1.0
     return Found(ratio(press), **values, **raw, **settled, early_apart=early, true_B=damping)
 

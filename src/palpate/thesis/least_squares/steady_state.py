@@ -6,12 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
 from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
+from palpate.thesis.laboratory.surfaces import own_damping
 from palpate.thesis.least_squares import panels, press_runs
 from palpate.thesis.least_squares.press_runs import Array, Found, median
 from palpate.thesis.runs import Runs
@@ -48,7 +50,7 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment], *, vary: int) -> Data:
     """One press a seed on each surface, and conditions varied on the first `vary` of them."""
     first = next(iter(surfaces.values()))
     each = runs.over_seeds(first, lambda record: by_ratios(press_runs.contact(record)))
-    surface = first.surface
+    surface = msgspec.to_builtins(runs.laboratory.of(first).surface)
     return Data(
         shown={name: press_runs.contact(runs.one(e)) for name, e in surfaces.items()},
         found={name: runs.over_seeds(e, press_runs.found) for name, e in surfaces.items()},
@@ -57,7 +59,7 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment], *, vary: int) -> Data:
             for name, e in list(surfaces.items())[:vary]
         },
         ratios={key: np.array([one[key] for one in each]) for key in "KBM"},
-        truth={"M": surface.mass, "B": surface.damping, "K": surface.stiffness},
+        truth={"M": surface["mass"], "B": own_damping(surface), "K": surface["stiffness"]},
     )
 
 
@@ -79,7 +81,7 @@ def by_ratios(press: Record) -> dict[str, Array]:
     seen = np.abs(a) > LEAST_ACCELERATION
     inertia = left[seen] / a[seen]
     return {
-        key: np.percentile(values, QUANTILES)
+        key: np.percentile(values, QUANTILES) if len(values) else np.full(len(QUANTILES), np.nan)
         for key, values in (("K", stiffness), ("B", damping), ("M", inertia))
     }
 

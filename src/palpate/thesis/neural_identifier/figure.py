@@ -44,7 +44,7 @@ def run(runs: Runs, experiment: Experiment, surface: str) -> Data:
     some = network.presses(runs, experiment, surface)
     return Data(
         some[0],
-        [network.learned(some[0], Choice(), start)[1] for start in STARTS[:SHOWN_STARTS]],
+        [network.learned(some[0], network.chosen(runs), start)[1] for start in STARTS[:SHOWN_STARTS]],
         grounds(runs, experiment, surface, some),
     )
 
@@ -52,14 +52,14 @@ def run(runs: Runs, experiment: Experiment, surface: str) -> Data:
 def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[Press]) -> Grounds:
     """What claims about a surface are decided from."""
     x = SETTINGS[surface].values[0]
-    at_probe = experiment.approach.switch + experiment.surface.stiffness * x
+    at_probe = experiment.approach.switch + runs.laboratory.of(experiment).surface.stiffness * x
     return Grounds(
         surface,
-        network.answers(runs, some, Choice()),
+        network.answers(runs, some, network.chosen(runs)),
         network.swept(runs, some),
         network.varied(runs, experiment, surface),
         at_probe / x / float(np.median([press.ratio for press in some])),
-        len(STARTS),
+        len(network.starts(runs)),
     )
 
 

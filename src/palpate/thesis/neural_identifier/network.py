@@ -120,6 +120,16 @@ class Choice:
         )
 
 
+def chosen(runs: Runs) -> Choice:
+    """The network of the runs' laboratory."""
+    return Choice(runs.laboratory.amplitude, runs.laboratory.weights)
+
+
+def starts(runs: Runs) -> tuple[int, ...]:
+    """The seeds of the weights that its claims are looked at over: all, or the laboratory's own."""
+    return STARTS if runs.laboratory.start is None else (int(runs.laboratory.start),)
+
+
 AMPLITUDES = (22.0, 25.0, 30.0, 40.0, 60.0, 100.0, 200.0)
 WEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0)
 SWEEP = [Choice(a, w, t) for t, a, w in product((True, False), AMPLITUDES, WEIGHTS)]
@@ -196,18 +206,21 @@ def error_gone(error: Array) -> float:
 
 
 def answers(
-    runs: Runs, some: Sequence[Press], choice: Choice, starts: Sequence[int] = STARTS
+    runs: Runs, some: Sequence[Press], choice: Choice, from_: Sequence[int] | None = None
 ) -> list[Answer]:
     """Every start on every press."""
-    cases = [(press, choice, start) for press in some for start in starts]
+    cases = [(press, choice, start) for press in some for start in (starts(runs) if from_ is None else from_)]
     return runs.map(lambda case: answer(*case), cases)
 
 
 def swept(
     runs: Runs, some: Sequence[Press], choices: Sequence[Choice] = tuple(SWEEP)
 ) -> dict[Choice, list[Answer]]:
-    """For each choice as many answers as there are presses, each of them with a start of its own."""
-    cases = [(press, choice, start) for choice in choices for start, press in enumerate(some)]
+    """For each choice as many answers as there are presses, each of them with a start of its own if there are many."""
+    own = starts(runs)
+    cases = [
+        (press, choice, i if len(own) > 1 else own[0]) for choice in choices for i, press in enumerate(some)
+    ]
     found = iter(runs.map(lambda case: answer(*case), cases))
     return {choice: [next(found) for _ in some] for choice in choices}
 
@@ -228,7 +241,8 @@ def _kind(experiment: Experiment) -> str:
 def varied(runs: Runs, experiment: Experiment, surface: str) -> dict[str, list[Answer]]:
     """Answers of networks as chosen under each condition."""
     some = varied_presses(runs, experiment, surface)
-    return {name: answers(runs, few, Choice(), STARTS[:VARIED_STARTS]) for name, few in some.items()}
+    own = starts(runs)[:VARIED_STARTS]
+    return {name: answers(runs, few, chosen(runs), own) for name, few in some.items()}
 
 
 def varied_presses(runs: Runs, experiment: Experiment, surface: str) -> Mapping[str, list[Press]]:

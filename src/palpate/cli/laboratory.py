@@ -1,0 +1,114 @@
+"""`palpate laboratory`: the laboratory under which most of the thesis' own sentences are true at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter, validators
+
+from palpate.cli._terminal import console, place, print_json, say, show_table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from palpate.thesis.inference.findings import Result
+    from palpate.thesis.inference.search import Runner
+
+
+# More than seven arguments: each is a flag of the command.
+def laboratory(
+    *,
+    out: Path = Path("runs/laboratory"),
+    particles: Annotated[int, Parameter(validator=validators.Number(gte=8, lte=100_000))] = 64,
+    moves: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1000))] = 2,
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=2**31 - 1))] = 1,
+    cores: Annotated[int | None, Parameter(validator=validators.Number(gte=1, lte=1024))] = None,
+    half: Annotated[bool, Parameter(negative="")] = False,
+    scheduler: str | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Infer what the thesis does not tell of its laboratory: once from half of its figures, once from all.
+
+    Args:
+        out: folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there is
+            gone on with.
+        particles: points of the posterior; it begins with four times as many of the prior.
+        moves: of each particle at each temperature.
+        seed: of everything drawn.
+        cores: that try laboratories side by side; all when left out.
+        half: search by the calibration half alone, in a third of the time; what it finds is looked at by all.
+        scheduler: address of a Dask scheduler whose workers try them, tcp://HOST:PORT. What they send back may run
+            anything here: name only a cluster that is trusted as this machine is.
+        force: replace the inference that stands there already.
+        json: print what was found as JSON and nothing else.
+    """
+    from palpate.bench.speed import cores as all_cores
+    from palpate.thesis.inference.infer import Inference
+    from palpate.thesis.inference.sampler import Settings
+
+    command = (
+        f"palpate laboratory --particles {particles} --moves {moves} --seed {seed}{' --half' if half else ''}"
+    )
+    threads = cores or all_cores()
+    screen = console(stderr=True)
+    try:
+        with _runner(scheduler, threads) as runner, _progress(screen) as told:
+            settings = Settings(particles + particles % 2, moves=moves, seed=seed)
+            result = Inference(out, settings, runner, command, threads, half, told).run(force=force)
+    except KeyboardInterrupt:
+        say(f"interrupted; what is tried is saved in {out}, and the same command goes on from there")
+        return 130
+    _tell(result, out, command, json)
+    return 0
+
+
+@contextmanager
+def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
+    from palpate.thesis.inference.search import Threads, Workers
+
+    if scheduler is None:
+        yield Threads(threads)
+        return
+    from palpate.studies.cluster import Cluster
+
+    cluster = Cluster(scheduler)
+    try:
+        yield Workers(cluster)
+    finally:
+        cluster.close()
+
+
+@contextmanager
+def _progress(screen: Console) -> Iterator[Callable[[str, int], None]]:
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=screen, transient=True) as progress:
+        bar = progress.add_task("compiling", total=None)
+
+        def told(what: str, count: int) -> None:
+            progress.update(bar, description=f"{what}: {count} laboratories")
+
+        yield told
+
+
+def _tell(result: Result, folder: Path, command: str, as_json: bool) -> None:
+    from palpate.report.page import Table
+    from palpate.thesis.inference.findings import PAGE, halves, laboratories
+    from palpate.thesis.inference.findings import as_json as numbers
+
+    if as_json:
+        print_json(numbers(result, command))
+        return
+    screen = console()
+    rows = [
+        (name, *(f"{one.count(of)} of {len(of)}" for of in halves().values()))
+        for name, one in laboratories(result).items()
+    ]
+    show_table(screen, Table("", ("laboratory", "calibration", "validation", "all"), rows))
+    place(screen, "laboratory:", folder / "inferred.toml")
+    place(screen, "page:", folder / PAGE)

@@ -1,0 +1,188 @@
+"""From the sentences to the laboratories under which they are most probable."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._jit import sources_stamp
+from palpate.studies.local import unordered
+from palpate.thesis.inference import archive, sampler
+from palpate.thesis.inference.archive import Archive, Head, Tried
+from palpate.thesis.inference.sampler import Sample, Settings
+from palpate.thesis.inference.sentences import HOLDS, Sentence
+from palpate.thesis.inference.trial import STEPS, Trial
+from palpate.thesis.laboratory.laboratory import drawn
+from palpate.thesis.laboratory.unknowns import UNKNOWNS
+
+if TYPE_CHECKING:
+    from palpate.studies.cluster import Cluster
+
+Array = NDArray[np.float64]
+WRONG = 0.05
+"""How probable it is that a sentence does not hold in the very laboratory that it was written in: one in twenty."""
+MISS = math.log((1.0 - WRONG) / WRONG)
+"""What a sentence that does not hold takes off the log-likelihood."""
+
+
+class Job(msgspec.Struct, frozen=True):
+    """A laboratory to be tried until it misses more sentences than are allowed."""
+
+    number: int
+    shares: tuple[float, ...]
+    allowed: float
+
+
+class Runner(Protocol):
+    """Tries laboratories: here, or on a cluster."""
+
+    def tried(self, jobs: Iterable[Job], ids: tuple[str, ...]) -> Iterator[Tried]:
+        """What becomes of the jobs, in any order, by the sentences of these names."""
+        ...
+
+
+class Threads:
+    """This machine's cores: compiled loops release the interpreter."""
+
+    def __init__(self, threads: int):
+        self._threads = threads
+
+    def tried(self, jobs: Iterable[Job], ids: tuple[str, ...]) -> Iterator[Tried]:
+        """As they are done; who stops asking stops the runs that are under way."""
+        stop = threading.Event()
+        try:
+            yield from unordered(lambda job: attempt(job, ids, stop.is_set), jobs, self._threads)
+        finally:
+            stop.set()
+
+
+class Workers:
+    """The workers of a Dask cluster, which have the same sources."""
+
+    def __init__(self, cluster: Cluster):
+        self._cluster = cluster
+
+    def tried(self, jobs: Iterable[Job], ids: tuple[str, ...]) -> Iterator[Tried]:
+        """As they are done."""
+        return self._cluster.map(partial(attempt, ids=ids), jobs)
+
+
+@dataclass(frozen=True)
+class Search:
+    """A search.
+
+    Args:
+        sentences: that decide, in the order in which they are tried.
+        settings: of the sampler.
+        runner: who tries.
+        progress: told how many laboratories are tried.
+        borrowed: verdicts of these sentences from another search that began with the same laboratories.
+    """
+
+    sentences: Sequence[Sentence]
+    settings: Settings
+    runner: Runner
+    progress: Callable[[int], None] = lambda _: None
+    borrowed: Mapping[int, Tried] = field(default_factory=dict)
+
+    def run(self, path: Path) -> Sample:
+        """The posterior; every laboratory is in the archive at `path` as soon as it is tried.
+
+        Raises:
+            InputError: the archive is of another search.
+        """
+        with archive.opened(path, self.head()) as book:
+            redrawn = np.array([unknown.redrawn for unknown in UNKNOWNS])
+            return sampler.sample(_Asked(self, book), redrawn, self.settings)
+
+    def survey(self, path: Path) -> None:
+        """Tries the laboratories of the prior alone, with which `run` begins."""
+        with archive.opened(path, self.head()) as book:
+            points = sampler.prior(self.settings, len(UNKNOWNS))
+            _Asked(self, book)(points, np.full(len(points), -np.inf))
+
+    def head(self) -> Head:
+        """What tells its archive from any other."""
+        from palpate import __version__
+
+        told = f"{self.settings} steps {STEPS} {[u.name for u in UNKNOWNS]}"
+        ids = tuple(s.id for s in self.sentences)
+        return Head("The thesis' laboratory", str(__version__), told, stamp(), ids)
+
+
+@dataclass
+class _Asked:
+    """The likelihood as the sampler asks for it; what the archive knows is not tried again."""
+
+    search: Search
+    book: Archive
+    number: int = 0
+
+    def __call__(self, points: Array, floor: Array) -> Array:
+        allowed = np.floor(-floor / MISS + 1e-9)
+        jobs = [
+            Job(self.number + i, tuple(point.tolist()), float(most))
+            for i, (point, most) in enumerate(zip(points, allowed, strict=True))
+        ]
+        self.number += len(jobs)
+        for job in jobs:
+            other = self.search.borrowed.get(job.number)
+            if other is not None and other.shares == job.shares and job.number not in self.book.known:
+                self.book.add(other)
+        self._try([job for job in jobs if job.number not in self.book.known])
+        return np.array([-MISS * self._misses(job) for job in jobs])
+
+    def _try(self, jobs: Sequence[Job]) -> None:
+        for tried in self.search.runner.tried(jobs, tuple(s.id for s in self.search.sentences)):
+            self.book.add(tried)
+            self.search.progress(len(self.book.known))
+
+    def _misses(self, job: Job) -> float:
+        """Of the sentences; of one that was given up, more than are allowed."""
+        verdicts = self.book.known[job.number].verdicts
+        return float(verdicts.count(False))
+
+
+def borrowed(path: Path, head: Head, of: Sequence[Sentence], wanted: Sequence[Sentence]) -> dict[int, Tried]:
+    """What another search's archive tells of the sentences wanted, where it was not given up; nothing if it is none."""
+    if not path.exists():
+        return {}
+    there, known, _ = archive.read(path)
+    if there != head:
+        return {}
+    at = [of.index(sentence) for sentence in wanted]
+    return {
+        number: Tried(number, one.shares, tuple(one.verdicts[i] for i in at))
+        for number, one in known.items()
+        if len(one.verdicts) == len(of)
+    }
+
+
+def stamp() -> str:
+    """Hash of the sources that a trial consists of."""
+    here = Path(__file__).parent
+    of_figures = ("figures", "force_control", "least_squares", "neural_identifier", "laboratory")
+    files = [path for folder in of_figures for path in sorted((here.parent / folder).rglob("*.py"))]
+    return sources_stamp(*files, here / "trial.py", here / "sentences.py")
+
+
+def attempt(job: Job, ids: Sequence[str], stopped: Callable[[], bool] = lambda: False) -> Tried:
+    """One laboratory, sentence by sentence in the order of their names, until it misses more than are allowed."""
+    trial = Trial(drawn(job.shares), stopped=stopped)
+    verdicts: list[bool] = []
+    missed = 0
+    for id_ in ids:
+        verdicts.append(bool(HOLDS[id_](trial)))
+        missed += not verdicts[-1]
+        if missed > job.allowed:
+            break
+    return Tried(job.number, job.shares, tuple(verdicts))

@@ -1,0 +1,366 @@
+"""The thesis' laboratory: its unknowns, what it makes of an experiment, and the search for it."""
+
+import math
+import re
+
+import msgspec
+import numpy as np
+import pytest
+
+from palpate.bench import Experiment, build, changed, load
+from palpate.cli import main
+from palpate.errors import InputError
+from palpate.studies.cluster import Cluster
+from palpate.thesis.claims import Claim, count_in_words, counted, with_wholes
+from palpate.thesis.conditions import rougher
+from palpate.thesis.figure import studies, study
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, SINE
+from palpate.thesis.inference import archive, contradictions, findings, infer, judge, sampler, search
+from palpate.thesis.inference.archive import Tried
+from palpate.thesis.inference.posterior import marginals
+from palpate.thesis.inference.sampler import Settings, sample
+from palpate.thesis.inference.search import MISS, Job, Search, Threads, Workers
+from palpate.thesis.inference.sentences import CHEAP_FIRST, HOLDS, searched, sentences
+from palpate.thesis.inference.trial import Trial
+from palpate.thesis.laboratory import files
+from palpate.thesis.laboratory.laboratory import CHOSEN, Laboratory, checked, drawn, values
+from palpate.thesis.laboratory.surfaces import own_damping, stiffening
+from palpate.thesis.laboratory.unknowns import BY_NAME, LISTING, RELAXING, STIFFENING, UNKNOWNS
+from palpate.thesis.least_squares import press_runs
+from palpate.thesis.measure import measure
+from palpate.thesis.runs import Runs
+from studies.cluster import local_cluster
+
+
+def test_every_unknown_is_a_field_with_a_range_that_holds_its_own_ends():
+    assert [u.name for u in UNKNOWNS] == list(Laboratory.__dataclass_fields__)
+    for u in UNKNOWNS:
+        assert u.reason
+        assert u.low < u.high
+        assert u.at(0.0) == pytest.approx(u.choices[0] if u.choices else u.low)
+        assert u.at(1.0) == pytest.approx(u.choices[-1] if u.choices else u.high)
+
+
+def test_the_hand_chosen_bench_lies_in_the_ranges():
+    for name, value in values(CHOSEN).items():
+        assert BY_NAME[name].holds(value), name
+
+
+@pytest.mark.parametrize("experiment", [FOAM, RUBBER, press_runs.PLAIN, press_runs.RELAXING])
+def test_the_hand_chosen_bench_changes_nothing(experiment: Experiment):
+    assert CHOSEN.of(experiment) == experiment
+
+
+def test_what_a_figure_varies_is_varied_about_the_laboratorys_own_value():
+    lab = Laboratory(friction=0.5, foam_damping=100.0)
+    twice = lab.of(changed(FOAM, {**rougher(FOAM, 2.0), "surface.damping": 400.0}))
+    assert twice.friction.coulomb == pytest.approx(FOAM.friction.coulomb)
+    assert twice.surface.damping == pytest.approx(200.0)
+
+
+def test_a_laboratory_changes_what_it_names():
+    lab = Laboratory(
+        wall=0.45,
+        motor2=5.0,
+        noise=0.3,
+        controller_weights=3.0,
+        restart=0.0,
+        arm_stiffness=1e5,
+        asymmetry=0.2,
+    )
+    e = lab.of(changed(FOAM, SINE))
+    assert e.wall.x - e.robot.start[0] == pytest.approx(FOAM.wall.x - FOAM.robot.start[0])
+    assert e.robot.torque_limits == (16.0, 5.0, 0.6)
+    assert e.force_sensor.noise == pytest.approx(0.3)
+    assert (e.controller.weights, e.controller.weights_seed) == ("random", 3)
+    assert e.force.restart == 0.0
+    assert e.elastic is not None
+    assert e.elastic.stiffness == 1e5
+    assert e.friction.asymmetry == 0.2
+
+
+def test_foams_of_all_laws_sink_in_alike_from_5_to_20_N():
+    for n in (1.0, 1.5, 2.5):
+        s = stiffening(5200.0, 200.0, 0.1, n)
+        depth = [(f / s["stiffness"]) ** (1.0 / n) for f in (5.0, 20.0)]
+        assert 15.0 / (depth[1] - depth[0]) == pytest.approx(5200.0)
+        assert s["damping"] * depth[1] ** n == pytest.approx(200.0)
+        assert own_damping(s) == pytest.approx(200.0)
+    assert Laboratory(foam_law=STIFFENING).of(FOAM).surface.exponent == 1.5
+    assert Laboratory(foam_law=RELAXING, foam_branch=2.0).of(FOAM).surface.branch_stiffness == pytest.approx(
+        10400.0
+    )
+    assert Laboratory(foam_law=RELAXING).of(RUBBER).surface.stiffness == RUBBER.surface.stiffness
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[unknowns]\nfrictoin = 1.0", "friction"),
+        ("[unknowns]\nfriction = 9.0", "between 0.05 and 1.47"),
+        ("[unknowns]\nrestart = 2.0", "one of"),
+        ('[unknowns]\nnoise = "much"', "must be a number"),
+        ("[unknowns]\nnoise = nan", "between"),
+        ("unknowns = 3", "no table"),
+        ("colour = 3\n[unknowns]", "unknown key"),
+        ("[unknowns", "not TOML"),
+    ],
+)
+def test_a_bad_file_is_refused_in_a_line(tmp_path, text: str, told: str):
+    path = tmp_path / "lab.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=told) as refused:
+        files.named(str(path))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_laboratory_comes_back_from_its_file(tmp_path):
+    lab = drawn([0.3] * len(UNKNOWNS))
+    path = tmp_path / "lab.toml"
+    path.write_text(files.text(lab, 'about "it"', "palpate laboratory --seed 1", 1))
+    assert files.named(str(path)) == lab
+    assert files.named("bench") is CHOSEN
+    assert checked({}, "nothing") == CHOSEN
+
+
+def test_each_surface_and_each_controller_stands_in_both_halves():
+    for half in (True, False):
+        ids = " ".join(s.id for s in sentences() if s.calibrates is half)
+        for word in ("foam", "rubber", "least-squares", "network", "neural-foam", "neural-rubber"):
+            assert word in ids, (half, word)
+
+
+def test_sentences_are_claims_of_their_figures_and_each_has_a_law():
+    assert {s.id for s in sentences()} == set(HOLDS)
+    assert len(sentences()) == len(HOLDS)
+    assert {s.figure for s in sentences()} <= {s.NUMBER for s in studies()}
+    assert {s.figure for s in searched(calibrating=False)} == set(CHEAP_FIRST)
+
+
+def gaussian(points, _):
+    return -0.5 * (((points - MIDDLE) / WIDTH) ** 2).sum(axis=1)
+
+
+MIDDLE, WIDTH = np.array([0.3, 0.6, 0.5]), np.array([0.05, 0.1, 0.02])
+
+
+def test_the_sampler_finds_a_known_posterior():
+    found = sample(gaussian, np.zeros(3, dtype=bool), Settings(400, 4, 4, 1))
+    # 400 points know a mean to a twentieth of the width, and the width to a twenty-eighth of it; three times that.
+    assert np.all(np.abs(found.points.mean(axis=0) - MIDDLE) < 0.15 * WIDTH)
+    assert found.points.std(axis=0) == pytest.approx(WIDTH, rel=0.15)
+    assert found.stages[-1].beta == 1.0
+
+
+def test_the_sampler_weighs_choices_and_steps():
+    def steps(points, _):
+        return np.where(points[:, 0] < 0.25, 0.0, -math.log(3.0))
+
+    found = sample(steps, np.array([True]), Settings(2000, 2, 4, 2))
+    # A quarter of the prior weighs three times as much as the rest: half of the posterior; three standard errors.
+    assert np.mean(found.points[:, 0] < 0.25) == pytest.approx(0.5, abs=3 * 0.5 / math.sqrt(2000))
+
+
+def test_a_floor_never_changes_what_is_sampled():
+    def lazy(points, floor):
+        full = gaussian(points, floor)
+        return np.where(full < floor, -np.inf, full)
+
+    settings = Settings(40, 4, 2, 3)
+    redrawn = np.zeros(3, dtype=bool)
+    assert np.array_equal(sample(gaussian, redrawn, settings).points, sample(lazy, redrawn, settings).points)
+
+
+class Stub:
+    """Tries laboratories by a rule that costs nothing, and can be interrupted."""
+
+    def __init__(self, after: int | None = None):
+        self.after, self.asked = after, 0
+
+    def tried(self, jobs, ids):
+        for job in jobs:
+            if self.asked == self.after:
+                raise KeyboardInterrupt
+            self.asked += 1
+            holds = [job.shares[i % len(job.shares)] < 0.7 for i in range(len(ids))]
+            cut = next(
+                (i + 1 for i in range(len(ids)) if holds[: i + 1].count(False) > job.allowed), len(ids)
+            )
+            yield Tried(job.number, job.shares, tuple(holds[:cut]))
+
+
+def test_an_interrupted_search_ends_as_one_that_was_not(tmp_path):
+    of, settings = searched(calibrating=True), Settings(16, 2, 1, 5)
+    whole = Search(of, settings, Stub()).run(tmp_path / "whole.jsonl")
+    with pytest.raises(KeyboardInterrupt):
+        Search(of, settings, Stub(after=50)).run(tmp_path / "cut.jsonl")
+    path = tmp_path / "cut.jsonl"
+    path.write_bytes(path.read_bytes()[:-7])  # a kill tears the last line
+    again = Stub()
+    resumed = Search(of, settings, again).run(path)
+    assert np.array_equal(whole.points, resumed.points)
+    assert again.asked == len(archive.read(tmp_path / "whole.jsonl")[1]) - 49
+    assert resumed.likelihood.max() >= -MISS * len(of)
+
+
+def test_an_archive_of_another_search_is_refused(tmp_path):
+    of, path = searched(calibrating=True), tmp_path / "some.jsonl"
+    Search(of, Settings(8, 2, 1, 5), Stub()).run(path)
+    with pytest.raises(InputError, match="another search"):
+        Search(of, Settings(8, 2, 1, 6), Stub()).run(path)
+    path.write_bytes(b"not ours\n")
+    with pytest.raises(InputError, match="did not write it"):
+        Search(of, Settings(8, 2, 1, 5), Stub()).run(path)
+
+
+def test_what_one_search_tried_in_full_is_lent_to_the_other(tmp_path):
+    all_, half = searched(calibrating=False), searched(calibrating=True)
+    settings, path = Settings(8, 2, 1, 5), tmp_path / "all.jsonl"
+    one = Search(all_, settings, Stub())
+    one.run(path)
+    lent = search.borrowed(path, one.head(), all_, half)
+    full = {n: t for n, t in archive.read(path)[1].items() if len(t.verdicts) == len(all_)}
+    assert set(lent) == set(full)
+    assert lent[0].verdicts == tuple(full[0].verdicts[all_.index(s)] for s in half)
+
+
+def test_a_laboratory_is_given_up_once_it_misses_more_than_is_allowed():
+    ids = [s.id for s in searched(calibrating=True) if s.figure == "6.1"]
+    job = Job(0, (0.0,) * len(UNKNOWNS), -1.0)  # no miss at all is allowed: given up at the first sentence
+    assert len(search.attempt(job, ids).verdicts) == 1
+
+
+def test_threads_try_what_they_are_given():
+    ids = tuple(s.id for s in searched(calibrating=True) if s.figure == "6.1")
+    jobs = [Job(n, (0.5,) * len(UNKNOWNS), math.inf) for n in range(2)]
+    found = sorted(Threads(2).tried(jobs, ids), key=lambda t: t.number)
+    assert found[0].verdicts == found[1].verdicts
+    assert [t.number for t in found] == [0, 1]
+
+
+def test_a_worker_of_a_cluster_finds_what_a_thread_does(tmp_path):
+    ids, jobs = ("force-noise",), [Job(n, (0.5,) * len(UNKNOWNS), math.inf) for n in range(2)]
+    with local_cluster(tmp_path, workers=1) as running:
+        cluster = Cluster(running.address)
+        try:
+            found = list(Workers(cluster).tried(jobs, ids))
+        finally:
+            cluster.close()
+    assert sorted(found, key=lambda t: t.number) == sorted(
+        Threads(1).tried(jobs, ids), key=lambda t: t.number
+    )
+
+
+def test_a_trial_of_the_bench_says_what_its_figures_do():
+    trial = Trial(CHOSEN, steps=20)
+    record = build(press_runs.PLAIN).run(60.0, 0, press=press_runs.PLAIN.run.press)
+    assert trial.foam is not None
+    assert trial.foam.found == press_runs.found(record)
+
+
+def test_contradictions_are_pairs_that_were_expected_and_never_seen():
+    rng = np.random.default_rng(4)
+    first = rng.random(200) < 0.5
+    rows = {
+        i: Tried(i, (0.5,), (bool(a), not a, bool(rng.random() < 0.5), False)) for i, a in enumerate(first)
+    }
+    table = contradictions.table(("a", "not a", "by chance", "never"), rows)
+    assert [(p.first, p.second) for p in table.pairs()] == [("a", "not a")]
+    assert [x.id for x in table.alone() if x.true == 0] == ["never"]
+
+
+def test_verdicts_that_were_given_up_are_not_taken_for_no():
+    rows = {0: Tried(0, (0.5,), (True, False)), 1: Tried(1, (0.5,), (True,))}
+    assert [x.tried for x in contradictions.table(("a", "b"), rows).alone()] == [2, 1]
+
+
+def test_what_a_part_was_not_asked_is_not_known_of_it():
+    whole = contradictions.table(("a", "b"), {0: Tried(0, (0.5,), (True, False))})
+    both = contradictions.joined(whole, contradictions.table(("b",), {0: Tried(0, (0.5,), (True,))}))
+    assert [(x.id, x.true, x.tried) for x in both.alone()] == [("a", 1, 1), ("b", 1, 2)]
+
+
+def test_marginals_say_what_is_told():
+    points = np.random.default_rng(1).random((400, len(UNKNOWNS)))
+    points[:, 0] = 0.5 + 0.05 * (points[:, 0] - 0.5)
+    found = marginals(points)
+    assert found[0].verdict == "told"
+    assert found[2].verdict == "not told"
+    assert re.fullmatch(r"[\d.]+ \([\d.]+ to [\d.]+\) times the bench's", found[0].in_words())
+
+
+def test_the_best_of_a_posterior_misses_fewest():
+    points = np.linspace(0.1, 0.9, 3)[:, None] * np.ones(len(UNKNOWNS))
+    found = sampler.Sample(points, np.array([-2.0, -1.0, -1.0]), ())
+    assert infer.best(found) == drawn(points[1])
+
+
+def test_a_figure_is_measured_in_another_laboratory(tmp_path):
+    runs = Runs(range(2), laboratory=Laboratory(noise=0.15))
+    (done,) = measure([study("4.4")], runs, tmp_path / "thesis", command="palpate thesis 4.4")
+    (claim,) = done.claims
+    assert claim.verdict == "differs"
+    assert "noise 0.15" in claim.note
+    assert "1 claims measured" in (tmp_path / "thesis" / "index.html").read_text()
+    rows = msgspec.json.decode((tmp_path / "thesis" / "claims.json").read_bytes())
+    assert [r["group"] for r in rows] == [False]
+
+
+def row(name: str, verdict) -> Claim:
+    return Claim(name, "", "", "", "", "", verdict, "")
+
+
+def test_claims_are_counted_without_the_rows_that_sum_them_up():
+    rows = with_wholes([row("a.K", "reproduced"), row("a.B", "differs"), row("b", "not checkable")])
+    assert [r.group for r in rows] == [True, False, False, False]
+    assert counted(rows).total() == 3
+    assert count_in_words(rows) == "3 claims measured: 1 reproduced, 1 differ, 1 not checkable"
+
+
+def test_the_listings_weights_stay_where_a_figure_has_others():
+    e = changed(load("foam-neural"), {"controller.weights": "random", "controller.weights_seed": 7})
+    assert Laboratory(controller_weights=2.0).of(e).controller.weights_seed == 7
+    assert Laboratory(controller_weights=LISTING, noise=0.3).of(FOAM).controller.weights == "thesis"
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (["thesis", "--laboratory", "nowhere"], "unknown laboratory 'nowhere'"),
+        (["thesis", "2.2", "--laboratory", "lab.toml"], "tells nothing of the thesis' own laboratory"),
+        (["laboratory", "--particles", "3"], "particles"),
+        (["laboratory", "--scheduler", "nowhere"], "no address of a scheduler"),
+    ],
+)
+def test_the_command_line_refuses_what_it_cannot_do(tmp_path, capsys, monkeypatch, command, told: str):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab.toml").write_text("[unknowns]\nfriction = 0.5\n")
+    assert main(command) == 2
+    err = capsys.readouterr().err
+    assert told in err
+    assert "Traceback" not in err
+    assert [p.name for p in tmp_path.iterdir()] == ["lab.toml"]
+
+
+def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkeypatch):
+    some = tuple(s for s in sentences() if s.figure in {"6.1", "6.8", "4.4"})
+    monkeypatch.setattr(judge, "SEEDS", (0,))
+    monkeypatch.setattr(judge, "sentences", lambda: some)
+    monkeypatch.setattr(findings, "sentences", lambda: some)
+    monkeypatch.setattr(infer, "sentences", lambda: some)
+    run = infer.Inference(tmp_path / "lab", Settings(8, 2, 1, 5), Stub(), "palpate laboratory --seed 5")
+    result = run.run()
+    found = msgspec.json.decode((tmp_path / "lab" / "found.json").read_bytes())
+    assert found["true"]["inferred from all"]["all"] == {"true": result.by_all.count(some), "of": len(some)}
+    assert files.named(str(tmp_path / "lab" / "inferred.toml")) == result.by_all.laboratory
+    assert "posterior" in (tmp_path / "lab" / "index.html").read_text()
+    again = infer.Inference(
+        tmp_path / "lab", Settings(8, 2, 1, 5), Stub(after=0), "palpate laboratory --seed 5"
+    )
+    assert again.run().by_all == result.by_all
+
+
+def test_the_page_is_made_anew_only_by_the_same_search(tmp_path):
+    (tmp_path / "mine.txt").write_text("years of work")
+    with pytest.raises(InputError, match="holds other files"):
+        infer.Inference(tmp_path, Settings(8, 2, 1, 5), Stub(), "palpate laboratory").run(force=False)
