@@ -26,6 +26,7 @@ The rooms, each `palpate.ROOM`:
     controllers     of force and motion
     environments    surfaces: Kelvin-Voigt, Hunt-Crossley, standard linear solid
     instruments     encoders, force sensors, filters, each with its lag
+    checks          the laws that every part obeys, run on one of yours
     analysis        a loop as a linear model: margins, boundaries of stability
     studies         many runs: grids, random points, a search
     report          figures, tables, pages
@@ -58,6 +59,7 @@ _HOME = {
 _ROOMS = (
     "analysis",
     "bench",
+    "checks",
     "contact_frame",
     "controllers",
     "environments",

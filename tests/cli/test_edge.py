@@ -160,11 +160,3 @@ def test_control_c_ends_a_running_command():
     _, error = child.communicate(timeout=20)
     assert child.returncode == 130
     assert error == "palpate: interrupted\n"
-
-
-@pytest.mark.parametrize("command", ["identify", "press", "tune"])
-def test_the_help_of_a_command_shows_how_it_is_typed(command, capsys):
-    assert main([command, "--help"]) == 0
-    told = capsys.readouterr().out
-    assert f"\npalpate {command} " in told
-    assert "╭" in told.partition(f"\npalpate {command} ")[2], "and then its options"

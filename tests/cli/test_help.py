@@ -17,7 +17,7 @@ from palpate.cli._program import COMMANDS, program
 
 WIDTH = 80
 PANEL = re.compile(r"^╭─ (.+?) ─*╮$")
-MOST = 17
+MOST = 14
 """Options that a group has at most: what a reader takes in without a search."""
 
 

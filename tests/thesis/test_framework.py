@@ -23,7 +23,7 @@ from palpate.thesis.measure import STATE, measure
 from palpate.thesis.page import chapter_of
 from palpate.thesis.runs import Runs
 
-FIELDS = ["id", "source", "claim", "thesis", "measured", "tolerance", "verdict", "note"]
+FIELDS = ["id", "source", "claim", "thesis", "measured", "tolerance", "verdict", "note", "group"]
 VERDICTS = {"reproduced", "differs", "not checkable"}
 CLAIMS = (
     *(
@@ -127,9 +127,10 @@ def test_there_is_one_count_of_claims(tmp_path, capsys):
     assert main(["thesis", "3.7", "--out", str(tmp_path / "t")]) == 0
     told = capsys.readouterr().out
     claims = json.loads((tmp_path / "t" / "claims.json").read_text("utf-8"))
+    claims = [claim for claim in claims if not claim["group"]]
     good = sum(claim["verdict"] == "reproduced" for claim in claims)
     page = (tmp_path / "t" / "index.html").read_text("utf-8")
-    assert f"{len(claims)} claims: {good} reproduced" in told
+    assert f"{len(claims)} claims measured: {good} reproduced" in told
     assert f"Of {len(claims)} claims, {good} are reproduced" in page
     assert f"all<b>{len(claims)}</b>" in page
     assert page.count('<article class="claim"') == len(claims)

@@ -62,7 +62,9 @@ class Motion:
         names, numbers = zip(*leaves(self._tree), strict=True)
         self._all = np.array(numbers)
         acts = acting(loop.controller)
-        live = [i for i, name in enumerate(names) if name not in FLAGS and not _idle(name, acts)]
+        rigid = loop.plant.mode.frequency == 0.0
+        still = [*FLAGS, *(name for name in names if rigid and name.startswith("plant.bent."))]
+        live = [i for i, name in enumerate(names) if name not in still and not _idle(name, acts)]
         self._live = np.array(live)
         self.names = tuple(names[i] for i in live)
         self.steps = np.array([_step(name) for name in self.names])

@@ -13,6 +13,8 @@ from palpate.errors import InputError
 def checks(name: str | None = None, /, *, json: Annotated[bool, Parameter(negative="")] = False) -> int:
     """Run the conformance suite of palpate's own parts on a controller, surface or identifier of yours.
 
+    palpate checks student:Damped
+
     Parameters
     ----------
     name

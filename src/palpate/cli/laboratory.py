@@ -33,6 +33,8 @@ def laboratory(
 ) -> int:
     """Infer what the thesis does not tell of its laboratory: once from half of its figures, once from all.
 
+    palpate laboratory --particles 32 --half --out runs/laboratory
+
     Args:
         out: folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there is
             gone on with.
