@@ -158,7 +158,7 @@ def _steady_conditions(data: Data) -> tuple[int, int]:
         usual = np.sign(np.median(surface.masses, axis=0))[: network.VARIED_STARTS]
         for some in surface.varied.values():
             found = np.sign(np.array([a.M for a in some]).reshape(-1, network.VARIED_STARTS))
-            kept.append(often(found == usual))
+            kept.append(often((found == usual).ravel()))
     return sum(map(bool, kept)), len(kept)
 
 
