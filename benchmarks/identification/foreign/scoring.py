@@ -150,7 +150,7 @@ def _named(truth: Range) -> str:
 
 def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, ...]:
     touched = log.dense.depth[log.dense.contact]
-    depth = found.depth or (float(np.percentile(touched, 99)) if len(touched) else None)
+    depth = getattr(found, "depth", None) or (float(np.percentile(touched, 99)) if len(touched) else None)
     own = of_model(log.plan.surface, found.model, _untold_arm(log), depth)
     answers = []
     for name, p in found.parameters.items():
