@@ -61,6 +61,17 @@ def test_a_log_without_joints_says_so_and_is_played(root):
         one.close()
 
 
+def channels_of(client):
+    """By topic, what the program offers to a viewer: the contact and the arm, within ten messages."""
+    offered = {}
+    for _ in range(10):
+        told = json.loads(client.recv(PATIENCE))
+        offered |= {c["topic"]: c for c in told.get("channels", [])}
+        if {"/palpate/contact", "/palpate/arm"} <= set(offered):
+            break
+    return offered
+
+
 def test_an_arm_presses_in_space_and_viewers_see_all_of_it():
     from websockets.sync.client import connect
 
@@ -71,12 +82,7 @@ def test_an_arm_presses_in_space_and_viewers_see_all_of_it():
         one.close()
         url = viewers.removeprefix("viewers: ")
         with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE) as client:
-            offered = {}
-            for _ in range(10):
-                told = json.loads(client.recv(PATIENCE))
-                offered |= {c["topic"]: c for c in told.get("channels", [])}
-                if {"/palpate/contact", "/palpate/arm"} <= set(offered):
-                    break
+            offered = channels_of(client)
         assert {"/palpate/contact", "/palpate/arm"} <= set(offered)
 
 
@@ -88,12 +94,7 @@ def test_viewers_are_served_beside_the_page(record):
         assert re.fullmatch(r"viewers: ws://127\.0\.0\.1:\d+", viewers)
         url = viewers.removeprefix("viewers: ")
         with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE) as client:
-            offered = {}
-            for _ in range(10):
-                told = json.loads(client.recv(PATIENCE))
-                offered |= {c["topic"]: c for c in told.get("channels", [])}
-                if {"/palpate/contact", "/palpate/arm"} <= set(offered):
-                    break
+            offered = channels_of(client)
             number = offered["/palpate/contact"]["id"]
             client.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": number}]}))
             # op code 1, the subscription's number, nanoseconds, then the message

@@ -121,9 +121,7 @@ def _in_contact(problem: Problem, model: Model) -> tuple[_Question, Solution]:
     if not segments:
         raise InputError("every stretch in contact is too short; log longer or faster")
     lag, theta = problem.lag.value, None
-    if (
-        problem.lag.std > 0 and not model.nonlinear
-    ):  # the lag's column needs parameters that are roughly right
+    if problem.lag.std > 0 and not model.nonlinear:  # its column needs parameters that are roughly right
         exact = replace(problem, lag=replace(problem.lag, std=0.0))
         first = _Question.of(exact, model, lag, segments, None)
         theta = dict(zip(first.names, estimate(first.system).theta, strict=True))
