@@ -86,25 +86,33 @@ def arm(folder: Path, *words: str):
     return child("-m", "palpate.wires.sim_arm", "--arm", str(folder / "arm.toml"), "--seconds", "60", *words)
 
 
-def wait_for_rows(path, rows=40):
-    """Until a press has kept so many."""
+def rows_came(path, rows=40) -> bool:
+    """Whether a press has kept so many, as soon as it has."""
     for _ in range(round(2.0 * PATIENCE / 0.02)):
         if path.exists():
             numbers = np.fromfile(path)
             if np.count_nonzero(numbers[1 :: len(UNITS)]) >= rows:
-                return
+                return True
         time.sleep(0.02)
-    raise AssertionError("the press keeps no rows")
+    return False
 
 
-def killed_when_it_moves(process, rows: Path) -> None:
-    """Kill a process as soon as a press keeps rows there."""
+def wait_for_rows(path) -> None:
+    """Until a press has kept some."""
+    assert rows_came(path), "the press keeps no rows"
 
-    def die():
-        wait_for_rows(rows)
-        process.kill()
 
-    threading.Thread(target=die, daemon=True).start()
+def while_it_presses(rows: Path, act) -> list[float]:
+    """Do something as soon as a press keeps rows; what is returned then has the time of it."""
+    begun: list[float] = []
+
+    def run():
+        if rows_came(rows):  # else the press has failed before, and says so itself
+            begun.append(time.monotonic())
+            act()
+
+    threading.Thread(target=run, daemon=True).start()
+    return begun
 
 
 class Relay(threading.Thread):

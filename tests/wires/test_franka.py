@@ -19,7 +19,7 @@ from palpate.wires import LostError, open_wire
 from palpate.wires.franka_driver import nearer
 from palpate.wires.protocol import Command
 from palpate.wires.turns import from_matrix_by_columns
-from wires.slow_cell import PATIENCE, WORDS, cell, child, killed_when_it_moves, wait_for_rows
+from wires.slow_cell import PATIENCE, WORDS, cell, child, wait_for_rows, while_it_presses
 
 pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this system")
 pytest.importorskip("franky_sim", reason="franky-sim is not installed")
@@ -97,7 +97,7 @@ def test_a_dry_run_moves_nothing(folder, here, capsys, address):
 
 def test_a_controller_that_dies_ends_the_press(folder, here, capsys, address):
     with controller(folder, address, "--gap", "0.05") as process:
-        killed_when_it_moves(process, here / "rec" / "rows.f64")
+        while_it_presses(here / "rec" / "rows.f64", process.kill)
         code, told = pressed(capsys, folder, address, "--record", "rec", "--seconds", "10")
     assert code == 1
     assert "the controller: " in told["ended"] or "no reading for" in told["ended"]

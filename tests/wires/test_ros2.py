@@ -11,7 +11,7 @@ import pytest
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.logs import read_record
-from wires.slow_cell import ALONE, DOMAIN, WORDS, cell, child, killed_when_it_moves
+from wires.slow_cell import ALONE, DOMAIN, WORDS, cell, child, while_it_presses
 
 pytest.importorskip("cyclonedds", reason="cyclonedds has no wheel for this system")
 
@@ -75,7 +75,7 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, kind, place):
 
 def test_a_node_that_dies_ends_the_press(folder, here, capsys):
     with node(folder, "--gap", 0.05) as process:
-        killed_when_it_moves(process, here / "rec" / "rows.f64")
+        while_it_presses(here / "rec" / "rows.f64", process.kill)
         code = main(words_of(folder, "--yes", "--record", "rec", "--seconds", "10"))
         told = json.loads(capsys.readouterr().out)
     assert code == 1

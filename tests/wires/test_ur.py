@@ -18,7 +18,7 @@ from palpate.cli import main
 from palpate.logs import read_record
 from palpate.wires import Command, open_wire
 from palpate.wires.turns import from_rotation_vector, turned
-from wires.slow_cell import WORDS, cell, child, killed_when_it_moves, wait_for_rows
+from wires.slow_cell import WORDS, cell, child, wait_for_rows, while_it_presses
 
 pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
 
@@ -81,7 +81,7 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, address, way)
 
 def test_a_controller_that_falls_silent_ends_the_press_and_stops_the_arm(folder, here, capsys, address):
     with controller(folder, address, "--gap", "0.05") as process:
-        killed_when_it_moves(process, here / "rec" / "rows.f64")
+        while_it_presses(here / "rec" / "rows.f64", process.kill)
         code = main(words_of(folder, address, "--yes", "--record", "rec", "--seconds", "10"))
         told = json.loads(capsys.readouterr().out)
     assert code == 1

@@ -29,6 +29,8 @@ _PHASES = {"air": 0.0, "learning": 1.0, "locked": 2.0}
 _BAND = 0.05
 """Of the force, within which a press counts as settled."""
 _FEWEST = 20
+_PATIENCE = 10.0
+"""For which that many readings may take: nothing moves yet, and a busy computer may be starved for a while [s]."""
 
 
 @dataclass(frozen=True)
@@ -183,11 +185,11 @@ def look(wire: Wire, order: Order) -> Air:
     """
     gains = order.loop.gains
     sensed = [wire.read(1.0)]
-    while sensed[-1].received - sensed[0].received < TARE:
-        sensed.append(wire.read(max(gains.theta, 0.1)))
+    while (span := sensed[-1].received - sensed[0].received) < TARE or len(sensed) < _FEWEST:
+        if span > _PATIENCE:
+            raise InputError(f"only {len(sensed)} readings came in {span:.3g} s; is the arm switched on?")
+        sensed.append(wire.read(1.0))
     stamps = np.array([s.stamp for s in sensed])
-    if len(sensed) < _FEWEST:
-        raise InputError(f"only {len(sensed)} readings came in {TARE:g} s; is the arm switched on?")
     rate = 1.0 / max(float(np.median(np.diff(stamps))), 1e-9)
     # Over the lag theta a rate that is off by this moves a reading by one tick, which is what is proved.
     if abs(rate * gains.arm.tick - 1.0) > gains.arm.tick / gains.theta:
