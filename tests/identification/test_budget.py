@@ -92,13 +92,13 @@ def test_a_force_that_nothing_explains_is_bounded_by_what_is_seen_of_it():
     noise = level(asked, NOISE**2)
     seen = noise.copy()
     seen[4] += 2.0**2
-    found = causes.of_unexplained(asked, solve(asked, seen), noise)
+    found = causes.of_unexplained(asked, solve(asked, seen), noise, asked.lines)
     weight = 1 / seen
     gram = asked.products[:, 0, 0]
     # All lines of the octave may conspire: a force of amplitude 2 in each, along the column.
     pull = np.sqrt(asked.lines[4] * 2.0**2 * gram[4]) * weight[4] / (weight @ gram)
     assert np.sqrt(found.variance[0]) == pytest.approx(HIDDEN_SHARE * pull, rel=1e-6)
-    none = causes.of_unexplained(asked, solve(asked, seen), seen)
+    none = causes.of_unexplained(asked, solve(asked, seen), seen, asked.lines)
     assert none.variance[0] == 0.0
 
 
@@ -109,7 +109,7 @@ def test_more_of_the_same_log_does_not_hide_what_is_unexplained():
         column = np.random.default_rng(3).normal(size=(rows, 1))
         asked = system(column, 5.0 * column[:, 0])
         whole = solve(asked, level(asked))
-        hidden = causes.of_unexplained(asked, whole, level(asked, 0.01))
+        hidden = causes.of_unexplained(asked, whole, level(asked, 0.01), asked.lines)
         shares.append(np.sqrt([hidden.variance[0], whole.cov[0, 0]]))
     (hidden, noise), (hidden_long, noise_long) = shares
     assert noise_long == pytest.approx(noise / 2, rel=0.1)

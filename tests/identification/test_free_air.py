@@ -59,12 +59,15 @@ def test_a_short_stretch_of_air_at_the_begin_is_seen():
 @pytest.mark.parametrize("every", [2, 4, 8])
 @pytest.mark.parametrize("ramp", [0.06, 0.3])
 def test_a_held_position_leaves_the_surface_all_the_same(every, ramp):
-    log = pressed(ramp=ramp)
-    held = np.repeat(log["position"][::every], every)[: len(log)]
-    found = identify(record(log["time"], held, log["force"]))
-    assert "contact-at-start" not in found.codes
-    low, high = found.parameters["K"].ci95
-    assert low < 5000 < high
+    held = []
+    for seed in range(3):
+        log = pressed(ramp=ramp, seed=seed)
+        position = np.repeat(log["position"][::every], every)[: len(log)]
+        found = identify(record(log["time"], position, log["force"]))
+        assert "contact-at-start" not in found.codes
+        low, high = found.parameters["K"].ci95
+        held.append(low < 5000 < high)
+    assert sum(held) >= 2  # of 95 % intervals: fewer would be chance in one of 140 such logs
 
 
 def test_a_force_that_drifts_in_the_air_is_level_again():

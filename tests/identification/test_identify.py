@@ -167,7 +167,7 @@ def test_a_mass_that_is_asked_for_where_there_is_none_spares_the_stiffness():
     found = identify(pressed(k=3000.0, b=60.0, seed=2), model="kelvin-voigt-mass")
     assert "model-rejected" not in found.codes
     assert found.parameters["K"].verdict is Verdict.IDENTIFIED
-    assert found.parameters["K"].value == pytest.approx(3000, rel=0.02)
+    assert holds(found.parameters["K"], 3000)
     assert found.parameters["M"].verdict is not Verdict.IDENTIFIED
 
 
@@ -237,10 +237,13 @@ def test_a_channel_that_is_refreshed_slowly(channel, every):
 
 
 def test_a_force_at_the_end_of_its_range_is_left_out():
-    log = pressed()
-    found = identify(record(log["time"], log["position"], np.minimum(log["force"], 12.0)))
-    assert "saturated" in found.codes
-    assert holds(found.parameters["K"], 5000)
+    held = []
+    for seed in range(5):
+        log = pressed(seed=seed)
+        found = identify(record(log["time"], log["position"], np.minimum(log["force"], 12.0)))
+        assert "saturated" in found.codes
+        held.append(holds(found.parameters["K"], 5000))
+    assert sum(held) >= 4  # of 95 % intervals: fewer would be chance in one of 44 such fives
 
 
 def test_jitter_and_repeated_times():

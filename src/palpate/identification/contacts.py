@@ -146,14 +146,15 @@ def _with_payload(found: Contacts, payload: Payload) -> Contacts:
 
 
 def _air(channels: Channels, chain: Chain, lag: float) -> FreeMotion | None:
-    """Where the probe is in the air; by the force without an inertia, if it shows one there."""
+    """Where the probe is in the air; by the force without an inertia, if it shows one there and more air without it."""
     force, position = chain(channels.force), chain(channels.position)
     ends = _ends(_calm(force, channels.dt))
     perhaps = free_motion_of(channels.force, channels.position, ends, none=False)
     payload = payload_of(channels, chain, perhaps, lag, alone=True) if perhaps else None
-    if payload is None:
-        return free_motion_of(channels.force, channels.position, ends)
-    return free_motion_of(force - payload.mass * chain(channels.position, 2, lag), position, ends)
+    without = None
+    if payload is not None:
+        without = free_motion_of(force - payload.mass * chain(channels.position, 2, lag), position, ends)
+    return without or free_motion_of(channels.force, channels.position, ends)
 
 
 def _without_drift(channels: Channels, air: FreeMotion) -> Channels:

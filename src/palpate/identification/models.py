@@ -276,14 +276,18 @@ def begun_before(model: Model) -> Model:
     return replace(model, linear=(*model.linear[:-1], "y0", model.linear[-1]), columns=columns)
 
 
-def direction(motion: Motion) -> Array:
+def direction(motion: Motion, least: float = 0.0) -> Array:
     """Which way friction holds the probe: 1 while it moves into the surface, -1 out of it, shape (n,).
 
     At rest it keeps what it has, and turns within a short way (an elastoplastic element; Dahl 1968 has it smooth): the
     shortest that the position's noise and its encoder do not turn it within.
+
+    Args:
+        motion: of the log.
+        least: way that it turns within at least [m].
     """
     noise, position = motion.noise, motion.position
-    way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), 1e-300)
+    way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), least, 1e-300)
     return _clipped_sum(np.diff(position, prepend=position[:1]) / way)
 
 

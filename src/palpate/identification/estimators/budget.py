@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.by_octave import Solution, System, solve
+from palpate.identification.estimators.by_octave import Solution, System, solve, worth
 from palpate.identification.least_squares import inverse
 
 Array = NDArray[np.float64]
@@ -121,15 +121,24 @@ def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Sp
     return Spread(np.maximum(apart, 0.0) ** 2)
 
 
-def of_unexplained(system: System, solution: Solution, sensor: Array) -> Spread:
+def of_unexplained(system: System, solution: Solution, sensor: Array, told: Array) -> Spread:
     """What a force hidden along the parameters' columns may do, as large as what is seen beyond the sensor's noise.
+
+    Seen is what chance would show in one of twenty logs at most, in any of their octaves: a level that n lines tell has
+    a relative deviation of 1/sqrt(n).
 
     Args:
         system: of the log.
         solution: of it.
         sensor: variance of a line by the sensor's own noise in each octave, shape (octaves,).
+        told: lines that those levels rest on, shape (octaves,).
     """
-    beyond = np.maximum(solution.noise - sensor, 0.0)
+    from scipy.special import ndtri
+
+    apart = 1 / np.maximum(worth(system), 1.0) + 1 / np.maximum(told, 1.0)
+    beyond = solution.noise - sensor
+    chance = float(ndtri(1 - 0.05 / max(np.count_nonzero(system.lines), 1)))
+    beyond = np.where(beyond > chance * np.sqrt(apart) * sensor, beyond, 0.0)
     gain = np.einsum("ki,oij,kj->ok", solution.cov, system.products[:, :-1, :-1], solution.cov)
     weight = np.where(system.lines > 0, system.lines * (beyond / solution.noise) / solution.noise, 0.0)
     return Spread(HIDDEN_SHARE**2 * np.maximum(weight @ gain, 0.0))

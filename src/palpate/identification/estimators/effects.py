@@ -6,6 +6,8 @@ with the touch (adhesion, or a surface that is met elsewhere), and the inertia o
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,9 @@ Array = NDArray[np.float64]
 
 FRICTION = "Fc"
 TOUCH = "touch"
+_BREAKAWAY = (0.03, 0.1)
+"""Ways that friction turns within, of the reach in contact, half a decade apart from the longest that is no matter of
+the stiffness on. Without them K took the spring that friction is before it slips: `make trust`, surface friction."""
 
 
 def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segment]) -> dict[str, Array]:
@@ -27,16 +32,27 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
         lag: of the force behind the position [s].
         segments: of the rows.
     """
-    found = {FRICTION: motion.filtered(direction(motion), 0, lag)}
+    x = motion.moved(0, lag)
+    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
+    reach = float(np.ptp(x[inside])) or 1.0
+    found = _friction(motion, lag, reach)
     if model.nonlinear:
         return found
     if motion.free is not None and motion.touched is not None:
         found[TOUCH] = motion.filtered(motion.touched, 0, lag)
         found["free inertia"] = motion.filtered(motion.free, 2, lag)
-    x = motion.moved(0, lag)
-    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
-    depth = (x - float(x[inside].mean())) / (float(np.ptp(x[inside])) or 1.0)
+    depth = (x - float(x[inside].mean())) / reach
     return found | {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
+
+
+def _friction(motion: Motion, lag: float, reach: float) -> dict[str, Array]:
+    """Friction, and what of it turns within a shorter way: elements that hold as springs and slip one after the other.
+
+    Side by side they follow any curve from sticking to slipping (Iwan 1966; the Maxwell-slip model).
+    """
+    turned = [motion.filtered(direction(motion, way * reach), 0, lag) for way in (0.0, *_BREAKAWAY)]
+    sooner = {f"{FRICTION} {i}": short - long for i, (short, long) in enumerate(pairwise(turned))}
+    return {FRICTION: turned[-1]} | {name: column for name, column in sooner.items() if column.any()}
 
 
 def _in_quadrature(x: Array, segments: list[Segment]) -> Array:

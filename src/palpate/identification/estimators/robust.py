@@ -235,12 +235,13 @@ class _Question:
 
     def answered(self, solution: Solution) -> Answer:
         """The answer with its budget."""
-        sensor = self._sensor(solution)
+        sensor, told = self._sensor(solution)
         budget = causes.of_noise(self.system, solution, self.names, self.own, LAG)
         budget["position noise"] = causes.of_position_noise(self.system, solution, self._position_noise())
         budget["octaves"] = causes.of_octaves(self.system, solution)
         budget["repetition"] = causes.of_stretches(self.system, solution)
-        budget["unexplained"] = causes.of_unexplained(self.system, solution, sensor)
+        sensors = np.minimum(sensor + self._by_position(solution), solution.noise)
+        budget["unexplained"] = causes.of_unexplained(self.system, solution, sensors, told)
         explained, left = self._explained(solution, sensor)
         if lag_open(self.problem) and {"K", "B", LAG} <= set(self.names):
             budget["lag"] = self._lag_of_damping(solution, budget["lag"])
@@ -255,10 +256,25 @@ class _Question:
             names, solution.theta[kept], cov, budget, predicted, explained, left, noise, self.problem
         )
 
+    def _line(self) -> Array:
+        """Power of the position's noise in a line of each octave, shape (octaves,)."""
+        motion = self.problem.motion
+        return _line_of_noise(motion, self.octaves.frequency) * motion.chain.dt / self.dt
+
+    def _by_position(self, solution: Solution) -> Array:
+        """Variance of a line by what the model makes of the position's noise in each octave, shape (octaves,)."""
+        if self.model.nonlinear:
+            return np.zeros(len(self.octaves.frequency))
+        omega = 2j * np.pi * self.octaves.frequency
+        own = dict(zip(self.names, solution.theta.tolist(), strict=True))
+        stiffness = sum(own[name] * omega**i for name, i in self.model.derivatives.items())
+        found: Array = np.abs(stiffness) ** 2 * self._line()
+        return found
+
     def _position_noise(self) -> Array:
         """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p)."""
-        chain, frequency = self.problem.motion.chain, self.octaves.frequency
-        power = _line_of_noise(self.problem.motion, frequency) * chain.dt / self.dt * self.system.lines
+        frequency = self.octaves.frequency
+        power = self._line() * self.system.lines
         found = np.zeros((len(frequency), len(self.names), len(self.names)))
         own = self.model.derivatives if not self.model.nonlinear else {}
         for a, i in own.items():
@@ -279,8 +295,8 @@ class _Question:
         variance[i] = max(variance[i], by_prior)
         return Spread(variance, found.freedom)
 
-    def _sensor(self, solution: Solution) -> Array:
-        """Variance of a line by the sensor's own noise in each octave, shape (octaves,).
+    def _sensor(self, solution: Solution) -> tuple[Array, Array]:
+        """Variance of a line by the sensor's own noise in each octave, and the lines that tell it, shape (octaves,).
 
         Out of contact it is seen; where the log has no such stretch, it is what the quietest octaves have in common.
         """
@@ -295,9 +311,11 @@ class _Question:
             lines = rest.all_lines
             level = rest.total[:, 0, 0] / np.maximum(lines, 1.0)
         sensor = causes.white_level(level / gain, lines) * gain
+        told = np.full(len(sensor), float(lines.sum()))
         if rest is not None:
-            sensor = np.maximum(sensor, np.where(lines > 0, level, 0.0))
-        return np.minimum(sensor, solution.noise)
+            own = (lines > 0) & (level > sensor)
+            sensor, told = np.where(own, level, sensor), np.where(own, lines, told)
+        return np.minimum(sensor, solution.noise), told
 
     def _rest(self, longest: int) -> Octaves | None:
         """The force out of contact by the octaves of the contacts; None if there is too little of it."""

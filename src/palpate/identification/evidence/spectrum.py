@@ -34,18 +34,32 @@ _OVERLAP = 0.75
 """Independent blocks for each of half-overlapping Hann blocks (Welch 1967)."""
 _TIED = np.array([[1, -2 / 3, 1 / 6], [-2 / 3, 1, -2 / 3], [1 / 6, -2 / 3, 1]])
 """Correlation of white noise between the lines of a Hann block: little of it is left across a sine's own lines."""
+_PHASES = 4
+"""Where a motion may stand between two counts of its encoder: the first three harmonics of the pull are told apart."""
 _FLAT = 1e-3
 """Share of the motion's power off the middle line below which a slope over the frequency is not asked for."""
 
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Transforms at the three lines, shape (blocks, 3), and the power of noise of the position in one line."""
+    """Transforms at the three lines, shape (blocks, 3), and the power of noise of the position in one line.
+
+    Args:
+        rounded: what an encoder may have added to the position, one for each phase of its counts.
+    """
 
     position: Complex
     velocity: Complex
     force: Complex
+    rounded: tuple[Complex, ...]
     noise: float
+
+    @property
+    def pull(self) -> float:
+        """Share that the encoder may pull a stiffness by, rms over the phases."""
+        total = float((np.abs(self.position) ** 2).sum()) or 1e-300
+        along = [complex((self.position.conj() * own).sum()) / total for own in self.rounded]
+        return float(np.sqrt(np.mean(np.abs(along) ** 2))) if along else 0.0
 
 
 @dataclass(frozen=True)
@@ -78,8 +92,8 @@ def dynamic_stiffness(
         lag_std: what is not known of it [s].
     """
     dt = float(np.median(np.diff(problem.time)))
-    channels = problem.motion.moved(0, lag), problem.motion.moved(1, lag), problem.force
-    position = channels[0]
+    position = problem.motion.moved(0, lag)
+    channels = position, problem.motion.moved(1, lag), problem.force, *_rounded(problem, position, lag)
     variance = float(np.concatenate([position[s.first : s.last] for s in segments]).var()) or 1e-300
     found = []
     length = max(s.last - s.first for s in segments)
@@ -94,6 +108,25 @@ def dynamic_stiffness(
     return tuple(found)
 
 
+def _rounded(problem: Problem, position: Array, lag: float) -> list[Array]:
+    """What an encoder adds to this motion, once for each phase of its counts, behind the same filter, shape (m,) each.
+
+    A coarse encoder's error goes with the motion: of a sine of a few counts it is part of the sine (the describing
+    function of a uniform quantiser), of two places that are held a part of their distance, and no noise. The motion is
+    drawn out by a part of a count over its reach, so that places that were read as whole counts lie between them.
+    """
+    count = problem.motion.noise.count
+    if not count:
+        return []
+    smooth = np.interp(np.arange(len(problem.motion.position)), problem.motion.instants, position)
+    found = []
+    longer = count / max(float(np.ptp(smooth)), count)
+    for phase in (np.arange(_PHASES) + 0.5) / _PHASES:
+        drawn = smooth * (1 + phase * longer) / count
+        found.append(problem.motion.filtered(count * (np.round(drawn + phase) - phase - drawn), 0, lag))
+    return found
+
+
 def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segment], length: int) -> _Blocks:
     """Of all segments that hold one; half overlapping, without their mean and their mean slope."""
     window = np.hanning(length + 2)[1:-1]
@@ -101,7 +134,7 @@ def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segmen
     phase = np.exp(-2j * np.pi * np.outer(np.arange(length), _LINES) / length) * window[:, None]
     level = window[:, None] * np.column_stack([np.ones(length), ramp])
     level_out = np.linalg.solve(level.T @ np.column_stack([np.ones(length), ramp]), level.T)
-    lines: list[list[Complex]] = [[], [], []]
+    lines: list[list[Complex]] = [[] for _ in channels]
     for s in segments:
         if s.last - s.first < length:
             continue
@@ -116,8 +149,8 @@ def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segmen
     frequency = np.array([PERIODS / (length * dt)])
     line = problem.motion.noise.power(frequency, chain.dt) * chain.position_gain(frequency) ** 2
     power = float(line[0]) * chain.dt / dt * float(window @ window)
-    x, v, f = (np.concatenate(channel) for channel in lines)
-    return _Blocks(x, v, f, power)
+    x, v, f, *rounded = (np.concatenate(channel) for channel in lines)
+    return _Blocks(x, v, f, tuple(rounded), power)
 
 
 def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: float) -> DynamicStiffness:
@@ -129,7 +162,7 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
     causes = {
         "blocks": student(line.freedom) * np.sqrt(line.variance),
         "lag": np.array([abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag]),
-        "position noise": noise * np.abs(parts),
+        "position noise": noise * np.abs(parts) + 1.96 * blocks.pull * np.hypot(*parts),
         "within the octave": np.abs(line.change),
     }
     halves = np.sqrt(sum(half**2 for half in causes.values()))
