@@ -133,8 +133,8 @@ def test_a_log_stiffer_than_what_is_in_series_is_refused(series):
 
 @pytest.mark.parametrize(("force", "position"), [(1, 1), (-1, 1), (1, -1), (-1, -1)])
 def test_it_is_taken_out_whichever_way_the_channels_count(force, position):
-    log = pressed(b=5.0, noise=0.01)
-    x = log["position"] + log["force"] / SERIES
+    log, true = pressed(b=5.0, noise=0.01), pressed(b=5.0, noise=0.0)
+    x = log["position"] + true["force"] / SERIES
     turned = record(log["time"], position * x, force * log["force"])
     found = identify(turned, lag=0.0, series_stiffness=SERIES)
     k = found.parameters["K"]

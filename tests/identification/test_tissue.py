@@ -40,13 +40,15 @@ def holds(p, truth):
     return p.verdict is Verdict.IDENTIFIED and p.ci95[0] <= truth <= p.ci95[1]
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_tissue_is_recognised_and_each_interval_holds(seed):
-    found = identify(tissue(TIME, once, seed), lag=0.0)
-    assert found.model == NAME
-    steep = K * N * found.depth ** (N - 1)
-    truths = {"K": steep, "K1": SHARE * steep, "n": N, "tau": TAU}
-    assert all(holds(found.parameters[name], truth) for name, truth in truths.items())
+def test_tissue_is_recognised_and_its_intervals_hold():
+    held = []
+    for seed in range(3):
+        found = identify(tissue(TIME, once, seed), lag=0.0)
+        assert found.model == NAME
+        steep = K * N * found.depth ** (N - 1)
+        truths = {"K": steep, "K1": SHARE * steep, "n": N, "tau": TAU}
+        held += [holds(found.parameters[name], truth) for name, truth in truths.items()]
+    assert sum(held) >= 10  # of twelve 95 % intervals: fewer would be chance in one of 50 such
     assert found.parameters["K"].unit == found.parameters["K1"].unit == "N/m"
     assert (
         2.5e-3 < found.to_json()["depth_m"] < 3e-3
