@@ -137,7 +137,7 @@ def of_unexplained(system: System, solution: Solution, sensor: Array, told: Arra
 
     apart = 1 / np.maximum(worth(system), 1.0) + 1 / np.maximum(told, 1.0)
     beyond = solution.noise - sensor
-    chance = float(ndtri(1 - 0.05 / max(np.count_nonzero(system.lines), 1)))
+    chance = float(ndtri(1 - 0.05 / max(int(np.count_nonzero(system.lines)), 1)))
     beyond = np.where(beyond > chance * np.sqrt(apart) * sensor, beyond, 0.0)
     gain = np.einsum("ki,oij,kj->ok", solution.cov, system.products[:, :-1, :-1], solution.cov)
     weight = np.where(system.lines > 0, system.lines * (beyond / solution.noise) / solution.noise, 0.0)

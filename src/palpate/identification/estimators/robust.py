@@ -313,8 +313,8 @@ class _Question:
         sensor = causes.white_level(level / gain, lines) * gain
         told = np.full(len(sensor), float(lines.sum()))
         if rest is not None:
-            own = (lines > 0) & (level > sensor)
-            sensor, told = np.where(own, level, sensor), np.where(own, lines, told)
+            louder = (lines > 0) & (level > sensor)
+            sensor, told = np.where(louder, level, sensor), np.where(louder, lines, told)
         return np.minimum(sensor, solution.noise), told
 
     def _rest(self, longest: int) -> Octaves | None:
