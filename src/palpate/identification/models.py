@@ -39,6 +39,7 @@ class Motion:
     free: Array | None = None
     touched: Array | None = None
     _kept: dict[tuple[int, float], Array] = field(default_factory=dict)
+    _turned: dict[float, Array] = field(default_factory=dict)
 
     def moved(self, derivative: int, lag: float) -> Array:
         """Filtered position or a derivative of it at t - lag, shape (m,)."""
@@ -52,6 +53,21 @@ class Motion:
     def filtered(self, signal: Array, derivative: int, lag: float) -> Array:
         """Any raw signal through the same chain, at t - lag, shape (m,)."""
         return self.chain.read(signal, derivative, lag, self.rows)
+
+    def direction(self, least: float = 0.0) -> Array:
+        """Which way friction holds the probe: 1 while it moves into the surface, -1 out of it, shape (n,).
+
+        At rest it keeps what it has, and turns within a short way (an elastoplastic element; Dahl 1968 has it smooth):
+        the shortest that the position's noise and its encoder do not turn it within.
+
+        Args:
+            least: way that it turns within at least [m].
+        """
+        noise, position = self.noise, self.position
+        way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), least, 1e-300)
+        if way not in self._turned:
+            self._turned[way] = _clipped_sum(np.diff(position, prepend=position[:1]) / way)
+        return self._turned[way]
 
     @property
     def instants(self) -> Array:
@@ -87,7 +103,7 @@ def from_surface(motion: Motion, inside: NDArray[np.bool_], surface: float) -> M
     depth = motion.position - surface
     pressed = np.where(inside, depth, np.maximum(depth, 0.0))
     touched = (inside | (depth > 0)).astype(np.float64)
-    return replace(motion, position=pressed, free=depth - pressed, touched=touched, _kept={})
+    return replace(motion, position=pressed, free=depth - pressed, touched=touched, _kept={}, _turned={})
 
 
 def without_noise(motion: Motion) -> Motion:
@@ -274,21 +290,6 @@ def begun_before(model: Model) -> Model:
         return [*own[:-1], motion.filtered(np.exp(-since / nonlinear["tau"]), 0, lag), own[-1]]
 
     return replace(model, linear=(*model.linear[:-1], "y0", model.linear[-1]), columns=columns)
-
-
-def direction(motion: Motion, least: float = 0.0) -> Array:
-    """Which way friction holds the probe: 1 while it moves into the surface, -1 out of it, shape (n,).
-
-    At rest it keeps what it has, and turns within a short way (an elastoplastic element; Dahl 1968 has it smooth): the
-    shortest that the position's noise and its encoder do not turn it within.
-
-    Args:
-        motion: of the log.
-        least: way that it turns within at least [m].
-    """
-    noise, position = motion.noise, motion.position
-    way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), least, 1e-300)
-    return _clipped_sum(np.diff(position, prepend=position[:1]) / way)
 
 
 def _clipped_sum(steps: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.identification.estimators.octaves import Segment
-from palpate.identification.models import Model, Motion, direction
+from palpate.identification.models import Model, Motion
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
     x = motion.moved(0, lag)
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     reach = float(np.ptp(x[inside])) or 1.0
-    found = _friction(motion, lag, reach, inside)
+    found = _friction(motion, lag, inside)
     if model.nonlinear:
         return found
     if motion.free is not None and motion.touched is not None:
@@ -45,16 +45,17 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
     return found | {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
 
 
-def _friction(motion: Motion, lag: float, reach: float, inside: NDArray[np.intp]) -> dict[str, Array]:
+def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str, Array]:
     """Friction, and what of it turns within a shorter way: elements that hold as springs and slip one after the other.
 
     Side by side they follow any curve from sticking to slipping (Iwan 1966; the Maxwell-slip model). What the probe
     passes from one sample to the next is not seen to turn.
     """
+    reach = float(np.ptp(motion.moved(0, 0.0)[inside]))
     at = motion.instants[inside].astype(np.intp)
     step = float(np.sqrt(np.mean(np.diff(motion.position, append=motion.position[-1])[at] ** 2)))
     ways = (0.0, *(way * reach for way in _BREAKAWAY if way * reach >= step))
-    turned = [motion.filtered(direction(motion, way), 0, lag) for way in ways]
+    turned = [motion.filtered(motion.direction(way), 0, lag) for way in ways]
     sooner = {f"{FRICTION} {i}": short - long for i, (short, long) in enumerate(pairwise(turned))}
     return {FRICTION: turned[-1]} | {name: column for name, column in sooner.items() if column.any()}
 
