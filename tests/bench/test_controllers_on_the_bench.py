@@ -100,6 +100,7 @@ def test_the_impedance_holds_within_what_friction_can_hide(surface):
     assert free["force"][-500:].mean() == pytest.approx(expected, abs=0.4)
 
 
+@pytest.mark.long
 def test_decoupling_keeps_a_step_of_force_out_of_the_angle():
     tables = {"press": 10.0, "force": STEPS}
     corrected = pressed({"kind": "decoupled-hybrid", "stiffness": 5200.0}, **tables)

@@ -43,8 +43,10 @@ def kinds_of_loop():
     return list(found.values())
 
 
-FEW = ("foam-cautious", "foam-chirp", "foam-hybrid", "foam-impedance", "foam-neural", "foam-viscoelastic")
+FEW = ("foam-chirp", "foam-hybrid", "foam-neural", "foam-viscoelastic")
 """Kinds of loop of which each test run asks; the others take as long and are `long`."""
+OF_ITS_OWN = ("cautious", "self-tuning")
+"""Controllers of which each has a loop compiled for itself; the others share one."""
 
 
 @pytest.mark.parametrize(
@@ -60,7 +62,10 @@ def test_compiled_and_stepped_runs_agree_to_the_bit(name):
     same(compiled, stepped, tolerance=1e-12 if ("neural" in name or "tuning" in name) else 0.0)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.long if n.endswith(OF_ITS_OWN) else ()) for n in names()],
+)
 def test_the_same_seed_gives_the_same_numbers_and_another_others(name):
     bench = build(quick(name))
     first, other, again = press(bench, 3), press(bench, 4), press(bench, 3)
@@ -225,6 +230,7 @@ class Rigid(NamedTuple):
         return 0.0
 
 
+@pytest.mark.long
 def test_a_surface_of_ones_own_is_pressed(foam):
     bench = foam.with_surface(Rigid(10_000.0, 300.0))
     record = bench.run(DURATION, press=0.05, compiled=False)

@@ -56,7 +56,6 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
     assert "yes, predicted K" in printed
     assert "written: excite.png" in printed
     assert (elsewhere / "excite.png").read_bytes().startswith(b"\x89PNG")
-    assert main(["excite", *ASKED, "--duration", "4"]) == 0  # over its own figure
 
 
 def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
@@ -76,6 +75,7 @@ def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
     assert main(["excite", *ASKED, "--no-figure", "--report", "page.pdf"]) == 2
 
 
+@pytest.mark.long
 def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
     words = (*ONE, "--lag-std", "1:ms", "--precision", "1%", "--out", "excite.csv", "--duration", "4")
     assert main(["excite", *words, "--no-figure"]) == 1
@@ -152,6 +152,7 @@ def test_a_surface_without_a_mass(capsys):
     assert len(found["surfaces"]) == 1
 
 
+@pytest.mark.long
 def test_a_robot_and_sensors_of_ones_own(capsys):
     own = ("--noise", "0.06", "--sampling", "1000", "--force-filter", "none", "--position-step", "0.1:um")
     asked = (*ONE, "--duration", "4")

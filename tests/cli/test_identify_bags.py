@@ -66,6 +66,7 @@ def test_what_was_declared_and_found_is_shown(tmp_path, capsys):
     assert "frame-guess" not in shown
 
 
+@pytest.mark.long
 def test_the_page_and_the_figure(tmp_path, capsys):
     press_bag(tmp_path / "press")
     assert main(["identify", "press", "--report", "press.html", "--figure", "press.png"]) == 0
@@ -186,6 +187,7 @@ def test_only_free_motion(tmp_path, capsys):
     assert "no free motion" not in shown
 
 
+@pytest.mark.long
 def test_many_short_contacts(tmp_path, capsys):
     """Taps of 0.13 s, 0.4 s apart."""
     time = np.arange(10_000) / 1000

@@ -90,6 +90,7 @@ def test_a_press_is_identified_with_the_payload(elsewhere, capsys):
     assert "by the payload file" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_a_payload_of_other_axes_is_refused(elsewhere, capsys):
     write(log_of(Tool(), six(), np.random.default_rng(0)), "turning.parquet")
     main(["payload", "turning.parquet", "--wrench-frame", "tool", "--out", "tool.toml"])

@@ -80,6 +80,7 @@ def test_a_force_that_drifts_in_the_air_is_level_again():
     assert "force-drifts" not in identify(log).codes
 
 
+@pytest.mark.long
 def test_many_presses_are_as_many_contacts():
     """In contact for more than half of the time, and in the air for half a second at a time."""
     t = np.arange(int(60 * 1.6 * 125)) / 125

@@ -90,6 +90,7 @@ def test_at_its_rate():
     )  # three deviations of 40 numbers of an even distribution
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(st.sampled_from([25 / 12, 2.5, 3.3, 8.0]), phases, seeds, st.floats(0.02, 0.6))
 def test_samples_that_equal_the_one_before_are_there_all_the_same(period, phase, seed, share):

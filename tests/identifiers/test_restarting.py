@@ -164,6 +164,7 @@ def test_a_change_that_shows_only_when_it_moves_is_found_when_it_does():
     assert estimator.theta[1] == pytest.approx(HARD[1], rel=0.02)
 
 
+@pytest.mark.long
 def test_four_parameters_go_the_same_way():
     phi, force = changed(7)
     a = np.gradient(phi[:, 0]) * RATE

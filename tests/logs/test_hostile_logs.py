@@ -237,6 +237,7 @@ def test_a_spreadsheet_that_unpacks_to_much(tmp_path):
     refused(path, "more than 0.01 GB", SMALL)
 
 
+@pytest.mark.long
 def test_noise_over_any_part_of_a_file_of_matlab(tmp_path):
     """Each is read, or refused in a line; the process survives."""
     path, rng = tmp_path / "log.mat", np.random.default_rng(0)

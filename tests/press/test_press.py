@@ -287,6 +287,7 @@ def test_a_users_own_model(tmp_path, physics):
     assert record["force"][-1] == pytest.approx(20.0, abs=1.0)
 
 
+@pytest.mark.long
 def test_only_mujoco_knows_the_damping_of_its_joints(tmp_path):
     path = tmp_path / "cell.xml"
     path.write_text(cell(damping=30.0))

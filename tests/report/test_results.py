@@ -68,7 +68,10 @@ def test_a_record_is_readable(record):
     assert repr(record).startswith("<Record: 3 columns of 4000 rows")
 
 
-@pytest.mark.parametrize("name", ["record", "found", "tuned"])
+TUNED = pytest.param("tuned", marks=pytest.mark.long)
+
+
+@pytest.mark.parametrize("name", ["record", "found", TUNED])
 def test_a_notebook_gets_a_table_and_nothing_that_runs(request, name):
     html = request.getfixturevalue(name)._repr_html_()
     tags = Tags(html)
@@ -91,7 +94,7 @@ def test_names_of_a_stranger_are_shown_and_do_nothing(found, tmp_path):
     assert "\x1b" not in str(told)
 
 
-@pytest.mark.parametrize("name", ["record", "found", "tuned"])
+@pytest.mark.parametrize("name", ["record", "found", TUNED])
 def test_results_are_drawn_and_written(request, name, tmp_path):
     result = request.getfixturevalue(name)
     figure = result.plot(tmp_path / "it.png")

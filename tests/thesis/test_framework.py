@@ -280,6 +280,7 @@ def cramped(folder: Path, most: int) -> subprocess.CompletedProcess:
     )
 
 
+@pytest.mark.long
 def test_a_disk_that_is_full_leaves_nothing_half_written_and_can_be_gone_on_from(program, tmp_path):
     folder = tmp_path / "t"
     one_line(cramped(folder, 2000))

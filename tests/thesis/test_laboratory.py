@@ -238,6 +238,7 @@ def test_threads_try_what_they_are_given():
     assert [t.number for t in found] == [0, 1]
 
 
+@pytest.mark.long
 def test_a_worker_of_a_cluster_finds_what_a_thread_does(tmp_path):
     ids, jobs = ("force-noise",), [Job(n, (0.5,) * len(UNKNOWNS), math.inf) for n in range(2)]
     with local_cluster(tmp_path, workers=1) as running:

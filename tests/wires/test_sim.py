@@ -146,6 +146,7 @@ def test_losses_and_jitter_that_it_can_bear_are_counted(folder, here, capsys):
     assert told["force_N"] == pytest.approx(10.0, rel=0.1)
 
 
+@pytest.mark.long
 def test_an_arm_that_dies_and_comes_again_is_lost_and_not_followed(folder, here, capsys):
     with arm(folder, "--gap", "0.05") as (process, address):
         threading.Timer(4.0, process.kill).start()
