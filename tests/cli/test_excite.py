@@ -90,6 +90,7 @@ def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
     assert {"change", "reached", "enough", "needed_s"} == set(found["remedies"][0])
 
 
+@pytest.mark.long
 def test_the_force_over_time(capsys, elsewhere):
     words = (*ASKED, "--no-figure", "--duration", "4")
     assert main(["excite", *words, "--out", "excite.csv"]) == 0

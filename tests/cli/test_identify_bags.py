@@ -144,6 +144,7 @@ def test_the_robot_s_stiffness_from_a_press_on_a_wall(tmp_path, capsys):
     assert stiffness(plain) == pytest.approx(5000 * 40 / 45, rel=0.05)
 
 
+@pytest.mark.long
 def test_two_sensors_of_opposite_signs(tmp_path, capsys):
     _, record = a_press(3)
     force, place = topics_of(record)

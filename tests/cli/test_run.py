@@ -134,6 +134,7 @@ def test_the_report_opens_without_a_network(done):
     assert "palpate run mine.toml --seed 3" in page
 
 
+@pytest.mark.long
 def test_the_same_seed_writes_the_same_record_and_prints_its_summary(mine, done, capsys):
     """To a folder named after experiment and seed; another seed writes another: see the bench's own tests."""
     assert main(["run", "mine.toml", "--seed", "3", "--json"]) == 0
@@ -186,6 +187,7 @@ def test_an_interrupted_run_is_saved_and_exits_130(mine, monkeypatch):
     assert len(read_record(mine.parent / "results" / "record.parquet")) == 200
 
 
+@pytest.mark.long
 def test_interrupted_at_once_there_is_still_a_folder(mine, monkeypatch):
     class Interrupting:
         def run(self, *arguments):

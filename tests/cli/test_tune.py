@@ -78,6 +78,7 @@ def test_the_contract_of_json(capsys, elsewhere):
     assert 0.0 < loop.update(0.0, 0.0) <= told["approach_speed_m_s"]
 
 
+@pytest.mark.long
 def test_gains_certificate_and_check(capsys, elsewhere):
     (elsewhere / "gains.toml").write_text(gains_of().to_toml())
     assert main(["certify", "gains.toml", "--held-only", "--out", "proof.json", "--json"]) == 0

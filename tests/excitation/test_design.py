@@ -142,7 +142,9 @@ def test_a_lag_that_is_badly_known_costs_precision(multisine):
     )
 
 
-@pytest.mark.parametrize("criterion", ["worst", "D", "A", "E"])
+@pytest.mark.parametrize(
+    "criterion", ["worst", "D", *(pytest.param(c, marks=pytest.mark.long) for c in "AE")]
+)
 def test_every_criterion_makes_an_excitation(criterion, ten_seconds):
     found = design(replace(QUESTION, criterion=criterion, duration=10.0))
     assert found.made.gap < 0.02

@@ -65,7 +65,7 @@ def test_a_press_in_as_much_noise_is_one():
 
 
 @pytest.mark.parametrize("noise", [0.1, 0.2])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 3))])
 def test_a_noisy_press_is_no_bonded_one(noise, seed):
     """A few samples at the noise's lower end lie close together, and are no contact whose position stands still."""
     found = identify(pressed(noise=noise, seed=seed))

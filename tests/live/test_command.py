@@ -110,6 +110,7 @@ def test_viewers_are_served_beside_the_page(record):
     assert message["K_true"] == 5200.0
 
 
+@pytest.mark.long
 def test_a_port_in_use(capsys, record):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

@@ -14,6 +14,7 @@ from palpate.press.loops import gains_for, loop_of
 from palpate.report.numbers import plain
 
 
+@pytest.mark.long
 def test_the_first_answers_are_those_of_the_linear_model():
     experiment = near()
     found = answers(OfBench(experiment))

@@ -46,6 +46,7 @@ def test_a_tag_of_matlab_that_no_library_survives(tmp_path, kind):
     refused(path, "cannot be read as a MATLAB file")
 
 
+@pytest.mark.long
 def test_a_small_file_of_matlab_that_unpacks_to_much(tmp_path):
     path = tmp_path / "log.mat"
     savemat(path, {"t": np.zeros(4_000_000)}, do_compression=True)

@@ -46,6 +46,7 @@ def test_the_same_record_gives_the_same_picture(record, tmp_path):
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
 
 
+@pytest.mark.long
 def test_a_surface_that_knows_no_mass_or_stiffness_is_drawn_too(record, tmp_path):
     untold = Record(record.columns, record.units, {**record.meta, "truth": {}})
     assert "identification.png" in run_figures.draw(untold, tmp_path)

@@ -65,6 +65,7 @@ def pressed(capsys, folder, address, *more):
     return code, json.loads(printed.out)
 
 
+@pytest.mark.long
 def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
     for name in (
         "first",

@@ -52,7 +52,7 @@ JOINTS = "joints=/joint_states&arm=ur5e"
 @pytest.mark.parametrize(
     ("kind", "place"),
     [
-        ("twist", JOINTS),
+        pytest.param("twist", JOINTS, marks=pytest.mark.long),
         pytest.param("joint-speeds", JOINTS, marks=pytest.mark.long),
         *(
             pytest.param(kind, "pose=/tcp/pose", marks=pytest.mark.long)
