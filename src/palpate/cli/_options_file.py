@@ -31,6 +31,7 @@ _PATHS = {"payload", "robot-stiffness-from", "gains", "certificate"}
 _KNOWN_BY = ("identify", "press")
 """Commands that take one file together: what one of them knows is no mistake to the other."""
 _LARGEST = 1 << 16
+"""Bytes that are read: a file with every option is a hundredth of it."""
 
 
 @Parameter(name="*", group=Group("Options from a file", sort_key=7))
