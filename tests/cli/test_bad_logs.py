@@ -105,7 +105,7 @@ def bag(tmp_path_factory):
     flat = np.zeros((len(record), 1))
     joint = joints("/joint_states", record["time"], ["lift"], flat, flat)
     return write_bag(
-        tmp_path_factory.mktemp("bags") / "press", "mcap", [*topics_of(record), joint], extra="/grip"
+        tmp_path_factory.mktemp("bags") / "press", "mcap", [*topics_of(record, 4), joint], extra="/grip"
     )
 
 

@@ -74,7 +74,7 @@ def drawn(outcome):
     return found, page(found, SOURCE)
 
 
-OFTEN = ("identified", "not_identifiable", "no_contact", "volts")
+OFTEN = ("identified", "no_contact")
 
 
 @pytest.fixture(

@@ -343,6 +343,7 @@ def test_the_command_line_refuses_what_it_cannot_do(tmp_path, capsys, monkeypatc
     assert [p.name for p in tmp_path.iterdir()] == ["lab.toml"]
 
 
+@pytest.mark.long
 def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkeypatch):
     some = tuple(s for s in sentences() if s.figure in {"6.1", "6.8", "4.4"})
     monkeypatch.setattr(judge, "SEEDS", (0,))
