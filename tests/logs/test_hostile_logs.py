@@ -121,7 +121,11 @@ def bag1_record(header, data):
 
 
 @pytest.mark.parametrize(
-    ("says", "words"), [(1000, "cannot be read as a ROS 1 bag"), (10**8, "more than 0.01 GB")]
+    ("says", "words"),
+    [
+        pytest.param(1000, "cannot be read as a ROS 1 bag", marks=pytest.mark.long),
+        (10**8, "more than 0.01 GB"),
+    ],
 )
 def test_a_chunk_of_a_bag_that_unpacks_to_much(tmp_path, says, words):
     path = tmp_path / "log.bag"
