@@ -123,6 +123,7 @@ def test_the_decoupled_law_as_printed_hammers_and_loses_the_surface():
     assert (corrected["phase"] == 1).all()
 
 
+@pytest.mark.long
 def test_with_the_gain_set_right_it_still_needs_the_surface_to_damp_it():
     """The printed law at the corrected one's loop gain: steady on foam of 200 N s/m, not on foam of 13 N s/m."""
     for surface, k in ((FOAM, 5200.0), (VISCOELASTIC, 7000.0)):

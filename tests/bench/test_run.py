@@ -126,6 +126,7 @@ def test_a_press_of_no_tick_is_refused(foam, press_for):
         foam.run(1.0, press=press_for)
 
 
+@pytest.mark.long
 def test_what_comes_after_the_stop_does_not_end_the_run(foam, monkeypatch):
     """A chunk reaches beyond the end of the press; what it holds there is nobody's."""
 

@@ -58,6 +58,7 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
     assert (elsewhere / "excite.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
     assert main(["excite", *ASKED, "--duration", "4", "--no-figure", "--report", "page.html"]) == 0
     assert "written: page.html" in capsys.readouterr().out

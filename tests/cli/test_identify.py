@@ -158,6 +158,7 @@ def test_the_terminal_begins_with_the_sentence(log, capsys):
     )
 
 
+@pytest.mark.long
 def test_the_page_says_how_it_was_made(log, capsys):
     assert main(["identify", str(log), *OWN, "--no-figure", "--report", "a.html"]) == 0
     text = Path("a.html").read_text()

@@ -170,6 +170,7 @@ def test_a_force_at_the_end_of_its_range(tmp_path, capsys):
     assert own["verdict"] != "identified" or own["ci95"][0] < 5000 < own["ci95"][1]
 
 
+@pytest.mark.long
 def test_only_free_motion(tmp_path, capsys):
     rng = np.random.default_rng(0)
     time = np.arange(3000) / 1000
@@ -273,6 +274,7 @@ def test_columns_of_a_table(root, capsys):
     assert position["last"] == pytest.approx(7.998)
 
 
+@pytest.mark.long
 def test_a_record_in_three_dimensions_that_palpate_wrote(tmp_path, capsys):
     from palpate.logs import write_record
 

@@ -212,6 +212,7 @@ def test_print_shows_a_file_that_can_be_run(name, capsys):
     assert capsys.readouterr().out == source(name)
 
 
+@pytest.mark.long
 def test_a_press_along_one_direction_has_its_own_page(tmp_path, capsys):
     out = tmp_path / "results"
     assert main(["run", "ur5e-touch", "--out", str(out)]) == 0

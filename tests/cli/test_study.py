@@ -136,6 +136,7 @@ def test_killed_at_any_moment_it_goes_on_and_the_table_is_the_same_to_the_byte(f
     assert not list(out.glob(".*"))
 
 
+@pytest.mark.long
 def test_ctrl_c_saves_and_says_how_to_go_on(folder, tmp_path):
     out = tmp_path / "out"
     process = started(folder / "many.toml", "--out", out)

@@ -36,8 +36,15 @@ FORCES = {
 }
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("force", FORCES)
+EACH = [
+    pytest.param(force, motion, marks=pytest.mark.long if (i + j) % 3 else ())
+    for i, force in enumerate(FORCES)
+    for j, motion in enumerate(MOTIONS)
+]
+"""Each force and each motion stands in a test of its own of each run; all their pairs in the long ones."""
+
+
+@pytest.mark.parametrize(("force", "motion"), EACH)
 def test_nothing_is_touched(motion, force):
     found = identify(record(TIME, MOTIONS[motion], FORCES[force]))
     assert all(p.value is None for p in found.parameters.values())

@@ -60,6 +60,7 @@ def test_any_even_grid_is_recovered(period, phase, seed):
     assert found.period == pytest.approx(period, abs=4 / len(wanted) + 1e-9)
 
 
+@pytest.mark.long
 @settings(max_examples=25)
 @given(phases, seeds)
 def test_the_spread_holds_the_true_phase(phase, seed):

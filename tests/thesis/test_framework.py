@@ -364,6 +364,7 @@ def test_a_run_cut_short_is_never_measured():
         runs.one(experiment)
 
 
+@pytest.mark.long
 def test_ctrl_c_stops_the_runs_of_all_threads():
     """Hours of simulated time are under way on other threads; they end within a look."""
     experiment = changed(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
