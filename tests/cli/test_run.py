@@ -330,6 +330,7 @@ def test_a_folder_that_may_not_be_written(mine, capsys, monkeypatch):
 
 def test_a_full_disk_leaves_nothing(mine, done, capsys, monkeypatch):
     """Behind a run that has compiled the loop, which says so while it waits."""
+
     def full(record, path):
         path.write_bytes(b"half a rec")
         raise OSError(28, "No space left on device", str(path))
