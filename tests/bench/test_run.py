@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.quick import DURATION, PRESS, changed, quick
+from own_parts import Spring
 from palpate._vector import Vec3
 from palpate.bench import bench as running
 from palpate.bench import build, load, names, part, simulation
-from palpate.environments import KelvinVoigt, SurfaceState
-from palpate.environments.surface_state import UNTOUCHED
+from palpate.environments import KelvinVoigt
 from palpate.errors import InputError
 
 
@@ -207,33 +207,9 @@ def test_the_record_carries_what_made_it(foam):
     assert again == quick("foam-hybrid")
 
 
-@part
-class Rigid(NamedTuple):
-    """A user's surface: a spring and a damper, without a mass and without a truth to tell."""
-
-    stiffness: float
-    damping: float
-    mass: float = 0.0
-
-    def start(self):
-        return UNTOUCHED
-
-    def force(self, state, p, v):
-        return self.stiffness * p + self.damping * v
-
-    def relax(self, state, p, v, dt):
-        return SurfaceState(p, v, 0.0, 1.0)
-
-    def free(self, state, dt):
-        return SurfaceState(0.0, 0.0, 0.0, 0.0)
-
-    def stored(self, state):
-        return 0.0
-
-
 @pytest.mark.long
 def test_a_surface_of_ones_own_is_pressed(foam):
-    bench = foam.with_surface(Rigid(10_000.0, 300.0))
+    bench = foam.with_surface(part(Spring)(10_000.0, 300.0))
     record = bench.run(DURATION, press=0.05, compiled=False)
     assert record.meta["truth"] == {}
     touching = record["touching"] == 1.0
