@@ -19,6 +19,26 @@ wall, cpu = time.perf_counter(), time.process_time()
 bench.run(0.01)
 print(time.perf_counter() - wall, time.process_time() - cpu)
 """
+WHERE = """
+import time
+from llvmlite.binding import ffi
+inside, call = [0.0, 0], ffi._lib_fn_wrapper.__call__
+def timed(function, *arguments):
+    begin = time.process_time()
+    inside[1] += 1
+    try:
+        return call(function, *arguments)
+    finally:
+        inside[1] -= 1
+        if not inside[1]:
+            inside[0] += time.process_time() - begin
+ffi._lib_fn_wrapper.__call__ = timed
+from palpate.bench import build, load
+bench = build(load("foam-neural"))
+begin = time.process_time()
+bench.run(0.01)
+print(time.process_time() - begin, inside[0])
+"""
 TEN_SECONDS = r"""
 import sys, time
 from pathlib import Path
@@ -65,6 +85,10 @@ def main() -> None:
             code = FIRST_CALL.format(name=name)
             told(f"the loop of {name}, compiled", child(code, **cache), COLD)
             told(f"the loop of {name}, from the cache", min(child(code, **cache) for _ in range(5)), WARM)
+        whole, llvm = child(WHERE, **{**cache, "NUMBA_CACHE_DIR": str(Path(folder) / "another")})
+        print(
+            f"of the processor's {whole:.2f} s for foam-neural, compiled, LLVM takes {llvm:.2f} s, Numba the rest"
+        )
         ten = [child(TEN_SECONDS, str(experiments / "foam-hybrid.toml"), folder, **cache) for _ in range(5)]
         told("palpate run, 10 s on the bench, with record and report", min(ten), RUN)
 

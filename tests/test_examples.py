@@ -12,7 +12,7 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parent.parent / "examples"
 EXAMPLES = sorted(FOLDER.glob("[0-9]*.py"))
-LONG = ("01", "05", "06", "08", "09", "10", "11", "12", "13", "14", "15", "17", "18", "19")
+LONG = ("01", "04", "05", "06", "08", "09", "10", "11", "12", "13", "14", "15", "16", "17", "18", "19")
 """They compile a loop of their own, march through many runs, design, or press at real time: seconds each."""
 
 

@@ -20,6 +20,7 @@ class Unit:
 GRAVITY = 9.80665
 """Standard gravity [m/s^2]."""
 _POUND_FORCE = 4.4482216152605
+"""[N]: 0.45359237 kg at the standard 9.80665 m/s^2, exact."""
 
 UNITS: dict[str, Unit] = {
     "1": Unit("number", "1", 1.0),

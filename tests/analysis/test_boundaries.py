@@ -85,6 +85,7 @@ def test_an_island_is_found_that_a_grid_steps_over():
     assert not any(growth(period(s)) < 0.0 for s in np.linspace(0.0, 1.0, 16))
 
 
+@pytest.mark.long
 def test_no_value_of_a_grid_is_on_the_wrong_side():
     base = surface(1e4, 480.0, 1.0, 0.003)
     found = stable_intervals(base, "controller.kf", 1.0, 4.0)

@@ -11,6 +11,7 @@ from palpate.bench.experiments.tables import changed, load
 from palpate.controllers.cautious_press import without_last_joint
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("K", "B"), [(1.3e3, 20.0), (1.1e4, 120.0), (1.2e5, 200.0)])
 def test_it_settles_under_friction_on_any_surface(K, B):
     surface = {"surface.stiffness": K, "surface.damping": B, "surface.mass": 0.05, "run.press": 2.0}

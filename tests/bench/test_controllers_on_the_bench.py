@@ -100,6 +100,7 @@ def test_the_impedance_holds_within_what_friction_can_hide(surface):
     assert free["force"][-500:].mean() == pytest.approx(expected, abs=0.4)
 
 
+@pytest.mark.long
 def test_decoupling_keeps_a_step_of_force_out_of_the_angle():
     tables = {"press": 10.0, "force": STEPS}
     corrected = pressed({"kind": "decoupled-hybrid", "stiffness": 5200.0}, **tables)
@@ -122,6 +123,7 @@ def test_the_decoupled_law_as_printed_hammers_and_loses_the_surface():
     assert (corrected["phase"] == 1).all()
 
 
+@pytest.mark.long
 def test_with_the_gain_set_right_it_still_needs_the_surface_to_damp_it():
     """The printed law at the corrected one's loop gain: steady on foam of 200 N s/m, not on foam of 13 N s/m."""
     for surface, k in ((FOAM, 5200.0), (VISCOELASTIC, 7000.0)):

@@ -63,6 +63,7 @@ def test_a_wrong_part_is_told_in_a_line(wrong, told):
     assert raised.value.__cause__ is not None or raised.value.compiler or "types" in told
 
 
+@pytest.mark.long
 def test_a_right_part_of_the_user_s_own_runs():
     @part
     @controller

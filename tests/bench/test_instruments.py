@@ -36,6 +36,7 @@ def shake(plant, line, state, base, swing, force, readings):
         way = line.advance(way, felt.normal, k, 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("phase", [0.0, 7.3e-4])
 def test_a_fresh_reading_is_the_filtered_force_of_its_instant(phase):
     """No noise and 32 bits: what is left is the true force, through a continuous Butterworth, so much earlier."""

@@ -56,7 +56,9 @@ HYBRID = ["foam-hybrid", "rubber-hybrid"]
 ALL = [*HYBRID, "foam-rls", "rubber-rls"]
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.long if n.endswith("rls") else ()) for n in ALL]
+)
 def test_every_run_ends_as_asked_for_in_one_contact(runs, name):
     assert {s["end"] for s in runs(name).summaries} == {"done"}
     assert not runs(name)("contacts_lost").any()

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.quick import DURATION, PRESS, changed, quick
+from own_parts import Spring
 from palpate._vector import Vec3
 from palpate.bench import bench as running
 from palpate.bench import build, load, names, part, simulation
-from palpate.environments import KelvinVoigt, SurfaceState
-from palpate.environments.surface_state import UNTOUCHED
+from palpate.environments import KelvinVoigt
 from palpate.errors import InputError
 
 
@@ -43,8 +43,10 @@ def kinds_of_loop():
     return list(found.values())
 
 
-FEW = ("foam-cautious", "foam-chirp", "foam-hybrid", "foam-impedance", "foam-neural", "foam-viscoelastic")
+FEW = ("foam-hybrid", "foam-neural", "foam-viscoelastic")
 """Kinds of loop of which each test run asks; the others take as long and are `long`."""
+OF_ITS_OWN = ("cautious", "self-tuning")
+"""Controllers of which each has a loop compiled for itself; the others share one."""
 
 
 @pytest.mark.parametrize(
@@ -60,7 +62,10 @@ def test_compiled_and_stepped_runs_agree_to_the_bit(name):
     same(compiled, stepped, tolerance=1e-12 if ("neural" in name or "tuning" in name) else 0.0)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.long if n.endswith(OF_ITS_OWN) else ()) for n in names()],
+)
 def test_the_same_seed_gives_the_same_numbers_and_another_others(name):
     bench = build(quick(name))
     first, other, again = press(bench, 3), press(bench, 4), press(bench, 3)
@@ -121,6 +126,7 @@ def test_a_press_of_no_tick_is_refused(foam, press_for):
         foam.run(1.0, press=press_for)
 
 
+@pytest.mark.long
 def test_what_comes_after_the_stop_does_not_end_the_run(foam, monkeypatch):
     """A chunk reaches beyond the end of the press; what it holds there is nobody's."""
 
@@ -201,32 +207,9 @@ def test_the_record_carries_what_made_it(foam):
     assert again == quick("foam-hybrid")
 
 
-@part
-class Rigid(NamedTuple):
-    """A user's surface: a spring and a damper, without a mass and without a truth to tell."""
-
-    stiffness: float
-    damping: float
-    mass: float = 0.0
-
-    def start(self):
-        return UNTOUCHED
-
-    def force(self, state, p, v):
-        return self.stiffness * p + self.damping * v
-
-    def relax(self, state, p, v, dt):
-        return SurfaceState(p, v, 0.0, 1.0)
-
-    def free(self, state, dt):
-        return SurfaceState(0.0, 0.0, 0.0, 0.0)
-
-    def stored(self, state):
-        return 0.0
-
-
+@pytest.mark.long
 def test_a_surface_of_ones_own_is_pressed(foam):
-    bench = foam.with_surface(Rigid(10_000.0, 300.0))
+    bench = foam.with_surface(part(Spring)(10_000.0, 300.0))
     record = bench.run(DURATION, press=0.05, compiled=False)
     assert record.meta["truth"] == {}
     touching = record["touching"] == 1.0

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.io import savemat
 
 from identification.synthetic_contacts import pressed
 from logs.arm_bags import a_press, topics_of
 from logs.ros_bags import joints, pose, storage, wrench, write_bag
 from palpate.cli import main
+from palpate.records import Record
 
 TIME = np.arange(200) / 100
 ZERO = np.zeros((200, 3))
@@ -102,7 +102,8 @@ def test_a_file_that_may_not_be_read(tmp_path, capsys, command):
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    _, record = a_press()
+    _, whole = a_press()
+    record = Record({name: column[::4] for name, column in whole.columns.items()}, whole.units, whole.meta)
     flat = np.zeros((len(record), 1))
     joint = joints("/joint_states", record["time"], ["lift"], flat, flat)
     return write_bag(
@@ -223,16 +224,15 @@ def test_a_wall_that_shows_nothing(tmp_path, bag, capsys):
 
 def test_a_wrench_of_a_log_of_one_axis(tmp_path, capsys):
     flat = pressed()
-    savemat(
-        tmp_path / "log.mat", {"time": flat["time"], "position": flat["position"], "force": flat["force"]}
-    )
-    refused(tmp_path, capsys, ["identify", "log.mat", "--tcp", "0,0,1"], "this log has one axis")
-    refused(tmp_path, capsys, ["identify", "log.mat", "--wrench", "force"], "name the pose's columns")
+    columns = [flat[name] for name in ("time", "position", "force")]
+    np.savetxt("log.csv", np.column_stack(columns), delimiter=",", header="time,position,force", comments="")
+    refused(tmp_path, capsys, ["identify", "log.csv", "--tcp", "0,0,1"], "this log has one axis")
+    refused(tmp_path, capsys, ["identify", "log.csv", "--wrench", "force"], "name the pose's columns")
     refused(
         tmp_path,
         capsys,
-        ["identify", "log.mat", "--wrench", "force", "--pose", "position"],
+        ["identify", "log.csv", "--wrench", "force", "--pose", "position"],
         "--wrench needs fx,fy,fz",
     )
-    assert main(["identify", "log.mat", "--no-figure"]) == 0
+    assert main(["identify", "log.csv", "--no-figure"]) == 0
     capsys.readouterr()

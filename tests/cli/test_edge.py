@@ -135,7 +135,7 @@ def test_a_reader_that_leaves_is_no_error():
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")
-@pytest.mark.parametrize("words", [("--help",), ("run", "--list"), ("run", "foam-hybrid", "--print")])
+@pytest.mark.parametrize("words", [("--help",), pytest.param(("run", "--list"), marks=pytest.mark.long)])
 def test_a_full_disk_is_one_line(words):
     with Path("/dev/full").open("w") as full:
         code, told = answered(*words, stdout=full, stderr=subprocess.PIPE)

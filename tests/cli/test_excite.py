@@ -56,9 +56,9 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
     assert "yes, predicted K" in printed
     assert "written: excite.png" in printed
     assert (elsewhere / "excite.png").read_bytes().startswith(b"\x89PNG")
-    assert main(["excite", *ASKED, "--duration", "4"]) == 0  # over its own figure
 
 
+@pytest.mark.long
 def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
     assert main(["excite", *ASKED, "--duration", "4", "--no-figure", "--report", "page.html"]) == 0
     assert "written: page.html" in capsys.readouterr().out
@@ -76,6 +76,7 @@ def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
     assert main(["excite", *ASKED, "--no-figure", "--report", "page.pdf"]) == 2
 
 
+@pytest.mark.long
 def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
     words = (*ONE, "--lag-std", "1:ms", "--precision", "1%", "--out", "excite.csv", "--duration", "4")
     assert main(["excite", *words, "--no-figure"]) == 1
@@ -90,6 +91,7 @@ def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
     assert {"change", "reached", "enough", "needed_s"} == set(found["remedies"][0])
 
 
+@pytest.mark.long
 def test_the_force_over_time(capsys, elsewhere):
     words = (*ASKED, "--no-figure", "--duration", "4")
     assert main(["excite", *words, "--out", "excite.csv"]) == 0
@@ -152,6 +154,7 @@ def test_a_surface_without_a_mass(capsys):
     assert len(found["surfaces"]) == 1
 
 
+@pytest.mark.long
 def test_a_robot_and_sensors_of_ones_own(capsys):
     own = ("--noise", "0.06", "--sampling", "1000", "--force-filter", "none", "--position-step", "0.1:um")
     asked = (*ONE, "--duration", "4")

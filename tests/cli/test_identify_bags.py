@@ -66,6 +66,7 @@ def test_what_was_declared_and_found_is_shown(tmp_path, capsys):
     assert "frame-guess" not in shown
 
 
+@pytest.mark.long
 def test_the_page_and_the_figure(tmp_path, capsys):
     press_bag(tmp_path / "press")
     assert main(["identify", "press", "--report", "press.html", "--figure", "press.png"]) == 0
@@ -143,6 +144,7 @@ def test_the_robot_s_stiffness_from_a_press_on_a_wall(tmp_path, capsys):
     assert stiffness(plain) == pytest.approx(5000 * 40 / 45, rel=0.05)
 
 
+@pytest.mark.long
 def test_two_sensors_of_opposite_signs(tmp_path, capsys):
     _, record = a_press(3)
     force, place = topics_of(record)
@@ -168,6 +170,7 @@ def test_a_force_at_the_end_of_its_range(tmp_path, capsys):
     assert own["verdict"] != "identified" or own["ci95"][0] < 5000 < own["ci95"][1]
 
 
+@pytest.mark.long
 def test_only_free_motion(tmp_path, capsys):
     rng = np.random.default_rng(0)
     time = np.arange(3000) / 1000
@@ -186,6 +189,7 @@ def test_only_free_motion(tmp_path, capsys):
     assert "no free motion" not in shown
 
 
+@pytest.mark.long
 def test_many_short_contacts(tmp_path, capsys):
     """Taps of 0.13 s, 0.4 s apart."""
     time = np.arange(10_000) / 1000
@@ -270,6 +274,7 @@ def test_columns_of_a_table(root, capsys):
     assert position["last"] == pytest.approx(7.998)
 
 
+@pytest.mark.long
 def test_a_record_in_three_dimensions_that_palpate_wrote(tmp_path, capsys):
     from palpate.logs import write_record
 

@@ -59,6 +59,7 @@ def test_a_folder_is_its_logs_and_what_they_say_together(presses, capsys):
     assert point["force_N"][0] < point["force_N"][1]
 
 
+@pytest.mark.long
 def test_files_are_pooled_as_a_folder_is(presses, capsys):
     _, folder = ask(capsys, presses)
     _, files = ask(capsys, *sorted(presses.glob("*.csv"), key=lambda p: int(p.stem[6:])))

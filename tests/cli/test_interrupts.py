@@ -83,7 +83,13 @@ def test_results_that_are_being_written_are_written(tmp_path, monkeypatch):
     assert read_record(tmp_path / "results" / "record.parquet").meta["end"] == "done"
 
 
-@pytest.mark.parametrize("error", [MemoryError("Unable to allocate"), OSError(28, "No space left on device")])
+@pytest.mark.parametrize(
+    "error",
+    [
+        pytest.param(MemoryError("Unable to allocate"), marks=pytest.mark.long),
+        OSError(28, "No space left on device"),
+    ],
+)
 def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeypatch, capsys, error):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")

@@ -59,6 +59,7 @@ def test_a_log_is_weighed_and_everything_is_written(elsewhere, capsys):
     assert "--replace" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_poses_that_do_not_tell_are_exit_code_1_and_nothing_is_written(elsewhere, capsys):
     write(log_of(Tool(), Rotation.from_rotvec(np.zeros((3, 3))), np.random.default_rng(0)), "still.parquet")
     code, found = ask(capsys, "payload", "still.parquet", "--wrench-frame", "tool", "--out", "tool.toml")
@@ -90,6 +91,7 @@ def test_a_press_is_identified_with_the_payload(elsewhere, capsys):
     assert "by the payload file" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_a_payload_of_other_axes_is_refused(elsewhere, capsys):
     write(log_of(Tool(), six(), np.random.default_rng(0)), "turning.parquet")
     main(["payload", "turning.parquet", "--wrench-frame", "tool", "--out", "tool.toml"])

@@ -12,6 +12,7 @@ from palpate.bench.sequence import CONTACT
 from palpate.cli import main
 
 
+@pytest.mark.long
 def test_json_is_one_object_that_agrees_with_itself(program):
     ran = program("speed", "--json")
     assert ran.returncode == 0, ran.stderr

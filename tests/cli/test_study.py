@@ -136,6 +136,7 @@ def test_killed_at_any_moment_it_goes_on_and_the_table_is_the_same_to_the_byte(f
     assert not list(out.glob(".*"))
 
 
+@pytest.mark.long
 def test_ctrl_c_saves_and_says_how_to_go_on(folder, tmp_path):
     out = tmp_path / "out"
     process = started(folder / "many.toml", "--out", out)
@@ -150,6 +151,7 @@ def test_ctrl_c_saves_and_says_how_to_go_on(folder, tmp_path):
     assert 20 <= done < 240
 
 
+@pytest.mark.long
 def test_on_a_full_disk_what_is_done_is_kept(folder, tmp_path):
     out = tmp_path / "out"
 
@@ -179,6 +181,7 @@ def test_a_thousand_million_runs_are_not_begun_unasked(capsys, tmp_path):
     assert not (tmp_path / "huge").exists()
 
 
+@pytest.mark.long
 def test_results_of_another_study_or_version_are_not_mixed(folder, capsys, tmp_path):
     out = tmp_path / "out"
     assert main(["study", str(folder / "small.toml"), "--out", str(out)]) == 0

@@ -86,10 +86,12 @@ def test_a_log_with_a_hostile_name(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("variables", "encoding", "told"),
     [
-        ({"LANG": "C", "LC_ALL": "C"}, "utf-8", "± K"),
+        pytest.param({"LANG": "C", "LC_ALL": "C"}, "utf-8", "± K", marks=pytest.mark.long),
         ({"PYTHONIOENCODING": "ascii"}, "ascii", "+- K"),
-        ({"PYTHONIOENCODING": "latin-1"}, "latin-1", "± K"),
-        ({"TERM": "xterm-256color", "HOME": "/proc/nobody"}, "utf-8", "± K"),
+        pytest.param({"PYTHONIOENCODING": "latin-1"}, "latin-1", "± K", marks=pytest.mark.long),
+        pytest.param(
+            {"TERM": "xterm-256color", "HOME": "/proc/nobody"}, "utf-8", "± K", marks=pytest.mark.long
+        ),
     ],
 )
 def test_little_is_needed_of_the_environment(tmp_path, variables, encoding, told):

@@ -13,6 +13,7 @@ from palpate.identification import Verdict, identify
 KNOWN = {"lag": 0.0, "model": "kelvin-voigt-mass"}
 
 
+@pytest.mark.long
 def test_the_tool_is_taken_out_of_the_mass():
     """f = (M + tool) a + ...: what is fitted is both."""
     both, _ = identify_contact(shaken(m=1.5), **KNOWN)

@@ -41,6 +41,7 @@ def test_all_numbers_of_a_tool_are_found(side):
     assert not found.notes
 
 
+@pytest.mark.long
 def test_the_intervals_hold_the_truth_where_each_orientation_errs_in_its_own_way():
     rng = np.random.default_rng(1)
     inside = {"mass": [], "weight": [], "centre": []}

@@ -75,7 +75,13 @@ def walk_on_arrays(controller, sense, task, model, ticks=5):
     return np.array(torques)
 
 
-@each
+ONES_OF_A_KIND = ("hybrid", "proportional-integral", "decoupled", "impedance")
+
+
+@pytest.mark.parametrize(
+    "make",
+    [pytest.param(m, id=n, marks=() if n in ONES_OF_A_KIND else pytest.mark.long) for n, m in MAKERS.items()],
+)
 def test_plain_and_compiled_are_the_same_to_the_last_bit(make):
     controller = make(alike, alike)
     values = [by_value(v) for v in inputs(3, 3, 1)]

@@ -30,6 +30,7 @@ def run(rate, normal, dt=DT, grip=GRIP, kernel=drag):
 wild = st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-20.0, 60.0)), min_size=1, max_size=200)
 
 
+@pytest.mark.long
 @given(wild, st.sampled_from([DT, 1e-3, 0.1]), st.sampled_from([GRIP, StickSlip(5000.0, 0.0, 0.7)]))
 @settings(max_examples=200)
 def test_it_stays_in_the_cone_and_gives_back_no_more_than_it_took(samples, dt, grip):

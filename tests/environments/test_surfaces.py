@@ -46,14 +46,14 @@ with_mass = pytest.mark.parametrize("surface", HEAVY.values(), ids=HEAVY.keys())
     frequencies=st.lists(st.floats(0.3, 40.0), min_size=3, max_size=3),
     depth=st.floats(1e-4, 5e-3),
 )
-@settings(max_examples=30)
+@settings(max_examples=12)
 def test_it_gives_back_no_more_than_it_was_given(surface, amplitudes, frequencies, depth):
     laws.gives_back_no_more(join(surface), amplitudes, frequencies, depth)
 
 
 @each
 @given(s=st.floats(-5e-3, 5e-3), v=st.floats(-0.5, 0.5), z=st.floats(-5e-3, 5e-3))
-@settings(max_examples=30)
+@settings(max_examples=12)
 def test_a_free_surface_never_gains_energy(surface, s, v, z):
     linear = not isinstance(surface, HuntCrossley)
     z = z if isinstance(surface, StandardLinearSolid) else 0.0

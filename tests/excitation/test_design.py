@@ -52,6 +52,7 @@ def test_the_range_is_its_middle_and_its_corners():
     assert len(SurfaceRange((1.0, 2.0), (3.0, 3.0)).surfaces()) == 3
 
 
+@pytest.mark.long
 def test_it_reaches_what_was_asked_on_every_surface(multisine, chirp):
     for found in (multisine, chirp):
         assert found.feasible
@@ -115,6 +116,7 @@ def test_a_slow_loop_may_be_driven_harder_than_its_surfaces_feel():
     assert driven.predictions[0].force[1] < 20.05
 
 
+@pytest.mark.long
 def test_twice_the_precision_takes_some_four_times_as_long():
     """But for the lag, of which something is known beforehand however short it is."""
     exact = replace(QUESTION, surfaces=KNOWN, sensors=Sensors(ForceChain()), longest=3600.0)
@@ -140,7 +142,9 @@ def test_a_lag_that_is_badly_known_costs_precision(multisine):
     )
 
 
-@pytest.mark.parametrize("criterion", ["worst", "D", "A", "E"])
+@pytest.mark.parametrize(
+    "criterion", ["worst", "D", *(pytest.param(c, marks=pytest.mark.long) for c in "AE")]
+)
 def test_every_criterion_makes_an_excitation(criterion, ten_seconds):
     found = design(replace(QUESTION, criterion=criterion, duration=10.0))
     assert found.made.gap < 0.02

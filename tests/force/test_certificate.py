@@ -216,6 +216,7 @@ def test_a_torque_arm_is_proved_on_surfaces_with_damping_too():
         assert inside <= prover.contraction(cell.cell.box, L)[0]
 
 
+@pytest.mark.long
 def test_contact_lost_and_found_makes_nothing_grow(proof):
     """A spring and a damper that only push, from one tick to the next; the tip starts away from the surface."""
     gains, claim = proof.gains, proof.claims[1]
@@ -277,6 +278,7 @@ def measured(half, late=0.0):
     )
 
 
+@pytest.mark.long
 def test_an_inner_loop_known_to_intervals_is_proved_for_all_that_it_may_be():
     gains = measured(0.01, 0.001)
     assert gains.theta > lag_of(gains_of().arm)

@@ -54,6 +54,7 @@ def test_it_finds_what_is_there(found):
     assert found.explained > 0.999
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("colour", [0.0, 0.95])
 def test_its_intervals_hold_the_truth(colour):
     """24 numbers of 95 %: fewer than 20 would be seen once in 2000 times. The benchmark counts 200 logs."""

@@ -108,6 +108,7 @@ def fits(log):
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("noise", "resolution"), [(1.5e-5, 0.0), (0.0, 4e-5)], ids=["noisy", "through a coarse encoder"]
 )

@@ -111,7 +111,9 @@ def test_a_surface_that_recovers_slowly_is_met_deeper_again():
     assert decay == pytest.approx(np.exp(-1000 * 999 / 500 * 1e-4 / 1), rel=2e-2)
 
 
-@pytest.mark.parametrize("cell", SLICE, ids=str)
+@pytest.mark.parametrize(
+    "cell", [pytest.param(c, id=str(c), marks=pytest.mark.long if i % 3 else ()) for i, c in enumerate(SLICE)]
+)
 def test_a_seed_makes_one_log(cell):
     log, again = make_log(cell, 11), make_log(cell, 11)
     for one, other in ((log.time, again.time), (log.position, again.position), (log.force, again.force)):

@@ -70,6 +70,7 @@ def test_a_held_position_leaves_the_surface_all_the_same(every, ramp):
     assert sum(held) >= 2  # of 95 % intervals: fewer would be chance in one of 140 such logs
 
 
+@pytest.mark.long
 def test_a_force_that_drifts_in_the_air_is_level_again():
     log = pressed()
     drift = 2.0 * log["time"] / log["time"][-1]
@@ -80,6 +81,7 @@ def test_a_force_that_drifts_in_the_air_is_level_again():
     assert "force-drifts" not in identify(log).codes
 
 
+@pytest.mark.long
 def test_many_presses_are_as_many_contacts():
     """In contact for more than half of the time, and in the air for half a second at a time."""
     t = np.arange(int(60 * 1.6 * 125)) / 125

@@ -36,8 +36,15 @@ FORCES = {
 }
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("force", FORCES)
+EACH = [
+    pytest.param(force, motion, marks=pytest.mark.long if (i + j) % 3 else ())
+    for i, force in enumerate(FORCES)
+    for j, motion in enumerate(MOTIONS)
+]
+"""Each force and each motion stands in a test of its own of each run; all their pairs in the long ones."""
+
+
+@pytest.mark.parametrize(("force", "motion"), EACH)
 def test_nothing_is_touched(motion, force):
     found = identify(record(TIME, MOTIONS[motion], FORCES[force]))
     assert all(p.value is None for p in found.parameters.values())
@@ -65,7 +72,7 @@ def test_a_press_in_as_much_noise_is_one():
 
 
 @pytest.mark.parametrize("noise", [0.1, 0.2])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 2, 3))])
 def test_a_noisy_press_is_no_bonded_one(noise, seed):
     """A few samples at the noise's lower end lie close together, and are no contact whose position stands still."""
     found = identify(pressed(noise=noise, seed=seed))

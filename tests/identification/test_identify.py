@@ -82,6 +82,7 @@ def test_intervals_of_presses_cover_the_truth_without_a_known_lag():
     assert min(inside.values()) >= 9, inside  # 11.4 expected, a binomial's three deviations less
 
 
+@pytest.mark.long
 def test_if_the_model_holds_estimates_are_unbiased_and_vary_as_claimed():
     found = [identify(pressed(seed=seed), lag=0.0, model="kelvin-voigt").estimate for seed in range(20)]
     values = np.array([e.theta[e.names.index("K")] for e in found])

@@ -60,6 +60,7 @@ def test_any_even_grid_is_recovered(period, phase, seed):
     assert found.period == pytest.approx(period, abs=4 / len(wanted) + 1e-9)
 
 
+@pytest.mark.long
 @settings(max_examples=25)
 @given(phases, seeds)
 def test_the_spread_holds_the_true_phase(phase, seed):
@@ -90,6 +91,7 @@ def test_at_its_rate():
     )  # three deviations of 40 numbers of an even distribution
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(st.sampled_from([25 / 12, 2.5, 3.3, 8.0]), phases, seeds, st.floats(0.02, 0.6))
 def test_samples_that_equal_the_one_before_are_there_all_the_same(period, phase, seed, share):

@@ -131,6 +131,7 @@ def same(one, other, scales):
             assert b.ci95 == pytest.approx([scale * end for end in a.ci95], rel=0.02), name
 
 
+@pytest.mark.long
 @settings(max_examples=6, deadline=None)
 @given(st.floats(-2, 2))
 def test_a_force_in_another_unit_scales_every_parameter(size):

@@ -160,6 +160,7 @@ def test_units_of_the_parameters_do_not_matter(make):
     np.testing.assert_allclose(theirs.estimate().std * unit, ours.estimate().std, rtol=1e-6)
 
 
+@pytest.mark.long
 @linear
 @pytest.mark.parametrize(("pole", "least"), [(0.0, 0.90), (0.8, 0.88)], ids=["white", "coloured"])
 def test_the_stated_interval_covers_the_truth_at_its_rate(make, pole, least):

@@ -246,6 +246,7 @@ def test_a_copy_goes_its_own_way_and_a_pickle_goes_on():
     np.testing.assert_array_equal(told(thawed), told(copied))
 
 
+@pytest.mark.long
 def test_any_estimator_of_four_goes_behind_it():
     x, force = moving()
     own = RecursiveLeastSquares(np.zeros(4), np.diag([1e2, 1e8, 1e12, 1e6]), forgetting=0.999, names=NAMES)

@@ -79,6 +79,7 @@ def test_a_loss_of_contact_is_found_and_so_is_the_next_touch():
     assert 2 <= one.contacts <= len(begun) + 1
 
 
+@pytest.mark.long
 def test_an_estimator_that_starts_again_is_trusted_again():
     """After a change the blocks that its estimate rests on are those of the new surface."""
     vague = np.diag([1e2, 1e8, 1e12, 1e6])

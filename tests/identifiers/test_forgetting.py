@@ -56,7 +56,9 @@ def test_it_is_its_definition(n, policy, forgotten):
     np.testing.assert_allclose(estimator.covariance, np.linalg.inv(information), rtol=1e-5, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", [Exponential, Directional, SIFt])
+@pytest.mark.parametrize(
+    "kind", [Exponential, *(pytest.param(k, marks=pytest.mark.long) for k in (Directional, SIFt))]
+)
 def test_forgetting_nothing_is_no_policy_at_all(kind):
     phi, y = samples(3, 200)
     plain = RecursiveLeastSquares(np.zeros(3), 1e4 * np.eye(3))

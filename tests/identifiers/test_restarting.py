@@ -88,6 +88,7 @@ def test_the_noise_is_known_from_before_the_change():
         assert estimate.std[1] == pytest.approx(NOISE * np.sqrt(estimator.covariance[1, 1]), rel=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("colour", [0.0, 0.8], ids=["white", "coloured"])
 @pytest.mark.parametrize("forgetting", [1.0, SIFt(0.999)], ids=["all kept", "SIFt"])
 def test_a_surface_that_stays_is_not_taken_for_another(colour, forgetting):
@@ -164,6 +165,7 @@ def test_a_change_that_shows_only_when_it_moves_is_found_when_it_does():
     assert estimator.theta[1] == pytest.approx(HARD[1], rel=0.02)
 
 
+@pytest.mark.long
 def test_four_parameters_go_the_same_way():
     phi, force = changed(7)
     a = np.gradient(phi[:, 0]) * RATE

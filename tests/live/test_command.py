@@ -41,6 +41,7 @@ def refused(capsys, *words):
     return told.err
 
 
+@pytest.mark.long
 def test_a_run_s_record_moves_the_arm_and_knows_the_truth(record):
     with running("--record", record) as (address,):
         assert ADDRESS.fullmatch(address)
@@ -52,6 +53,7 @@ def test_a_run_s_record_moves_the_arm_and_knows_the_truth(record):
         one.close()
 
 
+@pytest.mark.long
 def test_a_log_without_joints_says_so_and_is_played(root):
     columns = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
     with running("--log", root / "examples" / "data" / "press.csv", *columns) as (address,):
@@ -72,6 +74,7 @@ def channels_of(client):
     return offered
 
 
+@pytest.mark.long
 def test_an_arm_presses_in_space_and_viewers_see_all_of_it():
     from websockets.sync.client import connect
 
@@ -107,6 +110,7 @@ def test_viewers_are_served_beside_the_page(record):
     assert message["K_true"] == 5200.0
 
 
+@pytest.mark.long
 def test_a_port_in_use(capsys, record):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

@@ -14,6 +14,7 @@ from palpate.press.loops import gains_for, loop_of
 from palpate.report.numbers import plain
 
 
+@pytest.mark.long
 def test_the_first_answers_are_those_of_the_linear_model():
     experiment = near()
     found = answers(OfBench(experiment))
@@ -79,6 +80,7 @@ def test_an_arm_s_proof_and_margins_are_those_of_its_gains(proof):
     assert not softer["proved"]
 
 
+@pytest.mark.long
 def test_what_cannot_be_proved_is_said(monkeypatch):
     monkeypatch.setattr(stability, "_proof", lambda encoded, adapting: ())
     gains = gains_for(loop_of("fr3", "FR3", "torque", 5.0), 20.0)

@@ -46,6 +46,7 @@ def test_a_tag_of_matlab_that_no_library_survives(tmp_path, kind):
     refused(path, "cannot be read as a MATLAB file")
 
 
+@pytest.mark.long
 def test_a_small_file_of_matlab_that_unpacks_to_much(tmp_path):
     path = tmp_path / "log.mat"
     savemat(path, {"t": np.zeros(4_000_000)}, do_compression=True)
@@ -120,7 +121,11 @@ def bag1_record(header, data):
 
 
 @pytest.mark.parametrize(
-    ("says", "words"), [(1000, "cannot be read as a ROS 1 bag"), (10**8, "more than 0.01 GB")]
+    ("says", "words"),
+    [
+        pytest.param(1000, "cannot be read as a ROS 1 bag", marks=pytest.mark.long),
+        (10**8, "more than 0.01 GB"),
+    ],
 )
 def test_a_chunk_of_a_bag_that_unpacks_to_much(tmp_path, says, words):
     path = tmp_path / "log.bag"
@@ -237,6 +242,7 @@ def test_a_spreadsheet_that_unpacks_to_much(tmp_path):
     refused(path, "more than 0.01 GB", SMALL)
 
 
+@pytest.mark.long
 def test_noise_over_any_part_of_a_file_of_matlab(tmp_path):
     """Each is read, or refused in a line; the process survives."""
     path, rng = tmp_path / "log.mat", np.random.default_rng(0)

@@ -335,7 +335,14 @@ def an_object(name, kind):
 
 
 @pytest.mark.parametrize(
-    ("kind", "way"), [("table", "table2struct"), ("timeseries", r"\.Time"), ("press.Log", "struct")]
+    ("kind", "way"),
+    [
+        ("table", "table2struct"),
+        *(
+            pytest.param(*of, marks=pytest.mark.long)
+            for of in (("timeseries", r"\.Time"), ("press.Log", "struct"))
+        ),
+    ],
 )
 def test_objects_of_matlab_are_named_with_the_way_out(tmp_path, kind, way):
     path = tmp_path / "log.mat"

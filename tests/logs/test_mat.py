@@ -19,7 +19,7 @@ def saved(tmp_path, compressed=True, **variables):
     return path
 
 
-@pytest.mark.parametrize("compressed", [False, True])  # v6 and v7
+@pytest.mark.parametrize("compressed", [pytest.param(False, marks=pytest.mark.long), True])  # v6 and v7
 def test_vectors_whichever_way_they_lie(tmp_path, compressed):
     path = saved(
         tmp_path, compressed, t=T[:, None], x=1e3 * T[None, :], f=np.arange(50, dtype=np.int16), gain=3.0
@@ -92,7 +92,7 @@ def test_wrong_files(tmp_path, kind):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
+@pytest.mark.parametrize("share", [0.3, pytest.param(0.6, marks=pytest.mark.long), 0.95])
 def test_half_a_file(tmp_path, share):
     rng = np.random.default_rng(0)
     path = saved(tmp_path, t=T, x=rng.normal(size=50), f=rng.normal(size=50))

@@ -68,11 +68,13 @@ def test_what_is_said_counts_more(path, capsys):
     assert json.loads(capsys.readouterr().out)["lag_s"]["value"] == 0.001
 
 
+@pytest.mark.long
 def test_it_is_shown(path, capsys):
     assert main(["identify", str(path), "--no-figure"]) == 0
     assert "a run's record: x_measured and force_sampled" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_another_method_makes_no_use_of_the_filter(path, capsys):
     words = ["--model", "kelvin-voigt-mass", "--method", "instrumental-variables", "--json"]
     assert main(["identify", str(path), *words]) == 0

@@ -40,7 +40,10 @@ def read_as_proposed(path):
     return (read_wrench_and_pose if "wrench" in said else read_log)(path, **said)
 
 
-@pytest.mark.parametrize("path", MEASURED, ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(p, id=p.name, marks=pytest.mark.long if i % 3 else ()) for i, p in enumerate(MEASURED)],
+)
 def test_measured_logs_are_read_as_proposed(path):
     assert np.nanstd(read_as_proposed(path)["force"]) > 0
 

@@ -80,7 +80,7 @@ def alone(page):
     return [code for code in blocks(ROOT, page, "python") if not re.search(r"\bread_\w+\(", code)]
 
 
-LONG = ("docs/arms.md", "docs/force.md", "docs/analysis.md")
+LONG = ("docs/arms.md", "docs/force.md", "docs/analysis.md", "docs/online.md")
 """They press, tune or prove for seconds."""
 
 

@@ -21,11 +21,9 @@ PRIVATE = {
 """A private word, and the field's for it (CONVENTIONS.md)."""
 WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 STILL = {
-    "src/palpate/cli/_options_file.py",
     "src/palpate/force/law.py",
     "src/palpate/force/telling.py",
     "src/palpate/force/worlds.py",
-    "src/palpate/report/run/page.py",
     "src/palpate/wires/lateness.py",
     "src/palpate/wires/press.py",
 }

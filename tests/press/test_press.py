@@ -48,9 +48,8 @@ def test_it_presses_with_the_force_asked_for_and_finds_the_surface(arm, mode, st
     assert np.abs(record["y"] - record["y"][0]).max() < 1e-3
 
 
-@pytest.mark.parametrize(
-    "controller", ["hybrid", pytest.param("proportional-integral", marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("controller", ["hybrid", "proportional-integral"])
 def test_controllers_of_three_directions_press_with_seven_joints(controller):
     """Nothing of them was changed; damping of the surface is all that damps them, as on the bench."""
     _, summary = asked(controller=controller, arm="iiwa14", seconds=4.0)
@@ -287,6 +286,7 @@ def test_a_users_own_model(tmp_path, physics):
     assert record["force"][-1] == pytest.approx(20.0, abs=1.0)
 
 
+@pytest.mark.long
 def test_only_mujoco_knows_the_damping_of_its_joints(tmp_path):
     path = tmp_path / "cell.xml"
     path.write_text(cell(damping=30.0))

@@ -81,7 +81,10 @@ def test_a_name_is_no_formula(found):
     assert "\x1b" not in figure.subfigs[0].texts[0].get_text()
 
 
-@pytest.mark.parametrize("outcome", ["not_identifiable", "with_its_touch", "no_contact", "volts"])
+LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("not_identifiable", "volts")]
+
+
+@pytest.mark.parametrize("outcome", ["with_its_touch", "no_contact", *LONG])
 def test_every_outcome_has_a_picture(outcome, tmp_path):
     from matplotlib.image import imread
 

@@ -3,8 +3,6 @@
 import copy
 import pickle
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -68,7 +66,10 @@ def test_a_record_is_readable(record):
     assert repr(record).startswith("<Record: 3 columns of 4000 rows")
 
 
-@pytest.mark.parametrize("name", ["record", "found", "tuned"])
+TUNED = pytest.param("tuned", marks=pytest.mark.long)
+
+
+@pytest.mark.parametrize("name", ["record", "found", TUNED])
 def test_a_notebook_gets_a_table_and_nothing_that_runs(request, name):
     html = request.getfixturevalue(name)._repr_html_()
     tags = Tags(html)
@@ -91,7 +92,7 @@ def test_names_of_a_stranger_are_shown_and_do_nothing(found, tmp_path):
     assert "\x1b" not in str(told)
 
 
-@pytest.mark.parametrize("name", ["record", "found", "tuned"])
+@pytest.mark.parametrize("name", ["record", "found", TUNED])
 def test_results_are_drawn_and_written(request, name, tmp_path):
     result = request.getfixturevalue(name)
     figure = result.plot(tmp_path / "it.png")
@@ -173,17 +174,16 @@ def test_dir_is_what_a_user_can_use():
         assert getattr(palpate, name) is not None
 
 
-def test_help_tells_the_rooms_and_the_first_lines(root, tmp_path):
+def test_help_tells_the_rooms_and_the_first_lines(root, tmp_path, monkeypatch, capsys):
     told = palpate.__doc__
     first = [line.strip() for line in told.split("The first three lines:")[1].splitlines() if line.strip()][
         :3
     ]
     assert first[0] == "import palpate"
     (tmp_path / "press.csv").write_bytes((root / "examples" / "data" / "press.csv").read_bytes())
-    ran = subprocess.run(
-        [sys.executable, "-c", "\n".join(first)], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert ran.stdout.startswith("The stiffness is ")
+    monkeypatch.chdir(tmp_path)
+    exec("\n".join(first), {})
+    assert capsys.readouterr().out.startswith("The stiffness is ")
     rooms = re.findall(r"^    ([a-z_]+)  +\S", told, re.MULTILINE)
     assert sorted(rooms) == [name for name in dir(palpate) if (root / "src" / "palpate" / name).is_dir()]
 

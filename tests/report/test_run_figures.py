@@ -36,6 +36,7 @@ def test_without_contact_there_is_nothing_to_show_of_it(record, tmp_path):
     assert list(run_figures.draw(air, tmp_path)) == ["approach.png", "torque.png"]
 
 
+@pytest.mark.long
 def test_the_same_record_gives_the_same_picture(record, tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
@@ -45,12 +46,15 @@ def test_the_same_record_gives_the_same_picture(record, tmp_path):
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
 
 
+@pytest.mark.long
 def test_a_surface_that_knows_no_mass_or_stiffness_is_drawn_too(record, tmp_path):
     untold = Record(record.columns, record.units, {**record.meta, "truth": {}})
     assert "identification.png" in run_figures.draw(untold, tmp_path)
 
 
-@pytest.mark.parametrize("rows", [1, 2, 250])
+@pytest.mark.parametrize(
+    "rows", [1, pytest.param(2, marks=pytest.mark.long), pytest.param(250, marks=pytest.mark.long)]
+)
 def test_a_short_record_is_drawn(record, tmp_path, rows):
     """An interrupted run has whatever it has."""
     short = Record(

@@ -114,6 +114,7 @@ def test_certificates_and_tls_go_together(tmp_path):
         Cluster("tcp://127.0.0.1:8786", certificates=Certificates(*files))
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="certificates are made by openssl")
 def test_a_cluster_is_reached_through_tls(tmp_path):
     """With the certificate that its authority signed, and not without."""

@@ -229,6 +229,7 @@ def test_the_equivalent_of_the_neural_controller_is_its_integrator():
     assert equivalent(plain) == plain
 
 
+@pytest.mark.long
 def test_the_bound_is_where_the_linear_model_turns_unstable():
     from palpate.analysis import linearise
 

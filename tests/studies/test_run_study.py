@@ -142,6 +142,7 @@ def test_an_error_within_a_run_is_its_result(tmp_path, monkeypatch):
     assert set(frame["why"]) == {"ZeroDivisionError: a metric that fails"}
 
 
+@pytest.mark.long
 def test_records_are_kept_where_they_are_asked_for(tmp_path):
     source = SMALL.replace("seeds = 2", "seeds = 1\nkeep_records = true")
     frame = work(source, tmp_path / "out", Local(2)).done()

@@ -89,6 +89,7 @@ def swings(loop, stiffness, seconds=3.0, physics=20000):
     return late / early
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("gains", [(1.0, 0.003), (0.25, 0.0015)])
 def test_the_linear_limit_is_where_a_stepped_loop_begins_to_swing(gains):
     """Another way to the same number: the parts of the bench, step by step, without friction."""

@@ -280,6 +280,7 @@ def cramped(folder: Path, most: int) -> subprocess.CompletedProcess:
     )
 
 
+@pytest.mark.long
 def test_a_disk_that_is_full_leaves_nothing_half_written_and_can_be_gone_on_from(program, tmp_path):
     folder = tmp_path / "t"
     one_line(cramped(folder, 2000))
@@ -363,6 +364,7 @@ def test_a_run_cut_short_is_never_measured():
         runs.one(experiment)
 
 
+@pytest.mark.long
 def test_ctrl_c_stops_the_runs_of_all_threads():
     """Hours of simulated time are under way on other threads; they end within a look."""
     experiment = changed(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})

@@ -238,6 +238,7 @@ def test_threads_try_what_they_are_given():
     assert [t.number for t in found] == [0, 1]
 
 
+@pytest.mark.long
 def test_a_worker_of_a_cluster_finds_what_a_thread_does(tmp_path):
     ids, jobs = ("force-noise",), [Job(n, (0.5,) * len(UNKNOWNS), math.inf) for n in range(2)]
     with local_cluster(tmp_path, workers=1) as running:
@@ -342,6 +343,7 @@ def test_the_command_line_refuses_what_it_cannot_do(tmp_path, capsys, monkeypatc
     assert [p.name for p in tmp_path.iterdir()] == ["lab.toml"]
 
 
+@pytest.mark.long
 def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkeypatch):
     some = tuple(s for s in sentences() if s.figure in {"6.1", "6.8", "4.4"})
     monkeypatch.setattr(judge, "SEEDS", (0,))

@@ -69,7 +69,9 @@ def said(capsys):
     return json.loads(printed.out)
 
 
-@pytest.mark.parametrize("kind", ["rtde", "franka", pytest.param("ros2", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "kind", ["rtde", *(pytest.param(k, marks=pytest.mark.long) for k in ("franka", "ros2"))]
+)
 def test_silence_ends_the_press_in_time_and_loses_nothing(folders, here, capsys, kind):
     """The makers' libraries themselves would wait for a second, or for a minute for the answer to a stop."""
     with standing(kind, folders, "--gap", "0.05") as (process, words):
@@ -87,9 +89,8 @@ def test_silence_ends_the_press_in_time_and_loses_nothing(folders, here, capsys,
     assert len(read_record(here / "rec" / "record.parquet")) == told["lateness"]["ticks"] > 20
 
 
-@pytest.mark.parametrize(
-    "kind", ["rtde", *(pytest.param(k, marks=pytest.mark.long) for k in ("franka", "ros2", "sim"))]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["rtde", "franka", "ros2", "sim"])
 def test_jitter_that_it_can_bear_is_measured_and_told(folders, here, capsys, kind):
     """The controller halts for 60 ms, a quarter of the loop's lag, three times a second."""
     with standing(kind, folders, "--stiffness", "4000") as (process, words):
@@ -151,6 +152,7 @@ def test_a_missing_extra_is_named(folders, here, capsys, monkeypatch, address, m
     assert f"pip install 'palpate[{extra}]'" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_tool_that_was_weighed_is_compared_and_its_mass_is_kept(folders, here, capsys):
     """A kilogram on a sensor with a bias; then the sensor is zeroed, and that is told."""
     tool = {

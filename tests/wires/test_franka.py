@@ -65,6 +65,7 @@ def pressed(capsys, folder, address, *more):
     return code, json.loads(printed.out)
 
 
+@pytest.mark.long
 def test_it_presses_with_the_force_asked_for(folder, here, capsys, address):
     for name in (
         "first",
@@ -95,6 +96,7 @@ def test_a_dry_run_moves_nothing(folder, here, capsys, address):
     assert not list(here.iterdir())
 
 
+@pytest.mark.long
 def test_a_controller_that_dies_ends_the_press(folder, here, capsys, address):
     with controller(folder, address, "--gap", "0.05") as process:
         while_it_presses(here / "rec" / "rows.f64", process.kill)
@@ -106,6 +108,7 @@ def test_a_controller_that_dies_ends_the_press(folder, here, capsys, address):
         assert main(words_of(folder, address, "--dry-run")) == 0
 
 
+@pytest.mark.long
 def test_the_arm_rests_when_its_master_dies(folder, here, address):
     words = [
         w for w in words_of(folder, address, "--yes", "--record", "rec", "--seconds", "10") if w != "--json"
@@ -141,6 +144,7 @@ def test_a_driver_that_dies_is_told_and_the_controller_has_the_arm(folder, here,
     assert np.ptp(depth[10:]) < 1e-5
 
 
+@pytest.mark.long
 def test_a_second_master_nothing_at_the_address_and_another_protocol_are_named(
     folder, here, capsys, address, monkeypatch
 ):

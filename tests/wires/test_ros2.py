@@ -52,7 +52,7 @@ JOINTS = "joints=/joint_states&arm=ur5e"
 @pytest.mark.parametrize(
     ("kind", "place"),
     [
-        ("twist", JOINTS),
+        pytest.param("twist", JOINTS, marks=pytest.mark.long),
         pytest.param("joint-speeds", JOINTS, marks=pytest.mark.long),
         *(
             pytest.param(kind, "pose=/tcp/pose", marks=pytest.mark.long)
@@ -73,6 +73,7 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, kind, place):
         assert np.ptp(record["position_x"]) < 1e-4
 
 
+@pytest.mark.long
 def test_a_node_that_dies_ends_the_press(folder, here, capsys):
     with node(folder, "--gap", 0.05) as process:
         while_it_presses(here / "rec" / "rows.f64", process.kill)
@@ -91,6 +92,7 @@ def test_nothing_that_listens_and_nothing_that_speaks_are_refused(folder, here, 
     assert "nothing listens at /nobody" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_second_master_is_refused(folder, here, capsys):
     from palpate.wires import open_wire
 

@@ -146,6 +146,7 @@ def test_losses_and_jitter_that_it_can_bear_are_counted(folder, here, capsys):
     assert told["force_N"] == pytest.approx(10.0, rel=0.1)
 
 
+@pytest.mark.long
 def test_an_arm_that_dies_and_comes_again_is_lost_and_not_followed(folder, here, capsys):
     with arm(folder, "--gap", "0.05") as (process, address):
         threading.Timer(4.0, process.kill).start()
@@ -161,8 +162,16 @@ def test_an_arm_that_dies_and_comes_again_is_lost_and_not_followed(folder, here,
     [
         (("--force-limit", "11:N", "--seconds", "10"), "above the limit of 11 N"),
         (("--travel-limit", "0.5:mm", "--retreat", "0:mm"), "beyond the limit of 0.5 mm"),
-        (("--time-limit", "2.6:s", "--seconds", "2"), "the time limit of 2.6 s is over"),
-        (("--normal", "0,0,1", "--travel-limit", "1:mm", "--retreat", "0:mm"), "beyond the limit of 1 mm"),
+        pytest.param(
+            ("--time-limit", "2.6:s", "--seconds", "2"),
+            "the time limit of 2.6 s is over",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            ("--normal", "0,0,1", "--travel-limit", "1:mm", "--retreat", "0:mm"),
+            "beyond the limit of 1 mm",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_each_limit_stops_the_arm(folder, here, capsys, words, says):
@@ -199,6 +208,7 @@ def test_a_second_master_is_refused(folder, here, capsys):
             first.close()
 
 
+@pytest.mark.long
 def test_an_arm_rests_when_its_master_dies_and_its_record_is_recovered(folder, here, capsys):
     with arm(folder, "--gap", "0.05") as (_, address):
         words = [w for w in words_of(folder, address) if w != "--json"]

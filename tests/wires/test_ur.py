@@ -79,6 +79,7 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, address, way)
     assert told["stiffness_N_per_m"][0] == pytest.approx(4000 / (1 + 4000 / 5e4), rel=0.1)
 
 
+@pytest.mark.long
 def test_a_controller_that_falls_silent_ends_the_press_and_stops_the_arm(folder, here, capsys, address):
     with controller(folder, address, "--gap", "0.05") as process:
         while_it_presses(here / "rec" / "rows.f64", process.kill)
@@ -89,6 +90,7 @@ def test_a_controller_that_falls_silent_ends_the_press_and_stops_the_arm(folder,
     assert len(read_record(here / "rec" / "record.parquet")) > 20
 
 
+@pytest.mark.long
 def test_the_controller_stops_the_arm_where_its_master_dies(folder, here, address):
     with controller(folder, address, "--gap", "0.05"):
         words = [
@@ -106,6 +108,7 @@ def test_the_controller_stops_the_arm_where_its_master_dies(folder, here, addres
     assert np.ptp(depth[10:]) < 1e-5
 
 
+@pytest.mark.long
 def test_a_second_master_is_refused(folder, here, capsys, address):
     with controller(folder, address):
         first = open_wire(f"rtde:{address}")

@@ -1,15 +1,17 @@
 """How Numba compiles what only kernels call: to be put where it is called, and no further.
 
 Left to itself it optimises every function for good and makes machine code of it, although only the kernel that swallows
-it ever runs. Without that a kernel compiles in four fifths of the time, and is the same.
+it ever runs. And it makes passes over each that look for what no law has: closures, context managers, literals to
+unroll. Without all that a kernel compiles in two thirds of the time, and is the same (benchmarks/cold_start.py).
 """
 
 from __future__ import annotations
 
 import functools
+from types import CodeType
 from typing import Any
 
-from palpate._jit.registry import INSIDE
+from palpate._jit.registry import INSIDE, PACKAGE
 
 
 @functools.cache
@@ -57,4 +59,76 @@ def _compiler() -> type:
         def __init__(self, typing: Any, target: Any, library: Any, *others: Any):
             super().__init__(typing, target, library or Swallowed(target.codegen(), "inside"), *others)
 
+        def define_pipelines(self) -> list[Any]:
+            own = _is_plain(self.state.func_id.code)
+            return [_short_pipeline()] if own else super().define_pipelines()
+
     return Inside
+
+
+def _is_plain(code: CodeType) -> bool:
+    """Whether it is the package's own, and holds no function of its own: a user's may need every pass."""
+    return code.co_filename.startswith(str(PACKAGE)) and not any(
+        isinstance(c, CodeType) for c in code.co_consts
+    )
+
+
+def _short_pipeline() -> Any:
+    """The passes that a law needs: each of them costs some milliseconds, and a loop is made of some 250 functions."""
+    from numba.core import typed_passes as typed
+    from numba.core import untyped_passes as untyped
+    from numba.core.compiler_machinery import PassManager
+
+    manager = PassManager("inside")
+    for one in (
+        untyped.TranslateByteCode,
+        untyped.FixupArgs,
+        untyped.IRProcessing,
+        untyped.RewriteSemanticConstants,
+        untyped.DeadBranchPrune,
+        untyped.GenericRewrites,
+        untyped.ReconstructSSA,
+        typed.NopythonTypeInference,
+        typed.PreLowerStripPhis,
+        typed.NopythonRewrites,
+        typed.IRLegalization,
+        _native_lowering(),
+        typed.NoPythonBackend,
+    ):
+        manager.add_pass(one, one.__name__)
+    manager.finalize()
+    return manager
+
+
+@functools.cache
+def _native_lowering() -> type:
+    """Numba's lowering, but that it counts references only of what has any: numbers have none."""
+    from numba.core import typed_passes
+    from numba.core.compiler_machinery import register_pass
+    from numba.core.lowering import Lower
+
+    class Counting(Lower):
+        """Lowers a function; values without an array in them are passed over at once."""
+
+        def incref(self, typ: Any, val: Any) -> None:
+            if _counted(self.context, typ):
+                super().incref(typ, val)
+
+        def decref(self, typ: Any, val: Any) -> None:
+            if _counted(self.context, typ):
+                super().decref(typ, val)
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class CountingLowering(typed_passes.BaseNativeLowering):
+        _name = "inside_lowering"
+
+        @property
+        def lowering_class(self) -> type:
+            return Counting
+
+    return CountingLowering
+
+
+@functools.cache
+def _counted(context: Any, kind: Any) -> bool:
+    return context.data_model_manager[kind].contains_nrt_meminfo()

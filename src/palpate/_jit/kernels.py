@@ -1,6 +1,7 @@
 """Kernels: from the cache where it has them, and else compiled when first called."""
 
 import functools
+import gc
 import importlib
 import threading
 from collections.abc import Callable
@@ -38,6 +39,7 @@ class Kernel:
         return self._dispatcher
 
     def __call__(self, *args: Any) -> Any:
+        collects = gc.isenabled()
         with uninterrupted():
             try:
                 return self.compiled(*args)
@@ -45,6 +47,9 @@ class Kernel:
                 if type(error).__module__.startswith("numba."):
                     raise NotCompiled(error) from error
                 raise
+            finally:
+                if collects:
+                    gc.enable()
 
     def run(self, waiting: Callable[[], None] | None, *args: Any) -> Any:
         """Calls the kernel; calls `waiting` before, if it has to be compiled, which takes seconds."""
@@ -55,6 +60,8 @@ class Kernel:
             self._waiting = None
 
     def _wait(self) -> None:
+        """Called before it is compiled, while millions of small objects live and none of them is garbage."""
+        gc.disable()
         if self._waiting is not None:
             self._waiting()
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 EXAMPLE = "palpate "
 """Begins a paragraph that is an example."""
 _INDENT = 4
+"""Letters by which a command stands in from the text."""
 _PHRASE = (".", ",", ";", ":", ")", "]")
 """What a phrase ends with."""
 _BROKEN = 0.3

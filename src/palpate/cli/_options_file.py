@@ -31,6 +31,7 @@ _PATHS = {"payload", "robot-stiffness-from", "gains", "certificate"}
 _KNOWN_BY = ("identify", "press")
 """Commands that take one file together: what one of them knows is no mistake to the other."""
 _LARGEST = 1 << 16
+"""Bytes that are read: a file with every option is a hundredth of it."""
 
 
 @Parameter(name="*", group=Group("Options from a file", sort_key=7))
@@ -64,11 +65,11 @@ class CellOptions:
             parts: dataclasses of options.
         """
         if self.save_options is not None:
-            kept = {name: value for name, value in said(parts).items() if name not in _NEVER}
+            kept = {name: value for name, value in options_given(parts).items() if name not in _NEVER}
             write_text(self.save_options, _toml(kept))
 
 
-def said(parts: Iterable[Any]) -> dict[str, Any]:
+def options_given(parts: Iterable[Any]) -> dict[str, Any]:
     """What is not left at its default, by the option's name."""
     return {
         field.name.replace("_", "-"): value

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._flags import FLAG, SIGNED, in_si
-from palpate.cli._options_file import said
+from palpate.cli._options_file import options_given
 from palpate.cli._values import vector
 from palpate.cli.run import whole_number
 from palpate.errors import InputError
@@ -193,7 +193,7 @@ def only(part: SimulatedOptions | WireOptions | LimitOptions, of: str) -> None:
     Raises:
         InputError: something was; it is named.
     """
-    given = next(iter(said((part,))), None)
+    given = next(iter(options_given((part,))), None)
     if given is not None:
         raise InputError(f"--{given} is of {of}; leave it out, or the other arm")
 

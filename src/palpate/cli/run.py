@@ -179,12 +179,12 @@ def _draw(
         return
     from palpate.report.identification.source import sha256_of
     from palpate.report.run.figures import draw
-    from palpate.report.run.page import Told, run_page
+    from palpate.report.run.page import Content, run_page
 
     draw(record, folder, drawn.endings, drawn.dpi)
     sha256, why = sha256_of(folder / "record.parquet"), summary["not_identified"]
-    told = Told(about["title"], about["about"], source, summary, found, why, sha256)
-    write_text(folder / "report.html", run_page(record, told))
+    content = Content(about["title"], about["about"], source, summary, found, why, sha256)
+    write_text(folder / "report.html", run_page(record, content))
     if drawn.movie:
         from palpate.report.run.movie import write_movie
 

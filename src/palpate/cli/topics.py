@@ -94,6 +94,7 @@ def _told(found: Listing, command: str | None) -> list[str]:
 
 _NUMBERS = range(2, 6)
 _UNIX = 1e8
+"""Seconds since 1970 from which on a clock counts from there: March 1973."""
 
 
 def _begin(entries: list[Entry]) -> float:

@@ -11,6 +11,7 @@ from palpate.errors import InputError
 _ROUNDS = 40
 _CAUTION = 0.7  # the power of each correction: a whole one would overshoot where friction gives way
 _CLOSE = 1e-3
+"""To the budget, as a share of it."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ BENCH_FILTERS = LowPass(((3, 120.0), (2, 120.0)))
 """Of the bench's sensor, and of its controller."""
 _ROUNDS = 200
 _SETTLED = 1e-4
+"""Change of a round, as a share, at which friction's describing function has been found; and rounds at most."""
 _STILL = 1e-9  # m/s; friction is never divided by less
 
 

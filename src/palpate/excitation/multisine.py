@@ -26,8 +26,10 @@ _LINES, _MOST = 32, 128  # frequencies that the spectrum is looked for on, and t
 _ROUNDS = 6
 _QUICK, _THOROUGH = 60, 500  # rounds of clipping, to choose a width and for good
 _USUAL_CREST = 1.5
+"""Of a multisine with good phases: the first guess of its power, which the rounds then correct."""
 _FAINT = 0.003  # of the strongest power; a line below it is left out
 _MIXES = (0.0, 0.5, 0.8, 0.95)
+"""Shares of a line's price that go with its frequency squared where the rate of the force is limited; all are tried."""
 _POINTS = 32  # a cycle of the highest line
 _WIDTHS = (0.01, 0.05, 0.1, 0.2, 0.4, 0.8)  # of a line, in the frequency's logarithm
 

@@ -12,6 +12,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 _POINTS = 8  # of the period a cycle of the highest harmonic
 _STARTS = 5
+"""Random phases beside Schroeder's; the best peak of all is taken."""
 
 
 def schroeder(powers: Array) -> Array:

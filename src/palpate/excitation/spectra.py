@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 _SHARPNESS = 8.0  # of the norm that stands for a maximum: of 27 equal ones it makes 1.5 times as much
 _ROUNDS = 1500
 _CLOSE = 0.01
+"""To the best design there is, as a share of its criterion: Kiefer and Wolfowitz' bound on what is left."""
 
 
 @dataclass(frozen=True)

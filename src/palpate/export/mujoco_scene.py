@@ -34,6 +34,7 @@ _WIDE = 10.0
 _CLOSE = 1e-6
 """Reach of a surface at the touch [m]."""
 _HEAD = 1 << 16
+"""Bytes in which an MJCF names itself, behind whatever comments."""
 _ROUND = ("mjGEOM_SPHERE", "mjGEOM_ELLIPSOID")
 
 

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _RADIUS = 0.02
 _MASS = 1.0
+"""Radius [m] and mass [kg] of the sphere that presses."""
 
 
 class NewtonRig:

@@ -30,6 +30,7 @@ _NAMES = {
 _SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}
 """What changes by more than so much is hardly in SI units; and which unit it is taken in then."""
 _RATE = 1000
+"""Of the example [Hz]; nothing is computed with it."""
 
 
 @dataclass(frozen=True)

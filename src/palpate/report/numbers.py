@@ -6,6 +6,7 @@ import math
 
 NONE = "-"
 _LARGE, _SMALL = 1e7, 1e-4
+"""Sizes from which on, and under which, a power of ten is written out of a number."""
 
 
 def plain(value: float | None, digits: int = 4) -> str:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _WIDTH = 100
+"""Letters of a line in a notebook."""
 
 
 def printed(show: Callable[[Console], None]) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from palpate.errors import InputError
 
 _HIGHEST_ORDER = 10
+"""Of a Butterworth filter; sensors and their drivers have one to four."""
 _SECTION = re.compile(r"butterworth(\d+):(-?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?:hz)?")
 _FORM = "butterworth3:120 (order and cut-off in Hz), several joined by '+', or none"
 

@@ -85,7 +85,10 @@ def told(arm, axes, q, qd):
     )
 
 
-@pytest.mark.parametrize("name", ["hybrid", "decoupled", "raibert-craig"])  # all others have their laws
+LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("decoupled", "raibert-craig")]
+
+
+@pytest.mark.parametrize("name", ["hybrid", *LONG])  # all others have their laws
 @pytest.mark.parametrize("arm", ["ur5e", "panda"])
 def test_plain_and_compiled_are_the_same(name, arm):
     arm = SerialArm.named(arm)
@@ -125,6 +128,7 @@ def test_the_tip_accelerates_as_it_was_told(name, arm):
     assert xdd == pytest.approx(wanted, rel=1e-8, abs=1e-7)
 
 
+@pytest.mark.long
 def test_one_compiled_version_serves_every_arm():
     for name in ("ur5e", "panda"):
         arm = SerialArm.named(name)

@@ -8,6 +8,7 @@ filtered channels exactly as for the raw ones, because F is the same on all of t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import factorial, pi
 
 import numpy as np
@@ -86,10 +87,12 @@ class Chain:
         Returns:
             Shape (n,).
         """
-        taps, first = self._taps(derivative, lag)
+        taps, first = _taps(self, derivative, lag)
         reach = len(taps) + abs(first)
         level = float(signal[0])
-        padded = np.pad(signal - level, reach, mode="edge")
+        padded = np.empty(len(signal) + 2 * reach)
+        np.subtract(signal, level, out=padded[reach:-reach])
+        padded[:reach], padded[-reach:] = padded[reach], padded[-reach - 1]
         start = reach - first
         full = _convolve(padded, taps)
         return full[start : start + len(signal)] + (level if derivative == 0 else 0.0)
@@ -103,12 +106,13 @@ class Chain:
             return np.empty(0)
         memory = _memory(self, lag)
         cuts = np.flatnonzero(np.diff(rows) > 2 * memory) + 1
-        stretches = np.split(rows, cuts)
+        stretches = np.split(rows, cuts) if len(cuts) else [rows]
         begins = [max(int(own[0]) - memory, 0) for own in stretches]
         parts = [signal[a : int(own[-1]) + memory] for a, own in zip(begins, stretches, strict=True)]
         firsts = np.cumsum([0, *(len(part) for part in parts[:-1])])
         at = np.concatenate([own + (f - b) for own, f, b in zip(stretches, firsts, begins, strict=True)])
-        found: Array = self(np.concatenate([part - part[0] for part in parts]), derivative, lag)[at]
+        joined = parts[0] - parts[0][0] if len(parts) == 1 else np.concatenate([p - p[0] for p in parts])
+        found: Array = self(joined, derivative, lag)[at]
         if derivative == 0:
             levels = [float(part[0]) for part in parts]
             found += np.repeat(levels, [len(own) for own in stretches])
@@ -116,34 +120,40 @@ class Chain:
 
     def noise_spread(self, noise: PositionNoise) -> Array:
         """Covariance of what noise of the position leaves in the derivatives 0 to 3, shape (4, 4)."""
-        return noise.spread(np.stack([self._taps(derivative, 0.0)[0] for derivative in range(4)]))
+        return noise.spread(np.stack([_taps(self, derivative, 0.0)[0] for derivative in range(4)]))
 
-    def _taps(self, derivative: int, lag: float) -> tuple[Array, int]:
-        """Samples of the response to one hat of a first-order hold, and the index of the first of them."""
-        first = int(np.floor(lag / self.dt)) - 1
-        count = int(np.ceil(_LENGTH / (self.rate * self.dt))) + 3
-        time = (first + np.arange(count)) * self.dt - lag
-        curve = self._integrated(derivative, time[:, None] + np.array([self.dt, 0.0, -self.dt]))
-        taps = (curve[:, 0] - 2 * curve[:, 1] + curve[:, 2]) / self.dt
-        if derivative == 0:
-            taps /= taps.sum()  # the cut-off tail would otherwise cost 1e-9 of the level
-        return taps, first
 
-    def _integrated(self, derivative: int, time: Array) -> Array:
-        """The impulse response integrated twice and then differentiated `derivative` times."""
-        w = self.rate
-        tau = w * np.maximum(time, 0.0)
-        if derivative == 0:
-            return (tau * _erlang_cdf(ORDER, tau) - ORDER * _erlang_cdf(ORDER + 1, tau)) / w
-        if derivative == 1:
-            return _erlang_cdf(ORDER, tau)
-        if derivative == 2:
-            return w * _erlang(ORDER, tau)
-        if derivative == 3:
-            return w**2 * (_erlang(ORDER - 1, tau) - _erlang(ORDER, tau))
-        if derivative == 4:
-            return w**3 * (_erlang(ORDER - 2, tau) - 2 * _erlang(ORDER - 1, tau) + _erlang(ORDER, tau))
-        raise ValueError(f"the chain gives derivatives 0 to 4, not {derivative}")
+@lru_cache(maxsize=64)
+def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
+    """Samples of the response to one hat of a first-order hold, and the index of the first of them.
+
+    They are kept: a fit reads many signals with one lag.
+    """
+    first = int(np.floor(lag / chain.dt)) - 1
+    count = int(np.ceil(_LENGTH / (chain.rate * chain.dt))) + 3
+    time = (first + np.arange(count)) * chain.dt - lag
+    curve = _integrated(chain.rate, derivative, time[:, None] + np.array([chain.dt, 0.0, -chain.dt]))
+    taps = (curve[:, 0] - 2 * curve[:, 1] + curve[:, 2]) / chain.dt
+    if derivative == 0:
+        taps /= taps.sum()  # the cut-off tail would otherwise cost 1e-9 of the level
+    taps.flags.writeable = False
+    return taps, first
+
+
+def _integrated(w: float, derivative: int, time: Array) -> Array:
+    """The impulse response integrated twice and then differentiated `derivative` times."""
+    tau = w * np.maximum(time, 0.0)
+    if derivative == 0:
+        return (tau * _erlang_cdf(ORDER, tau) - ORDER * _erlang_cdf(ORDER + 1, tau)) / w
+    if derivative == 1:
+        return _erlang_cdf(ORDER, tau)
+    if derivative == 2:
+        return w * _erlang(ORDER, tau)
+    if derivative == 3:
+        return w**2 * (_erlang(ORDER - 1, tau) - _erlang(ORDER, tau))
+    if derivative == 4:
+        return w**3 * (_erlang(ORDER - 2, tau) - 2 * _erlang(ORDER - 1, tau) + _erlang(ORDER, tau))
+    raise ValueError(f"the chain gives derivatives 0 to 4, not {derivative}")
 
 
 def _memory(chain: Chain, lag: float) -> int:

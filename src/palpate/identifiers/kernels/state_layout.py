@@ -12,6 +12,7 @@ from palpate.identifiers.kernels.error_covariance import NOTHING, ErrorCovarianc
 from palpate.identifiers.kernels.square_root import held
 
 _STATISTICS = 6
+"""Numbers that stand behind theta in the state: what is known of the residuals."""
 
 
 def known_first(theta: NDArray[np.float64], P: NDArray[np.float64]) -> NDArray[np.float64]:

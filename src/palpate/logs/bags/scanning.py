@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import NamedTuple
-
-from palpate.logs.limits import Budget
 
 
 class Channel(NamedTuple):
@@ -51,7 +47,3 @@ class End(NamedTuple):
 
     finished: bool
     share: float | None = None
-
-
-Scan = Callable[[Path, Budget], Iterator["Channel | Raw | End"]]
-"""Reads a file from its beginning as far as it is whole; yields channels before their messages, and the end last."""

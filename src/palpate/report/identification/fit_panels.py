@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 _BINS = 1200
 """Of time: more than a page has columns for; each keeps its least and its largest value."""
 _MARGIN = 0.35
+"""Of a contact's length, that is shown before and after it."""
 
 
 def force(axes: Axes, found: Identification, traces: Traces) -> None:

@@ -48,6 +48,7 @@ _WIDE, _HALF, _NARROW = 1150, 560, 360
 _SHARE = 0.25
 """Of the value: the ends of the bar that shows how narrow an interval is, the same on all cards."""
 _MOST_CONTACTS = 20
+"""That a page lists one by one."""
 
 
 def write_page(found: Identification, path: Path, source: Source) -> Path:

@@ -25,6 +25,7 @@ from palpate.text import shown
 
 STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 _MANY = 6
+"""Contacts that a line names."""
 
 
 def show(found: Identification, name: str, console: Console) -> None:

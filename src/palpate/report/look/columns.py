@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 GAP = -32768
 """Where there is no value."""
 _HALF = 32500
+"""Steps of a two-byte number on either side of the middle, but for what says that there is none."""
 
 
 def packed(values: Array) -> dict[str, Any]:

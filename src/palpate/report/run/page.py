@@ -41,7 +41,7 @@ _STILL = ("force", "identification")
 
 
 @dataclass(frozen=True)
-class Told:
+class Content:
     """What the page is of.
 
     Args:
@@ -62,9 +62,9 @@ class Told:
     sha256: str
 
 
-def run_page(record: Record, told: Told) -> str:
+def run_page(record: Record, content: Content) -> str:
     """The page as HTML."""
-    summary = told.summary
+    summary = content.summary
     contact = summary["force"] is not None
     worth = len(record) > 2
     codes = "palpate.report.run"
@@ -72,22 +72,22 @@ def run_page(record: Record, told: Told) -> str:
         "run.html",
         codes,
         room="run",
-        title=shown(told.title),
-        about=shown(told.about),
+        title=shown(content.title),
+        about=shown(content.about),
         sentence=sentence(summary),
         alerts=alerts(summary),
-        cards=_cards(told),
-        surface=_surface(told),
-        identified_by=_identified_by(told),
+        cards=_cards(content),
+        surface=_surface(content),
+        identified_by=_identified_by(content),
         thesis=thesis_table(summary) if contact else None,
         motors=motors(summary),
         facts=force_rows(summary) if contact else [],
-        source=told.source,
+        source=content.source,
         charts=data(_charts(record, summary)) if worth else "",
         pictures=list(_pictures(record)) if worth else [],
         scripts=(*scripts(*CHARTS, *ARM, *TABLES), _script()) if worth else scripts(*TABLES),
         command=summary["command"],
-        origin=[("seed", str(summary["seed"])), ("record.parquet", f"sha256 {told.sha256}")],
+        origin=[("seed", str(summary["seed"])), ("record.parquet", f"sha256 {content.sha256}")],
         made=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
@@ -98,8 +98,8 @@ def _script() -> str:
     return (resources.files("palpate.report.run") / "run.js").read_text(encoding="utf-8")
 
 
-def _cards(told: Told) -> list[dict[str, str]]:
-    summary, f = told.summary, told.summary["force"]
+def _cards(content: Content) -> list[dict[str, str]]:
+    summary, f = content.summary, content.summary["force"]
     if f is None:
         return []
     lost, end = summary["contacts_lost"], summary["end"]
@@ -123,19 +123,19 @@ def _cards(told: Told) -> list[dict[str, str]]:
     cards.append(
         _card("Error, last second", error, "N", why=f"RMS since contact {plain(f['rms_error_N'], 2)} N")
     )
-    return [*cards, _stiffness(told)]
+    return [*cards, _stiffness(content)]
 
 
 def _card(name: str, number: str, unit: str = "", **more: str) -> dict[str, str]:
     return {"name": name, "number": number, "unit": unit, **more}
 
 
-def _stiffness(told: Told) -> dict[str, str]:
+def _stiffness(content: Content) -> dict[str, str]:
     """By `palpate identify`: at the working point, or else of the model."""
-    if told.found is None:
-        return _card("Stiffness", "", why=told.why, colour="K", tone="none", verdict="not identified")
-    point = told.found.working_point
-    own = told.found.parameters.get("K") or (point.stiffness if point else None)
+    if content.found is None:
+        return _card("Stiffness", "", why=content.why, colour="K", tone="none", verdict="not identified")
+    point = content.found.working_point
+    own = content.found.parameters.get("K") or (point.stiffness if point else None)
     if own is None:
         return _card("Stiffness", "", why="nothing is touched", colour="K", tone="none", verdict="")
     number = split(own)
@@ -152,22 +152,22 @@ def _stiffness(told: Told) -> dict[str, str]:
     )
 
 
-def _identified_by(told: Told) -> str:
-    if told.found is None:
-        return f"palpate identify says nothing of this record: {shown(told.why)}."
+def _identified_by(content: Content) -> str:
+    if content.found is None:
+        return f"palpate identify says nothing of this record: {shown(content.why)}."
     return (
-        f"By palpate identify of record.parquet, as the model {told.found.model}; on the bench the truth is known. The "
-        "charts are of an estimator on line, which assumes a spring, a damper and a mass."
+        f"By palpate identify of record.parquet, as the model {content.found.model}; on the bench the truth is known. "
+        "The charts are of an estimator on line, which assumes a spring, a damper and a mass."
     )
 
 
-def _surface(told: Told) -> list[dict[str, str]]:
+def _surface(content: Content) -> list[dict[str, str]]:
     """What was identified beside the truth."""
-    if told.found is None:
+    if content.found is None:
         return []
-    truth = told.summary["truth"]
+    truth = content.summary["truth"]
     rows = []
-    for name, p in told.found.parameters.items():
+    for name, p in content.found.parameters.items():
         known = truth.get(name, {}).get("value")
         off = "–"
         if known is not None and p.value is not None and p.ci95 is not None:

@@ -9,6 +9,7 @@ from palpate.errors import InputError
 
 Array = NDArray[np.float64]
 _ROUNDING = 1e-12
+"""Of an inertia tensor's eigenvalues, as a share of the largest: some thousand last places of a float."""
 
 
 def check_inertia(name: str, mass: float, moment: Array) -> str:
