@@ -24,8 +24,6 @@ STILL = {
     "src/palpate/force/law.py",
     "src/palpate/force/telling.py",
     "src/palpate/force/worlds.py",
-    "src/palpate/wires/lateness.py",
-    "src/palpate/wires/press.py",
 }
 """Files whose names and public names are still to be changed; to be emptied, and to stay empty."""
 

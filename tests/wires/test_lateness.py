@@ -16,7 +16,7 @@ def run(late, allowed=TICK, drift=0.0, missed=()):
     for k, delay in enumerate(late):
         stamp = 5.0 + k * TICK * (1.0 + drift)
         watch.done(stamp, 100.0 + k * TICK + 0.001 + delay, 1 if k in missed else 0)
-    return watch.told()
+    return watch.summary()
 
 
 def test_it_is_told_beyond_the_least_that_was_seen():
@@ -26,7 +26,7 @@ def test_it_is_told_beyond_the_least_that_was_seen():
     assert found.late[0] == pytest.approx(np.percentile(late, 50), rel=0.05)
     assert found.late[2] == pytest.approx(np.percentile(late, 99.9), rel=0.05)
     assert found.jumps == 0
-    assert "within the 2 ms of jitter" in found.told()[1]
+    assert "within the 2 ms of jitter" in found.sentences()[1]
 
 
 def test_a_jump_beyond_the_certificates_jitter_is_counted_and_said():
@@ -34,10 +34,10 @@ def test_a_jump_beyond_the_certificates_jitter_is_counted_and_said():
     late[500] = 0.0025
     found = run(late)
     assert found.jumps == 2  # there and back
-    assert "does not cover this run" in found.told()[1]
-    assert run(late, allowed=None).told()[1].startswith("no certificate")
+    assert "does not cover this run" in found.sentences()[1]
+    assert run(late, allowed=None).sentences()[1].startswith("no certificate")
     assert run(np.zeros(100), missed={7}).missed == 1
-    assert "does not cover" in run(np.zeros(100), missed={7}).told()[1]
+    assert "does not cover" in run(np.zeros(100), missed={7}).sentences()[1]
 
 
 @pytest.mark.parametrize("drift", [-5e-5, 5e-5])

@@ -69,8 +69,9 @@ def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folde
     found = json.loads(capsys.readouterr().out)
     K = found["parameters"]["K"]
     assert K["verdict"] == "identified"
-    # A press at real time is another each time, and its interval of 95 % would miss one in twenty.
-    assert K["value"] == pytest.approx(4000, rel=0.05)
+    # A press at real time is another each time, and its interval of 95 % would miss one in twenty: four deviations.
+    assert abs(K["value"] - 4000) < 4.0 * K["std"]
+    assert K["std"] < 150
     # A late reading here and there moves the loop's estimate by some per cent.
     assert told["stiffness_N_per_m"][0] == pytest.approx(4000 / (1 + 4000 / 5e4), rel=0.1)
 

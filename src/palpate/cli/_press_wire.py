@@ -14,7 +14,7 @@ from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.contact_frame import Payload
-    from palpate.wires import Air, Order, Outcome, Rows, Wire
+    from palpate.wires import AtRest, Order, Outcome, Rows, Wire
 
 _WORD = "press"
 
@@ -34,8 +34,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
     if options.record is not None and options.record.exists():
         raise InputError(f"{options.record} exists; choose another place for --record")
     from palpate.force import ForceLoop
-    from palpate.wires import Rows, look, open_wire
-    from palpate.wires.press import checked
+    from palpate.wires import Rows, checked, look, open_wire
 
     assert asked.gains is not None
     order = checked(ForceLoop.load(asked.gains, options.certificate), task, most)
@@ -53,15 +52,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
             if not json:
                 print_lines(*notes)
         _ask(options.yes)
-        about = {
-            "command": command(),
-            "title": arm.title,
-            "normal": list(order.task.direction),
-            "desired_N": asked.desired,
-        }
-        if tool is not None and tool.beyond is not None:
-            about["tool_mass_kg"] = list(tool.beyond)
-        rows = Rows(options.record, order.most, about)
+        rows = Rows(options.record, order.most, _about(arm, order, tool))
         outcome, words = _pressed(arm, order, rows, options.ordinary_priority)
     finally:
         arm.close()
@@ -88,7 +79,7 @@ def _tool(path: Path | None) -> Payload | None:
     return None if path is None else load_payload(path)
 
 
-def _compared(tool: Payload, air: Air) -> list[str]:
+def _compared(tool: Payload, air: AtRest) -> list[str]:
     from palpate.wires.tool import unlike
 
     note = unlike(tool, air)
@@ -139,7 +130,7 @@ def _ask(yes: bool) -> None:
         raise InputError("nothing was moved, as nobody said so")
 
 
-def _looked(air: Air, plan: list[str], notes: list[str], json: bool) -> int:
+def _looked(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
     found = f"in the air: bias {', '.join(f'{b:.3g}' for b in air.bias)} N, noise {air.noise:.2g} N, {air.rate:.4g} Hz"
     if json:
         print_json({"plan": plan, "bias_N": air.bias.tolist(), "noise_N": air.noise, "rate_Hz": air.rate})
@@ -161,7 +152,7 @@ def _print(outcome: Outcome, words: str, where: Path | None, json: bool) -> int:
     if outcome.stiffness is not None:
         value, std = outcome.stiffness
         lines.append(f"stiffness as the arm feels it {value:.4g} N/m (std {std:.2g})")
-    lines += [*outcome.lateness.told(), words]
+    lines += [*outcome.lateness.sentences(), words]
     if where is not None:
         lines.append(f"written: {where}; palpate identify {where} reads it")
     print_lines(*lines)

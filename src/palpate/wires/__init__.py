@@ -1,13 +1,16 @@
 """Wires to real arms: readings in, commands out, each by the arm's own library."""
 
+from palpate.wires.at_rest import AtRest, look
 from palpate.wires.opening import KINDS, open_wire
-from palpate.wires.press import Air, Limits, Order, Outcome, Task, checked, look, press
+from palpate.wires.order import Limits, Order, Task, checked
+from palpate.wires.outcome import Outcome
+from palpate.wires.press import press
 from palpate.wires.protocol import Command, LostError, Sense, Wire
 from palpate.wires.recording import Rows, recover
 
 __all__ = [
     "KINDS",
-    "Air",
+    "AtRest",
     "Command",
     "Limits",
     "LostError",

@@ -33,7 +33,7 @@ class Lateness:
     jumps: int
     allowed: float | None
 
-    def told(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """Sentences."""
         a, b, c, most = (1e3 * v for v in self.late)
         late = (
@@ -96,7 +96,7 @@ class Stopwatch:
             self._ages[self._n] = age
             self._n += 1
 
-    def told(self) -> Lateness:
+    def summary(self) -> Lateness:
         """What was seen."""
         ages = self._ages[: self._n] if self._n else np.zeros(1)
         a, b, c = (float(v) for v in np.percentile(ages, SHARES))

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
 
 from palpate.errors import PalpateError
 
 Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+
+
+def triple(vector: Sequence[float] | Any) -> Triple:
+    """Three numbers of an array as plain floats."""
+    x, y, z = vector
+    return float(x), float(y), float(z)
 
 
 class Sense(NamedTuple):

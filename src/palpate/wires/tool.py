@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from palpate.contact_frame import Payload
-from palpate.wires.press import Air
+from palpate.wires.at_rest import AtRest
 from palpate.wires.turns import turned
 
 _SURE = 3.0
 """Standard deviations of what was weighed, beyond which a difference is none of it."""
 
 
-def unlike(tool: Payload, air: Air) -> str | None:
+def unlike(tool: Payload, air: AtRest) -> str | None:
     """How the sensor's reading at rest differs from what the tool's weighing makes expect; None if it does not.
 
     The force of a wire is what the tool exerts, that of a payload is as its log had it: either sign is tried.

@@ -1,0 +1,93 @@
+"""What an arm shows at rest before a press: rate, bias and noise; and what no press should begin with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.errors import InputError
+from palpate.wires.order import TARE, Order
+from palpate.wires.protocol import Sense, Wire
+
+Array = NDArray[np.float64]
+
+_FEWEST = 20
+_PATIENCE = 10.0
+"""For which that many readings may take: nothing moves yet, and a busy computer may be starved for a while [s]."""
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """What the arm shows at rest, the surface untouched.
+
+    Args:
+        position: [m], shape (3,).
+        bias: of the force [N], shape (3,).
+        noise: of the force along the direction [N].
+        rate: readings a second [Hz].
+        last: the last reading.
+    """
+
+    position: Array
+    bias: Array
+    noise: float
+    rate: float
+    last: Sense
+
+
+def look(wire: Wire, order: Order) -> AtRest:
+    """Read an arm at rest in the air, and refuse what no press should begin with.
+
+    Raises:
+        InputError: another rate than the gains', an arm that moves, a sensor that is saturated, untared or too noisy.
+        LostError: no readings.
+    """
+    sensed = _readings(wire)
+    gains = order.loop.gains
+    rate = 1.0 / max(float(np.median(np.diff([s.stamp for s in sensed]))), 1e-9)
+    # Over the lag theta a rate that is off by this moves a reading by one tick, which is what is proved.
+    if abs(rate * gains.arm.tick - 1.0) > gains.arm.tick / gains.theta:
+        raise InputError(
+            f"the arm gives {rate:.4g} readings a second, and the gains are for {gains.arm.rate:g}: tune for this rate"
+        )
+    force, place = np.array([s.force for s in sensed]), np.array([s.position for s in sensed])
+    if not (np.isfinite(force).all() and np.isfinite(place).all()):
+        raise InputError("the arm gives readings that are no numbers; is its sensor switched on?")
+    along = force @ np.array(order.task.direction)
+    found = AtRest(place[-1], force.mean(axis=0), float(along.std()), rate, sensed[-1])
+    _check(found, float(np.ptp(place, axis=0).max()), order)
+    return found
+
+
+def _readings(wire: Wire) -> list[Sense]:
+    """Those of half a second, and enough of them."""
+    sensed = [wire.read(1.0)]
+    while (span := sensed[-1].received - sensed[0].received) < TARE or len(sensed) < _FEWEST:
+        if span > _PATIENCE:
+            raise InputError(f"only {len(sensed)} readings came in {span:.3g} s; is the arm switched on?")
+        sensed.append(wire.read(1.0))
+    return sensed
+
+
+def _check(found: AtRest, moved: float, order: Order) -> None:
+    task, limits, gains = order.task, order.limits, order.loop.gains
+    full_scale = gains.arm.sensor.full_scale
+    largest = float(np.abs(found.bias).max())
+    if largest >= 0.99 * full_scale:
+        raise InputError(
+            f"the force sensor shows {largest:.3g} N in the air, the end of its scale; unload it"
+        )
+    if largest + limits.force > full_scale:
+        raise InputError(
+            f"the force sensor shows {largest:.3g} N in the air, so that it cannot read a force up to the limit of"
+            f" {limits.force:g} N (full scale {full_scale:g} N); tare it, or lower the limit"
+        )
+    if moved > max(gains.approach * TARE, 1e-5):
+        raise InputError(f"the arm moved by {1e3 * moved:.3g} mm in {TARE:g} s; let it rest first")
+    lowest = task.force * (1.0 - task.probe)
+    if 8.0 * found.noise > lowest:
+        raise InputError(
+            f"the force's noise is {found.noise:.2g} N in the air: {lowest:g} N is below 8 standard deviations of it"
+        )

@@ -1,0 +1,136 @@
+"""What is asked of a press over a wire, and within which limits; checked against the gains before anything moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from palpate.errors import InputError
+from palpate.force import ForceLoop
+from palpate.press.plan import Plan
+from palpate.wires.protocol import Triple, triple
+
+TARE = 0.5
+"""In the air before the press [s]."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What ends a press; all are asked of the user.
+
+    Args:
+        force: of any component [N].
+        speed: of the tool along the direction, commanded and measured [m/s].
+        travel: from where the tool is at the start, along the direction and back [m].
+        seconds: of the whole press, tare and withdrawal included [s].
+    """
+
+    force: float
+    speed: float
+    travel: float
+    seconds: float
+
+    def __post_init__(self) -> None:
+        for name, unit, most in (
+            ("force", "N", 1e4),
+            ("speed", "m/s", 1.0),
+            ("travel", "m", 2.0),
+            ("seconds", "s", 3600.0),
+        ):
+            value = getattr(self, name)
+            if not 0.0 < value <= most:
+                raise InputError(
+                    f"the {name} limit must be above 0 and at most {most:g} {unit}, got {value:g}"
+                )
+
+
+@dataclass(frozen=True)
+class Task:
+    """What to do.
+
+    Args:
+        force: F_d [N].
+        direction: into the surface, of unit length in the base.
+        hold: how long to press after the touch [s].
+        retreat: way back afterwards [m].
+        probe: share of the force by which it is lowered now and then.
+
+    Raises:
+        InputError: a probe that is no share, a hold that is no time.
+    """
+
+    force: float
+    direction: Triple
+    hold: float
+    retreat: float
+    probe: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.plan  # noqa: B018 - it refuses what it cannot be
+
+    @property
+    def plan(self) -> Plan:
+        """The force at each time since the touch."""
+        return Plan(self.force, self.hold, self.probe)
+
+
+@dataclass(frozen=True)
+class Order:
+    """A press that was checked: what to do with which gains, within which limits.
+
+    Args:
+        loop: of the arm, its desired force set.
+        task: what to do, the direction of unit length.
+        limits: what ends it.
+    """
+
+    loop: ForceLoop
+    task: Task
+    limits: Limits
+
+    @property
+    def most(self) -> int:
+        """Readings that there may be: a fifth more than the time limit's, for an arm that runs a little fast."""
+        return int(1.2 * self.limits.seconds * self.loop.gains.arm.rate) + 1000
+
+    @property
+    def jitter(self) -> float | None:
+        """By which the certificate lets a reading's age change [s]; None without one that covers the adapting law."""
+        certificate = self.loop.certificate
+        claims = [] if certificate is None else [c for c in certificate.claims if c.kind == "adapting"]
+        ticks = max((claim.jitter for claim in claims), default=None)
+        return None if ticks is None else ticks * self.loop.gains.arm.tick
+
+
+def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
+    """What was asked as an order, its direction of unit length; refused where it does not fit the gains.
+
+    Raises:
+        InputError: what does not fit, and what to do.
+    """
+    gains = loop.gains
+    size = float(np.linalg.norm(task.direction))
+    if not (math.isfinite(size) and size > 0.0):
+        raise InputError(
+            "--normal must have a length; it points into the surface in the base's axes, as 0,0,-1"
+        )
+    if not task.force < limits.force <= gains.arm.sensor.full_scale:
+        raise InputError(
+            f"the force limit must lie between the force of {task.force:g} N and the sensor's full scale of"
+            f" {gains.arm.sensor.full_scale:g} N, got {limits.force:g} N"
+        )
+    if not gains.approach <= limits.speed <= gains.arm.limits.speed:
+        raise InputError(
+            f"the speed limit must lie between the certified approach of {1e3 * gains.approach:.3g} mm/s and the arm's"
+            f" {1e3 * gains.arm.limits.speed:g} mm/s, got {1e3 * limits.speed:g} mm/s"
+        )
+    if not (task.hold > 0.0 and task.hold + TARE < limits.seconds):
+        raise InputError(
+            f"--seconds must be above 0 and leave time for the approach within the limit of {limits.seconds:g} s"
+        )
+    if not 0.0 <= task.retreat <= limits.travel:
+        raise InputError(f"--retreat must be from 0 to the travel limit of {1e3 * limits.travel:g} mm")
+    loop.desired = task.force
+    return Order(loop, replace(task, direction=triple(np.array(task.direction) / size)), limits)
