@@ -44,6 +44,7 @@ def test_an_arm_at_rest_tells_nothing():
 
 @pytest.mark.parametrize(("left", "named"), [(-0.3, True), (0.0, False), (0.3, False)])
 def test_a_wrong_sign_is_named_and_damping_refused(left, named):
+    """A sensor that shows what is exerted on the surface shows f + m a: what moves the tool goes through it."""
     rng = np.random.default_rng(3)
     world = any_world(rng, frame="base", turns=False, slip=np.zeros(3), sign=1.0)
     press = press_of(world, rng)
@@ -53,7 +54,7 @@ def test_a_wrong_sign_is_named_and_damping_refused(left, named):
     columns = {"time": time}
     acceleration = np.gradient(np.gradient(swing, 0.001), 0.001)
     for i, axis in enumerate("xyz"):
-        for what, add in (("position", swing), ("force", -left * acceleration)):
+        for what, add in (("position", swing), ("force", left * acceleration)):
             column = press[f"{what}_{axis}"]
             before = np.full(3000, column[0] if what == "position" else np.nan)
             if what == "force":
@@ -61,7 +62,9 @@ def test_a_wrong_sign_is_named_and_damping_refused(left, named):
             columns[f"{what}_{axis}"] = np.r_[before, column] + world.normal[i] * add
     record = Record(columns, dict.fromkeys(columns, "1"))
     found, along = identify_contact(record, ContactFrame(wrench_frame="base", normal=tuple(world.normal)))
-    assert ("tool-inertia" in found.codes) is named
+    said = [warn.text for warn in found.warnings if warn.code.word == "tool-inertia"]
+    assert any("with the wrong sign" in text for text in said) is named
+    assert bool(said) is (left != 0.0)  # a tool's own mass is told too, and taken out
     assert ("wrong sign" in found.parameters["B"].reason) is named
     assert found.parameters["K"].value == pytest.approx(5000, rel=0.05)
     value, std = along.meta["contact_frame"]["air_inertia_kg"]

@@ -23,7 +23,7 @@ class Tool:
         centre: in the tool's axes from the sensor [m].
         bias, drift: of the force [N], [N/s].
         torque_bias: [N m].
-        side: 1 if the sensor shows what the tool exerts, -1 for the reaction.
+        side: 1 if the sensor shows what the tool exerts on it, -1 for the opposite.
         taken_off: share of the inertia that the driver takes off; 2 is the wrong sign.
         noise: of an axis [N]; of the torque a twentieth of it.
         uneven: by which a cable or a flange errs in each orientation, of an axis [N].

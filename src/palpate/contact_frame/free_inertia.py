@@ -32,7 +32,8 @@ def free_inertia(time: Array, force: Array, place: Array, free: Rows) -> tuple[f
 
     Args:
         time: of the rows [s], shape (n,).
-        force: that the tool exerts, in the base, without weight and bias [N], shape (n, 3); NaN without a reading.
+        force: that the tool exerts on its sensor, in the base, without weight and bias [N], shape (n, 3); NaN without a
+            reading. Of a contact that is the reaction.
         place: of the tool's centre of mass, in the base [m], shape (n, 3), likewise.
         free: rows in which nothing is touched, shape (n,).
     """

@@ -25,7 +25,8 @@ class Payload(Table):
     """[kg]."""
     mass_std: NotNegative
     weight: Vector
-    """As the sensor shows it, in the base's axes [N]; it points up where the sensor shows the reaction."""
+    """As the sensor shows it, in the base's axes [N]; it points up where the sensor shows the action, since the
+    arm exerts what holds a tool as it exerts what presses it on."""
     weight_std: NotNegative
     """Of an axis [N]."""
     bias: Vector

@@ -142,11 +142,14 @@ def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) 
 def _inertia_in_air(
     signals: Signals, freed: Unloaded, sign: float, frame: ContactFrame
 ) -> tuple[float, float] | None:
-    """The mass by which the force follows the acceleration before the touch, and its std [kg]."""
+    """The mass by which the force follows the acceleration before the touch, and its std [kg].
+
+    What the tool exerts on its sensor is m (g - a), and less what it exerts on the surface: the reaction.
+    """
     payload = frame.payload
     centre = payload.centre if payload is not None and payload.centre is not None else (0.0, 0.0, 0.0)
     off = np.array(frame.wrench_at) + np.array(centre) - np.array(frame.tcp)
-    return free_inertia(signals.time, sign * freed.force, signals.place + signals.rotations @ off, freed.free)
+    return free_inertia(signals.time, -sign * freed.force, signals.place + signals.rotations @ off, freed.free)
 
 
 def _doubts(

@@ -268,7 +268,7 @@ def _inertia(signals: Signals, fit: PoseFit, frame: ContactFrame) -> dict[str, E
 
 
 def side_of(weight: Array) -> float | None:
-    """1 where a sensor shows what the tool exerts, so that its weight points down; -1 for the reaction.
+    """1 where a sensor shows what the tool exerts on it, so that its weight points down; -1 for the opposite.
 
     None where the weight lies across the base's z: the base may hang on a wall.
     """
