@@ -15,6 +15,7 @@ from palpate.cli.run import whole_number
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
+    from palpate.contact_frame import Payload
     from palpate.press.prepare import Question
     from palpate.wires import Limits, Task
 
@@ -39,6 +40,9 @@ class AskOptions:
     probe
         Share of the force by which it is lowered three times, so that the surface shows what it is: a force that stays
         tells palpate identify little. 0.2 of a simulated arm, 0 of a real one if left out.
+    payload
+        What palpate payload wrote of the tool; its mass is taken out of M. A simulated arm carries that tool, and its
+        sensor shows what that one did; of a real arm the sensor in the air is compared with it.
     """
 
     force: Annotated[str | None, SIGNED] = None
@@ -46,6 +50,14 @@ class AskOptions:
     gains: Path | None = None
     normal: Annotated[str | None, SIGNED] = None
     probe: Annotated[float | None, SIGNED] = None
+    payload: Path | None = None
+
+    @property
+    def tool(self) -> Payload | None:
+        """The tool that was weighed; None if none was said."""
+        from palpate.contact_frame import load_payload
+
+        return None if self.payload is None else load_payload(self.payload)
 
     @property
     def desired(self) -> float:
@@ -110,7 +122,7 @@ class SimulatedOptions:
             arm=self.arm, force=asked.desired, surface=surface_of(self.surface), site=self.site, mode=self.mode,
             physics=self.physics, controller=self.controller, gains=asked.gains, at=vector("at", self.at, "length"),
             normal=vector("normal", asked.normal, "number"), seconds=asked.seconds,
-            probe=0.2 if asked.probe is None else asked.probe, seed=self.seed,
+            probe=0.2 if asked.probe is None else asked.probe, seed=self.seed, payload=asked.tool,
         )  # fmt: skip
 
     @property
@@ -142,9 +154,6 @@ class WireOptions:
         Folder for everything that was read and commanded; palpate identify takes its record.parquet.
     certificate
         What palpate certify wrote; without it the lateness is measured, and nothing is proved.
-    payload
-        What palpate payload wrote of the tool: compared with what the sensor shows in the air, and its mass is kept in
-        the record for palpate identify.
     retreat
         Way back afterwards.
     ordinary_priority
@@ -158,7 +167,6 @@ class WireOptions:
     yes: Annotated[bool, FLAG] = False
     record: Path | None = None
     certificate: Path | None = None
-    payload: Path | None = None
     retreat: Annotated[str, SIGNED] = "2:mm"
     ordinary_priority: Annotated[bool, FLAG] = False
     recover: Path | None = None

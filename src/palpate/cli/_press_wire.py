@@ -38,7 +38,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
 
     assert asked.gains is not None
     order = checked(ForceLoop.load(asked.gains, options.certificate), task, most)
-    tool = _tool(options.payload)
+    tool = asked.tool
     arm = open_wire(str(options.wire))
     try:
         plan = _plan(arm, order, options.record)
@@ -63,20 +63,13 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
 def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
     """What the record says of the press, as plain values."""
     task = order.task
-    known = {
+    return {
         "command": command(),
         "title": arm.title,
         "normal": list(task.direction),
         "desired_N": task.force,
+        **({} if tool is None else tool.meta),
     }
-    beyond = None if tool is None else tool.beyond
-    return known if beyond is None else {**known, "tool_mass_kg": list(beyond)}
-
-
-def _tool(path: Path | None) -> Payload | None:
-    from palpate.contact_frame import load_payload
-
-    return None if path is None else load_payload(path)
 
 
 def _compared(tool: Payload, air: AtRest) -> list[str]:

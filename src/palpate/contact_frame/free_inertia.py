@@ -57,6 +57,14 @@ def wrong_sign(inertia: tuple[float, float] | None) -> bool:
     return inertia is not None and inertia[0] < -float(t.isf(CHANCE, BLOCKS - 1)) * inertia[1]
 
 
+def wrong_sign_of(inertia: tuple[float, float]) -> str:
+    """What to say of it."""
+    return (
+        f"in the air the force follows the acceleration as a mass of {inertia[0]:.3g} kg (std {inertia[1]:.2g})"
+        " would: the tool's inertia is compensated with the wrong sign, or twice"
+    )
+
+
 def _by_window(force: Array, place: Array, there: Rows, dt: float, n: int) -> tuple[float, float] | None:
     """Windows of n rows that overlap by half, all of whose rows are there."""
     if n < _ROWS or len(force) < n:

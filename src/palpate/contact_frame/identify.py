@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.contact_frame.arm import with_arm
 from palpate.contact_frame.declared import Arm, ContactFrame
-from palpate.contact_frame.free_inertia import wrong_sign
+from palpate.contact_frame.free_inertia import wrong_sign, wrong_sign_of
 from palpate.contact_frame.projecting import project
 from palpate.contact_frame.signals_in_base import FORCE
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
@@ -48,11 +48,13 @@ def identify_contact(
         position_from=arm.position_from or record.meta.get("position_from"),
         tool_mass=arm.tool_mass or record.meta.get("tool_mass_kg"),
     )
-    spread = 0.0
+    spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
     in_space = FORCE[0] in record.columns
     if in_space:
         record = project(record, frame or ContactFrame())
-        spread = record.meta["contact_frame"]["scale_std"]
+        spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "air_inertia_kg"))
+    elif inertia is not None and wrong_sign(inertia):
+        record = _noted(record, inertia)
     if arm.stiffness is not None:
         options |= {"series_stiffness": arm.stiffness[0], "series_std": arm.stiffness[1]}
     scale = float(np.hypot(calibration, spread))
@@ -61,12 +63,18 @@ def identify_contact(
         found = _untouched(found)
     if in_space and Code.NO_CONTACT.word in found.codes:
         found, record = _all_free(found, record)
-    if in_space and wrong_sign(record.meta["contact_frame"]["air_inertia_kg"]):
+    if wrong_sign(inertia):
         found = _mistaken(found)
     about = _about(arm) | {"force_filter": str(options.get("force_filter") or "none")}
     about["method"] = options.get("method", LEAST_SQUARES)
     record = replace(record, meta={**record.meta, "arm": about})
     return with_arm(found, arm, tolerance, from_pose=in_space), record
+
+
+def _noted(record: Record, inertia: tuple[float, float]) -> Record:
+    """A record whose tool's inertia was weighed with the wrong sign says so."""
+    note = {"code": Code.TOOL_INERTIA.word, "text": wrong_sign_of(inertia)}
+    return replace(record, meta={**record.meta, "notes": [*record.meta.get("notes", ()), note]})
 
 
 def _untouched(found: Identification) -> Identification:

@@ -60,9 +60,21 @@ class Payload(Table):
         The one that follows the acceleration, where it was shaken; else the one that hangs, unless that is nothing: a
         driver that takes off the weight may leave the inertia in.
         """
-        if self.inertia is not None and self.inertia_std is not None:
-            return max(self.inertia, 0.0), self.inertia_std
+        if self._followed is not None:
+            return max(self._followed[0], 0.0), self._followed[1]
         return (self.mass, self.mass_std) if self.mass > 2.0 * self.mass_std else None
+
+    @property
+    def meta(self) -> dict[str, list[float]]:
+        """What a record of a press with this tool says of it, for `identify_contact` [kg]."""
+        known = {"tool_mass_kg": self.beyond, "tool_inertia_kg": self._followed}
+        return {name: list(value) for name, value in known.items() if value is not None}
+
+    @property
+    def _followed(self) -> tuple[float, float] | None:
+        if self.inertia is None or self.inertia_std is None:
+            return None
+        return self.inertia, self.inertia_std
 
     def to_toml(self) -> str:
         """The file's text."""

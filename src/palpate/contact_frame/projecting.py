@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.free_inertia import CHANCE, free_inertia, wrong_sign
+from palpate.contact_frame.free_inertia import CHANCE, free_inertia, wrong_sign, wrong_sign_of
 from palpate.contact_frame.lever import line_misses_tcp
 from palpate.contact_frame.load import load_of, turns
 from palpate.contact_frame.load_removal import Unloaded, in_range
@@ -149,7 +149,9 @@ def _inertia_in_air(
     payload = frame.payload
     centre = payload.centre if payload is not None and payload.centre is not None else (0.0, 0.0, 0.0)
     off = np.array(frame.wrench_at) + np.array(centre) - np.array(frame.tcp)
-    return free_inertia(signals.time, -sign * freed.force, signals.place + signals.rotations @ off, freed.free)
+    return free_inertia(
+        signals.time, -sign * freed.force, signals.place + signals.rotations @ off, freed.free
+    )
 
 
 def _doubts(
@@ -161,11 +163,7 @@ def _doubts(
     notes = []
     if wrong_sign(inertia):
         assert inertia is not None
-        text = (
-            f"in the air the force follows the acceleration as a mass of {inertia[0]:.3g} kg (std {inertia[1]:.2g})"
-            " would: the tool's inertia is compensated with the wrong sign, or twice"
-        )
-        notes.append({"code": "tool-inertia", "text": text})
+        notes.append({"code": "tool-inertia", "text": wrong_sign_of(inertia)})
     free = freed.free
     if frame.payload is None or not free.any() or not turns(signals.rotations[free]):
         return notes

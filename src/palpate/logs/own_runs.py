@@ -32,20 +32,21 @@ def read_run(path: Path, **options: Any) -> Record:
     about = stored_about(path)
     if about is not None and "wire" in about.meta:
         fact = "a press over a wire: force and position along its direction, the force less what it was in the air"
-        meta = {**record.meta, "facts": [fact], "position_from": "joints", **_tool(path, about.meta["wire"])}
+        wire = about.meta["wire"]
+        meta = {**record.meta, "facts": [fact], "position_from": "joints", **_tool(path, wire)}
         return Record(record.columns, record.units, meta)
     fact = f"a run's record: {RUN['position']} and {RUN['force']}, measured as the record itself says"
-    no_tool = {"tool_mass_kg": (0.0, 0.0)}  # the bench's force is that on the surface itself
-    return Record(record.columns, record.units, {**record.meta, **no_tool, "facts": [fact]})
+    # Without a tool the bench's force is that on the surface itself.
+    tool = {} if about is None else _tool(path, about.meta)
+    return Record(record.columns, record.units, {**record.meta, **(tool or _NO_TOOL), "facts": [fact]})
 
 
-def _tool(path: Path, wire: Any) -> dict[str, Any]:
-    """The mass beyond the sensor and its std [kg], where the press was told what hangs there."""
-    told = wire.get("tool_mass_kg") if isinstance(wire, dict) else None
-    if told is None:
+def _tool(path: Path, known: Any) -> dict[str, Any]:
+    """The mass beyond the sensor, the one that the force follows, and their std [kg], where a press was told them."""
+    if not isinstance(known, dict):
         return {}
     try:
-        return {"tool_mass_kg": msgspec.convert(told, tuple[_Kilograms, _Kilograms])}
+        return {name: msgspec.convert(known[name], kind) for name, kind in _TOOL.items() if name in known}
     except msgspec.ValidationError as error:
         raise InputError(f"{path}: what it says of its tool is spoiled ({error}); press again") from None
 
@@ -73,6 +74,12 @@ def measured_by(path: Path) -> dict[str, Any]:
 
 
 _Kilograms = Annotated[float, msgspec.Meta(ge=0, le=1e3)]
+_Followed = Annotated[float, msgspec.Meta(ge=-1e3, le=1e3)]
+_TOOL: dict[str, Any] = {
+    "tool_mass_kg": tuple[_Kilograms, _Kilograms],
+    "tool_inertia_kg": tuple[_Followed, _Kilograms],
+}
+_NO_TOOL = {"tool_mass_kg": (0.0, 0.0)}
 
 
 class _Force(msgspec.Struct, frozen=True):

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate._jit import kernel, law, part
-from palpate._vector import Mat3, Vec3
+from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
 from palpate.robots.serial.chain import Chain, Room, chain_model, room_for
 from palpate.robots.serial.linear import backward, factorise, forward
+from palpate.robots.serial.spatial import cross
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,26 @@ class Reading(NamedTuple):
 
 
 @part
+class HeldTool(NamedTuple):
+    """What hangs beyond the force sensor, as the sensor shows it: the sign is that of a press.
+
+    Args:
+        weight: in the base's axes, less what a driver takes off [N].
+        bias: of the sensor, in the tool's axes [N].
+        inertia: mass by which the reading follows the acceleration, less what a driver takes off [kg].
+        centre: of mass, in the tool's axes from the tip [m].
+    """
+
+    weight: Vec3
+    bias: Vec3
+    inertia: float
+    centre: Vec3
+
+
+NO_TOOL = HeldTool(ZERO3, ZERO3, 0.0, ZERO3)
+
+
+@part
 class Cell(NamedTuple):
     """Arm, surface and sensor.
 
@@ -57,7 +78,8 @@ class Cell(NamedTuple):
         normal: into the surface, in the base's axes.
         place: of the undeformed surface along the normal [m].
         surface: what is touched, without friction along it.
-        sensor: at the tip; it feels what the surface does.
+        sensor: at the tip; it feels what the surface does, and what moves and holds the tool beyond it.
+        tool: that one.
         step: of the physics [s].
         steps: of the physics in a tick.
         elastic: 1 where motors lead the links through springs, 0 where torques act on the links.
@@ -72,6 +94,7 @@ class Cell(NamedTuple):
     place: float
     surface: KelvinVoigt
     sensor: WristSensor
+    tool: HeldTool
     step: float
     steps: int
     elastic: float
@@ -178,11 +201,26 @@ def answered(cell, body, tip, touch):
 
 
 @law
-def measured_by(sensor, share, touch, surface, force, depth, time, noise):
-    """The touch after a step that is this share of a tick."""
+def held_by(cell, body, tip):
+    """Force along the normal that the tool beyond the sensor adds to its reading: w + R b + m a of its centre [N]."""
+    tool, room = cell.tool, body.room
+    shown = tool.weight + tip.R @ tool.bias
+    if tool.inertia != 0.0:
+        a, dw = tip.a, tip.dw
+        for i in range(len(body.q)):
+            a = a + body.qdd[i] * Vec3(room.J[0, i], room.J[1, i], room.J[2, i])
+            dw = dw + body.qdd[i] * Vec3(room.J[3, i], room.J[4, i], room.J[5, i])
+        r = tip.R @ tool.centre
+        shown = shown + tool.inertia * (a + cross(dw, r) + cross(tip.w, cross(tip.w, r)))
+    return cell.normal @ shown
+
+
+@law
+def measured(cell, body, tip, touch, surface, force, depth, time, noise):
+    """The touch after a step."""
     felt = max(force, 0.0)
-    reading = sensed(sensor, touch.reading, felt, time, noise)
-    return Touch(surface, reading, force, touch.mean + share * felt, depth)
+    reading = sensed(cell.sensor, touch.reading, felt + held_by(cell, body, tip), time, noise)
+    return Touch(surface, reading, force, touch.mean + felt / cell.steps, depth)
 
 
 @law
@@ -191,7 +229,7 @@ def tick(cell, body, touch, setpoint, k, noise):
 
     Semi-implicit Euler, first order; the contact force is solved together with the acceleration.
     """
-    sensor, step, share = cell.sensor, cell.step, 1.0 / cell.steps
+    step = cell.step
     touch = Touch(touch.surface, touch.reading, touch.force, 0.0, touch.depth)
     for j in range(cell.steps):
         driven(cell, body, setpoint)
@@ -200,9 +238,8 @@ def tick(cell, body, touch, setpoint, k, noise):
         for i in range(len(body.q)):
             body.qd[i] += step * body.qdd[i]
             body.q[i] += step * body.qd[i]
-        touch = measured_by(
-            sensor, share, touch, surface, force, depth, (k * cell.steps + j + 1) * step, noise
-        )
+        time = (k * cell.steps + j + 1) * step
+        touch = measured(cell, body, tip, touch, surface, force, depth, time, noise)
     return touch
 
 
@@ -211,7 +248,7 @@ def foreign(cell, body, touch, tip, setpoint, time, noise):
     """One step whose M, h and J another engine has filled in; that engine moves the arm."""
     driven(cell, body, setpoint)
     surface, force, depth = answered(cell, body, tip, touch)
-    return measured_by(cell.sensor, 1.0 / cell.steps, touch, surface, force, depth, time, noise)
+    return measured(cell, body, tip, touch, surface, force, depth, time, noise)
 
 
 compiled_tick = kernel(tick)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate._jit import Bound
-from palpate._vector import ZERO3, Mat3, Vec3
+from palpate._vector import Mat3, Vec3
 from palpate.press.cell import Body, Cell, Touch, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.serial_arm import SerialArm
@@ -101,10 +101,11 @@ class ByMuJoCo:
         body.room.M[:] = self._M[np.ix_(dofs, dofs)]
         body.room.h[:] = (data.qfrc_bias - data.qfrc_passive)[dofs]
         body.room.J[:] = J[:, dofs]
-        bias = (Jdot @ data.qvel)[:3]
-        velocity = (J @ data.qvel)[:3]
-        R = Mat3(*(Vec3(*map(float, row)) for row in axes))
-        return Tip(_three(at), R, _three(velocity), ZERO3, _three(bias), ZERO3)
+        bias, velocity = Jdot @ data.qvel, J @ data.qvel
+        R = Mat3(*(_three(row) for row in axes))
+        return Tip(
+            _three(at), R, _three(velocity[:3]), _three(velocity[3:]), _three(bias[:3]), _three(bias[3:])
+        )
 
 
 def _three(values: Any) -> Vec3:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.contact_frame import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.gains import Gains, load_gains
@@ -19,6 +20,8 @@ from palpate.press.pressing import Progress, press
 from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import Asked
+from palpate.press.tare import SURE, check_range
+from palpate.press.tool import held_tool, with_tool
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.serial_arm import SerialArm
@@ -46,6 +49,7 @@ class Question:
         seconds: from the touch on [s].
         probe: share of the force.
         seed: of the noise.
+        payload: of `palpate payload`: the arm carries this tool, and its sensor shows what that one did.
     """
 
     arm: str
@@ -61,6 +65,7 @@ class Question:
     seconds: float = 6.0
     probe: float = 0.2
     seed: int = 0
+    payload: Payload | None = None
 
 
 @dataclass(frozen=True)
@@ -79,11 +84,16 @@ class Pressing:
         """Runs it; the record says itself what it is of."""
         asked = self.asked
         loop = asked.gains.arm
-        cell = cell_of(asked.arm, asked.place, asked.surface, loop)
+        cell = cell_of(asked.arm, asked.place, asked.surface, loop, held_tool(asked.payload))
         arm = SimulatedArm(asked.arm, loop, asked.place, cell, asked.physics, asked.seed)
+        if asked.payload is not None:
+            arm.tare()
+            most = self.plan.force + SURE * loop.sensor.noise
+            check_range(abs(arm.zero), most, loop.sensor.full_scale)
         pilot = pilot_of(asked.controller, arm, asked.gains, asked.place, self.plan.force)
         record = press(arm, pilot, asked.place, self.plan, progress)
-        return Record(record.columns, record.units, {**record.meta, **asked.meta(record)})
+        meta = {**record.meta, **asked.meta(record), "tare_N": arm.zero}
+        return Record(record.columns, record.units, meta)
 
 
 def prepared(question: Question) -> Pressing:
@@ -94,16 +104,29 @@ def prepared(question: Question) -> Pressing:
     """
     _check_words(question)
     Plan(question.force, question.seconds, question.probe)
-    arm = arm_of(question.arm, question.site)
+    arm = _loaded(question, arm_of(question.arm, question.site))
     place = place_of(arm, _array(question.at), _array(question.normal))
     gains = _gains(question, arm, place)
     _check_force(question, gains)
     notes = check_able(arm, place, gains.approach, question.force)
+    notes = [*arm.notes, *notes, *_engine_notes(question, arm)]
     asked = Asked(
         arm=arm, gains=gains, place=place, surface=question.surface, controller=question.controller,
-        physics=question.physics, seed=question.seed, notes=(*arm.notes, *notes, *_engine_notes(question, arm)),
+        physics=question.physics, seed=question.seed, payload=question.payload, notes=tuple(notes),
     )  # fmt: skip
     return Pressing(asked, plan_for(question.force, question.seconds, question.probe, GAP, gains.approach))
+
+
+def _loaded(question: Question, arm: SerialArm) -> SerialArm:
+    """The arm with its tool, if there is one."""
+    if question.payload is None:
+        return arm
+    if question.physics == "mujoco" and arm.scene is not None:
+        raise InputError(
+            f"{question.arm} is MuJoCo's own model, in which --payload hangs nothing; give the tool a body there, or"
+            " leave --physics out"
+        )
+    return with_tool(arm, question.payload)
 
 
 def arm_of(name: str, site: str | None) -> SerialArm:
@@ -189,7 +212,7 @@ def _gains(question: Question, arm: SerialArm, place: Place) -> Gains:
 
 
 def _check_force(question: Question, gains: Gains) -> None:
-    least, most = 8.0 * gains.arm.sensor.noise, gains.force_limit
+    least, most = SURE * gains.arm.sensor.noise, gains.force_limit
     lowest = question.force * (1.0 - question.probe)
     if not least <= lowest:
         raise InputError(

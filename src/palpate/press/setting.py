@@ -13,7 +13,7 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop
 from palpate.force.sampled_loop import filter_of, held
-from palpate.press.cell import Cell, WristSensor
+from palpate.press.cell import NO_TOOL, Cell, HeldTool, WristSensor
 from palpate.robots.serial.inverse import checked_pose
 from palpate.robots.serial.serial_arm import SerialArm
 
@@ -131,8 +131,8 @@ def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None
         )
 
 
-def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm) -> Cell:
-    """The simulated cell of an arm whose inner loop is known."""
+def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL) -> Cell:
+    """The simulated cell of an arm whose inner loop is known; the tool is what its sensor shows of one."""
     elastic = isinstance(loop.inner, PositionLoop)
     chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if elastic else arm.chain
     J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)
@@ -149,7 +149,7 @@ def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm) -> Ce
     steps = int(np.ceil(loop.tick / min(_STEP, _RESOLVED / fastest) - 1e-9))
     return Cell(
         chain=chain, normal=_three(place.normal), place=place.place, surface=surface,
-        sensor=_sensor(loop, loop.tick / steps), step=loop.tick / steps, steps=steps, elastic=float(elastic),
+        sensor=_sensor(loop, loop.tick / steps), tool=tool, step=loop.tick / steps, steps=steps, elastic=float(elastic),
         spring=spring, damper=damper, first=float(first), second=float(second),
     )  # fmt: skip
 

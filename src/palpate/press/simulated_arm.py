@@ -19,6 +19,7 @@ from palpate.press.cell import Cell, Reading, Touch, body_at
 from palpate.press.engines import ByMuJoCo, Engine, Own
 from palpate.press.protocol import Command, Sense
 from palpate.press.setting import Place
+from palpate.press.tare import TARE
 from palpate.press.tip_control import Spring, compiled_tip_torque
 from palpate.robots.serial.described import compiled_description, found_for
 from palpate.robots.serial.inverse import pose_error
@@ -90,7 +91,7 @@ class SimulatedArm:
         first = Reading(ZERO3, 0.0, 0.0)
         self._touch = Touch(UNTOUCHED, first, 0.0, 0.0, float(place.normal @ place.pose[:3, 3]) - place.place)
         self._engine: Engine = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
-        self._k = 0
+        self._k, self.zero = 0, 0.0
         self._goal, self._setpoint = place.pose.copy(), place.q.copy()
         self._saturated = np.zeros(arm.joints)
         self._seen = self._before = self._encoders()
@@ -101,9 +102,17 @@ class SimulatedArm:
     def read(self) -> Sense:
         """What the arm says at this tick."""
         force = np.zeros(6)
-        force[:3] = self._touch.reading.value * np.array(self.cell.normal)
+        force[:3] = (self._touch.reading.value - self.zero) * np.array(self.cell.normal)
         seen = self._seen
         return Sense(self._k * self.loop.tick, force, self.arm.forward_kinematics(seen), seen)
+
+    def tare(self) -> None:
+        """Rests in the air, and takes what the sensor shows in the second half of that for zero."""
+        shown = []
+        for _ in range(round(TARE / self.loop.tick)):
+            self.write(Command(velocity=np.zeros(6)))
+            shown.append(self._touch.reading.value)
+        self.zero = float(np.mean(shown[len(shown) // 2 :]))
 
     def write(self, command: Command) -> None:
         """Moves as told for a tick.
@@ -174,7 +183,7 @@ class SimulatedArm:
     def _act(self, controller: Any, task: Task) -> None:
         assert self._tip is not None
         qd = (self._seen - self._before) / self.loop.tick
-        torque = self._tip.torque(controller, task, self._seen, qd, self._touch.reading.value)
+        torque = self._tip.torque(controller, task, self._seen, qd, self._touch.reading.value - self.zero)
         held = np.clip(torque, -self.arm.torque, self.arm.torque)
         self._saturated = (np.abs(torque) > self.arm.torque).astype(float)
         self._advance(held)

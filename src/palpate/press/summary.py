@@ -9,10 +9,10 @@ import numpy as np
 
 from palpate.bench.metrics.summary import WINDOW, force_figures, losses
 from palpate.bench.sequence import CONTACT
+from palpate.contact_frame import Payload, identify_contact
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.gains import Gains
-from palpate.identification import identify
 from palpate.identification.sample_clock import sample_clock_of
 from palpate.press.loops import series_of
 from palpate.press.setting import Place
@@ -33,6 +33,7 @@ class Asked:
         physics: by name.
         seed: of the noise.
         notes: what a reader should know.
+        payload: the tool that was carried; None without one.
     """
 
     arm: SerialArm
@@ -43,6 +44,7 @@ class Asked:
     physics: str
     seed: int
     notes: tuple[str, ...]
+    payload: Payload | None = None
 
     def meta(self, record: Record) -> dict[str, Any]:
         """What the record carries along, plain values."""
@@ -62,6 +64,7 @@ class Asked:
                 "position": {"lag_s": 0.0},
             },
             "notes": list(self.notes),
+            **({} if self.payload is None else self.payload.meta),
         }
 
     def delay(self, record: Record) -> float:
@@ -95,6 +98,10 @@ def summarise(record: Record, asked: Asked) -> dict[str, Any]:
         "truth": record.meta["truth"],
         "loop": _loop(asked),
         "pose": {"smallest_singular_value": asked.place.weakest, "tip_mass_kg": asked.place.mass},
+        "tare_N": record.meta["tare_N"],
+        "sensor_saturated": _mean(
+            np.abs(record["force_sampled"] + record.meta["tare_N"]) >= _full_scale(asked)
+        ),
         "notes": list(asked.notes),
     }
     if pressing.any():
@@ -115,10 +122,11 @@ def identified(record: Record, asked: Asked) -> dict[str, Any]:
     log = Record(
         {"time": record["t"], "position": record["x_measured"], "force": record["force_sampled"]},
         {"time": "s", "position": "m", "force": "N"},
+        {"tool_mass_kg": (0.0, 0.0)} if asked.payload is None else asked.payload.meta,
     )
     low_pass = loop.low_pass
     try:
-        found = identify(
+        found, _ = identify_contact(
             log,
             lag=low_pass.lag + asked.delay(record),
             lag_std=loop.tick / np.sqrt(12.0),
@@ -140,6 +148,10 @@ def _loop(asked: Asked) -> dict[str, Any]:
         "approach_speed_m_s": gains.approach,
         "series_stiffness": series_of(gains.arm),
     }
+
+
+def _full_scale(asked: Asked) -> float:
+    return float(asked.gains.arm.sensor.full_scale)
 
 
 def _mean(values: Any) -> float:

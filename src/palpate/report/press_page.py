@@ -56,10 +56,21 @@ def notes(summary: dict[str, Any]) -> list[str]:
     joint, share = max(summary["saturated"].items(), key=lambda item: item[1])
     if share > 0.01:
         found.append(f"The motor of {joint} was at its limit in {100 * share:.1f} % of the ticks.")
+    if summary["sensor_saturated"]:
+        share = f"{100 * summary['sensor_saturated']:.2g} % of the ticks"
+        found.append(
+            f"The force sensor stood at the end of its scale in {share}: what it showed is not the force."
+        )
     identified = summary["identified"] or {}
+    found += [note["text"][0].upper() + note["text"][1:] + "." for note in _of_tool(identified)]
     if identified.get("why_not"):
         found.append(f"Nothing was identified: {identified['why_not']}.")
     return [*found, *(f"{note[0].upper()}{note[1:]}." for note in summary["notes"])]
+
+
+def _of_tool(identified: dict[str, Any]) -> list[dict[str, Any]]:
+    """Warnings that a tool's inertia is the cause of."""
+    return [note for note in identified.get("warnings", ()) if note["code"] == "tool-inertia"]
 
 
 def tables(summary: dict[str, Any]) -> list[Table]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.wires.order import TARE, Order
+from palpate.press.tare import SURE, TARE, check_range
+from palpate.wires.order import Order
 from palpate.wires.protocol import Sense, Wire
 
 Array = NDArray[np.float64]
@@ -73,21 +74,11 @@ def _readings(wire: Wire) -> list[Sense]:
 
 def _check(found: AtRest, moved: float, order: Order) -> None:
     task, limits, gains = order.task, order.limits, order.loop.gains
-    full_scale = gains.arm.sensor.full_scale
-    largest = float(np.abs(found.bias).max())
-    if largest >= 0.99 * full_scale:
-        raise InputError(
-            f"the force sensor shows {largest:.3g} N in the air, the end of its scale; unload it"
-        )
-    if largest + limits.force > full_scale:
-        raise InputError(
-            f"the force sensor shows {largest:.3g} N in the air, so that it cannot read a force up to the limit of"
-            f" {limits.force:g} N (full scale {full_scale:g} N); tare it, or lower the limit"
-        )
+    check_range(float(np.abs(found.bias).max()), limits.force, gains.arm.sensor.full_scale)
     if moved > max(gains.approach * TARE, 1e-5):
         raise InputError(f"the arm moved by {1e3 * moved:.3g} mm in {TARE:g} s; let it rest first")
     lowest = task.force * (1.0 - task.probe)
-    if 8.0 * found.noise > lowest:
+    if SURE * found.noise > lowest:
         raise InputError(
             f"the force's noise is {found.noise:.2g} N in the air: {lowest:g} N is below 8 standard deviations of it"
         )

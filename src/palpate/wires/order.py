@@ -10,10 +10,8 @@ import numpy as np
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.press.plan import Plan
+from palpate.press.tare import TARE
 from palpate.wires.protocol import Triple, triple
-
-TARE = 0.5
-"""In the air before the press [s]."""
 
 
 @dataclass(frozen=True)
