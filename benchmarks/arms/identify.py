@@ -4,8 +4,9 @@
 """
 
 import argparse
-import re
 from pathlib import Path
+
+from pages import put
 
 from palpate.press.prepare import Question, prepared, surface_of
 from palpate.press.summary import summarise
@@ -13,7 +14,6 @@ from palpate.report.numbers import with_half
 from palpate.robots.serial.from_toml import names
 
 STIFFNESSES, DAMPING, FORCE = (5e3, 6e4), 50.0, 20.0
-MARKS = "<!-- identify: made by benchmarks/arms/identify.py -->", "<!-- end of identify -->"
 HEAD = "| arm | mode | K [N/m] | K found | B found, 50 N s/m | force, last second [N] | overshoot [N] | settling [s] |"
 
 
@@ -48,14 +48,7 @@ def main() -> None:
             for stiffness in STIFFNESSES:
                 lines.append(row(arm, mode, stiffness, words.seed))
                 print(lines[-1], flush=True)
-    if words.markdown:
-        text = words.markdown.read_text(encoding="utf-8")
-        body = f"{MARKS[0]}\n\n" + "\n".join(lines) + f"\n\n{MARKS[1]}"
-        new, count = re.subn(
-            re.escape(MARKS[0]) + ".*?" + re.escape(MARKS[1]), lambda _: body, text, flags=re.DOTALL
-        )
-        assert count == 1, f"{words.markdown} has no marks for the table"
-        words.markdown.write_text(new, encoding="utf-8")
+    put(words.markdown, "identify", lines)
 
 
 if __name__ == "__main__":

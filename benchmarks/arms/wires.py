@@ -15,12 +15,13 @@ import sys
 import tempfile
 from pathlib import Path
 
+from pages import put
+
 from palpate.cli import main as palpate
 from palpate.force import load_arm
 from palpate.press.loops import gains_for
 
 STIFFNESS, SERIES, FORCE = 6000.0, 5e4, 20.0
-MARKS = "<!-- wires: made by benchmarks/arms/wires.py -->", "<!-- end of wires -->"
 HEAD = (
     "| wire | readings [Hz] | late by 50 % [ms] | 99 % | 99.9 % | most | missed of | force [N] | K found, 6000 N/m |"
     " ended |"
@@ -99,11 +100,7 @@ def main() -> None:
         for name in WIRES:
             lines.append(row(name, words.seconds, Path(folder)))
             print(lines[-1], flush=True)
-    if words.markdown:
-        text = words.markdown.read_text(encoding="utf-8")
-        body = f"{MARKS[0]}\n\n" + "\n".join(lines) + f"\n\n{MARKS[1]}"
-        before, rest = text.split(MARKS[0])
-        words.markdown.write_text(before + body + rest.split(MARKS[1])[1], encoding="utf-8")
+    put(words.markdown, "wires", lines)
 
 
 if __name__ == "__main__":

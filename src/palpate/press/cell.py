@@ -12,9 +12,9 @@ from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
-from palpate.robots.serial.chain import Chain, Room, chain_model, room_for
-from palpate.robots.serial.linear import backward, factorise, forward
-from palpate.robots.serial.spatial import cross
+from palpate.robots.serial.chain import Chain, Room, axis_of, chain_motion, room_for
+from palpate.robots.serial.linear import backward, factorise, forward, product
+from palpate.robots.serial.spatial import Wrench, cross
 
 Array = NDArray[np.float64]
 
@@ -113,11 +113,12 @@ class Body(NamedTuple):
     motor: Array  # angle of each motor at the joint [rad, m]
     motor_rate: Array
     room: Room
-    L: Array  # of M = L L^T
+    L: Array  # of M = L D L^T
     drive: Array  # torque on the links
     qdd: Array
     normal: Array  # row of J along the normal
-    yielding: Array  # L^-1 times that
+    centre: Array  # likewise, of the tool's centre of mass
+    yielding: Array  # L^-1 times that of the tip
 
 
 @part
@@ -134,7 +135,7 @@ class Touch(NamedTuple):
 def body_at(q: Array, motor: Array) -> Body:
     """At rest."""
     n = len(q)
-    one = [np.zeros(n) for _ in range(6)]
+    one = [np.zeros(n) for _ in range(7)]
     return Body(q.copy(), one[0], motor.copy(), one[1], room_for(n), np.zeros((n, n)), *one[2:])
 
 
@@ -143,9 +144,9 @@ def sensed(sensor, reading, force, time, noise):
     """The sensor after a step that ends at `time` [s]; `noise` are eight standard normal numbers of this tick."""
     z = sensor.E @ reading.z + force * sensor.e
     value, samples = reading.value, reading.samples
+    shown = sensor.c @ z + sensor.d * force + sensor.noise * noise[int(samples) % 8]
     if time >= samples / sensor.sampling:
-        value = sensor.c @ z + sensor.d * force + sensor.noise * noise[int(samples) % 8]
-        value = min(max(value, -sensor.full_scale), sensor.full_scale)
+        value = min(max(shown, -sensor.full_scale), sensor.full_scale)
         samples += 1.0
     return Reading(z, value, samples)
 
@@ -165,35 +166,64 @@ def driven(cell, body, setpoint):
 
 
 @law
+def lever_of(cell, tip):
+    """Turning times this is what the tool's centre moves along the normal beside the tip [m]."""
+    return cross(tip.R @ cell.tool.centre, cell.normal)
+
+
+@law
+def swung(cell, body):
+    """Joints that the tool's centre is followed for: none where the reading follows no acceleration."""
+    return len(body.q) * int(cell.tool.inertia != 0.0)
+
+
+@law
+def joint_rows(cell, body, tip):
+    """Fills the rows along the normal from the joints' axes."""
+    lever, push = lever_of(cell, tip), Wrench(cross(tip.p, cell.normal), cell.normal)
+    for i in range(len(body.q)):
+        body.normal[i] = push.power(axis_of(body.room, i))
+    for i in range(swung(cell, body)):
+        body.centre[i] = body.normal[i] + axis_of(body.room, i).w @ lever
+
+
+@law
+def jacobian_rows(cell, body, tip):
+    """Fills them from the Jacobian in the body's room."""
+    J, lever = body.room.J, lever_of(cell, tip)
+    for i in range(len(body.q)):
+        body.normal[i] = cell.normal @ Vec3(J[0, i], J[1, i], J[2, i])
+    for i in range(swung(cell, body)):
+        body.centre[i] = body.normal[i] + Vec3(J[3, i], J[4, i], J[5, i]) @ lever
+
+
+@law
 def answered(cell, body, tip, touch):
     """Fills the joints' accelerations under drive and contact: the surface's state and the force on it [N].
 
     Args:
         cell: all of it.
-        body: its room filled with M, h and J of this moment, its drive with the torques.
+        body: filled with M, h and the rows along the normal of this moment, its drive with the torques.
         tip: of this moment.
         touch: after the step before.
     """
     n, room = len(body.q), body.room
     factorise(room.M, body.L)
     for i in range(n):
-        along = cell.normal @ Vec3(room.J[0, i], room.J[1, i], room.J[2, i])
-        body.normal[i], body.yielding[i] = along, along
+        body.yielding[i] = body.normal[i]
         body.qdd[i] = body.drive[i] - room.h[i]
     forward(body.L, body.yielding)
     forward(body.L, body.qdd)
-    mobility, free, v = 0.0, cell.normal @ tip.a, 0.0
+    mobility = product(body.L, body.yielding, body.yielding)
+    free = cell.normal @ tip.a + product(body.L, body.yielding, body.qdd)
+    v = 0.0
     for i in range(n):
-        mobility += body.yielding[i] * body.yielding[i]
-        free += body.yielding[i] * body.qdd[i]
         v += body.normal[i] * body.qd[i]
     p = cell.normal @ tip.p - cell.place
     surface, impulse = follow(cell.surface, touch.surface, touch.force, p, v, 1.0 / mobility, cell.step)
-    force = 0.0
-    if surface.contact == 1.0:
-        late = v - 0.5 * cell.step * (cell.normal @ tip.a)
-        elastic, opposed = opposing(cell.surface, surface, p, late, cell.step)
-        force = contact_force(elastic, opposed, 1.0 / mobility, free)
+    late = v - 0.5 * cell.step * (cell.normal @ tip.a)
+    elastic, opposed = opposing(cell.surface, surface, p, late, cell.step)
+    force = surface.contact * contact_force(elastic, opposed, 1.0 / mobility, free)
     for i in range(n):
         body.qdd[i] -= body.yielding[i] * (max(force, 0.0) + impulse / cell.step)
     backward(body.L, body.qdd)
@@ -201,26 +231,37 @@ def answered(cell, body, tip, touch):
 
 
 @law
-def held_by(cell, body, tip):
-    """Force along the normal that the tool beyond the sensor adds to its reading: w + R b + m a of its centre [N]."""
-    tool, room = cell.tool, body.room
-    shown = tool.weight + tip.R @ tool.bias
-    if tool.inertia != 0.0:
-        a, dw = tip.a, tip.dw
-        for i in range(len(body.q)):
-            a = a + body.qdd[i] * Vec3(room.J[0, i], room.J[1, i], room.J[2, i])
-            dw = dw + body.qdd[i] * Vec3(room.J[3, i], room.J[4, i], room.J[5, i])
-        r = tip.R @ tool.centre
-        shown = shown + tool.inertia * (a + cross(dw, r) + cross(tip.w, cross(tip.w, r)))
-    return cell.normal @ shown
+def shown_of(tool, normal, tip, along):
+    """Force along the normal that a tool beyond the sensor adds to its reading, w + R b + m a of its centre [N].
+
+    Args:
+        tool: what hangs there.
+        normal: into the surface.
+        tip: of this moment.
+        along: acceleration of the centre along the normal that the joints' accelerations make [m/s^2].
+    """
+    rest = normal @ (tool.weight + tip.R @ tool.bias)
+    if tool.inertia == 0.0:
+        return rest
+    r = tip.R @ tool.centre
+    return rest + tool.inertia * (along + normal @ (tip.a + cross(tip.dw, r) + cross(tip.w, cross(tip.w, r))))
 
 
 @law
-def measured(cell, body, tip, touch, surface, force, depth, time, noise):
-    """The touch after a step."""
+def held_by(cell, body, tip):
+    """The same, of the cell after a step."""
+    along = 0.0
+    for i in range(swung(cell, body)):
+        along += body.centre[i] * body.qdd[i]
+    return shown_of(cell.tool, cell.normal, tip, along)
+
+
+@law
+def measured_by(sensor, share, touch, surface, force, held, depth, time, noise):
+    """The touch after a step that is this share of a tick; `held` is what the tool adds to the reading [N]."""
     felt = max(force, 0.0)
-    reading = sensed(cell.sensor, touch.reading, felt + held_by(cell, body, tip), time, noise)
-    return Touch(surface, reading, force, touch.mean + felt / cell.steps, depth)
+    reading = sensed(sensor, touch.reading, felt + held, time, noise)
+    return Touch(surface, reading, force, touch.mean + share * felt, depth)
 
 
 @law
@@ -229,17 +270,20 @@ def tick(cell, body, touch, setpoint, k, noise):
 
     Semi-implicit Euler, first order; the contact force is solved together with the acceleration.
     """
-    step = cell.step
+    # What a function with a branch in it is handed is counted at each step, if it is an array; so it is handed none.
+    sensor, step, share = cell.sensor, cell.step, 1.0 / cell.steps
     touch = Touch(touch.surface, touch.reading, touch.force, 0.0, touch.depth)
     for j in range(cell.steps):
         driven(cell, body, setpoint)
-        tip = chain_model(cell.chain, body.q, body.qd, body.room)
+        tip = chain_motion(cell.chain, body.q, body.qd, body.room)
+        joint_rows(cell, body, tip)
         surface, force, depth = answered(cell, body, tip, touch)
         for i in range(len(body.q)):
             body.qd[i] += step * body.qdd[i]
             body.q[i] += step * body.qd[i]
         time = (k * cell.steps + j + 1) * step
-        touch = measured(cell, body, tip, touch, surface, force, depth, time, noise)
+        held = held_by(cell, body, tip)
+        touch = measured_by(sensor, share, touch, surface, force, held, depth, time, noise)
     return touch
 
 
@@ -247,8 +291,10 @@ def tick(cell, body, touch, setpoint, k, noise):
 def foreign(cell, body, touch, tip, setpoint, time, noise):
     """One step whose M, h and J another engine has filled in; that engine moves the arm."""
     driven(cell, body, setpoint)
+    jacobian_rows(cell, body, tip)
     surface, force, depth = answered(cell, body, tip, touch)
-    return measured(cell, body, tip, touch, surface, force, depth, time, noise)
+    held = held_by(cell, body, tip)
+    return measured_by(cell.sensor, 1.0 / cell.steps, touch, surface, force, held, depth, time, noise)
 
 
 compiled_tick = kernel(tick)

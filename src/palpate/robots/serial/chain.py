@@ -18,7 +18,7 @@ from palpate.robots.serial.spatial import (
     Wrench,
     cross,
     inertia_at,
-    momentum_rate,
+    load_at,
     turned,
     turned_about_z,
 )
@@ -154,19 +154,22 @@ def outward(chain, q, qd, room):
     p, R = ZERO3, UNIT3
     V, A = Twist(ZERO3, ZERO3), Twist(ZERO3, -g)
     for i in range(len(q)):
-        slide = chain.slide[i]
-        turns = 1.0 - slide
         p = p + R @ vector_at(chain.at, i)
-        R = turned_about_z(R @ matrix_at(chain.turn, i), turns * q[i])
+        R = R @ matrix_at(chain.turn, i)
         z = R.T.r3
-        p = p + (slide * q[i]) * z
-        s = Twist(turns * z, turns * cross(p, z) + slide * z)
+        if chain.slide[i] == 0.0:
+            R = turned_about_z(R, q[i])
+            s = Twist(z, cross(p, z))
+        else:
+            p = p + q[i] * z
+            s = Twist(ZERO3, z)
         step = qd[i] * s
         A = A + V.carries(step)
         V = V + step
         moment = turned(R, matrix_at(chain.inertia, i))
-        X = inertia_at(chain.mass[i], p + R @ vector_at(chain.com, i), moment)
-        load = X.momentum(A) + momentum_rate(V, X.momentum(V))
+        mass, centre = chain.mass[i], p + R @ vector_at(chain.com, i)
+        X = inertia_at(mass, centre, moment)
+        load = load_at(mass, centre, moment, V, A)
         put_pair(room.axes, i, s.w, s.v)
         put_pair(room.loads, i, load.m, load.f)
         put_body(room.bodies, i, X)
@@ -181,7 +184,7 @@ def outward(chain, q, qd, room):
 
 @law
 def inward(chain, room):
-    """From tip to base: bias torque and mass matrix."""
+    """From tip to base: bias torque, and the mass matrix' lower triangle, all that a factor of it needs."""
     load = Wrench(ZERO3, ZERO3)
     X = Inertia(0.0, ZERO3, 0.0 * UNIT3)
     n = len(room.h)
@@ -194,16 +197,24 @@ def inward(chain, room):
         push = X.momentum(s)
         for k in range(i + 1):
             room.M[i, k] = push.power(axis_of(room, k))
-            room.M[k, i] = room.M[i, k]
         room.M[i, i] += chain.rotor[i]
+
+
+@law
+def chain_motion(chain, q, qd, room):
+    """Fills h, M's lower triangle and the joints' axes; the tip."""
+    tip = outward(chain, q, qd, room)
+    inward(chain, room)
+    return tip
 
 
 @law
 def chain_model(chain, q, qd, room):
     """Fills M, h and J; the tip."""
-    tip = outward(chain, q, qd, room)
-    inward(chain, room)
+    tip = chain_motion(chain, q, qd, room)
     for i in range(len(q)):
+        for k in range(i):
+            room.M[k, i] = room.M[i, k]
         s = axis_of(room, i)
         v = s.at(tip.p)
         room.J[0, i], room.J[1, i], room.J[2, i] = v.x, v.y, v.z

@@ -1,45 +1,54 @@
-"""Positive definite systems of any small size, in place: no array is made inside a loop.
+"""Positive definite systems of any small size, in place: no array is made inside a loop, and no root is taken.
 
-The factor's diagonal holds reciprocals, so that solving divides by nothing.
+A = L D L^T with ones on L's diagonal. One array holds L below its diagonal, 1/D on it, and D L^T above it.
 """
 
 from palpate._jit import law
-from palpate._vector import sqrt
 
 
 @law
 def factorise(A, L):
-    """Fills the lower triangle of L with that of A = L L^T, its diagonal inverted, shape (n, n)."""
+    """Fills L, 1/D and D L^T from A's lower triangle, shape (n, n)."""
     n = len(A)
     for j in range(n):
         total = A[j, j]
         for k in range(j):
-            total -= L[j, k] * L[j, k]
-        share = 1.0 / sqrt(total)
+            total -= L[j, k] * L[k, j]
+        share = 1.0 / total
         L[j, j] = share
         for i in range(j + 1, n):
             total = A[i, j]
             for k in range(j):
-                total -= L[i, k] * L[j, k]
+                total -= L[i, k] * L[k, j]
+            L[j, i] = total
             L[i, j] = share * total
 
 
 @law
 def forward(L, b):
     """b becomes L^-1 b, shape (n,)."""
-    for i in range(len(b)):
-        total = b[i]
-        for k in range(i):
-            total -= L[i, k] * b[k]
-        b[i] = total * L[i, i]
+    n = len(b)
+    for k in range(n):
+        for i in range(k + 1, n):
+            b[i] -= L[i, k] * b[k]
+
+
+@law
+def product(L, a, b):
+    """a^T D^-1 b: of A^-1, where both went `forward`."""
+    total = 0.0
+    for k in range(len(a)):
+        total += a[k] * b[k] * L[k, k]
+    return total
 
 
 @law
 def backward(L, b):
-    """b becomes L^-T b, shape (n,)."""
+    """b becomes L^-T D^-1 b, shape (n,)."""
     n = len(b)
+    for i in range(n):
+        b[i] *= L[i, i]
     for back in range(n):
         i = n - 1 - back
-        b[i] *= L[i, i]
         for k in range(i):
             b[k] -= L[i, k] * b[i]

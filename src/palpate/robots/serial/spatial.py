@@ -6,7 +6,7 @@ There twists, wrenches and inertias of all bodies simply add (Featherstone, 2008
 from typing import NamedTuple
 
 from palpate._jit import law, part
-from palpate._vector import Mat3, Vec3, cos, outer, sin
+from palpate._vector import Mat3, Vec3, cos, sin
 
 UNIT3 = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 
@@ -71,9 +71,11 @@ class Wrench(NamedTuple):
 
 
 @law
-def momentum_rate(V, momentum):
-    """Rate of a momentum that a body of twist V carries along."""
-    return Wrench(cross(V.w, momentum.m) + cross(V.v, momentum.f), cross(V.w, momentum.f))
+def load_at(mass, centre, moment, V, A):
+    """What moving a body takes (Newton and Euler), of its inertia about its centre of mass, its twist and its rate."""
+    w, dw = V.w, A.w
+    f = mass * (A.at(centre) + cross(w, V.at(centre)))
+    return Wrench(moment @ dw + cross(w, moment @ w) + cross(centre, f), f)
 
 
 @part
@@ -95,8 +97,11 @@ class Inertia(NamedTuple):
 @law
 def inertia_at(mass, centre, moment):
     """A body's inertia from that about its centre of mass, in the world's axes."""
-    spread = (centre @ centre) * UNIT3 - outer(centre, centre)
-    return Inertia(mass, mass * centre, moment + mass * spread)
+    c, first = centre, mass * centre
+    xx, yy, zz = first.x * c.x, first.y * c.y, first.z * c.z
+    xy, xz, yz = first.x * c.y, first.x * c.z, first.y * c.z
+    spread = Mat3(Vec3(yy + zz, -xy, -xz), Vec3(-xy, xx + zz, -yz), Vec3(-xz, -yz, xx + yy))
+    return Inertia(mass, first, moment + spread)
 
 
 for _cls in (Twist, Wrench, Inertia):

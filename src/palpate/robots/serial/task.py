@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from palpate._jit import law, part
 from palpate._vector import Vec3, Vec6
-from palpate.robots.serial.linear import backward, factorise, forward
+from palpate.robots.serial.linear import backward, factorise, forward, product
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def put_six(a, i, v):
 class TaskRoom(NamedTuple):
     """Where the laws of this file put what they find; `task_room_for` makes it."""
 
-    L: Array  # of M = L L^T, shape (n, n)
+    L: Array  # of M = L D L^T, as `linear` has it, shape (n, n)
     W: Array  # J in the task's axes, then L^-1 J^T in rows; the last row is L^-1 h, shape (7, n)
     mobility: Array  # J M^-1 J^T, shape (6, 6)
     factor: Array  # of that, shape (6, 6)
@@ -134,7 +134,7 @@ def task_model(axes, room, tip, own):
         forward(own.L, own.W[k])
     for i in range(6):
         for k in range(i + 1):
-            own.mobility[i, k] = product(own.W, i, k)
+            own.mobility[i, k] = product(own.L, own.W[i], own.W[k])
     factorise(own.mobility, own.factor)
     inertia = ApparentInertia(own.factor, own.six)
     Jdqd = into(axes, tip.a, tip.dw)
@@ -142,20 +142,11 @@ def task_model(axes, room, tip, own):
 
 
 @law
-def product(W, i, j):
-    """Of two rows."""
-    total = 0.0
-    for k in range(W.shape[1]):
-        total += W[i, k] * W[j, k]
-    return total
-
-
-@law
 def passed(own):
     """Task acceleration that the torque of the last row gives, J M^-1 tau."""
     y = own.six
     for i in range(6):
-        y[i] = product(own.W, i, 6)
+        y[i] = product(own.L, own.W[i], own.W[6])
     return Vec6(Vec3(y[0], y[1], y[2]), Vec3(y[3], y[4], y[5]))
 
 
