@@ -95,7 +95,7 @@ class _Press:
         """The next reading, within all limits."""
         sense = self._wire.read(self._loop.gains.theta)
         self._end_if("stopped by the user" if self._asked_to_stop() else None)
-        self._end_if(spoiled(sense, self._last))
+        self._end_if(spoiled(sense, self._last, self._loop.gains.theta))
         now = self._moment(sense)
         self._depth, self._last = now.depth, sense
         self._end_if(reason_to_stop(now, self._order, self._rest))

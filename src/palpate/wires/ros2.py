@@ -153,8 +153,12 @@ class Ros2Wire:
         received, stamp = time.monotonic(), seconds(sample.header.stamp)
         if not stamp > self._last:
             return None
-        if stamp - self._tool.stamp > timeout:  # type: ignore[operator]
-            raise LostError(f"what came at {self._topics.place} is older than {1e3 * timeout:.3g} ms")
+        behind = stamp - float(self._tool.stamp or 0.0)
+        if behind > timeout:
+            raise LostError(
+                f"what came at {self._topics.place} is {behind:.3g} s older than what came at {self._topics.wrench}: has it"
+                " ended, or are their clocks not set alike?"
+            )
         self._last = stamp
         position, quaternion = self._tool.place()
         sign = 1.0 if self._topics.force_sign == "action" else -1.0

@@ -36,17 +36,21 @@ class Moment(NamedTuple):
     since_touch: float | None
 
 
-def spoiled(sense: Sense, last: Sense) -> str | None:
+def spoiled(sense: Sense, last: Sense, theta: float) -> str | None:
     """Why a reading is none, in words; None if it is one.
 
     Args:
         sense: as it came.
         last: the one before.
+        theta: the loop's lag [s]: no reading that counts is later than that, so that none catches up by more.
     """
     if not all(map(math.isfinite, (sense.stamp, *sense.force, *sense.position, *sense.quaternion))):
         return "the arm gives a reading that is no number"
     if not sense.stamp > last.stamp:
         return f"the arm's clock went back, from {last.stamp:.6g} to {sense.stamp:.6g} s; has its controller restarted?"
+    ahead = (sense.stamp - last.stamp) - (sense.received - last.received)
+    if ahead > theta:
+        return f"the arm's clock jumped ahead by {ahead:.3g} s; has it been set, or do two arms speak?"
     return None
 
 
