@@ -7,6 +7,7 @@ import math
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import new_class
 
@@ -63,6 +64,7 @@ def wrench(nanoseconds, force=(0.0, 0.0, 1.0)):
     return m.wrench(m.header(nanoseconds, "base"), force, (0.0, 0.0, 0.0))
 
 
+@cache
 def short():
     """A message that has the name of a wrench and ends after two numbers, so that its bytes are no wrench."""
     from cyclonedds.idl import IdlStruct, types

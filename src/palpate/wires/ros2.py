@@ -156,8 +156,8 @@ class Ros2Wire:
         behind = stamp - float(self._tool.stamp or 0.0)
         if behind > timeout:
             raise LostError(
-                f"what came at {self._topics.place} is {behind:.3g} s older than what came at {self._topics.wrench}: has it"
-                " ended, or are their clocks not set alike?"
+                f"what came at {self._topics.place} is {behind:.3g} s older than what came at {self._topics.wrench}:"
+                " has it ended, or are their clocks not set alike?"
             )
         self._last = stamp
         position, quaternion = self._tool.place()

@@ -110,6 +110,6 @@ def _step(J: Array, error: Array, damping: float) -> Array:
 def _out_of_reach(arm: SerialArm, goal: Array, off: Array) -> str:
     place = ", ".join(f"{v:.4g}" for v in goal[:3, 3])
     return (
-        f"the pose at ({place}) m is out of reach of {arm.title} by {1e3 * np.linalg.norm(off[:3]):.3g} mm and "
+        f"the pose at ({place}) m is out of reach of {arm.title} by {1e3 * np.linalg.norm(off[:3]):.0f} mm and "
         f"{np.degrees(np.linalg.norm(off[3:])):.3g} deg at the nearest found within the joints' limits"
     )
