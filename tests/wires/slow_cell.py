@@ -62,9 +62,18 @@ def cell(folder: Path, **changed: float) -> Path:
     for name, value in changed.items():
         text = re.sub(rf"(?m)^{name} = .*$", f"{name} = {value}", text)
     (folder / "arm.toml").write_text(text)
-    gains = gains_for(load_arm(str(folder / "arm.toml")), 10.0)
-    (folder / "gains.toml").write_text(gains.to_toml())
+    (folder / "gains.toml").write_text(_gains(text, folder / "arm.toml"))
     return folder / "gains.toml"
+
+
+_MADE: dict[str, str] = {}
+
+
+def _gains(text: str, arm_file: Path) -> str:
+    """Gains of an arm's text, made once: of a lag of hundreds of ticks that takes seconds."""
+    if text not in _MADE:
+        _MADE[text] = gains_for(load_arm(str(arm_file)), 10.0).to_toml()
+    return _MADE[text]
 
 
 @contextmanager

@@ -124,7 +124,8 @@ def _ask(yes: bool) -> None:
 
 
 def _looked(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
-    found = f"in the air: bias {', '.join(f'{b:.3g}' for b in air.bias)} N, noise {air.noise:.2g} N, {air.rate:.4g} Hz"
+    bias = ", ".join(f"{b + 0.0:.3g}" for b in air.bias.round(4))
+    found = f"in the air: bias {bias} N, noise {air.noise:.2g} N, {air.rate:.4g} Hz"
     if json:
         print_json({"plan": plan, "bias_N": air.bias.tolist(), "noise_N": air.noise, "rate_Hz": air.rate})
     else:
