@@ -35,6 +35,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
         raise InputError(f"{options.record} exists; choose another place for --record")
     from palpate.force import ForceLoop
     from palpate.wires import Rows, checked, look, open_wire
+    from palpate.wires.tool import notes_on
 
     assert asked.gains is not None
     order = checked(ForceLoop.load(asked.gains, options.certificate), task, most)
@@ -46,7 +47,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
             print_lines(*plan)
         if options.dry_run or tool is not None:
             air = look(arm, order)
-            notes = [] if tool is None else _compared(tool, air)
+            notes = [] if tool is None else notes_on(tool, air)
             if options.dry_run:
                 return _looked(air, [*plan, *notes], notes, json)
             if not json:
@@ -70,13 +71,6 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
         "desired_N": task.force,
         **({} if tool is None else tool.meta),
     }
-
-
-def _compared(tool: Payload, air: AtRest) -> list[str]:
-    from palpate.wires.tool import unlike
-
-    note = unlike(tool, air)
-    return ["the sensor shows the tool as it was weighed" if note is None else note]
 
 
 def _pressed(arm: Wire, order: Order, rows: Rows, ordinary: bool) -> tuple[Outcome, str]:

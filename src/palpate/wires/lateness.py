@@ -42,7 +42,9 @@ class Lateness:
         )
         lines = [late]
         if self.allowed is None:
-            lines.append("no certificate was given (palpate certify makes one): nothing is proved of this loop")
+            lines.append(
+                "no certificate was given (palpate certify makes one): nothing is proved of this loop"
+            )
         elif self.jumps or self.missed:
             lines.append(
                 f"the certificate does not cover this run: in {self.jumps} ticks the age of a reading changed by more"
