@@ -38,7 +38,7 @@ def folders(tmp_path_factory):
     """Two cells, of 100 Hz and of libfranka's 1 kHz; both so slow that a busy machine is in time."""
     made = {rate: tmp_path_factory.mktemp(f"at{rate}") for rate in (100, 1000)}
     for rate, folder in made.items():
-        cell(folder, rate=rate, sampling=rate, bandwidth=0.7, delay=0.02)
+        cell(folder, rate=rate, sampling=rate, bandwidth=1.5, delay=0.1)
     return made
 
 

@@ -29,7 +29,7 @@ pytest.importorskip("franky_sim", reason="franky-sim is not installed")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("franka")
     # At its controller's 1 kHz; slower than the others', so that a loop at this rate may be late on a busy machine.
-    cell(made, rate=1000, sampling=1000, bandwidth=0.7, delay=0.02)
+    cell(made, rate=1000, sampling=1000, bandwidth=1.5, delay=0.1)
     return made
 
 

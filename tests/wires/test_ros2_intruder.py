@@ -24,7 +24,7 @@ TOPIC = "rt/ft/wrench"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("ros2")
-    cell(made, bandwidth=0.7, delay=0.02)
+    cell(made, bandwidth=1.5, delay=0.1)
     return made
 
 

@@ -27,7 +27,7 @@ def folders(tmp_path_factory):
     made = {kind: tmp_path_factory.mktemp(kind) for kind in LIBRARIES}
     for kind, folder in made.items():
         rate = 1000 if kind == "franka" else 100
-        cell(folder, rate=rate, sampling=rate, bandwidth=0.7, delay=0.02)
+        cell(folder, rate=rate, sampling=rate, bandwidth=1.5, delay=0.1)
     return made
 
 
