@@ -18,7 +18,7 @@ from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
 from palpate.logs.own_runs import read_run
-from wires.slow_cell import ALONE, DOMAIN, WORDS, cell, child, while_it_presses
+from wires.slow_cell import ALONE, DOMAIN, WORDS, child, slower_cell, while_it_presses
 
 OWN = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}"
 KINDS = {
@@ -38,7 +38,7 @@ def folders(tmp_path_factory):
     """Two cells, of 100 Hz and of libfranka's 1 kHz; both so slow that a busy machine is in time."""
     made = {rate: tmp_path_factory.mktemp(f"at{rate}") for rate in (100, 1000)}
     for rate, folder in made.items():
-        cell(folder, rate=rate, sampling=rate, bandwidth=1.5, delay=0.1)
+        slower_cell(folder, rate)
     return made
 
 

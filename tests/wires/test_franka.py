@@ -19,7 +19,7 @@ from palpate.wires import LostError, open_wire
 from palpate.wires.franka_driver import nearer
 from palpate.wires.protocol import Command
 from palpate.wires.turns import from_matrix_by_columns
-from wires.slow_cell import PATIENCE, WORDS, cell, child, wait_for_rows, while_it_presses
+from wires.slow_cell import PATIENCE, WORDS, child, slower_cell, wait_for_rows, while_it_presses
 
 pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this system")
 pytest.importorskip("franky_sim", reason="franky-sim is not installed")
@@ -29,7 +29,7 @@ pytest.importorskip("franky_sim", reason="franky-sim is not installed")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("franka")
     # At its controller's 1 kHz; slower than the others', so that a loop at this rate may be late on a busy machine.
-    cell(made, rate=1000, sampling=1000, bandwidth=1.5, delay=0.1)
+    slower_cell(made, 1000)
     return made
 
 

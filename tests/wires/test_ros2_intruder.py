@@ -15,7 +15,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from wires.slow_cell import ALONE, DOMAIN, WORDS, cell, child, while_it_presses
+from wires.slow_cell import ALONE, DOMAIN, WORDS, child, slower_cell, while_it_presses
 
 pytest.importorskip("cyclonedds", reason="cyclonedds has no wheel for this system")
 TOPIC = "rt/ft/wrench"
@@ -24,7 +24,7 @@ TOPIC = "rt/ft/wrench"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("ros2")
-    cell(made, bandwidth=1.5, delay=0.1)
+    slower_cell(made, 100)
     return made
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from palpate.force import ForceLoop
 from palpate.logs import read_record
-from wires.slow_cell import PATIENCE, WORDS, cell, child, while_it_presses
+from wires.slow_cell import PATIENCE, WORDS, child, slower_cell, while_it_presses
 
 OWN = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}"
 LIBRARIES = {"rtde": "rtde_control", "franka": "franky_sim"}
@@ -26,8 +26,7 @@ RELAY = Path(__file__).parent / "relay.py"
 def folders(tmp_path_factory):
     made = {kind: tmp_path_factory.mktemp(kind) for kind in LIBRARIES}
     for kind, folder in made.items():
-        rate = 1000 if kind == "franka" else 100
-        cell(folder, rate=rate, sampling=rate, bandwidth=1.5, delay=0.1)
+        slower_cell(folder, 1000 if kind == "franka" else 100)
     return made
 
 

@@ -15,6 +15,8 @@ from palpate.wires.protocol import Sense, Wire
 Array = NDArray[np.float64]
 
 _FEWEST = 20
+_TRIES = 4
+"""Half seconds more in which a busy computer may get readings that follow on each other: starved, it misses most."""
 _PATIENCE = 10.0
 """For which that many readings may take: nothing moves yet, and a busy computer may be starved for a while [s]."""
 
@@ -45,9 +47,14 @@ def look(wire: Wire, order: Order) -> AtRest:
         InputError: another rate than the gains', an arm that moves, a sensor that is saturated, untared or too noisy.
         LostError: no readings.
     """
-    sensed = _readings(wire)
     gains = order.loop.gains
-    rate = 1.0 / max(float(np.median(np.diff([s.stamp for s in sensed]))), 1e-9)
+    sensed = _readings(wire)
+    rate = rate_of(np.array([s.stamp for s in sensed]))
+    for _ in range(_TRIES):
+        if rate * gains.arm.tick > 1.0 - gains.arm.tick / gains.theta:
+            break
+        sensed = _readings(wire)
+        rate = max(rate, rate_of(np.array([s.stamp for s in sensed])))
     # Over the lag theta a rate that is off by this moves a reading by one tick, which is what is proved.
     if abs(rate * gains.arm.tick - 1.0) > gains.arm.tick / gains.theta:
         raise InputError(
@@ -60,6 +67,17 @@ def look(wire: Wire, order: Order) -> AtRest:
     found = AtRest(place[-1], force.mean(axis=0), float(along.std()), rate, sensed[-1])
     _check(found, float(np.ptp(place, axis=0).max()), order)
     return found
+
+
+def rate_of(stamps: Array) -> float:
+    """Readings a second that the arm takes [Hz], by its own clock [s], shape (n,), though some never came.
+
+    A step between two stamps is a tick or several. One of the shortest is taken for a tick, by which the others are
+    counted.
+    """
+    steps = np.diff(stamps)
+    tick = max(float(np.quantile(steps, 0.1)), 1e-9)
+    return float(np.maximum(np.round(steps / tick), 1.0).sum() / max(float(steps.sum()), 1e-9))
 
 
 def _readings(wire: Wire) -> list[Sense]:
