@@ -67,7 +67,7 @@ def cell(folder: Path, **changed: float) -> Path:
 
 
 def slower_cell(folder: Path, rate: int) -> Path:
-    """A cell of a lag of 0.2 s: by its delay at 100 Hz; at 1 kHz, where that would be a hundred ticks, by its bandwidth."""
+    """A cell of a lag of 0.2 s: by its delay at 100 Hz, by its bandwidth at 1 kHz, where gains would take seconds."""
     numbers = (1.5, 0.1) if rate == 100 else (0.7, 0.02)
     return cell(folder, rate=rate, sampling=rate, bandwidth=numbers[0], delay=numbers[1])
 
