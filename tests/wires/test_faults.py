@@ -104,7 +104,7 @@ def test_jitter_that_it_can_bear_is_measured_and_told(folders, here, capsys, kin
 
         while_it_presses(here / "rec" / "rows.f64", halt)
         try:
-            code = main([*words, "--yes", "--record", "rec", "--seconds", "2"])
+            code = main([*words, "--yes", "--record", "rec", "--seconds", "5"])
         finally:
             done.set()
     told = said(capsys)
