@@ -121,7 +121,9 @@ def main() -> None:
     print(f"frames drawn                {found['frames_per_s']:7.1f} a second, {shown}; aimed at {FRAMES:g}")
     print(f"gap between frames, p50 p99 {found['gap_p50_ms']:7.1f} {found['gap_p99_ms']:.1f} ms")
     print(f"a frame                     {cost}; aimed at {COST:g}")
-    print(f"slider to picture           {late} ms: first, p50, p99, max of {asked.slides}; aimed at {DELAY:g}")
+    print(
+        f"slider to picture           {late} ms: first, p50, p99, max of {asked.slides}; aimed at {DELAY:g}"
+    )
     print(f"sent to the page            {found['kB_per_s']:7.1f} kB/s")
     print(
         f"the program                 {found['cores']:7.2f} cores; load of the machine {found['load']:.1f} a core"

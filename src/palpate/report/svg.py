@@ -7,22 +7,12 @@ import re
 from typing import TYPE_CHECKING
 
 from palpate.files import SIGNATURE
-from palpate.report import style
 from palpate.report.look.tokens import PAIRS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BY_DARK = {
-    **{PAIRS[name][0]: PAIRS[name][1] for name in ("ink", "quiet", "grid")},
-    style.VEIL: "#4a4d52",
-    style.BLUE: "#5ea6e6",
-    style.ORANGE: "#f0a35b",
-    style.GREEN: "#5fc98b",
-    style.RED: "#f2766d",
-    style.VIOLET: "#b79be6",
-    style.GREY: "#a0a0a0",
-}
+_BY_DARK = dict(PAIRS[name] for name in ("ink", "quiet", "grid", "line", "card"))
 
 
 def svg(drawing: Figure, *, signed: bool = False) -> bytes:
