@@ -15,16 +15,20 @@ if TYPE_CHECKING:
 _BY_DARK = dict(PAIRS[name] for name in ("ink", "quiet", "grid", "line", "card"))
 
 
-def svg(drawing: Figure, *, signed: bool = False) -> bytes:
+def svg(drawing: Figure, *, signed: bool = False, tight: bool = False) -> bytes:
     """The figure without a background, its colours turned where the reader's page is dark; needs no other file.
 
-    The same figure gives the same bytes. A file of its own is `signed`; what lies in a page need not be.
+    The same figure gives the same bytes. A file of its own is `signed`; what lies in a page need not be. `tight`
+    leaves out what is empty around it.
     """
     import matplotlib
 
     buffer = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "palpate", "path.simplify_threshold": 0.3}):
-        drawing.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    with matplotlib.rc_context(
+        {"svg.hashsalt": "palpate", "svg.fonttype": "none", "path.simplify_threshold": 0.3}
+    ):
+        within = {"bbox_inches": "tight", "pad_inches": 0.04} if tight else {}
+        drawing.savefig(buffer, format="svg", transparent=True, metadata={"Date": None}, **within)
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*", "", text, flags=re.DOTALL)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
-FAILED = {"color": style.FAIL, "s": 20, "marker": "x", "linewidths": 1.0}
-"""How a run is marked that did not do what is claimed."""
+HELD: dict[str, Any] = {"color": style.OK, "s": 16, "linewidths": 0}
+FAILED: dict[str, Any] = {"color": style.FAIL, "s": 20, "marker": "x", "linewidths": 1.0}
+"""How a run is marked that did what is claimed, and one that did not."""
 
 
 def panels(heights: Sequence[float], columns: int = 1, width: float = 9.0) -> tuple[Figure, list[list[Axes]]]:
@@ -82,7 +83,7 @@ def dots_panel(
     """A run each, by variation: a dot where what is claimed holds, a cross where it does not."""
     for at, runs in enumerate(found.values()):
         spot = at + np.linspace(-0.22, 0.22, max(2, len(runs)))[: len(runs)]
-        for good, mark in ((True, {"color": style.OK, "s": 16, "linewidths": 0}), (False, FAILED)):
+        for good, mark in ((True, HELD), (False, FAILED)):
             places = [i for i, one in enumerate(runs) if holds(one) == good]
             axis.scatter(spot[places], [value(runs[i]) for i in places], **mark)
     if limit is not None:
