@@ -263,7 +263,7 @@ def test_one_figure_is_measured_by_the_program(program, tmp_path):
     folder = tmp_path / "t"
     ran = program("thesis", "3.7", "--out", folder)
     assert ran.returncode == 0, ran.stderr
-    assert names(folder) == {"claims.json", "index.html", STATE, "3.7.png"}
+    assert names(folder) == {"claims.json", "index.html", STATE, "3.7.png", "3.7.panels.json"}
     assert "217 Hz" in ran.stdout
     assert "--force" in one_line(program("thesis", "3.7", "--out", folder))
 

@@ -57,7 +57,7 @@ def many(
         raise InputError(
             failed[0].error if one else f"none of {len(rows)} logs can be identified: {failed[0].error}"
         )
-    pooled = pool([row.found for row in rows], asked.fitted.tolerance)
+    pooled = pool([row.found for row in rows], asked.fitted.tolerance, [row.source.title for row in rows])
     if rows:
         _print(rows, pooled, _write(rows, pooled, figure, page, dpi), json=json)
     if interrupted:
