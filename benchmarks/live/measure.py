@@ -44,7 +44,7 @@ SLIDE = """share => new Promise(done => {
 
 
 def quantile(values: list[float], share: float) -> float:
-    return sorted(values)[min(len(values) - 1, int(share * len(values)))]
+    return sorted(values)[round(share * (len(values) - 1))]
 
 
 def ticks(pid: int) -> float:
