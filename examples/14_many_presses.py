@@ -7,8 +7,8 @@ same with a folder of logs.
 import numpy as np
 
 import palpate
+from palpate.identification import pool
 from palpate.identification.indenter import Indenter, with_modulus
-from palpate.identification.pooling import pool
 from palpate.records import Record
 
 rng = np.random.default_rng(1)

@@ -44,7 +44,7 @@ SLIDE = """share => new Promise(done => {
 
 
 def quantile(values: list[float], share: float) -> float:
-    return sorted(values)[min(len(values) - 1, int(share * len(values)))]
+    return sorted(values)[round(share * (len(values) - 1))]
 
 
 def ticks(pid: int) -> float:
@@ -90,13 +90,18 @@ def measured(address: str, pid: int, seconds: float, slides: int, settle: float)
         found["kB_per_s"] = (page.evaluate("palpate.live.rows") - rows) * width * 8 / 1000 / span
         found["cores"] = (ticks(pid) - cpu) / span
         late = delays(page, slides)
-    return found | {"slider_p50_ms": quantile(late, 0.5), "slider_max_ms": max(late)}
+    return found | {
+        "slider_first_ms": late[0],
+        "slider_p50_ms": quantile(late, 0.5),
+        "slider_p99_ms": quantile(late, 0.99),
+        "slider_max_ms": max(late),
+    }
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--slides", type=int, default=30)
+    parser.add_argument("--slides", type=int, default=100)
     parser.add_argument("--settle", type=float, default=15.0, help="before it is measured [s]")
     parser.add_argument("--arm", help="an arm in space instead of foam-hybrid")
     parser.add_argument("--json", action="store_true")
@@ -111,12 +116,14 @@ def main() -> None:
         print(json.dumps(found))
         return
     shown = f"{found['drawn_of_shown']:.0%} of those the browser showed"
-    late = f"{found['slider_p50_ms']:7.1f} {found['slider_max_ms']:.1f} ms"
+    late = " ".join(f"{found[f'slider_{name}_ms']:7.1f}" for name in ("first", "p50", "p99", "max"))
     cost = f"{found['cost_ms']:7.2f} ms of the processor, {found['script_ms']:.2f} in scripts"
     print(f"frames drawn                {found['frames_per_s']:7.1f} a second, {shown}; aimed at {FRAMES:g}")
     print(f"gap between frames, p50 p99 {found['gap_p50_ms']:7.1f} {found['gap_p99_ms']:.1f} ms")
     print(f"a frame                     {cost}; aimed at {COST:g}")
-    print(f"slider to picture, p50 max  {late}; aimed at {DELAY:g}")
+    print(
+        f"slider to picture           {late} ms: first, p50, p99, max of {asked.slides}; aimed at {DELAY:g}"
+    )
     print(f"sent to the page            {found['kB_per_s']:7.1f} kB/s")
     print(
         f"the program                 {found['cores']:7.2f} cores; load of the machine {found['load']:.1f} a core"

@@ -134,24 +134,6 @@ def test_completion_knows_commands_and_options(capsys, shell):
         assert word in script
 
 
-def completed(script, *words):
-    """What bash would propose for the last word."""
-    line = " ".join(map(shlex.quote, words))
-    asked = f"COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _palpate"
-    asks = f'source {script}; {asked}; printf "%s\\n" "${{COMPREPLY[@]}}"'
-    ran = subprocess.run(["bash", "--norc", "-c", asks], capture_output=True, text=True, check=True)
-    return ran.stdout.split()
-
-
-def test_bash_completes(capsys, tmp_path):
-    main(["completion", "bash"])
-    script = tmp_path / "palpate.bash"
-    script.write_text(capsys.readouterr().out)
-    assert completed(script, "palpate", "iden") == ["identify"]
-    assert completed(script, "palpate", "identify", "--wrench-f") == ["--wrench-frame"]
-    assert set(completed(script, "palpate", "export", "f.json", "--to", "m")) == {"mujoco", "mjcf-spring"}
-
-
 def test_completion_imports_nothing_heavy():
     code = "import sys; from palpate.cli import main; main(['completion', 'bash']); print([n for n in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

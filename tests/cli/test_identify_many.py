@@ -69,7 +69,7 @@ def test_files_are_pooled_as_a_folder_is(presses, capsys):
 def test_one_log_of_many_is_what_it_is_alone(presses, capsys):
     _, many = ask(capsys, presses)
     _, alone = ask(capsys, presses / "press_2.csv")
-    assert many["logs"][0] == alone
+    assert many["logs"][0] == {key: alone[key] for key in alone if key not in ("command", "files")}
 
 
 def test_a_log_that_fails_is_a_row_that_says_why(presses, capsys):

@@ -115,7 +115,8 @@ def test_the_page_says_what_was_found_and_fetches_nothing(folder):
 def test_a_finished_study_is_shown_again_and_json_is_all_there_is(folder, capsys):
     assert main(["study", str(folder / "small.toml"), "--out", str(folder / "small"), "--json"]) == 0
     captured = capsys.readouterr()
-    assert json.loads(captured.out) == json.loads((folder / "small" / "summary.json").read_text())
+    summary = json.loads((folder / "small" / "summary.json").read_text())
+    assert summary.items() <= json.loads(captured.out).items()
     assert captured.err == ""
 
 

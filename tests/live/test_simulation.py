@@ -1,5 +1,9 @@
 """The bench a few ticks at a time: the same numbers as a run, and sliders that change the surface, not the force."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -112,3 +116,23 @@ def test_controllers_without_a_force_gain_say_so():
     simulation = Simulation("foam-impedance", near("foam-impedance"), seed=0)
     assert "controller.kf" not in simulation.state.values
     assert any("no force gain" in note for note in simulation.view.notes)
+
+
+@pytest.mark.long
+def test_the_first_change_of_a_surface_waits_for_no_import():
+    """In a process that has loaded nothing else; a slider's picture would be late by a third of a second."""
+    code = (
+        "import sys; sys.path.insert(0, '../benchmarks/live')\n"
+        "from live.conftest import near\n"
+        "from palpate.live.player import made_ready\n"
+        "from palpate.live.simulation import Simulation\n"
+        "shown = Simulation('foam-hybrid', near(), seed=1)\n"
+        "made_ready()\n"
+        "for _ in range(300): shown.advance(0.01)\n"
+        "before = set(sys.modules)\n"
+        "shown.set('surface.stiffness', 7000.0)\n"
+        "print(sorted(set(sys.modules) - before))\n"
+    )
+    folder = Path(__file__).parents[1]
+    ran = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"

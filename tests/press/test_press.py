@@ -74,7 +74,7 @@ def test_the_folder_and_what_is_printed(tmp_path, capsys):
     out = tmp_path / "press"
     assert main([*PLAIN, "--seconds", "3", "--out", str(out), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed == json.loads((out / "summary.json").read_text())
+    assert json.loads((out / "summary.json").read_text()).items() <= printed.items()
     assert {"end", "force", "identified", "truth", "saturated", "contacts_lost", "seed"} <= set(printed)
     assert printed["command"].startswith("palpate press --arm fr3")
     page = (out / "report.html").read_text()

@@ -16,15 +16,15 @@ from palpate.errors import InputError
 from palpate.report import style
 from palpate.report.look.assets import CHARTS, data, policy, scripts, styles, text_of
 from palpate.report.look.columns import GAP, packed, thinned
-from palpate.report.look.tokens import DATA, GROUNDS, PAIRS, contrast, style_sheet
+from palpate.report.look.tokens import DATA, GROUNDS, PAIRS, SERIES, contrast, style_sheet
 from palpate.report.page import render
 
 ALL_GROUNDS = [PAIRS[name][i] for name in GROUNDS for i in (0, 1)]
 
 
-@pytest.mark.parametrize("name", DATA)
+@pytest.mark.parametrize("name", [*DATA, *SERIES])
 def test_what_is_drawn_stands_out_on_every_ground(name):
-    assert min(contrast(DATA[name], ground) for ground in ALL_GROUNDS) >= 3.0  # WCAG 2.2, 1.4.11
+    assert min(contrast((DATA | SERIES)[name], ground) for ground in ALL_GROUNDS) >= 3.0  # WCAG 2.2, 1.4.11
 
 
 @pytest.mark.parametrize("dark", [0, 1])
@@ -51,9 +51,25 @@ def test_figures_and_pages_have_the_same_colours():
     assert len(set(DATA.values())) == len(DATA)
 
 
-def test_no_colour_stands_in_a_style_sheet_but_by_its_token():
-    for name in ("look.css",):
-        assert set(re.findall(r"#[0-9a-fA-F]{3,6}\b", text_of(name))) <= {"#fff"}
+def test_a_quantity_shares_its_colour_with_nothing():
+    assert len({*DATA.values(), *SERIES.values()}) == len(DATA) + len(SERIES)
+
+
+def test_no_colour_stands_anywhere_but_among_the_tokens(root):
+    """By its code, or by one of matplotlib's names: in figures, pages and scripts, the vendored library aside."""
+    known = {code.lower() for code in itertools.chain(*PAIRS.values(), DATA.values())}
+    codes = re.compile(r"(?<![&\w])#(?:[0-9a-fA-F]{6}|[0-9a-fA-F]{3})\b(?!-)|\bcolor=\"(?!none|white)\w+\"")
+    strange = [
+        (path.name, code)
+        for path in sorted((root / "src" / "palpate").rglob("*"))
+        if path.suffix in (".py", ".js", ".css", ".html")
+        and "vendor" not in path.parts
+        and path.name != "tokens.py"
+        for code in codes.findall(path.read_text(encoding="utf-8"))
+    ]
+    assert strange == []
+    site = (root / "docs" / "site.css").read_text(encoding="utf-8")
+    assert {code.lower() for code in re.findall(r"#[0-9a-fA-F]{6}\b", site)} <= known
 
 
 columns = arrays(np.float64, st.integers(1, 60), elements=st.floats(-1e12, 1e12))

@@ -3,9 +3,14 @@
 import shlex
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 
 from palpate.cli import main
+from palpate.report import style
+from palpate.report.figure_panels.panels import panels_of
+from palpate.thesis.claims import Done
+from palpate.thesis.page import index_page
 
 EXCITE = (
     "excite --stiffness 3:8:N/mm --damping 100:300 --mass 0.1 --force 15 --peak 20 --duration 4 --no-figure"
@@ -78,3 +83,33 @@ def test_claims_of_one_verdict_are_shown(browser, pages):
         page.fill("#word", "")
         page.click("#filter button[value='']")
         assert page.locator(".claim:visible").count() == every
+
+
+def test_lines_of_a_figure_are_zoomed_together_and_told(browser, tmp_path):
+    t = np.linspace(0.0, 10.0, 5000)
+    with style.inked():
+        figure, (above, below) = style.figure(rows=2)
+        above.plot(t, 20.0 + np.sin(t), color=style.F, label="true")
+        below.plot(t, np.cos(t), label="angle")
+        below.set_xlabel("time [s]")
+    path = tmp_path / "index.html"
+    done = [Done("6.11", "A title", "What is seen.", [], 1.0)]
+    path.write_text(
+        index_page(done, {"6.11": panels_of(figure)}, [], "palpate thesis 6.11"), encoding="utf-8"
+    )
+    with opened(browser, path, viewport={"width": 1400, "height": 900}) as page:
+        plots = page.locator(".panels .plot")
+        plots.nth(1).scroll_into_view_if_needed()
+        plots.first.hover()
+        assert (
+            page.locator(".read").all_text_contents()[1].startswith(("4", "5"))
+        )  # the other one is told as well
+        box = plots.first.bounding_box()
+        page.mouse.move(box["x"] + 200, box["y"] + 60)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 300, box["y"] + 60, steps=4)
+        page.mouse.up()
+        assert page.locator(".chart.zoomed").count() == 2
+        page.locator(".chart.zoomed button").first.click()
+        assert page.locator(".chart.zoomed").count() == 0
+        assert page.wrong == []

@@ -12,6 +12,7 @@ import pytest
 import palpate
 from palpate.errors import InputError
 from palpate.force import Known, load_arm, tune
+from palpate.identification import pool
 from palpate.results import same
 
 HOSTILE = "<script>alert(1)</script>\x1b[31m&\"'"
@@ -31,6 +32,12 @@ def found(record):
 @pytest.fixture(scope="module")
 def tuned():
     return tune(load_arm("ur5e"), 20.0, Known((1e3, 1e5)), prove_adapting=False)
+
+
+@pytest.fixture(scope="module")
+def pooled(record, found):
+    other = palpate.identify(record, lag=0.0076, lag_std=0.0005)
+    return pool([found, other, None], names=["left.csv", "right.csv", "broken.csv"])
 
 
 class Tags(HTMLParser):
@@ -59,6 +66,26 @@ def test_an_identification_is_readable(found):
     assert "\n" not in repr(found)
 
 
+def test_many_logs_are_readable(pooled):
+    text = str(pooled)
+    assert text.startswith("Over 2 of 3 logs the stiffness is ")
+    assert re.search(r"^left.csv +\d", text, re.MULTILINE)
+    assert "broken.csv" in text
+    assert repr(pooled).startswith("<Pooled: 3 logs; working point 5230 ± ")
+    assert "1 of 3 logs could not be identified" in pooled._repr_html_()
+
+
+def test_many_logs_are_equal_by_value_and_named_one_by_one(found, pooled):
+    assert pooled == copy.deepcopy(pooled)
+    assert pooled == pickle.loads(pickle.dumps(pooled))
+    assert pool([found, found]) != pool([found, found, found])
+    assert str(pool([found, found])).count("log 1") == 1
+    with pytest.raises(InputError, match="one for each of the 2 logs, got 1"):
+        pool([found, found], names=["a"])
+    with pytest.raises(InputError, match="nothing to draw"):
+        pool([None, None]).plot()
+
+
 def test_a_record_is_readable(record):
     lines = str(record).splitlines()
     assert lines[0].startswith("Record: 3 columns of 4000 rows, 0 to 7.998 s")
@@ -69,7 +96,7 @@ def test_a_record_is_readable(record):
 TUNED = pytest.param("tuned", marks=pytest.mark.long)
 
 
-@pytest.mark.parametrize("name", ["record", "found", TUNED])
+@pytest.mark.parametrize("name", ["record", "found", "pooled", TUNED])
 def test_a_notebook_gets_a_table_and_nothing_that_runs(request, name):
     html = request.getfixturevalue(name)._repr_html_()
     tags = Tags(html)
@@ -92,7 +119,7 @@ def test_names_of_a_stranger_are_shown_and_do_nothing(found, tmp_path):
     assert "\x1b" not in str(told)
 
 
-@pytest.mark.parametrize("name", ["record", "found", TUNED])
+@pytest.mark.parametrize("name", ["record", "found", "pooled", TUNED])
 def test_results_are_drawn_and_written(request, name, tmp_path):
     result = request.getfixturevalue(name)
     figure = result.plot(tmp_path / "it.png")

@@ -11,7 +11,8 @@ from contextlib import contextmanager
 class LocalCluster:
     """A scheduler and workers, each a process of its own that a test may kill."""
 
-    def __init__(self, folder, words):
+    def __init__(self, folder, words, place=None):
+        self._place = place
         self._file = folder / "scheduler.json"
         here = ("--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(self._file))
         self._words = words
@@ -35,6 +36,7 @@ class LocalCluster:
                     "--no-nanny",
                     "--no-dashboard",
                     *self._words,
+                    place=self._place,
                 )
             )
 
@@ -45,15 +47,15 @@ class LocalCluster:
             process.wait()
 
 
-def _started(program, *words):
+def _started(program, *words, place=None):
     command = [sys.executable, "-m", f"distributed.cli.{program}", *words]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 @contextmanager
-def local_cluster(folder, workers, words=()):
-    """A cluster with so many workers; `words` go to its programs."""
-    cluster = LocalCluster(folder, words)
+def local_cluster(folder, workers, words=(), place=None):
+    """A cluster with so many workers, in a folder of theirs; `words` go to its programs."""
+    cluster = LocalCluster(folder, words, place)
     try:
         cluster.start(workers)
         yield cluster

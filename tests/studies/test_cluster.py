@@ -1,5 +1,6 @@
 """A study on a Dask cluster of real processes: the same table as here, whatever dies on the way."""
 
+import json
 import pickle
 import shutil
 import subprocess
@@ -10,6 +11,7 @@ from types import SimpleNamespace
 import pytest
 from distributed import KilledWorker
 
+from palpate.cli import main
 from palpate.errors import InputError
 from palpate.studies import cluster as clusters
 from palpate.studies.cluster import Certificates, Cluster, run_batch
@@ -18,7 +20,7 @@ from palpate.studies.run_one import Job
 from palpate.studies.run_study import Work
 from palpate.studies.sources import sources
 from studies.cluster import local_cluster
-from studies.small import SMALL, Formula, planned
+from studies.small import SMALL, Formula, planned, text
 
 MORE = SMALL.replace("points = 3", "points = 20")
 
@@ -171,3 +173,25 @@ def test_batches_grow_to_the_unit():
     assert len(next(batches)) == 1
     batches.again(first[:2])
     assert [len(next(batches)) for _ in range(3)] == [1, 1, 1]
+
+
+@pytest.mark.long
+def test_workers_run_a_controller_of_ones_own(tmp_path, capsys, monkeypatch, root):
+    """As a user types it: the module lies beside the study, the workers were started somewhere else."""
+    (tmp_path / "push_of_mine.py").write_text((root / "tests" / "own_parts.py").read_text(encoding="utf-8"))
+    cases = 'mine = { controller = { kind = "push_of_mine:Push" } }\nPI = {}'
+    metrics = '["force_rms", "push_of_mine:mean_force"]'
+    source = text(f"[parameters.law.cases]\n{cases}", metrics=metrics)
+    (tmp_path / "mine.toml").write_text(source, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    words = ["study", "mine.toml", "--yes", "--json"]
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    with local_cluster(elsewhere, workers=2, place=elsewhere) as running:
+        assert main([*words, "--out", "there", "--scheduler", running.address]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["results"] == {"done": 2}
+    assert main([*words, "--out", "here"]) == 0
+    assert (tmp_path / "there" / "results.parquet").read_bytes() == (
+        tmp_path / "here" / "results.parquet"
+    ).read_bytes()

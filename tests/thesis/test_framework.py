@@ -111,15 +111,25 @@ def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
     folder = tmp_path / "runs" / "thesis"
     done = measured([toy("1.1", []), toy("1.2", [])], folder)
     assert [d.number for d in done] == ["1.1", "1.2"]
-    assert names(folder) == {"claims.json", "index.html", STATE, "1.1.png", "1.2.png"}
+    assert names(folder) == {
+        "claims.json",
+        "index.html",
+        STATE,
+        "1.1.png",
+        "1.1.panels.json",
+        "1.2.png",
+        "1.2.panels.json",
+    }
     claims = json.loads((folder / "claims.json").read_text("utf-8"))
     assert [list(claim) for claim in claims] == [FIELDS, FIELDS]
     assert [claim["id"] for claim in claims] == ["T1-1", "T1-2"]
     assert {claim["verdict"] for claim in claims} <= VERDICTS
     page = (folder / "index.html").read_text("utf-8")
     assert "&lt;it&gt; holds &amp; is told" in page
-    assert page.count("data:image/png;base64,") == 2
-    assert "://" not in re.sub(r"http://www\.w3\.org\S*", "", page), "the page opens without a network"
+    assert page.count("data:image/svg+xml;base64,") == 2
+    assert "://" not in re.sub(r"http://www\.w3\.org\S*|https://github\.com/leeoniya/uPlot", "", page), (
+        "the page opens without a network"
+    )
 
 
 def test_there_is_one_count_of_claims(tmp_path, capsys):
@@ -253,7 +263,7 @@ def test_one_figure_is_measured_by_the_program(program, tmp_path):
     folder = tmp_path / "t"
     ran = program("thesis", "3.7", "--out", folder)
     assert ran.returncode == 0, ran.stderr
-    assert names(folder) == {"claims.json", "index.html", STATE, "3.7.png"}
+    assert names(folder) == {"claims.json", "index.html", STATE, "3.7.png", "3.7.panels.json"}
     assert "217 Hz" in ran.stdout
     assert "--force" in one_line(program("thesis", "3.7", "--out", folder))
 

@@ -24,17 +24,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     from palpate.cli._edge import guarded
     from palpate.cli._options_file import expanded
-    from palpate.cli._program import TYPED, program
+    from palpate.cli._program import EXPANDED, TYPED, program
 
     TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
 
     def run() -> int:
         words = list(TYPED.get())
         app = program(*words[:1])
-        return app(
-            expanded(words, app)
-            if any(word.startswith(("--options", "--preset")) for word in words)
-            else words
-        )
+        if any(word.startswith(("--options", "--preset")) for word in words):
+            words = expanded(words, app)
+        EXPANDED.set(tuple(words))
+        return app(words)
 
     return guarded(run)

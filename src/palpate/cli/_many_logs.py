@@ -8,9 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from palpate.cli._answer import print_answer
 from palpate.cli._edge import INTERRUPTED
 from palpate.cli._one_log import OneLog, answered
-from palpate.cli._terminal import console, place, print_json, say
+from palpate.cli._terminal import console, place, say
 from palpate.errors import InputError, PalpateError
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def many(
         raise InputError(
             failed[0].error if one else f"none of {len(rows)} logs can be identified: {failed[0].error}"
         )
-    pooled = pool([row.found for row in rows], asked.fitted.tolerance)
+    pooled = pool([row.found for row in rows], asked.fitted.tolerance, [row.source.title for row in rows])
     if rows:
         _print(rows, pooled, _write(rows, pooled, figure, page, dpi), json=json)
     if interrupted:
@@ -110,7 +111,12 @@ def _print(rows: Sequence[LogRow], pooled: Pooled, written: Sequence[Path], *, j
     if json:
         from palpate.report.many.rows import json_of
 
-        print_json(json_of(rows, pooled))
+        print_answer(
+            {
+                "files": [{"file": r.source.file, "sha256": r.source.sha256} for r in rows],
+                **json_of(rows, pooled),
+            }
+        )
         return
     from palpate.report.many.table import show
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli import _interrupts
+from palpate.cli._answer import print_answer
 from palpate.cli._press_options import AskOptions, LimitOptions, WireOptions, task_of
 from palpate.cli._program import command
-from palpate.cli._terminal import print_json, print_lines, say
+from palpate.cli._terminal import print_lines, say
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ def _looked(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
     bias = ", ".join(f"{b + 0.0:.3g}" for b in air.bias.round(4))
     found = f"in the air: bias {bias} N, noise {air.noise:.2g} N, {air.rate:.4g} Hz"
     if json:
-        print_json({"plan": plan, "bias_N": air.bias.tolist(), "noise_N": air.noise, "rate_Hz": air.rate})
+        print_answer({"plan": plan, "bias_N": air.bias.tolist(), "noise_N": air.noise, "rate_Hz": air.rate})
     else:
         print_lines(found, *notes, "dry run: nothing was moved")
     return 0
@@ -129,7 +130,7 @@ def _looked(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
 
 def _print(outcome: Outcome, words: str, where: Path | None, json: bool) -> int:
     if json:
-        print_json(outcome.to_json() | {"priority": words, "record": None if where is None else str(where)})
+        print_answer(outcome.to_json() | {"priority": words, "record": None if where is None else str(where)})
         return 0 if outcome.ok else 1
     lines = [f"ended: {outcome.ended}; the arm rests"]
     if outcome.force is not None:

@@ -14,6 +14,8 @@ from palpate.cli._help import PhraseFormatter
 
 TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
 """The words after the program's name, as they were typed."""
+EXPANDED: ContextVar[tuple[str, ...]] = ContextVar("EXPANDED", default=())
+"""The same, with what an options file or a preset adds to them."""
 
 # In the order of the help. Each is a function of its own name in the module of its own name,
 # and returns its exit code. The line is repeated here so that the help imports none of them.

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG, SIGNED
 from palpate.cli._force_options import ColumnOptions, OutputOptions, inner_loop, one_thread
-from palpate.cli._terminal import console, print_json, print_lines
+from palpate.cli._terminal import console, print_lines
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -162,7 +163,7 @@ def _print(certificate: Certificate, verdict: Verdict, json: bool) -> None:
     if json:
         from palpate.force.telling import told
 
-        print_json(told(certificate, verdict))
+        print_answer(told(certificate, verdict))
         return
     from palpate.force.telling import lines
 

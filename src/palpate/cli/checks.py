@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from palpate.cli._terminal import console, print_json, show_table
+from palpate.cli._answer import print_answer
+from palpate.cli._terminal import console, show_table
 from palpate.errors import InputError
 
 
@@ -35,7 +36,7 @@ def checks(name: str | None = None, /, *, json: Annotated[bool, Parameter(negati
             subject: [{"check": one.sentence, "failed": one.failed or None} for one in some]
             for subject, some in found.items()
         }
-        print_json({"parts": parts, "failed": failed})
+        print_answer({"parts": parts, "failed": failed})
         return 1 if failed else 0
     from palpate.report.page import Table
 

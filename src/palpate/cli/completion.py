@@ -7,6 +7,15 @@ from typing import Literal
 from palpate.cli._program import program
 from palpate.cli._terminal import print_lines
 
+_MORE = {
+    "bash": (),
+    # What zsh loads from fpath becomes the completing function itself: it has to complete, not only to define how.
+    "zsh": ("", '_cyclopts_palpate "$@"'),
+    # In the place of a command stands no file.
+    "fish": ("complete -c palpate -n __fish_use_subcommand -f",),
+}
+"""What a shell needs beside the script that is generated, lines at its end."""
+
 
 def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
     """Print what makes a shell complete commands, options and files.
@@ -26,5 +35,5 @@ def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
     shell
         Which shell.
     """
-    print_lines(program().generate_completion(prog_name="palpate", shell=shell).rstrip("\n"))
+    print_lines(program().generate_completion(prog_name="palpate", shell=shell).rstrip("\n"), *_MORE[shell])
     return 0

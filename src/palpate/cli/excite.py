@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG, SIGNED, check_new, in_si, in_si_if_given
-from palpate.cli._terminal import console, place, print_json
+from palpate.cli._terminal import console, place
 from palpate.errors import InputError
 from palpate.files import check_place
 from palpate.text import shown
@@ -349,7 +350,7 @@ def _print(
     if json:
         from palpate.report.excitation.files import summary
 
-        print_json(summary(found, helps))
+        print_answer(summary(found, helps))
         return
     from palpate.report.excitation.table import show
 

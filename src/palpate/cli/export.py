@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._answer import print_answer
 from palpate.cli._found import read_found
 from palpate.cli._program import command
-from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
+from palpate.cli._terminal import STYLE, console, head, place, show_table
 from palpate.errors import InputError
 from palpate.files import MADE, check_place, signed, whole, write_json
 
@@ -169,7 +170,7 @@ def _print(
     exported: Exported, told: dict[str, Any], checked: list[Checked], places: tuple[Path, ...], *, json: bool
 ) -> None:
     if json:
-        print_json(told)
+        print_answer(told)
         return
     screen = console()
     own = exported.contact

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._answer import print_answer
 from palpate.cli._arm_options import ArmOptions, FrameOptions
 from palpate.cli._flags import FLAG, SIGNED
 from palpate.cli._indenter_options import IndenterOptions
 from palpate.cli._log_options import LogOptions
 from palpate.cli._one_log import OneLog, answered
 from palpate.cli._options_file import CellOptions
-from palpate.cli._terminal import console, place, print_json
+from palpate.cli._terminal import console, place
 from palpate.cli._values import with_std
 from palpate.errors import InputError
 from palpate.files import check_place
@@ -210,7 +211,7 @@ def _print(found: Identification, origin: Source, written: list[Path], json: boo
     if json:
         from palpate.report.identification.source import as_json
 
-        print_json(as_json(found, origin))
+        print_answer({"files": [{"file": origin.file, "sha256": origin.sha256}], **as_json(found, origin)})
         return
     from palpate.report.identification.table import show
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
-from palpate.cli._terminal import console, place, print_json, say, show_table
+from palpate.cli._answer import print_answer
+from palpate.cli._terminal import console, place, say, show_table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -104,7 +105,7 @@ def _tell(result: Result, folder: Path, command: str, as_json: bool) -> None:
     from palpate.thesis.inference.findings import as_json as numbers
 
     if as_json:
-        print_json(numbers(result, command))
+        print_answer(numbers(result, command))
         return
     screen = console()
     rows = [

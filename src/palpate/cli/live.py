@@ -167,9 +167,10 @@ def _replay(path: Path, asked: Any, whole: bool) -> Source:
 
 def _serve(shown: Source, at: ServedOptions) -> int:
     from palpate.live.feed import Feed
-    from palpate.live.player import Player
+    from palpate.live.player import Player, made_ready
     from palpate.live.server import served
 
+    made_ready()
     with _stability(shown) as (changed, latest, tell):
         player = Player(shown, Feed(), changed, latest)
         tell.append(player.news)

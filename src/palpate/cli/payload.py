@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._answer import print_answer
 from palpate.cli._arm_options import FrameOptions
 from palpate.cli._flags import FLAG, check_new
 from palpate.cli._log_options import LogOptions, read
 from palpate.cli._options_file import CellOptions
-from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
+from palpate.cli._terminal import STYLE, console, head, place, show_table
 from palpate.errors import InputError
 from palpate.files import check_place
 
@@ -107,7 +108,7 @@ def payload(
 
 def _print(found: Weighed, log: Path, written: list[Path], json: bool) -> None:
     if json:
-        print_json(found.to_json())
+        print_answer(found.to_json())
         return
     from palpate.report.payload import sentence, table
 

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
 from palpate.cli._options_file import CellOptions
 from palpate.cli._press_options import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
 from palpate.cli._program import command
-from palpate.cli._terminal import STYLE, console, head, place, print_json, print_lines, show_table
+from palpate.cli._terminal import STYLE, console, head, place, print_lines, show_table
 from palpate.files import fresh_folder, signed, write_json
 from palpate.text import shown
 
@@ -126,7 +127,7 @@ def _tell(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bo
     from palpate.report.press_page import notes, tables
 
     if as_json:
-        print_json(summary)
+        print_answer(summary)
         return
     screen = console()
     head(

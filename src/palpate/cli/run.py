@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter, Token
 
+from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
 from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
-from palpate.cli._terminal import STYLE, console, head, place, print_json, show_table
+from palpate.cli._terminal import STYLE, console, head, place, show_table
 from palpate.errors import InputError
 from palpate.files import fresh_folder, signed, write_json, write_text
 from palpate.text import shown
@@ -244,7 +245,7 @@ def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
 
     summary = ran.summary
     if as_json:
-        print_json(summary)
+        print_answer(summary)
         return
     screen = console()
     head(screen, ran.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._terminal import print_json, print_lines, say
+from palpate.cli._answer import print_answer
+from palpate.cli._terminal import print_lines, say
 
 
 def speed(
@@ -26,7 +27,7 @@ def speed(
 
     figures = measure(waiting=lambda: say(COMPILING))
     if json:
-        print_json(figures)
+        print_answer(figures)
         return 0
     print_lines(
         f"one tick of {EXPERIMENT}, pressing and learning, {STEPS} steps of the physics included: "

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG
 from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
-from palpate.cli._terminal import STYLE, console, head, place, print_json, say, show_table
+from palpate.cli._terminal import STYLE, console, head, place, say, show_table
 from palpate.errors import InputError
 from palpate.text import shown
 
@@ -210,7 +211,7 @@ class Lines:
 
 def _tell(found: Findings, folder: Path, as_json: bool) -> None:
     if as_json:
-        print_json(found.summary)
+        print_answer(found.summary)
         return
     screen = console()
     head(screen, found.summary["study"], f", {found.summary['runs']} runs")

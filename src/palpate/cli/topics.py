@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._answer import print_answer
 from palpate.cli._log_options import GB, limits_of
-from palpate.cli._terminal import print_json, print_lines
+from palpate.cli._terminal import print_lines
 
 if TYPE_CHECKING:
     from palpate.logs.listing import Entry, Listing
@@ -52,7 +53,9 @@ def topics(
     if json:
         proposal = {"command": command, "guesses": list(found.proposal.guesses)}
         entries = [entry.to_json() for entry in found.entries]
-        print_json({"entries": entries, "troubles": found.troubles, "identify": proposal})
+        # A log of gigabytes is listed at once, and so is not read through for a digest.
+        files = [{"file": str(log), "sha256": None}]
+        print_answer({"files": files, "entries": entries, "troubles": found.troubles, "identify": proposal})
         return 0
     print_lines(*_table(log, found), *_told(found, command))
     return 0

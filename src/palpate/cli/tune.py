@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._answer import print_answer
 from palpate.cli._force_options import (
     ArmOptions,
     ColumnOptions,
@@ -19,7 +20,7 @@ from palpate.cli._force_options import (
 from palpate.cli._found import read_found
 from palpate.cli._log_options import LogOptions
 from palpate.cli._program import command
-from palpate.cli._terminal import console, place, print_json
+from palpate.cli._terminal import console, place
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
 
@@ -146,7 +147,7 @@ def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
 
 def _print(told: Tuning, inner: InnerLoop | None, written: list[Path], json: bool) -> None:
     if json:
-        print_json(told.to_json() | {"inner_loop": None if inner is None else inner.to_json()})
+        print_answer(told.to_json() | {"inner_loop": None if inner is None else inner.to_json()})
         return
     from palpate.report.force_table import show
 

@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 from palpate.identification.pipeline import identify
+from palpate.identification.pooling import Pooled, pool
 from palpate.identification.result import Comparison, Identification, Parameter, Verdict
 from palpate.identification.warning_codes import Code, Warn
 
-__all__ = ["Code", "Comparison", "Identification", "Parameter", "Verdict", "Warn", "identify"]
+__all__ = [
+    "Code",
+    "Comparison",
+    "Identification",
+    "Parameter",
+    "Pooled",
+    "Verdict",
+    "Warn",
+    "identify",
+    "pool",
+]

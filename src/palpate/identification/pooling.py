@@ -15,7 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Verdict
+from palpate.results import Result
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -155,19 +157,26 @@ class PooledPoint:
         return {"stiffness": self.stiffness.to_json()} | ranges
 
 
-@dataclass(frozen=True)
-class Pooled:
+@dataclass(frozen=True, eq=False, repr=False)
+class Pooled(Result, shown_by="palpate.report.many.shown"):
     """What many logs say together.
 
     Args:
-        count: of the logs.
         parameters: by name.
         working_point: None if no log has one.
+        logs: that it is from; None for one that could not be read.
+        names: of the logs; empty where they have none.
     """
 
-    count: int
     parameters: dict[str, PooledParameter]
     working_point: PooledPoint | None
+    logs: tuple[Identification | None, ...]
+    names: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Of the logs."""
+        return len(self.logs)
 
     @property
     def found(self) -> bool:
@@ -185,19 +194,25 @@ class Pooled:
         }
 
 
-def pool(logs: Sequence[Identification | None], tolerance: float = 0.25) -> Pooled:
+def pool(logs: Sequence[Identification | None], tolerance: float = 0.25, names: Sequence[str] = ()) -> Pooled:
     """Pool identifications of one thing.
 
     Args:
         logs: one of each; None for a log that could not be read.
         tolerance: largest half-width of an identified mean's 95 % interval, as a share of its value.
+        names: of the logs, by which tables and figures call them.
+
+    Raises:
+        InputError: as many names as there are logs, or none, are wanted.
     """
+    if names and len(names) != len(logs):
+        raise InputError(f"names must be one for each of the {len(logs)} logs, got {len(names)}")
     own = {
         name: _pooled([_one(found, name) for found in logs], tolerance)
         for name in POOLED
         if any(found is not None and name in found.parameters for found in logs)
     }
-    return Pooled(len(logs), own, _point(logs, tolerance))
+    return Pooled(own, _point(logs, tolerance), tuple(logs), tuple(names))
 
 
 def _point(logs: Sequence[Identification | None], tolerance: float) -> PooledPoint | None:

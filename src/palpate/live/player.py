@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import queue
 import threading
 import time
@@ -63,6 +64,18 @@ class Pace(msgspec.Struct, tag="pace", tag_field="do", forbid_unknown_fields=Tru
 
 
 Request = Pause | Step | Reset | Set | Seek | Pace
+
+
+def made_ready() -> None:
+    """Does before anybody watches what the first slider would wait for, some 0.3 s: once everything is loaded.
+
+    A surface that changes under load is solved for by SciPy, which takes long to import; and the garbage collector's
+    whole round looks at all that Numba has loaded, unless that is set aside.
+    """
+    import scipy.optimize  # noqa: F401
+
+    gc.collect()
+    gc.freeze()
 
 
 class Player:

@@ -72,15 +72,15 @@ def _figure(caption: str, drawn: Callable[[], Figure]) -> dict[str, str]:
 
 
 def _intervals(axis: Axes, told: Tuning) -> None:
-    spans = [("stable, exact", told.exact, style.VEIL)]
+    spans = [("stable, exact", told.exact, style.LINE)]
     for kind, name in (("adapting", "proved, adapting"), ("held", "proved, gain held")):
         found = told.surface_stiffness(kind)
         if found is not None and kind == "adapting" and told.gains.arm.kind == "position":
             found = (_SHOWN[0], RIGID)
         if found is not None:
-            spans.append((name, found, style.GREEN if kind == "held" else style.BLUE))
+            spans.append((name, found, style.OK if kind == "held" else style.SERIES[0]))
     if told.known is not None:
-        spans.append(("what is touched", told.known.stiffness, style.ORANGE))
+        spans.append(("what is touched", told.known.stiffness, style.K))
     for i, (_, (low, high), colour) in enumerate(spans):
         ends = [max(low, _SHOWN[0]), min(max(high, 1.02 * low), _SHOWN[1])]
         axis.plot(ends, [i, i], color=colour, linewidth=9, solid_capstyle="butt")
@@ -91,12 +91,10 @@ def _intervals(axis: Axes, told: Tuning) -> None:
 
 def steps(axis: Axes, told: Tuning) -> None:
     """The force after the touch on the softest and on the stiffest surface."""
-    for step, name, colour in zip(
-        told.steps, ("softest", "stiffest"), (style.BLUE, style.ORANGE), strict=True
-    ):
+    for step, name, colour in zip(told.steps, ("softest", "stiffest"), style.SERIES[:2], strict=True):
         axis.plot(step.time, told.gains.force * step.force, color=colour, label=name)
     for edge in (1.0 - BAND, 1.0 + BAND):
-        axis.axhline(edge * told.gains.force, color=style.GREY, linewidth=0.7, linestyle="--")
+        axis.axhline(edge * told.gains.force, color=style.MEASURED, linewidth=0.7, linestyle="--")
     longest = max(step.settling if isfinite(step.settling) else 0.0 for step in told.steps)
     axis.set(xlabel="time from the touch [s]", ylabel="force [N]", xlim=(0.0, max(2.5 * longest, 0.1)))
     style.legend(axis)
@@ -106,7 +104,7 @@ def _nyquist(axis: Axes, told: Tuning) -> None:
     _, L = frequency_response(told.gains, told.gains.seen_cap)
     shown = L[np.abs(L) < 4.0]
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
-    axis.plot(np.cos(angle), np.sin(angle), color=style.VEIL, linewidth=1.0)
-    axis.plot(shown.real, shown.imag, color=style.BLUE)
-    axis.plot([-1.0], [0.0], color=style.RED, marker="+", markersize=12, linestyle="")
+    axis.plot(np.cos(angle), np.sin(angle), color=style.LINE, linewidth=1.0)
+    axis.plot(shown.real, shown.imag, color=style.SERIES[0])
+    axis.plot([-1.0], [0.0], color=style.FAIL, marker="+", markersize=12, linestyle="")
     axis.set(xlabel="real part", ylabel="imaginary part", xlim=(-2.5, 1.5), ylim=(-2.0, 1.2), aspect="equal")

@@ -86,7 +86,7 @@ def draw(found: Weighed) -> Figure:
     with style.inked():
         figure, (axis,) = style.figure(height=2.8)
         places = np.arange(1, len(found.shown) + 1)
-        for i, (name, colour) in enumerate(zip("xyz", (style.BLUE, style.ORANGE, style.GREEN), strict=True)):
+        for i, (name, colour) in enumerate(zip("xyz", style.SERIES[:3], strict=True)):
             axis.plot(places, found.shown[:, 0, i], ".", color=colour, label=name)
             axis.plot(places, found.shown[:, 1, i], "o", mfc="none", color=colour, markersize=8)
         axis.set_xlabel("orientation")

@@ -82,7 +82,7 @@ def draw(record: Record) -> Figure:
     with style.inked():
         figure, axes = style.figure(rows=len(names), height=1.6)
         for axis, name in zip(axes, names, strict=True):
-            axis.plot(*_thinned(time, record[name]), color=style.BLUE, linewidth=0.9)
+            axis.plot(*_thinned(time, record[name]), color=style.SERIES[0], linewidth=0.9)
             axis.set_ylabel(style.literal(f"{name} [{record.units[name]}]"))
         axes[-1].set_xlabel("time [s]" if clock else "row")
     return figure

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
+from palpate.report.look import tokens
 from palpate.report.look.tokens import DATA, PAIRS
 from palpate.text import shown
 
@@ -17,15 +18,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
-INK, QUIET, GRID = (PAIRS[name][0] for name in ("ink", "quiet", "grid"))
+INK, QUIET, GRID, LINE, CARD = (PAIRS[name][0] for name in ("ink", "quiet", "grid", "line", "card"))
 K, B, M, F = (DATA[name] for name in ("K", "B", "M", "F"))
 """One colour a quantity, the same by light and by dark: stiffness, damping, mass; true force and contact."""
-MEASURED, FAIL, DOUBT = (DATA[name] for name in ("measured", "fail", "warn"))
+MEASURED, FAIL, DOUBT, OK = (DATA[name] for name in ("measured", "fail", "warn", "ok"))
+SERIES = tuple(tokens.SERIES.values())
+"""What is compared and is no quantity of its own."""
 KNOWN: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": (0, (5, 4))}
 """The line of what is asked for, or known to be true."""
 FORMATS = (".png", ".svg", ".pdf")
-BLUE, ORANGE, GREEN, RED, VIOLET, GREY = "#1f6fb4", "#e07b16", "#2a9254", "#c4342d", "#7b53a6", "#8a8a8a"
-VEIL = "#d0d0d0"
 DPI = 110
 _COARSEST, _FINEST = 30, 1200
 _NARROW = 5.6
@@ -38,16 +39,20 @@ _LONG = 15
 def inked(size: float | None = None) -> Iterator[None]:
     """Letters, ticks and frames of what is drawn inside are in ink, not in black, so that a page can turn them.
 
+    What is given no colour takes those of `SERIES` in turn.
+
     Args:
         size: of the letters [pt]; matplotlib's own if none is given.
     """
     import matplotlib
+    from cycler import cycler
 
     parts: dict[str, Any] = dict.fromkeys(
         ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK
     )
     sizes = ("font.size", "axes.labelsize", "xtick.labelsize", "ytick.labelsize", "legend.fontsize")
-    with matplotlib.rc_context(parts | (dict.fromkeys(sizes, size) if size else {})):
+    cycle: dict[str, Any] = {"axes.prop_cycle": cycler(color=SERIES)}
+    with matplotlib.rc_context(parts | cycle | (dict.fromkeys(sizes, size) if size else {})):
         yield
 
 

@@ -7,34 +7,28 @@ import re
 from typing import TYPE_CHECKING
 
 from palpate.files import SIGNATURE
-from palpate.report import style
 from palpate.report.look.tokens import PAIRS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BY_DARK = {
-    **{PAIRS[name][0]: PAIRS[name][1] for name in ("ink", "quiet", "grid")},
-    style.VEIL: "#4a4d52",
-    style.BLUE: "#5ea6e6",
-    style.ORANGE: "#f0a35b",
-    style.GREEN: "#5fc98b",
-    style.RED: "#f2766d",
-    style.VIOLET: "#b79be6",
-    style.GREY: "#a0a0a0",
-}
+_BY_DARK = dict(PAIRS[name] for name in ("ink", "quiet", "grid", "line", "card"))
 
 
-def svg(drawing: Figure, *, signed: bool = False) -> bytes:
+def svg(drawing: Figure, *, signed: bool = False, tight: bool = False) -> bytes:
     """The figure without a background, its colours turned where the reader's page is dark; needs no other file.
 
-    The same figure gives the same bytes. A file of its own is `signed`; what lies in a page need not be.
+    The same figure gives the same bytes. A file of its own is `signed`; what lies in a page need not be. `tight`
+    leaves out what is empty around it.
     """
     import matplotlib
 
     buffer = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "palpate", "path.simplify_threshold": 0.3}):
-        drawing.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
+    with matplotlib.rc_context(
+        {"svg.hashsalt": "palpate", "svg.fonttype": "none", "path.simplify_threshold": 0.3}
+    ):
+        within = {"bbox_inches": "tight", "pad_inches": 0.04} if tight else {}
+        drawing.savefig(buffer, format="svg", transparent=True, metadata={"Date": None}, **within)
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*", "", text, flags=re.DOTALL)

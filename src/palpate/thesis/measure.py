@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -13,7 +14,7 @@ from palpate._jit import sources_stamp
 from palpate.errors import InputError
 from palpate.files import check_place, kept_folder, signed, write_json, write_text
 from palpate.report import style
-from palpate.report.page import png
+from palpate.report.figure_panels.panels import panels_of
 from palpate.thesis.claims import Claim, Done, rows_of
 from palpate.thesis.figure import Study
 from palpate.thesis.laboratory.laboratory import values
@@ -21,6 +22,7 @@ from palpate.thesis.page import index_page
 from palpate.thesis.runs import Runs
 
 STATE = "thesis.json"
+PANELS = ".panels.json"
 
 
 @dataclass
@@ -43,7 +45,9 @@ def measure(
     started: Callable[[Study], None] = lambda _: None,
     resumed: Callable[[int], None] = lambda _: None,
 ) -> list[Done]:
-    """Runs the studies and writes claims.json, index.html and a figure each into the folder, after each study.
+    """Runs the studies and writes claims.json, index.html and each figure into the folder, after each study.
+
+    A figure is written as a picture, and as the panels that the page draws (`NUMBER.panels.json`).
 
     A folder that holds an unfinished measurement of the same sources, studies and seeds is gone on with; `resumed` is
     told how many studies are done.
@@ -68,7 +72,10 @@ def _measured(study: Study, runs: Runs, folder: Path) -> Done:
     begun = time.perf_counter()
     data = study.run(runs)
     claims = [_noted(claim, runs) for claim in study.check(data)]
-    style.save(study.plot(data), folder / f"{study.NUMBER}.png")
+    with style.inked():
+        drawing = study.plot(data)
+        style.save(drawing, folder / f"{study.NUMBER}.png")
+        write_json(folder / f"{study.NUMBER}{PANELS}", signed({"panels": panels_of(drawing)}))
     return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
 
 
@@ -111,10 +118,18 @@ def _write(state: State, folder: Path) -> None:
     """Everything that the folder says, each file whole or as it was."""
     finished = [state.done[n] for n in state.wanted if n in state.done]
     write_json(folder / "claims.json", [asdict(row) for row in rows_of(finished)])
-    pictures = {done.number: png(folder / f"{done.number}.png") for done in finished}
+    panels = {done.number: _panels(folder / f"{done.number}{PANELS}") for done in finished}
     missing = [number for number in state.wanted if number not in state.done]
-    write_text(folder / "index.html", index_page(finished, pictures, missing, state.command))
+    write_text(folder / "index.html", index_page(finished, panels, missing, state.command))
     _write_state(state, folder)
+
+
+def _panels(path: Path) -> list[dict[str, Any]]:
+    """As an earlier measurement left them; none where they are spoiled, and the page names the picture."""
+    try:
+        return list(msgspec.json.decode(path.read_bytes(), type=dict[str, Any])["panels"])
+    except (OSError, msgspec.DecodeError, KeyError, TypeError):
+        return []
 
 
 def _write_state(state: State, folder: Path) -> None:

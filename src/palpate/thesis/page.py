@@ -7,6 +7,8 @@ from datetime import UTC, datetime
 from importlib import resources
 from typing import Any
 
+from palpate.report.figure_panels.panels import panel_scripts
+from palpate.report.look.assets import data
 from palpate.report.page import render
 from palpate.thesis.claims import Done, counted
 
@@ -18,13 +20,16 @@ _OTHERS = "Explanations"
 
 
 def index_page(
-    done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], command: str
+    done: Sequence[Done],
+    panels: Mapping[str, Sequence[Mapping[str, Any]]],
+    missing: Sequence[str],
+    command: str,
 ) -> str:
     """The page as HTML, figures included; it opens without a network.
 
     Args:
         done: studies that are measured.
-        pictures: of each by its number, as the source of an image.
+        panels: of each by its number, as `report.figure_panels` makes them.
         missing: numbers of those still to come.
         command: that measures them.
     """
@@ -39,11 +44,11 @@ def index_page(
         count=verdicts.total(),
         verdicts=verdicts,
         tones=TONES,
-        images=pictures,
+        panels=data(dict(panels)),
         missing=missing,
         command=command,
         seconds=sum(one.seconds for one in done),
-        scripts=(_script(),),
+        scripts=(*panel_scripts(), _script()),
     )
 
 

@@ -32,14 +32,14 @@ const palpate = (() => {
   };
   const tick = (value) => (value == null ? "" : String(+value.toPrecision(6)).replace("-", "−"));
 
-  /* A column as `look/columns.py` packs it; gaps are null. */
+  /* A column as `look/columns.py` packs it; gaps are null, and what it has no place for is undefined. */
   const unpacked = (column) => {
-    if (Array.isArray(column)) return column;
+    if (Array.isArray(column)) return column.map((value) => (value === "absent" ? undefined : value));
     const bytes = Uint8Array.from(atob(column.b), (letter) => letter.charCodeAt(0));
     const codes = new DataView(bytes.buffer);
     return Array.from({ length: bytes.length / 2 }, (_, i) => {
       const code = codes.getInt16(2 * i, true);
-      return code === -32768 ? null : (code + 32500) * column.s + column.o;
+      return code === -32768 ? null : code === -32767 ? undefined : (code + 32500) * column.s + column.o;
     });
   };
 
@@ -51,6 +51,7 @@ const palpate = (() => {
     model: { width: 1.5, dash: [] },
     other: { width: 1.5, dash: [8, 3] },
   };
+  const look = (one) => (one.width == null ? KINDS[one.kind] : { width: one.width, dash: one.dash || [] });
   const sample = (one) => {
     const ns = "http://www.w3.org/2000/svg";
     const svg = document.createElementNS(ns, "svg");
@@ -62,8 +63,9 @@ const palpate = (() => {
     };
     const colour = `var(--${one.colour})`;
     if (one.kind === "band") put("rect", { width: 18, height: 10, rx: 2, fill: colour, "fill-opacity": 0.3 });
-    else put("line", { x1: 0, x2: 18, y1: 5, y2: 5, stroke: colour, "stroke-width": KINDS[one.kind].width,
-      "stroke-dasharray": KINDS[one.kind].dash.join(" ") });
+    else if (one.dots) put("circle", { cx: 9, cy: 5, r: one.dots / 2, fill: colour });
+    else put("line", { x1: 0, x2: 18, y1: 5, y2: 5, stroke: colour, "stroke-width": look(one).width,
+      "stroke-dasharray": look(one).dash.join(" ") });
     return svg;
   };
 
@@ -92,13 +94,13 @@ const palpate = (() => {
 
   /* A chart in `host`.
      spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, text,
-     tone}], shades [[from, to]], series [{label, kind, colour, of}] or [{..., kind: "band",
+     tone}], shades [[from, to, colour]], keys of the legend that are no series, series [{label, kind, colour, of}] or [{..., kind: "band",
      low, high}], where `of`, `low` and `high` name columns, and a `silent` one has no place in the legend; `x_of` names that of x; log
-     is "x", "y" or "xy". */
+     is "x", "y" or "xy". A series may have its own width, dash, alpha, or dots [px] in place of a line. */
   const chart = (host, spec, columns, group = new Group()) => {
     const self = { marks: spec.marks || [] };
     const whole = make("button", { type: "button", class: "screen" }, "whole range");
-    const head = make("header", {}, make("h3", {}, spec.title), legend(spec.series), whole);
+    const head = make("header", {}, make("h3", {}, spec.title), legend([...spec.series, ...(spec.keys || [])]), whole);
     const read = make("span", { class: "read" });
     const box = make("div", { class: "plot", tabindex: 0, role: "img", "aria-label": spec.alt || spec.title });
     host.classList.add("chart");
@@ -114,7 +116,9 @@ const palpate = (() => {
         series.push({ width: 0, points: { show: false } }, { width: 0, points: { show: false } });
       } else {
         rows.push(one.of);
-        series.push({ stroke: () => token(one.colour), ...KINDS[one.kind], points: { show: false } });
+        const ink = () => (one.alpha < 1 ? faded(one.colour, one.alpha) : token(one.colour));
+        const dots = one.dots ? { paths: () => null, points: { show: true, size: one.dots, fill: ink, stroke: ink } } : { points: { show: false } };
+        series.push({ stroke: ink, ...look(one), ...dots });
       }
     }
     const logarithmic = { x: (spec.log || "").includes("x"), y: (spec.log || "").includes("y") };
@@ -133,6 +137,11 @@ const palpate = (() => {
       while (high - low > 1) { const middle = (low + high) >> 1; if (data[0][middle] < x) low = middle; else high = middle; }
       return x - data[0][low] < data[0][high] - x ? low : high;
     };
+    /* A column's value at the place of its own that is nearest to the i-th. */
+    const there = (column, i) => {
+      for (let away = 0; away < column.length; away++) for (const at of [i - away, i + away]) if (at in column && column[at] !== undefined) return column[at];
+      return null;
+    };
     const tell = (x) => {
       if (x == null || !data[0].length) { read.textContent = ""; return; }
       const i = nearest(x), parts = [`${figure(data[0][i], 5)} ${spec.unit || "s"}`];
@@ -142,16 +151,16 @@ const palpate = (() => {
         if (one.kind === "band" && one.silent) k += 2;
         else if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i], digits)} to ${figure(data[k][i], digits)}`); k += 2; }
         else if (one.silent) k++;
-        else parts.push(`${one.label} ${figure(data[k++][i], digits)}`);
+        else parts.push(`${one.label} ${figure(there(data[k++], i), digits)}`);
       }
       read.textContent = parts.join("  ·  ");
     };
     const behind = (plot) => {
       const { ctx, bbox } = plot;
-      for (const [from, to] of spec.shades || []) {
+      for (const [from, to, colour] of spec.shades || []) {
         const left = Math.max(bbox.left, plot.valToPos(from, "x", true));
         const right = Math.min(bbox.left + bbox.width, plot.valToPos(to, "x", true));
-        ctx.fillStyle = faded("F", 0.09);
+        ctx.fillStyle = colour ? faded(colour, 0.16) : faded("F", 0.09);
         if (right > left) ctx.fillRect(left, bbox.top, right - left, bbox.height);
       }
     };
@@ -163,7 +172,7 @@ const palpate = (() => {
       for (const mark of self.marks) {
         const at = plot.valToPos(mark.x, "x", true), failed = mark.tone === "fail";
         if (at < bbox.left - 1) continue;
-        ctx.strokeStyle = token(failed ? "fail" : "quiet");
+        ctx.strokeStyle = token(mark.colour || (failed ? "fail" : "quiet"));
         ctx.lineWidth = 1.25 * dense; ctx.setLineDash([3 * dense, 3 * dense]);
         ctx.beginPath(); ctx.moveTo(at, bbox.top); ctx.lineTo(at, bbox.top + bbox.height); ctx.stroke();
         if (!mark.text || spec.wordless) continue;

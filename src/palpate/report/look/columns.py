@@ -13,6 +13,10 @@ Array = NDArray[np.float64]
 
 GAP = -32768
 """Where there is no value."""
+NO_PLACE = -32767
+"""Where a column has no place, and a line goes on over it."""
+ABSENT = "absent"
+"""The same, in a column that is not packed."""
 _HALF = 32500
 """Steps of a two-byte number on either side of the middle, but for what says that there is none."""
 
@@ -20,12 +24,14 @@ _HALF = 32500
 def packed(values: Array) -> dict[str, Any]:
     """A column: `b` its values as little-endian int16 in base64, value = origin `o` + step `s` (i + 32500).
 
-    The step is a 65,000th of the column's range: finer than a screen, and than four digits of most readings.
+    Infinite stands for a place that the column does not have, NaN for a gap. The step is a 65,000th of the column's
+    range: finer than a screen, and than four digits of most readings.
     """
     known = np.isfinite(values)
     low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 0.0)
     step = (high - low) / (2 * _HALF) or 1.0
     codes = np.full(len(values), GAP, dtype="<i2")
+    codes[np.isinf(values)] = NO_PLACE
     codes[known] = np.round((values[known] - low) / step).astype(np.int64) - _HALF
     return {"b": base64.b64encode(codes.tobytes()).decode(), "s": step, "o": low}
 

@@ -18,6 +18,34 @@ DATA = {
 }
 """Stiffness, damping, mass, true force; what a sensor said; it failed, it is in doubt, it holds."""
 
+SERIES = {
+    "s0": "#6a5ff0",
+    "s1": "#a8643f",
+    "s2": "#0793ad",
+    "s3": "#cc4f9c",
+    "s4": "#6f8c00",
+    "s5": "#94707f",
+}
+"""What is compared and is no quantity of its own: laws, settings, seeds; none of them is a colour of `DATA`."""
+
+OUTCOMES = {
+    "follows": "#7fbf94",
+    "yes": "#7fbf94",
+    "done": "#a9cfb6",
+    "slow": "#9fc3e6",
+    "rings": "#f2c07c",
+    "no": "#e4b7a5",
+    "lost contact": "#d9776f",
+    "diverged": "#8a4a86",
+    "no contact": "#bdbdbd",
+    "failed": "#7a7a7a",
+    "refused": "#dedede",
+}
+"""What a run may come to, as the fields of a map: grounds, not lines."""
+
+MAPS = {"map-low": "#e6f3c9", "map-high": "#173f6b", "map-mark": "#14181d", "map-halo": "#ffffff"}
+"""Of a map: the ends of its scale, what is marked on it, and the rim that keeps a mark legible on any field."""
+
 PAIRS = {
     "paper": ("#ffffff", "#13161a"),
     "card": ("#f5f6f8", "#1b1f25"),
@@ -45,7 +73,7 @@ GROUNDS = ("paper", "card")
 
 def style_sheet() -> str:
     """The tokens as custom properties of CSS; paper that is printed on is always light."""
-    light = "".join(f"--{name}:{value};" for name, value in DATA.items())
+    light = "".join(f"--{name}:{value};" for name, value in (DATA | SERIES | MAPS).items())
     light += "".join(f"--{name}:{pair[0]};" for name, pair in PAIRS.items())
     dark = "".join(f"--{name}:{pair[1]};" for name, pair in PAIRS.items())
     return (

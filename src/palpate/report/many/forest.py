@@ -25,6 +25,8 @@ _LONGEST = 26
 """Letters of a log's name that stand beside its row."""
 _LETTERS = 12
 _WIDE = 13.0
+_TICKS = 5
+"""Numbers under a panel at most: more run into each other where it is narrow."""
 
 
 def write_figure(rows: Sequence[LogRow], pooled: Pooled, path: Path, dpi: int | None = None) -> Path:
@@ -75,6 +77,7 @@ def forest(axis: Axes, rows: Sequence[LogRow], name: str, pooled: PooledParamete
     called = "stiffness at the working point" if name == POINT else f"{name}, {CALLED.get(name, name)}"
     style.panel(axis, called if unit == "1" else f"{called} [{unit}]")
     axis.grid(visible=False, axis="y")
+    axis.locator_params(axis="x", nbins=_TICKS)
     for i, row in enumerate(rows):
         p, y = row.value_of(name), len(rows) - i
         if p is None or p.value is None or p.ci95 is None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-COLORS = (style.BLUE, style.ORANGE, style.GREEN, style.VIOLET, style.RED, style.GREY)
+COLORS = style.SERIES
 WIDE = 40.0
 """Ratio of the largest to the smallest value from which they are drawn by the logarithm."""
 ACROSS = 3

@@ -10,26 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.report import style
+from palpate.report.look.tokens import MAPS, OUTCOMES
 from palpate.report.study.axes import Array, Scale, decades, grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WORDS = {
-    "follows": "#7fbf94",
-    "yes": "#7fbf94",
-    "done": "#a9cfb6",
-    "slow": "#9fc3e6",
-    "rings": "#f2c07c",
-    "no": "#e4b7a5",
-    "lost contact": "#d9776f",
-    "diverged": "#8a4a86",
-    "no contact": "#bdbdbd",
-    "failed": "#7a7a7a",
-    "refused": "#dedede",
-}
-"""Colours of what a run may come to."""
+HALO = MAPS["map-halo"]
 
 
 @dataclass(frozen=True)
@@ -102,14 +90,14 @@ def _norm(values: Sequence[Array]) -> Any:
 
 
 def _heat(panel: Heat, axis: Axes, norm: Any) -> Any:
-    axis.set_facecolor("#f0f0f0")
+    axis.set_facecolor(style.CARD)
     return axis.pcolormesh(panel.x.edges(), panel.y.edges(), panel.values, norm=norm, cmap="viridis_r")
 
 
 def _words(panel: Heat, axis: Axes) -> None:
     from matplotlib.colors import to_rgb
 
-    colors = np.array([[to_rgb(WORDS.get(str(word), "#ffffff")) for word in row] for row in panel.values])
+    colors = np.array([[to_rgb(OUTCOMES.get(str(word), HALO)) for word in row] for row in panel.values])
     axis.pcolormesh(panel.x.edges(), panel.y.edges(), colors)
 
 
@@ -117,7 +105,7 @@ def _crosses(panel: Heat, axis: Axes) -> None:
     """Where most runs did not come to their end."""
     y, x = np.nonzero(panel.failed)
     size = max(2.0, min(5.0, 90.0 / max(panel.values.shape)))
-    for color, width in (("#ffffff", 2.2), (style.INK, 0.9)):  # seen on dark and on light
+    for color, width in ((HALO, 2.2), (style.INK, 0.9)):  # seen on dark and on light
         axis.plot(
             panel.x.places[x], panel.y.places[y], "x", color=color, markersize=size, markeredgewidth=width
         )
@@ -127,8 +115,8 @@ def _bounds(panel: Heat, axis: Axes) -> None:
     limits = panel.x.edges()[[0, -1]], panel.y.edges()[[0, -1]]
     for i, one in enumerate(panel.bounds):
         label = one.label if i == 0 else None
-        axis.plot(one.x, one.y, color="#ffffff", linewidth=3.4)
-        axis.plot(one.x, one.y, color=style.RED, linewidth=1.8, label=label)
+        axis.plot(one.x, one.y, color=HALO, linewidth=3.4)
+        axis.plot(one.x, one.y, color=style.FAIL, linewidth=1.8, label=label)
     axis.set(xlim=limits[0], ylim=limits[1])
     if panel.bounds:
         axis.legend(fontsize=8, loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
@@ -138,7 +126,7 @@ def _key(drawing: Figure, panels: Sequence[Heat]) -> None:
     from matplotlib.patches import Patch
 
     there = {str(word) for panel in panels for word in panel.values.flat}
-    patches = [Patch(color=color, label=word) for word, color in WORDS.items() if word in there]
+    patches = [Patch(color=color, label=word) for word, color in OUTCOMES.items() if word in there]
     drawing.legend(
         handles=patches, loc="outside upper right", ncols=len(patches), fontsize=8.5, frameon=False
     )

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from palpate.report.look.tokens import MAPS, OUTCOMES
 from palpate.report.study.axes import Array, Scale, decades
 from palpate.report.study.clouds import Cloud, Points, middles
 from palpate.report.study.lines import Curve, Line
-from palpate.report.study.maps import WORDS, Heat
+from palpate.report.study.maps import Heat
 
 MOST = 1500
 """Points of a cloud that lie in the page, evenly taken."""
@@ -91,7 +92,9 @@ def heat(one: Heat) -> dict[str, Any]:
         "log": not words and decades(np.asarray(flat, float)),
         "failed": one.failed.ravel().astype(int).tolist(),
         "bounds": [{"label": b.label, "x": numbers(b.x), "y": numbers(b.y)} for b in one.bounds],
-        "colours": {w: WORDS.get(w, "#ffffff") for w in sorted({str(v) for v in flat})} if words else None,
+        "colours": {w: OUTCOMES.get(w, MAPS["map-halo"]) for w in sorted({str(v) for v in flat})}
+        if words
+        else None,
     }
 
 

@@ -191,7 +191,7 @@
           const cell = put(p.ink, "rect", { class: "cell", x: Math.min(x0, x1), y: Math.min(y0, y1), width: Math.abs(x1 - x0) + 0.5, height: Math.abs(y1 - y0) + 0.5 });
           if (none) cell.setAttribute("fill", "var(--card)");
           else if (one.colours) cell.setAttribute("fill", one.colours[value]);
-          else cell.setAttribute("fill", `color-mix(in oklab, #173f6b ${Math.round(100 * clipped(shade(value), 0, 1))}%, #e6f3c9)`);
+          else cell.setAttribute("fill", `color-mix(in oklab, var(--map-high) ${Math.round(100 * clipped(shade(value), 0, 1))}%, var(--map-low))`);
           const place = `${one.x.names[i] || figure(one.x.places[i])}, ${one.y.names[j] || figure(one.y.places[j])}`;
           p.points.push({ x: (x0 + x1) / 2, y: (y0 + y1) / 2, text: `${place}: ${none ? "nothing" : one.colours ? value : figure(value)}${one.failed[n] ? ", most failed" : ""}` });
           if (one.failed[n]) put(p.ink, "text", { class: "cross", x: (x0 + x1) / 2, y: (y0 + y1) / 2 + 4, "text-anchor": "middle" }, "×");

@@ -292,17 +292,17 @@ def _waterfall(axis: Axes, data: Data, surface: str, index: int) -> None:
     labels = ["perfect signals", *(f"+ {name}" for name in CAUSES.values()), "channels matched"]
     for i, value in enumerate(steps):
         before = steps[i - 1] if i else 0.0
-        color = style.GREY if i == 0 else (style.RED if value < before else style.BLUE)
+        color = style.MEASURED if i == 0 else (style.FAIL if value < before else style.SERIES[0])
         axis.barh(i, value - before, left=before, color=color, height=0.62)
         axis.plot(seeds[:, i], np.full(len(seeds), i), "o", color=style.INK, markersize=1.8, alpha=0.5)
         if i:
-            axis.plot([before, before], [i - 1, i], color=style.GREY, linewidth=0.8)
+            axis.plot([before, before], [i - 1, i], color=style.MEASURED, linewidth=0.8)
     matched = [float(p.matched[index]) for p in data.presses[surface]]
-    axis.barh(len(steps), float(np.median(matched)), color=style.GREEN, height=0.62)
+    axis.barh(len(steps), float(np.median(matched)), color=style.OK, height=0.62)
     axis.plot(matched, np.full(len(matched), len(steps)), "o", color=style.INK, markersize=1.8, alpha=0.5)
-    axis.axvline(0.0, color=style.GREY, linewidth=0.9)
+    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
     if surface != "relaxing foam":
-        axis.axvline(data.truth[surface][index], color=style.GREEN, linewidth=1.1, linestyle="--")
+        axis.axvline(data.truth[surface][index], color=style.OK, linewidth=1.1, linestyle="--")
     axis.set_yticks(range(len(labels)), labels, fontsize=7.5)
     axis.invert_yaxis()
 
@@ -317,14 +317,14 @@ def _lag_panel(axis: Axes, data: Data, index: int) -> None:
         )
         predicted = [delayed_fit(*data.truth[surface], lag)[index] for lag in fine]
         axis.plot(1e3 * fine, predicted, "--", color=color, linewidth=1.1)
-    axis.axhline(0.0, color=style.GREY, linewidth=0.9)
+    axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
     axis.set(xlabel="T [ms]", ylabel=("$M_e$ [kg]", "$B_e$ [N s/m]")[index])
     axis.legend(fontsize=7.5, frameon=False)
 
 
 def _conditions(axis: Axes, data: Data, surface: str, letter: str) -> None:
     panels.titled(axis, letter, f"$M_e$ under varied conditions, {surface}")
-    colors = dict(zip(CHAINS, (style.GREEN, style.VIOLET, style.BLUE, style.RED), strict=True))
+    colors = dict(zip(CHAINS, style.SERIES[:4], strict=True))
     groups = {
         chain: {
             condition: [float(p.chains[i, 0]) for p in some]
@@ -333,5 +333,5 @@ def _conditions(axis: Axes, data: Data, surface: str, letter: str) -> None:
         for i, chain in enumerate(CHAINS)
     }
     panels.dots(axis, groups, colors)
-    axis.axvline(0.0, color=style.GREY, linewidth=0.9)
+    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
     axis.set_xlabel("$M_e$ [kg]")

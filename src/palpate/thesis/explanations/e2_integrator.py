@@ -14,7 +14,7 @@ from palpate.bench.metrics.window import rms
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
-from palpate.thesis.force_control.panels import PALE, limits, panels
+from palpate.thesis.force_control.panels import limits, panels
 from palpate.thesis.force_control.tracking import (
     FOAM,
     RUBBER,
@@ -37,7 +37,7 @@ NUMBER = "neural-is-an-integrator"
 TITLE = "Why it works: the neural controller is an integrator"
 CAPTION = (
     "Above: true force under the neural controller and under a plain PI of the same integral gain, on the "
-    "four experiments of figures 6.11, 6.12, 6.16 and 6.17; red bars: a motor at its limit. Below, left: "
+    "four experiments of figures 6.11, 6.12, 6.16 and 6.17; bars below: a motor at its limit. Below, left: "
     "integral gain measured from the network's command over the learning rate, and eta (A/2)²/Ts. Right: "
     "RMS error of the network over that of the PI, as chosen and under variations; crosses: with the "
     "network's weights from the torques held at zero."
@@ -161,8 +161,10 @@ def plot(data: Data) -> Figure:
 
 
 def _overlay(axis: Axes, name: str, pair: Pair) -> None:
-    axis.plot(pair.network.t, pair.network.true, color=PALE, linewidth=3.2, label="network")
-    axis.plot(pair.pi.t, pair.pi.true, color=style.BLUE, linewidth=1.0, label="PI")
+    axis.plot(
+        pair.network.t, pair.network.true, color=style.SERIES[1], linewidth=3.2, alpha=0.5, label="network"
+    )
+    axis.plot(pair.pi.t, pair.pi.true, color=style.SERIES[0], linewidth=1.0, label="PI")
     axis.plot(pair.pi.t, pair.pi.desired, **style.KNOWN, label="desired")
     limits(axis, pair.network)
     axis.set_title(
@@ -181,18 +183,18 @@ def _gain_panel(axis: Axes, gains: Mapping[str, NDArray[np.float64]]) -> None:
         linewidth=1,
         label="eta (A/2)²/Ts",
     )
-    for (name, found), color, marker in zip(gains.items(), (style.BLUE, style.RED), "o^", strict=True):
+    for (name, found), color, marker in zip(gains.items(), style.SERIES[:2], "o^", strict=True):
         axis.plot(
             RATES, np.median(found, axis=1), marker, color=color, markersize=6, fillstyle="none", label=name
         )
-    axis.axvline(RATE, color=style.GREY, linewidth=1, linestyle="--", label="the text's")
-    axis.axvline(1e-4, color=style.GREY, linewidth=1, linestyle=":", label="the listing's")
+    axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle="--", label="the text's")
+    axis.axvline(1e-4, color=style.MEASURED, linewidth=1, linestyle=":", label="the listing's")
     axis.set(xscale="log", yscale="log", xlabel="learning rate eta", ylabel="K_i [1/s]")
     style.legend(axis, ncols=5, columnspacing=0.9, handletextpad=0.4)
 
 
 def _ratio_panel(axis: Axes, pairs: Mapping[str, Pair]) -> None:
-    colors = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.VIOLET, style.GREY, style.INK)
+    colors = (*style.SERIES, style.INK)
     names = list(dict.fromkeys(name for p in pairs.values() for name in p.ratios))
     for i, name in enumerate(names):
         at = [
@@ -213,7 +215,7 @@ def _ratio_panel(axis: Axes, pairs: Mapping[str, Pair]) -> None:
         linewidths=0.9,
         label="torque weights zero",
     )
-    axis.axhspan(1 - SHARE, 1 + SHARE, color="#eef3ee", zorder=0)
+    axis.axhspan(1 - SHARE, 1 + SHARE, color=style.OK, alpha=0.1, zorder=0)
     axis.set_xticks(range(len(pairs)), [n.replace(", ", "\n", 1) for n in pairs], fontsize=8)
     axis.set(ylabel="RMS, network / PI", ylim=(0.5, 1.5))
     style.legend(axis, ncols=4, columnspacing=0.7, handletextpad=0.1)

@@ -126,8 +126,8 @@ def plot(data: Data) -> Figure:
     """Errors over the rate, and over the size."""
     drawing, grid = panels([2.6, 2.6], columns=2, width=11.0)
     for axis, names in zip(grid[0], (("foam", "rubber"), ("foam that relaxes",)), strict=True):
-        for name, color in zip(names, (style.BLUE, style.GREEN), strict=False):
-            _rates(axis, data, name, style.RED if name == "foam that relaxes" else color)
+        for name, color in zip(names, style.SERIES[:2], strict=False):
+            _rates(axis, data, name, style.FAIL if name == "foam that relaxes" else color)
         axis.set(
             xscale="log",
             xlabel="learning rate eta",
@@ -138,11 +138,13 @@ def plot(data: Data) -> Figure:
         legend_inside(axis, loc="upper center", ncols=len(names), bbox_to_anchor=(0.42, 0.97))
     labels = ["-".join(map(str, size)) for size in SIZES]
     for i, found in enumerate(data.sizes.values()):
-        grid[1][0].plot([i] * len(found), [one.rms for one in found], "o", color=style.BLUE, markersize=4)
+        grid[1][0].plot(
+            [i] * len(found), [one.rms for one in found], "o", color=style.SERIES[0], markersize=4
+        )
     grid[1][0].set(ylabel="RMS error, foam [N]", ylim=(0.0, 2.5))
     for i, times in enumerate(data.losses.values()):
         for lost in times:
-            marker, color = ("^", style.GREEN) if lost is None else ("o", style.RED)
+            marker, color = ("^", style.OK) if lost is None else ("o", style.FAIL)
             grid[1][1].plot(i, LONG if lost is None else lost, marker, color=color, markersize=5)
     grid[1][1].set(ylabel="contact lost after [s]", ylim=(0.0, LONG * 1.08))
     grid[1][1].set_title(

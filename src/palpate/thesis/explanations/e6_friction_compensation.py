@@ -47,7 +47,7 @@ TITLE = "Friction compensation, and contact lost and found again"
 CAPTION = (
     "The laws of chapter 4 add F_c sgn(q'). Above: 20 N on foam without integral, as the listing compensates "
     "(not at all), with its blend of 0.002 rad/s made to act, and with one of 0.05. Middle: force error and "
-    "shaking against the blend; grey: what one encoder count a tick amounts to for motors 1 and 2. Below: "
+    "shaking against the blend; dotted: what one encoder count a tick amounts to for motors 1 and 2. Below: "
     "the error with the blend of 0.05 over the one without. Last: the surface is drawn back by 5 mm; the arm "
     "waits, looks for it and presses again."
 )
@@ -208,9 +208,9 @@ def plot(data: Data) -> Figure:
     """The press, the blends, the worlds, the loss."""
     drawing, grid = panels([2.3, 2.4, 1.9, 2.2], 2, 11.0)
     wide = [across(grid[i]) for i in (0, 2, 3)]
-    for (name, one), color in zip(data.traces.items(), (style.GREY, style.RED, style.BLUE), strict=True):
+    for (name, one), color in zip(data.traces.items(), style.SERIES[:3], strict=True):
         wide[0].plot(one.t, one.signal, color=color, linewidth=1.0, label=name)
-    wide[0].axhline(20.0, color=style.ORANGE, linewidth=1.2)
+    wide[0].axhline(20.0, **style.KNOWN)
     wide[0].set(
         xlabel="time since contact [s]",
         ylabel="true force [N]",
@@ -235,12 +235,14 @@ def plot(data: Data) -> Figure:
 
 def _blend_panel(axis: Axes, data: Data, value: Callable[[Held], float], label: str) -> None:
     for blend, found in zip(BLENDS, data.sweep, strict=True):
-        axis.plot([blend] * len(found), [value(h) for h in found], "o", color=style.BLUE, markersize=4)
-    axis.axhline(np.median([value(h) for h in data.plain]), color=style.GREY, linewidth=1.2, label="without")
+        axis.plot([blend] * len(found), [value(h) for h in found], "o", color=style.SERIES[0], markersize=4)
+    axis.axhline(
+        np.median([value(h) for h in data.plain]), color=style.MEASURED, linewidth=1.2, label="without"
+    )
     for i, quantum in enumerate(_quanta()[:2]):
         axis.axvline(
             quantum,
-            color=style.GREY,
+            color=style.MEASURED,
             linewidth=0.9,
             linestyle=":",
             label="one count a tick" if i == 0 else None,

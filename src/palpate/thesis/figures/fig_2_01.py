@@ -210,13 +210,13 @@ def plot(data: Data) -> Figure:
         lambda p: p.worse,
         limit=100 * WORSE,
         label="ratio [%]",
-        title="stray of the angle; green: worse in this and in overshoot",
+        title="stray of the angle; a dot: worse in this and in overshoot",
     )
     return drawing
 
 
 def _over_time(axis: Axes, data: Data, name: str) -> None:
-    for (law, trace), color in zip(data.traces.items(), (style.RED, style.BLUE), strict=True):
+    for (law, trace), color in zip(data.traces.items(), style.SERIES[:2], strict=True):
         axis.plot(trace.t, getattr(trace, name), color=color, linewidth=1.1, label=law)
     axis.set_xlim(0.0, PARAMETERS.run.press)
     if name == "force":
@@ -232,9 +232,14 @@ def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
     shown = np.where(np.isfinite(data.growth), np.clip(data.growth, 0.0, 20.0), np.nan)
     mesh = axis.pcolormesh(XS, YS, shown, cmap="OrRd", vmin=0.0, vmax=20.0, shading="nearest")
     drawing.colorbar(mesh, ax=axis, pad=0.02, label="[1/s], up to 20 and more")
-    axis.plot([0.40, 0.49], [0.0, 0.0], color=style.BLUE, linewidth=2.5)
+    axis.plot([0.40, 0.49], [0.0, 0.0], color=style.SERIES[0], linewidth=2.5)
     axis.annotate(
-        "experiments", (0.40, 0.0), (-22, -14), textcoords="offset points", fontsize=8.5, color=style.BLUE
+        "experiments",
+        (0.40, 0.0),
+        (-22, -14),
+        textcoords="offset points",
+        fontsize=8.5,
+        color=style.SERIES[0],
     )
     axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axis.set_title("growth of the original", loc="left", fontsize=9.5)

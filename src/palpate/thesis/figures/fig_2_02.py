@@ -164,7 +164,7 @@ def _claim(data: Data, claim: str, name: str) -> Claim:
 def plot(data: Data) -> Figure:
     """The force over time, and what was found in each world."""
     drawing, grid = panels([2.6, 1.8, 1.8, 1.8])
-    colors = (style.BLUE, style.GREEN, style.ORANGE)
+    colors = style.SERIES[:3]
     for (name, one), color in zip(data.traces.items(), colors, strict=True):
         grid[0][0].plot(one.t, one.force, color=color, linewidth=1.2, label=name)
     grid[0][0].set(xlabel="time since contact [s]", ylabel="force [N]", xlim=(0.0, len(DEPTHS)))
@@ -183,7 +183,7 @@ def _share_panel(axis: Axes, data: Data, name: str) -> None:
         limit=100.0,
         label=f"{name} [%]",
         title=(
-            f"{_WORDS[name]} found, over the target's; green: within {TOLERANCES[name]:.0%}; dashed: the "
+            f"{_WORDS[name]} found, over the target's; a dot: within {TOLERANCES[name]:.0%}; dashed: the "
             "target"
         ),
     )

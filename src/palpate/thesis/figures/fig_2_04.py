@@ -198,7 +198,9 @@ def plot(data: Data) -> Figure:
     c = data.record
     force.plot(c["t"], c["force"], color=style.F, linewidth=1.1, label="true force")
     force.plot(c["t"], c["force_desired"], **style.KNOWN, label="desired")
-    force.plot(c["t"], 1e4 * c["gain"], color=style.GREY, linewidth=0.9, label="gain [0.1 mN m per N and ms]")
+    force.plot(
+        c["t"], 1e4 * c["gain"], color=style.MEASURED, linewidth=0.9, label="gain [0.1 mN m per N and ms]"
+    )
     force.set(xlabel="time [s]", ylabel="force [N]", xlim=(0.0, DURATION), ylim=(0.0, 27.0))
     style.legend(force)
     _rate_panel(grid[1][0], data)
@@ -209,20 +211,20 @@ def plot(data: Data) -> Figure:
         lambda p: p.follows,
         limit=LIMIT,
         label="RMS error [N]",
-        title="at the chosen rate; each dot a run: green follows",
+        title="at the chosen rate; a dot follows, a cross does not",
     )
     return drawing
 
 
 def _rate_panel(axis: Axes, data: Data) -> None:
-    for (name, found), color in zip(data.rates.items(), (style.BLUE, style.ORANGE), strict=True):
+    for (name, found), color in zip(data.rates.items(), style.SERIES[:2], strict=True):
         axis.loglog(
             RATES, [np.median([p.settled for p in v]) for v in found], color=color, linewidth=1.2, label=name
         )
         for rate, v in zip(RATES, found, strict=True):
             axis.plot([rate] * len(v), [p.settled for p in v], "o", color=color, markersize=3)
     axis.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
-    axis.axvline(RATE, color=style.GREY, linewidth=1, linestyle=":")
+    axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle=":")
     axis.set(xlabel="learning rate", ylabel="RMS error [N]")
     axis.legend(frameon=False, fontsize=8.5)
     axis.set_title("outside the steps; dashed: the limit, dotted: the chosen rate", loc="left", fontsize=9.5)

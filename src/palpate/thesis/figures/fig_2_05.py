@@ -167,7 +167,9 @@ def plot(data: Data) -> Figure:
     """The turn, the gains, and the runs."""
     drawing, ((force,), (gains,), (dots,)) = panels([2.8, 1.8, 2.2])
     force_panel(force, data.shown)
-    for i, (name, color) in enumerate((("K_fp", style.BLUE), ("K_fi", style.ORANGE), ("K_fd", style.GREEN))):
+    for i, (name, color) in enumerate(
+        (("K_fp", style.SERIES[0]), ("K_fi", style.SERIES[1]), ("K_fd", style.OK))
+    ):
         gains.plot(data.shown.t, data.gains[:, i], color=color, linewidth=1.2, label=name)
     gains.set(xlabel="time since contact [s]", ylabel="gain over middle", xlim=SHOWN, ylim=(0.0, 2.0))
     style.legend(gains)
@@ -181,13 +183,13 @@ def plot(data: Data) -> Figure:
         limit=LIMIT,
         label="RMS error [N]",
         title=(
-            "outside the steps; green follows, red does not; grey: the gains of the start, left alone; "
+            "outside the steps; a dot follows, a cross does not; small: the gains of the start, left alone; "
             "dashed: the limit"
         ),
     )
     for at, runs in enumerate(data.fixed.values(), start=1):
         spot = at + np.linspace(-0.22, 0.22, len(runs))
-        dots.plot(spot, [f.settled for f in runs], "o", color=style.GREY, markersize=2.5, zorder=1)
+        dots.plot(spot, [f.settled for f in runs], "o", color=style.MEASURED, markersize=2.5, zorder=1)
     dots.set_ylim(0.0, max(4.0, 1.1 * _largest(data)))
     return drawing
 

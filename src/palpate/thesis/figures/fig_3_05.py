@@ -192,20 +192,20 @@ def plot(data: Data) -> Figure:
 def _spectra(axis: Axes, data: Data) -> None:
     shown = data.frequency > 0.0
     for power, color, label in (
-        (data.plain, style.GREY, "without filter"),
-        (data.filtered, style.BLUE, "with the 190 Hz filter"),
+        (data.plain, style.MEASURED, "without filter"),
+        (data.filtered, style.SERIES[0], "with the 190 Hz filter"),
     ):
         axis.plot(
             data.frequency[shown], 10.0 * np.log10(power[shown]), color=color, linewidth=1.2, label=label
         )
-    axis.axvspan(0.0, BAND, color=style.GREEN, alpha=0.08, linewidth=0.0)
-    axis.text(5.0, -53.0, "below 120 Hz", fontsize=8, color=style.GREEN)
+    axis.axvspan(0.0, BAND, color=style.OK, alpha=0.08, linewidth=0.0)
+    axis.text(5.0, -53.0, "below 120 Hz", fontsize=8, color=style.OK)
     axis.set(xlabel="frequency [Hz]", ylabel="power density [dB re 1 N²/Hz]", xlim=(0.0, 500.0))
     style.legend(axis)
 
 
 def _folded(axis: Axes, data: Data) -> None:
-    colors = {"480": style.ORANGE, "960": style.RED}
+    colors = {"480": style.SERIES[1], "960": style.FAIL}
     for line in data.lines:
         frequency, amplitude = _peak(data, line)
         weak = "filtered" in line
@@ -214,6 +214,6 @@ def _folded(axis: Axes, data: Data) -> None:
         axis.vlines(
             where, 0.0, amplitude, color=color, linewidth=3.5, alpha=0.45 if weak else 1.0, label=line
         )
-    axis.axvspan(0.0, BAND, color=style.GREEN, alpha=0.08, linewidth=0.0)
+    axis.axvspan(0.0, BAND, color=style.OK, alpha=0.08, linewidth=0.0)
     axis.set(xlabel="read at [Hz]", ylabel="amplitude [N]", xlim=(0.0, 500.0), ylim=(0.0, 0.6))
     axis.legend(fontsize=7.5, frameon=False, loc="upper center")

@@ -130,20 +130,20 @@ def _half_power(data: Data) -> Claim:
 def plot(data: Data) -> Figure:
     """The gain, its asymptotes, and both frequencies."""
     drawing, (axis,) = style.figure(1, height=3.4)
-    axis.fill_between(FREQUENCY, data.low, data.high, color=style.BLUE, alpha=0.15, linewidth=0.0)
-    axis.plot(FREQUENCY, data.gain, color=style.BLUE, linewidth=1.6, label="gain")
+    axis.fill_between(FREQUENCY, data.low, data.high, color=style.SERIES[0], alpha=0.15, linewidth=0.0)
+    axis.plot(FREQUENCY, data.gain, color=style.SERIES[0], linewidth=1.6, label="gain")
     beyond = np.maximum(FREQUENCY / data.corner, 1.0)
     axis.plot(
         FREQUENCY,
         -40.0 * np.log10(beyond),
-        color=style.GREY,
+        color=style.MEASURED,
         linestyle="--",
         linewidth=1.0,
         label="asymptotes",
     )
-    axis.axvline(data.corner, color=style.GREEN, linewidth=1.0, label=f"corner {data.corner:.0f} Hz")
-    axis.axvline(data.cutoff, color=style.RED, linewidth=1.0, label=f"-3 dB at {data.cutoff:.0f} Hz")
-    axis.axhline(-3.01, color=style.RED, linewidth=0.8, linestyle=":")
+    axis.axvline(data.corner, color=style.OK, linewidth=1.0, label=f"corner {data.corner:.0f} Hz")
+    axis.axvline(data.cutoff, color=style.FAIL, linewidth=1.0, label=f"-3 dB at {data.cutoff:.0f} Hz")
+    axis.axhline(-3.01, color=style.FAIL, linewidth=0.8, linestyle=":")
     axis.set(
         xscale="log", xlabel="frequency [Hz]", ylabel="gain [dB]", xlim=(10.0, 2000.0), ylim=(-45.0, 5.0)
     )

@@ -179,13 +179,13 @@ def plot(data: Data) -> Figure:
 
 def _force(axis: Axes, data: Data) -> None:
     titled(axis, "a", "Force through the switch")
-    for (name, (t, force)), color in zip(data.shown.items(), (style.BLUE, style.GREEN), strict=True):
+    for (name, (t, force)), color in zip(data.shown.items(), style.SERIES[:2], strict=True):
         axis.plot(t, force, color=color, linewidth=1.0, label=name)
     axis.plot([0.0, AFTER], [DESIRED, DESIRED], **style.KNOWN, label="desired")
-    axis.axvspan(-BEFORE, 0.0, color=style.GREY, alpha=0.10, linewidth=0.0)
+    axis.axvspan(-BEFORE, 0.0, color=style.MEASURED, alpha=0.10, linewidth=0.0)
     axis.text(-0.98 * BEFORE, 21.0, "position control", fontsize=8, color=style.INK)
     axis.text(0.02, 23.2, "hybrid control", fontsize=8, color=style.INK)
-    axis.axhline(CHOSEN, color=style.RED, linewidth=0.9, linestyle=":")
+    axis.axhline(CHOSEN, color=style.FAIL, linewidth=0.9, linestyle=":")
     axis.set(xlabel="time since 5 N [s]", ylabel="force [N]", xlim=(-BEFORE, AFTER), ylim=(-2.5, 25.0))
     style.legend(axis)
 
@@ -193,9 +193,11 @@ def _force(axis: Axes, data: Data) -> None:
 def _thresholds(axis: Axes, data: Data) -> None:
     titled(axis, "b", "Thresholds, foam; above: share of the runs that noise switched in the air")
     for f, some in data.by_threshold.items():
-        axis.plot(np.full(len(some), f), [s.true_force for s in some], "o", color=style.BLUE, markersize=3.5)
-        axis.annotate(f"{100 * _false(some):.0f} %", (f, 5.6), ha="center", fontsize=7.5, color=style.RED)
-    axis.plot([0.0, 5.5], [0.0, 5.5], color=style.GREY, linewidth=0.9, linestyle="--")
+        axis.plot(
+            np.full(len(some), f), [s.true_force for s in some], "o", color=style.SERIES[0], markersize=3.5
+        )
+        axis.annotate(f"{100 * _false(some):.0f} %", (f, 5.6), ha="center", fontsize=7.5, color=style.FAIL)
+    axis.plot([0.0, 5.5], [0.0, 5.5], color=style.MEASURED, linewidth=0.9, linestyle="--")
     axis.set(
         xlabel="threshold of the measured force [N]", ylabel="true force at the switch [N]", ylim=(-0.5, 6.3)
     )

@@ -191,7 +191,7 @@ def plot(data: Data) -> Figure:
     bar.set_ticks([float(np.log10(k)) for k in ticks], labels=[f"{k}" for k in ticks])
     bar.set_label("stable up to [kN/m]")
     for name, (kf, ki) in GAINS.items():
-        wide.plot(kf, 1e3 * ki, "o", color=style.ORANGE, markersize=6)
+        wide.plot(kf, 1e3 * ki, "o", color=style.SERIES[1], markersize=6)
         wide.annotate(
             name.split("(")[1].rstrip(")"), (kf, 1e3 * ki), (6, 4), textcoords="offset points", fontsize=8.5
         )
@@ -201,7 +201,7 @@ def plot(data: Data) -> Figure:
 
 
 def _damping_panel(axis: Axes, data: Data) -> None:
-    colors = (style.BLUE, style.ORANGE)
+    colors = style.SERIES[:2]
     for (name, (kf, _)), color in zip(GAINS.items(), colors, strict=True):
         axis.loglog(DAMPINGS, data.curves[name] / 1e3, color=color, label=name)
         for case, limit in data.limits.items():
@@ -213,7 +213,7 @@ def _damping_panel(axis: Axes, data: Data) -> None:
                         case[0], share * limit / 1e3, "o", color=color, markerfacecolor=face, markersize=6
                     )
     for name, (damping, stiffness) in SURFACES.items():
-        axis.plot(damping, stiffness / 1e3, "s", color=style.GREY, markersize=5)
+        axis.plot(damping, stiffness / 1e3, "s", color=style.MEASURED, markersize=5)
         axis.annotate(name, (damping, stiffness / 1e3), (5, -10), textcoords="offset points", fontsize=8.5)
     axis.set(xlabel="damping of the surface [N s/m]", ylabel="stable up to [kN/m]")
     axis.legend(loc="upper left", frameon=False, fontsize=8.5)
@@ -221,7 +221,7 @@ def _damping_panel(axis: Axes, data: Data) -> None:
 
 
 def _cutoff_panel(axis: Axes, data: Data) -> None:
-    for name, color in zip(GAINS, (style.BLUE, style.ORANGE), strict=True):
+    for name, color in zip(GAINS, style.SERIES[:2], strict=True):
         axis.loglog(CUTOFFS, data.filtered[name] / 1e3, color=color)
     axis.axvline(PARAMETERS.filters.force, color=style.INK, linewidth=1, linestyle="--")
     axis.set(xlabel="cut-off of the controller's force filter [Hz]")

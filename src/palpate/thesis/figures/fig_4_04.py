@@ -74,8 +74,8 @@ def plot(data: Data) -> Figure:
     drawing, (axis,) = style.figure(1, height=3.0)
     shown = data.t < data.t[0] + 0.5
     t = data.t[shown] - data.t[0]
-    axis.plot(t, data.sampled[shown], color=style.GREY, linewidth=0.9, label="as sampled")
-    axis.plot(t, data.filtered[shown], color=style.BLUE, linewidth=1.4, label="filtered at 120 Hz")
+    axis.plot(t, data.sampled[shown], color=style.MEASURED, linewidth=0.9, label="as sampled")
+    axis.plot(t, data.filtered[shown], color=style.SERIES[0], linewidth=1.4, label="filtered at 120 Hz")
     axis.set(xlabel="time [s]", ylabel="force [N]")
     style.legend(axis)
     return drawing

@@ -240,7 +240,7 @@ def plot(data: Data) -> Figure:
 
 
 def _column(axes: Sequence[Axes], traces: Mapping[str, Trace]) -> None:
-    colors = dict(zip(LAWS, (style.GREY, style.BLUE, style.RED), strict=True))
+    colors = dict(zip(LAWS, style.SERIES[:3], strict=True))
     for name in reversed(LAWS):
         one, pale = traces[name], name == LAWS[2]
         options: dict[str, Any] = {

@@ -177,7 +177,7 @@ def plot(data: Data) -> Figure:
             scale * p[f"{key}_raw"][press_runs.between(p, 0.1, press_runs.FIRST)] for p in shown.values()
         ]
         panels.calm_limits(axis, np.zeros(1), *curves)
-        axis.axhline(0.0, color=style.GREY, linewidth=0.9)
+        axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
     for axis in axes[6:]:
         axis.remove()
     _signs(drawing.add_subplot(5, 2, (7, 9)), data)
@@ -188,21 +188,21 @@ def plot(data: Data) -> Figure:
 def _signs(axis: Axes, data: Data) -> None:
     panels.titled(axis, "g", "Raw signals: signs on all foams")
     for label, names, color in (
-        ("without memory", [n for n in data.foams if n.startswith("B ")], style.BLUE),
-        ("relaxing", [n for n in data.foams if not n.startswith("B ")], style.ORANGE),
+        ("without memory", [n for n in data.foams if n.startswith("B ")], style.SERIES[0]),
+        ("relaxing", [n for n in data.foams if not n.startswith("B ")], style.SERIES[1]),
     ):
         B = [data.foams[n].B_raw for n in names]
         M = [data.foams[n].M_raw for n in names]
         axis.plot(B, M, "o", color=color, markersize=4, label=label)
-    axis.axhline(0.0, color=style.GREY, linewidth=0.9)
-    axis.axvline(0.0, color=style.GREY, linewidth=0.9)
+    axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
     axis.set_xscale("symlog", linthresh=50.0)
     axis.set_xticks([-100.0, 0.0, 100.0, 1000.0], ["-100", "0", "100", "1000"])
     (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()
     left = min(left, -60.0)
-    axis.fill_between([left, 0.0], bottom, 0.0, color=style.RED, alpha=0.10, linewidth=0.0)
+    axis.fill_between([left, 0.0], bottom, 0.0, color=style.FAIL, alpha=0.10, linewidth=0.0)
     axis.set(xlabel="$B_e$ [N s/m]", ylabel="$M_e$ [kg]", xlim=(left, right), ylim=(bottom, top))
-    axis.grid(visible=True, color="#e6e6e6", linewidth=0.8)
+    axis.grid(visible=True, color=style.GRID, linewidth=0.8)
     axis.legend(fontsize=7, frameon=False)
 
 

@@ -28,7 +28,7 @@ CAPTION = (
 )
 PARAMETERS = network.FOAM
 RATES = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
-SHOWN = {1e-6: style.GREEN, 1e-5: style.VIOLET, 1e-4: style.BLUE, 1e-2: style.RED}
+SHOWN = {1e-6: style.SERIES[0], 1e-5: style.SERIES[1], 1e-4: style.SERIES[2], 1e-2: style.SERIES[3]}
 SMALLER = (1e-4, 3e-5, 1e-5, 3e-6)
 """The thesis' rate and smaller ones, among which each has to take longer than the one before."""
 FEW = 5
@@ -169,7 +169,7 @@ def plot(data: Data) -> Figure:
     for axis, (letter, (title, label)) in zip(axes, PANELS.items(), strict=True):
         panels.titled(axis, letter, title)
         axis.set_ylabel(label)
-    colors = (style.BLUE, style.GREEN, style.ORANGE)
+    colors = style.SERIES[:3]
     for (amplitude, by_rate), color in zip(data.found.items(), colors, strict=True):
         _times(axes[3], by_rate, f"{amplitude:g} N", color)
     axes[3].axhline(network.PRESS, color=style.INK, linewidth=0.6)
@@ -186,7 +186,7 @@ def _curves(axes: list[Axes], data: Data) -> None:
         axes[0].plot(t, data.press.force - curve[:, 3], color=color, linewidth=1.0, label=f"{rate:g}")
         axes[1].plot(t, 1e-3 * curve[:, 0], color=color, linewidth=1.0)
         axes[2].plot(t, curve[:, 3], color=color, linewidth=0.8)
-    axes[1].axhline(1e-3 * data.press.ratio, color=style.ORANGE, linewidth=1.0, linestyle=":")
+    axes[1].axhline(1e-3 * data.press.ratio, **style.KNOWN)
     for axis, limits in zip(axes[:3], ((-2.0, 42.0), (0.0, 21.0), (-25.0, 25.0)), strict=True):
         axis.set(xlim=(0.0, network.PRESS), ylim=limits, xlabel="time since 5 N [s]")
     axes[0].legend(fontsize=7, frameon=False, ncols=2, loc="upper right", bbox_to_anchor=(1.0, 0.92))

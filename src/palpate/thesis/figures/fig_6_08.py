@@ -58,9 +58,9 @@ def plot(data: Data) -> Figure:
         (axes[0], data.shown.curves[0][:, 3], "a", "Error as chosen: amplitude 40 N, weights to 0.5"),
         (axes[2], data.near, "b", f"Error with amplitude {NEAR.amplitude:g} N, weights to {NEAR.weights:g}"),
     ):
-        axis.plot(np.arange(len(error)) * network.TICK, error, color=style.BLUE, linewidth=0.7)
-        axis.axhspan(-network.GONE, network.GONE, color=style.GREEN, alpha=0.15, linewidth=0)
-        axis.axvline(0.6, color=style.RED, linewidth=0.9, linestyle=":")
+        axis.plot(np.arange(len(error)) * network.TICK, error, color=style.SERIES[0], linewidth=0.7)
+        axis.axhspan(-network.GONE, network.GONE, color=style.OK, alpha=0.15, linewidth=0)
+        axis.axvline(0.6, color=style.FAIL, linewidth=0.9, linestyle=":")
         axis.set(xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]", ylabel="error [N]")
         panels.titled(axis, letter, title)
     for axis, thresholds, letter in ((axes[1], True, "c"), (axes[3], False, "d")):
@@ -72,13 +72,13 @@ def plot(data: Data) -> Figure:
 
 
 def _times(axis: Axes, data: Data, *, thresholds: bool) -> None:
-    colors = (style.VIOLET, style.BLUE, style.GREEN, style.ORANGE, style.RED)
+    colors = style.SERIES[:5]
     swept = data.shown.grounds.swept
     for weights, color in zip(WEIGHTS, colors, strict=True):
         found = [[a.error_gone for a in swept[Choice(a, weights, thresholds)]] for a in AMPLITUDES]
         middle = np.median(found, axis=1)
         axis.plot(AMPLITUDES, middle, "o-", color=color, markersize=3.5, linewidth=1.0, label=f"{weights:g}")
-    axis.axhspan(*notes.TIME, color=style.RED, alpha=0.12, linewidth=0)
+    axis.axhspan(*notes.TIME, color=style.FAIL, alpha=0.12, linewidth=0)
     axis.set(xscale="log", yscale="log", xlabel="output amplitude [N]", ylabel="time [s]")
     axis.set_xticks(AMPLITUDES, [f"{a:g}" for a in AMPLITUDES], fontsize=7.5)
     axis.minorticks_off()

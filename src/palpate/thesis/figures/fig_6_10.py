@@ -103,7 +103,7 @@ def plot(data: Data) -> Figure:
         misses,
         limit=20.0 * SHARE,
         label="error at 20 N [N]",
-        title="end of the 20 N intervals, each dot a run: green if it misses both levels, as claimed; dashed: 10 %",
+        title="end of the 20 N intervals, a dot misses both levels, as claimed, a cross does not; dashed: 10 %",
     )
     return drawing
 

@@ -115,7 +115,7 @@ def plot(data: Data) -> Figure:
     """Six seconds after three minutes, and the course of the error."""
     drawing, ((force,), (course,)) = panels([3.2, 2.4])
     force_panel(force, data.shown)
-    for (name, found), color in zip(data.courses.items(), (style.BLUE, style.RED, style.GREY), strict=True):
+    for (name, found), color in zip(data.courses.items(), style.SERIES[:3], strict=True):
         for i, one in enumerate(found):
             t = CYCLE * (np.arange(len(one.error)) + 0.5)
             course.plot(t, one.error, color=color, linewidth=1, alpha=0.7, label=name if i == 0 else None)

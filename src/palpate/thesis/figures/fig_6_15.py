@@ -155,13 +155,13 @@ def plot(data: Data) -> Figure:
     """The four signals of the thesis' figure, and the causes."""
     drawing, ((desired,), (force,), (y,), (phi,), (dots,)) = panels([0.9, 1.3, 1.0, 1.0, 1.7])
     t = data.shown.t
-    _signal(desired, t, data.shown.desired, "(a) desired\nforce [N]", style.ORANGE)
-    _signal(force, t, data.shown.measured, "(b) measured\nforce [N]", style.BLUE)
-    force.plot(t, data.shown.true, color="#a9c8e4", linewidth=1.6)
-    _signal(y, t, 1e3 * data.shown.y, "(c) y error\n[mm]", style.BLUE)
-    _signal(phi, t, np.degrees(data.shown.phi), "(d) angle\nerror [degrees]", style.BLUE)
+    _signal(desired, t, data.shown.desired, "(a) desired\nforce [N]", style.INK)
+    _signal(force, t, data.shown.measured, "(b) measured\nforce [N]", style.MEASURED)
+    force.plot(t, data.shown.true, color=style.F, linewidth=1.6, label="true")
+    _signal(y, t, 1e3 * data.shown.y, "(c) y error\n[mm]", style.SERIES[0])
+    _signal(phi, t, np.degrees(data.shown.phi), "(d) angle\nerror [degrees]", style.SERIES[0])
     for axis in (y, phi):
-        axis.axhline(0.0, color=style.ORANGE, linewidth=1.4)
+        axis.axhline(0.0, **style.KNOWN)
     phi.set_xlabel("time since contact [s]")
     dots_panel(
         dots,
@@ -170,7 +170,7 @@ def plot(data: Data) -> Figure:
         visible,
         limit=1e3 * VISIBLE[0],
         label="RMS of y [mm]",
-        title="10 to 15 s after contact, each dot a run: green if y and angle are visibly not zero; dashed: visible",
+        title="10 to 15 s after contact, a dot: y and angle are visibly not zero; a cross: not; dashed: visible",
     )
     return drawing
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from palpate.bench import changed
 from palpate.bench.metrics.following import LIMIT
 from palpate.records import Record
+from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.conditions import stops_holding
 from palpate.thesis.force_control.panels import following_panel, force_panel, panels
@@ -34,7 +35,7 @@ NUMBER = "6.17"
 TITLE = "Neural controller on rubber from the first touch: steps with 4 sin(πt) added"
 CAPTION = (
     "The first ten seconds on rubber, network and all. The thesis says that the force follows well and that "
-    "the controller adapts in almost 5 s. The red bar at the lower edge: motor 2 at its limit, near the "
+    "the controller adapts in almost 5 s. The bar at the lower edge: motor 2 at its limit, near the "
     "peaks of 24 N; the sine starts anew every 5 s as in the listing. Below the runs: how far the force is "
     "from what it settles to."
 )
@@ -119,7 +120,7 @@ def plot(data: Data) -> Figure:
     following_panel(dots, data.tracked.varied)
     shown = data.t < SHOWN[1]
     away.plot(data.t[shown], data.away[shown])
-    away.axhline(LIMIT, color="#222222", linewidth=1, linestyle="--")
+    away.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
     away.set(xlabel="time since contact [s]", ylabel="deviation [N]", xlim=SHOWN, ylim=(0.0, None))
     away.set_title(
         "from the settled cycles, mean over 0.25 s; dashed: what counts as adapted", loc="left", fontsize=9.5

@@ -107,7 +107,7 @@ SINE = Steps(
     "Neural controller on foam: steps with 4 sin(πt) added",
     (
         "The same controller, asked for steps between 10 and 20 N with a sine of 4 N on top, which starts anew "
-        "every 5 s as in the listing. The thesis says that the force follows acceptably well. The red bar at the "
+        "every 5 s as in the listing. The thesis says that the force follows acceptably well. The bar at the "
         "lower edge: motor 2 at its limit of 2.5 N m, near the peaks of 24 N."
     ),
     changed(tracking.FOAM, {**tracking.SINE, "run.press": 15.0}),

@@ -86,7 +86,7 @@ def loss_panel(axis: Axes, one: Trace) -> None:
     """The true force, and when there was no contact."""
     axis.plot(one.t, one.signal, color=style.F, linewidth=1.1, label="true force")
     away = (one.phase != CONTACT).astype(float)
-    shade: dict[str, Any] = {"transform": axis.get_xaxis_transform(), "color": "#eeeeee", "linewidth": 0}
+    shade: dict[str, Any] = {"transform": axis.get_xaxis_transform(), "color": style.GRID, "linewidth": 0}
     axis.fill_between(one.t, 0.0, 1.0, where=away > 0, label="lost, waiting, looking", **shade)
     axis.set(
         xlabel="time since contact [s]",

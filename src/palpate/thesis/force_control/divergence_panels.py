@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.report import style
-from palpate.thesis.force_control.panels import PALE, legend_inside
+from palpate.thesis.force_control.panels import legend_inside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,7 @@ class Loss:
 
 def weights_panel(axis: Axes, course: Course, name: str) -> None:
     """Sizes of the weights over a run."""
-    colors = (style.RED, style.VIOLET, style.GREY, style.BLUE, style.GREEN)
+    colors = style.SERIES[:5]
     for sizes, part, color in zip(course.sizes.T, PARTS, colors, strict=True):
         axis.plot(course.t, sizes, color=color, linewidth=1.2, label=part)
     if course.lost is not None:
@@ -60,7 +60,7 @@ def weights_panel(axis: Axes, course: Course, name: str) -> None:
 
 def gains_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[Course]]]) -> None:
     """Gain from the torques to the force, on each surface."""
-    for (name, found), color in zip(courses.items(), (style.RED, style.BLUE, style.GREEN), strict=True):
+    for (name, found), color in zip(courses.items(), style.SERIES[:3], strict=True):
         course = found[5e-5][0]
         axis.plot(course.t, np.linalg.norm(course.gains, axis=1), color=color, linewidth=1.2, label=name)
         if course.lost is not None:
@@ -82,8 +82,8 @@ def loss_panel(axis: Axes, loss: Loss | None) -> None:
     if loss is None:
         axis.set_axis_off()
         return
-    axis.plot(loss.t, loss.force, color=style.RED, linewidth=1.4, label="network's force")
-    axis.plot(loss.t, loss.true, color=PALE, linewidth=1.4, label="contact force")
+    axis.plot(loss.t, loss.force, color=style.SERIES[0], linewidth=1.4, label="network's force")
+    axis.plot(loss.t, loss.true, color=style.F, linewidth=1.4, label="contact force")
     axis.plot(loss.t, 200 * loss.velocity, color=style.INK, linewidth=1.1, label="velocity along x")
     axis.set(xlabel="time before the loss [s]", ylabel="[N], [5 mm/s]", xlim=(loss.t[0], 0.0))
     axis.set_title("the loss: foam that relaxes, eta 5e-5", loc="left", fontsize=9.5)
@@ -93,12 +93,12 @@ def loss_panel(axis: Axes, loss: Loss | None) -> None:
 def times_panel(axis: Axes, found_on: Mapping[str, Mapping[float, Sequence[Course]]]) -> None:
     """Times of loss over the learning rate, on each surface."""
     for (name, found), color, shift in zip(
-        found_on.items(), (style.RED, style.BLUE, style.GREEN), (1.0, 0.94, 1.06), strict=True
+        found_on.items(), style.SERIES[:3], (1.0, 0.94, 1.06), strict=True
     ):
         for rate, courses in found.items():
             _mark_losses(axis, [rate * shift] * len(courses), [c.lost for c in courses], color)
         axis.plot([], [], "o", color=color, markersize=4, label=name)
-    axis.plot([], [], "^", color=style.GREY, markersize=5, label=f"kept for {DURATION:g} s, as with PI")
+    axis.plot([], [], "^", color=style.MEASURED, markersize=5, label=f"kept for {DURATION:g} s, as with PI")
     axis.set(
         xscale="log", xlabel="learning rate eta", ylabel="contact lost after [s]", ylim=(0.0, DURATION * 1.08)
     )
@@ -114,8 +114,7 @@ def _mark_losses(axis: Axes, at: Sequence[float], times: Sequence[float | None],
 
 def steps_panel(axis: Axes, found: Mapping[float, Sequence[Course]]) -> None:
     """Growth of the output weights of the force over the steps asked for, at each learning rate."""
-    colors = ("#08306b", "#1f6fb4", "#4f9bd0", "#8fc1e0", "#bcd9ea")
-    for (rate, courses), color in zip(found.items(), colors, strict=True):
+    for (rate, courses), color in zip(found.items(), style.SERIES[:5], strict=True):
         one = courses[0]
         axis.plot(one.t / 2.5, one.sizes[:, 3], color=color, linewidth=1.5, label=f"{rate:g}")
     axis.set(xlabel="steps of the desired force", ylabel="force's output weights", yscale="log")
@@ -127,7 +126,7 @@ def causes_panel(axis: Axes, causes: Mapping[str, Sequence[float | None]]) -> No
     """Times of loss with one thing changed at a time."""
     for i, (name, times) in enumerate(causes.items()):
         for lost in times:
-            marker, color = (">", style.GREEN) if lost is None else ("o", style.RED)
+            marker, color = (">", style.OK) if lost is None else ("o", style.FAIL)
             axis.plot(DURATION if lost is None else lost, i, marker, color=color, markersize=6)
         last = max(DURATION if lost is None else lost for lost in times)
         side = "right" if last > 0.8 * DURATION else "left"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
-PALE = "#a9c8e4"
+HELD: dict[str, Any] = {"color": style.OK, "s": 16, "linewidths": 0}
+FAILED: dict[str, Any] = {"color": style.FAIL, "s": 20, "marker": "x", "linewidths": 1.0}
+"""How a run is marked that did what is claimed, and one that did not."""
 
 
 def panels(heights: Sequence[float], columns: int = 1, width: float = 9.0) -> tuple[Figure, list[list[Axes]]]:
@@ -54,7 +56,7 @@ def force_panel(axis: Axes, shown: Slot, title: str = "") -> None:
 
 
 def limits(axis: Axes, shown: Slot) -> None:
-    """A red bar at the lower edge where a motor is at its limit."""
+    """A bar at the lower edge where a motor is at its limit."""
     if shown.limited.any():
         axis.fill_between(
             shown.t,
@@ -62,7 +64,7 @@ def limits(axis: Axes, shown: Slot) -> None:
             0.035,
             where=shown.limited > 0.0,
             transform=axis.get_xaxis_transform(),
-            color=style.RED,
+            color=style.FAIL,
             linewidth=0,
             label="a motor at its limit",
         )
@@ -78,11 +80,12 @@ def dots_panel(
     label: str,
     title: str = "",
 ) -> None:
-    """A dot a run, by variation; red where what is claimed does not hold."""
+    """A run each, by variation: a dot where what is claimed holds, a cross where it does not."""
     for at, runs in enumerate(found.values()):
         spot = at + np.linspace(-0.22, 0.22, max(2, len(runs)))[: len(runs)]
-        colors = [style.GREEN if holds(one) else style.RED for one in runs]
-        axis.scatter(spot, [value(one) for one in runs], c=colors, s=16, linewidths=0)
+        for good, mark in ((True, HELD), (False, FAILED)):
+            places = [i for i, one in enumerate(runs) if holds(one) == good]
+            axis.scatter(spot[places], [value(runs[i]) for i in places], **mark)
     if limit is not None:
         axis.axhline(limit, color=style.INK, linewidth=1, linestyle="--")
     axis.set_xticks(range(len(found)), list(found), fontsize=8)
@@ -102,7 +105,7 @@ def following_panel(axis: Axes, found: Mapping[str, Sequence[Tracking]]) -> None
         lambda one: one.follows,
         limit=LIMIT,
         label="RMS error [N]",
-        title="outside the steps, each dot a run: green follows, red does not; dashed: the limit",
+        title="outside the steps, a mark each run: a dot follows, a cross does not; dashed: the limit",
     )
 
 

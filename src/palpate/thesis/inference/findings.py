@@ -274,9 +274,9 @@ def drawn_figure(sample: Sample) -> Figure:
         style.plain(axis)
         count = len(unknown.choices) or bins
         axis.hist(
-            sample.points[:, i], bins=count, range=(0.0, 1.0), density=True, color=style.BLUE, alpha=0.8
+            sample.points[:, i], bins=count, range=(0.0, 1.0), density=True, color=style.SERIES[0], alpha=0.8
         )
-        axis.axhline(1.0, color=style.GREY, linewidth=1.0)
+        axis.axhline(1.0, color=style.MEASURED, linewidth=1.0)
         axis.set_title(unknown.name.replace("_", " "), fontsize=8, loc="left")
         axis.set(xlim=(0.0, 1.0), yticks=[])
         if unknown.choices:

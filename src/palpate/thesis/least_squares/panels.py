@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLORS = {"plain foam": style.BLUE, "relaxing foam": style.ORANGE, "rubber": style.GREEN}
+COLORS = {"plain foam": style.SERIES[0], "relaxing foam": style.SERIES[1], "rubber": style.SERIES[2]}
 PARAMETERS = {"M": ("$M_e$ [kg]", 1.0), "B": ("$B_e$ [N s/m]", 1.0), "K": ("$K_e$ [kN/m]", 1e-3)}
 CALM = 0.03
 """Seconds after the change-over from which values set the scale of a panel; before, they go anywhere."""

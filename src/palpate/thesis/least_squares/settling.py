@@ -160,7 +160,7 @@ def plot(data: Data, limit: float) -> Figure:
     panels.six(axes, data.shown, "thesis", (0.0, press_runs.FIRST))
     _scales(axes, data.shown)
     for axis in axes[:6]:
-        axis.axvline(limit, color=style.RED, linewidth=0.9, linestyle=":")
+        axis.axvline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
     _starts(axes[6], data, limit)
     _conditions(axes[7], data, limit)
     return drawing
@@ -206,7 +206,7 @@ def _starts(axis: Axes, data: Data, limit: float) -> None:
                 if name == next(iter(data.started))
                 else None,
             )
-    axis.axhline(limit, color=style.RED, linewidth=0.9, linestyle=":")
+    axis.axhline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
     axis.set(xscale="log", yscale="log", xlabel="p in P(0); no dot: $K_e$ never right", ylabel="time [s]")
     axis.legend(fontsize=7, frameon=False)
 
@@ -223,6 +223,6 @@ def _conditions(axis: Axes, data: Data, limit: float) -> None:
         for key in "KBM"
     }
     panels.dots(axis, groups, colors)
-    axis.axvline(limit, color=style.RED, linewidth=0.9, linestyle=":")
+    axis.axvline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
     axis.set(xscale="log", xlabel="time [s]")
     axis.legend(fontsize=7, frameon=False)

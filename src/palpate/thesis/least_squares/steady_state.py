@@ -208,7 +208,7 @@ def plot(data: Data, near: float) -> Figure:
             for press in data.shown.values()
         ]
         panels.calm_limits(axis, np.zeros(1), *curves)
-        axis.axhline(0.0, color=style.GREY, linewidth=0.9)
+        axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
     _gaps(axes[6], data, near)
     _ratios(axes[7], data)
     return drawing
@@ -225,7 +225,7 @@ def _gaps(axis: Axes, data: Data, near: float) -> None:
     }
     panels.dots(axis, groups, panels.COLORS)
     for limit in (-100.0 * near, 100.0 * near):
-        axis.axvline(limit, color=style.RED, linewidth=0.9, linestyle=":")
+        axis.axvline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
     axis.set_xlabel(f"difference [%]; dotted: {100.0 * near:g} %")
 
 
@@ -234,10 +234,10 @@ def _ratios(axis: Axes, data: Data) -> None:
     panels.titled(axis, "h", f"Ratios of single samples (bars: 8 of 10), {surface}")
     for i, key in enumerate("KBM"):
         low, middle, high = np.median(data.ratios[key], axis=0) / data.truth[key]
-        axis.plot([low, high], [i, i], color=style.GREY, linewidth=6, solid_capstyle="butt")
+        axis.plot([low, high], [i, i], color=style.MEASURED, linewidth=6, solid_capstyle="butt")
         axis.plot(middle, i, "|", color=style.INK, markersize=13, label="ratios, middle" if i == 0 else None)
         fit = median([getattr(f, key) for f in data.found[surface]]) / data.truth[key]
-        axis.plot(fit, i, "o", color=style.BLUE, label="least squares" if i == 0 else None)
+        axis.plot(fit, i, "o", color=style.SERIES[0], label="least squares" if i == 0 else None)
     axis.axvline(1.0, **style.KNOWN, label="true")
     axis.set_xscale("symlog", linthresh=2.0)
     axis.set_yticks(range(3), ["K", "B", "M"])

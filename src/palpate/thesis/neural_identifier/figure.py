@@ -83,7 +83,7 @@ def plot(data: Data, parts: Sequence[Part], band: float) -> Figure:
     _conditions(axes[8], data.grounds, parts)
     panels.titled(axes[8], "i", "As chosen, under varied conditions")
     _cloud(axes[9], data.grounds, band)
-    panels.titled(axes[9], "j", "All answers; red: where the claim would hold")
+    panels.titled(axes[9], "j", "All answers; framed: where the claim would hold")
     return drawing
 
 
@@ -111,10 +111,10 @@ def _others(axes: list[Axes], data: Data, color: str) -> None:
         for other in curves[1:]:
             axis.plot(t, other, color=color, linewidth=0.8, alpha=0.35)
         squares = scale * data.press.squares[:, "MBK".index(key)]
-        axis.plot(t, squares, color=style.GREY, linewidth=1.0, linestyle="--")
+        axis.plot(t, squares, color=style.MEASURED, linewidth=1.0, linestyle="--")
         panels.calm_limits(axis, *(c[CALM:] for c in curves), squares[200:], margin=0.1)
     axes[2].plot(
-        t, 1e-3 * np.full(len(t), data.press.ratio), color=style.ORANGE, linewidth=1.0, linestyle=":"
+        t, 1e-3 * np.full(len(t), data.press.ratio), color=style.SERIES[1], linewidth=1.0, linestyle=":"
     )
     lines = ("network, five starts", "", "", "", "", "least squares", "f/x at the end")
     handles = [line for line, label in zip(axes[2].lines, lines, strict=True) if label]
@@ -167,8 +167,8 @@ def _cloud(axis: Axes, grounds: Grounds, band: float) -> None:
     fixed = [a for choice, some in grounds.swept.items() if not choice.thresholds for a in some]
     learning = [a for choice, some in grounds.swept.items() if choice.thresholds for a in some]
     for some, color, label in (
-        (learning, style.BLUE, "swept, thresholds learn"),
-        (fixed, style.ORANGE, "swept, thresholds at zero"),
+        (learning, style.SERIES[0], "swept, thresholds learn"),
+        (fixed, style.SERIES[1], "swept, thresholds at zero"),
         (grounds.nominal, style.INK, "as chosen"),
     ):
         axis.plot(
@@ -180,8 +180,10 @@ def _cloud(axis: Axes, grounds: Grounds, band: float) -> None:
             label=label,
             alpha=0.7,
         )
-    axis.axvline(grounds.perfect, color=style.GREY, linewidth=0.9, linestyle="--")
-    axis.add_patch(Rectangle((1.0 - band, 0.0), 2.0 * band, SMALL, fill=False, edgecolor=style.RED, zorder=3))
+    axis.axvline(grounds.perfect, color=style.MEASURED, linewidth=0.9, linestyle="--")
+    axis.add_patch(
+        Rectangle((1.0 - band, 0.0), 2.0 * band, SMALL, fill=False, edgecolor=style.FAIL, zorder=3)
+    )
     axis.set(xlim=(0.5, 2.5), xlabel="$K_e$ over f/x (dashed: a network without error)", ylabel="$M_e$ [kg]")
     axis.set_yscale("symlog", linthresh=0.1)
     axis.legend(fontsize=7, frameon=False, loc="center right", markerscale=3)

@@ -40,9 +40,9 @@ def causes(data: Mapping[str, Surface], fixed: Choice, straight: Choice) -> Figu
         panels.titled(axis, letter, title)
     foam = data["foam"]
     kinds = {
-        "as chosen": (Choice(), style.BLUE),
-        "thresholds at zero": (fixed, style.ORANGE),
-        "zero, 200 N, 0.1": (straight, style.GREEN),
+        "as chosen": (Choice(), style.SERIES[0]),
+        "thresholds at zero": (fixed, style.SERIES[1]),
+        "zero, 200 N, 0.1": (straight, style.SERIES[2]),
     }
     _known(eight[0], eight[1], foam, kinds)
     for axis, surface in zip(eight[2:4], data.values(), strict=True):
@@ -61,7 +61,7 @@ def _merge(drawing: Figure, axes: list[Axes]) -> list[Axes]:
         axis.remove()
     tall = [drawing.add_subplot(grid[1:3, column]) for column in (0, 1)]
     for axis in tall:
-        axis.grid(visible=True, axis="x", color="#e6e6e6", linewidth=0.8)
+        axis.grid(visible=True, axis="x", color=style.GRID, linewidth=0.8)
         axis.set_axisbelow(True)
         axis.spines[["top", "right"]].set_visible(False)
     return tall
@@ -85,12 +85,12 @@ def _known(force: Axes, stiffness: Axes, surface: Surface, kinds: Mapping[str, t
     stiffness.plot(
         1e3 * x[1:], truth[1:] / x[1:] / press.ratio, color=style.INK, linewidth=1.3, linestyle="--"
     )
-    stiffness.axhline(1.0, color=style.GREY, linewidth=0.8)
+    stiffness.axhline(1.0, color=style.MEASURED, linewidth=0.8)
     asked = 1e3 * Choice().probe(press.surface, 0).values[0]
     for axis in (force, stiffness):
-        axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.GREY, alpha=0.12, linewidth=0)
-        axis.axvline(asked, color=style.RED, linewidth=0.9, linestyle=":")
-        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; grey: learned; dotted: asked")
+        axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.MEASURED, alpha=0.12, linewidth=0)
+        axis.axvline(asked, color=style.FAIL, linewidth=0.9, linestyle=":")
+        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; shaded: learned; dotted: asked")
     force.set(ylim=(-2.0, 40.0), ylabel="force [N]")
     stiffness.set(ylim=(0.0, 3.0), ylabel="K over f/x")
     force.legend(fontsize=7, frameon=False, ncols=2, loc="lower right")
@@ -102,14 +102,16 @@ def _toggles(axis: Axes, surface: Surface, *, named: bool) -> None:
         some = surface.toggled[name]
         warned = all(look.warned for look in some)
         over, slopes = [look.over for look in some], [look.tangent for look in some]
-        _strip(axis, over, i - 0.16, style.RED if warned else style.BLUE)
-        _strip(axis, slopes, i + 0.16, style.ORANGE)
-    axis.axvline(1.0, color=style.GREY, linewidth=1.0)
-    axis.axvline(surface.perfect, color=style.BLUE, linewidth=0.9, linestyle="--")
-    axis.axvline(surface.stiffness / surface.press.ratio, color=style.ORANGE, linewidth=0.9, linestyle="--")
+        _strip(axis, over, i - 0.16, style.FAIL if warned else style.SERIES[0])
+        _strip(axis, slopes, i + 0.16, style.SERIES[1])
+    axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
+    axis.axvline(surface.perfect, color=style.SERIES[0], linewidth=0.9, linestyle="--")
+    axis.axvline(
+        surface.stiffness / surface.press.ratio, color=style.SERIES[1], linewidth=0.9, linestyle="--"
+    )
     axis.set_yticks(range(len(names)), names if named else [""] * len(names), fontsize=8)
     axis.set(xlim=(-0.6, 3.0), ylim=(len(names) - 0.5, -0.5))
-    axis.set_xlabel("blue: K (red: warned); orange: slope; dashed: no error", fontsize=8)
+    axis.set_xlabel("above: K; below: slope; dashed: no error", fontsize=8)
 
 
 def _strip(axis: Axes, values: Sequence[float], y: float, color: str) -> None:
@@ -121,10 +123,10 @@ def _masses(axis: Axes, surface: Surface) -> None:
     order = np.argsort(np.median(surface.masses, axis=0))
     rows = np.arange(len(MANY_STARTS))
     axis.plot(
-        rows, surface.before[order], "o", color=style.GREY, markersize=4, fillstyle="none", label="before"
+        rows, surface.before[order], "o", color=style.MEASURED, markersize=4, fillstyle="none", label="before"
     )
     for seed in surface.masses[:, order]:
-        axis.plot(rows, seed, ".", color=style.BLUE, markersize=3)
+        axis.plot(rows, seed, ".", color=style.SERIES[0], markersize=3)
     axis.axhline(0.0, color=style.INK, linewidth=0.8)
     axis.set(xlabel="start, by its M", ylabel="$M_e$ [kg]")
     handles = [axis.lines[0], axis.lines[1]]
@@ -138,22 +140,22 @@ def _lasting(axis: Axes, surface: Surface) -> None:
     t = (np.arange(len(press.force)) + 1) * network.TICK
     for start in SHOWN_STARTS[:5]:
         _, curve = network.learned(press, Choice(), start)
-        axis.plot(t, curve[:, 0] / press.ratio, color=style.BLUE, linewidth=0.9)
-    axis.plot(t, press.squares[:, 2] / press.ratio, color=style.GREY, linewidth=1.0, linestyle="--")
-    axis.axhline(surface.perfect, color=style.BLUE, linewidth=0.9, linestyle="--")
-    axis.axhline(1.0, color=style.GREY, linewidth=0.8)
+        axis.plot(t, curve[:, 0] / press.ratio, color=style.SERIES[0], linewidth=0.9)
+    axis.plot(t, press.squares[:, 2] / press.ratio, color=style.MEASURED, linewidth=1.0, linestyle="--")
+    axis.axhline(surface.perfect, color=style.SERIES[0], linewidth=0.9, linestyle="--")
+    axis.axhline(1.0, color=style.MEASURED, linewidth=0.8)
     axis.set(
-        xscale="log", xlim=(0.01, t[-1]), ylim=(0.0, 2.0), xlabel="time since 5 N [s]; grey: least squares"
+        xscale="log", xlim=(0.01, t[-1]), ylim=(0.0, 2.0), xlabel="time since 5 N [s]; dashed: least squares"
     )
     axis.set_ylabel("K over f/x")
 
 
 def _varied(axis: Axes, data: Mapping[str, Surface]) -> None:
     names = list(dict.fromkeys(name for s in data.values() for name in s.varied))
-    for shift, (surface, color) in enumerate(zip(data.values(), (style.BLUE, style.GREEN), strict=True)):
+    for shift, (surface, color) in enumerate(zip(data.values(), style.SERIES[:2], strict=True)):
         for i, name in enumerate(names):
             if name in surface.varied:
                 _strip(axis, [a.over for a in surface.varied[name]], i - 0.15 + 0.3 * shift, color)
-    axis.axvline(1.0, color=style.GREY, linewidth=1.0)
+    axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
     axis.set_yticks(range(len(names)), names, fontsize=7)
-    axis.set(ylim=(len(names) - 0.5, -0.5), xlabel="K over f/x; blue: foam, green: rubber")
+    axis.set(ylim=(len(names) - 0.5, -0.5), xlabel="K over f/x; above: foam, below: rubber")

@@ -1,0 +1,41 @@
+"""What stands at a panel of matplotlib, as plain text."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SIGNS = {r"\eta": "η", r"\mu": "µ", r"\theta": "θ", r"\lambda": "λ", r"\cdot": "·", r"\pm": "±"}
+_BELOW = str.maketrans("aehijklmnoprstuvx0123456789", "ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ₀₁₂₃₄₅₆₇₈₉")
+_UNIT = re.compile(r"\[([^\]]+)\]\s*$")
+
+
+def plain(text: str) -> str:
+    """A label without its formulas: `$K_e$ [N/m]` is Kₑ [N/m]; a letter that is not written so keeps its underscore."""
+    return re.sub(r"\$([^$]*)\$", lambda found: _spelled(found[1]), text).replace("\n", " ").strip()
+
+
+def unit(text: str) -> str:
+    """What a label has in brackets at its end."""
+    found = _UNIT.search(text)
+    return found[1] if found else ""
+
+
+def title(axes: Axes) -> str:
+    """Of a panel; wherever it stands."""
+    return plain(axes.get_title(loc="left") or axes.get_title() or axes.get_title(loc="right"))
+
+
+def _spelled(formula: str) -> str:
+    for sign, letter in _SIGNS.items():
+        formula = formula.replace(sign, letter)
+    formula = re.sub(r"_\{?(\w)\}?", _lowered, formula)
+    return re.sub(r"\\[a-z]+|[{}^]", "", formula)
+
+
+def _lowered(found: re.Match[str]) -> str:
+    letter = found[1].translate(_BELOW)
+    return found[0] if letter == found[1] else letter
