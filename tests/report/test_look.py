@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 from palpate.errors import InputError
 from palpate.report import style
 from palpate.report.look.assets import CHARTS, data, policy, scripts, styles, text_of
-from palpate.report.look.columns import GAP, packed, thinned
+from palpate.report.look.columns import GAP, NO_PLACE, packed, thinned
 from palpate.report.look.tokens import DATA, GROUNDS, PAIRS, SERIES, contrast, style_sheet
 from palpate.report.page import render
 
@@ -77,7 +77,8 @@ columns = arrays(np.float64, st.integers(1, 60), elements=st.floats(-1e12, 1e12)
 
 def unpacked(column):
     codes = np.frombuffer(base64.b64decode(column["b"]), dtype="<i2").astype(float)
-    return np.where(codes == GAP, np.nan, (codes + 32500) * column["s"] + column["o"])
+    known = (codes + 32500) * column["s"] + column["o"]
+    return np.select([codes == GAP, codes == NO_PLACE], [np.nan, np.inf], known)
 
 
 @given(columns)
@@ -87,9 +88,9 @@ def test_a_packed_column_is_itself_but_for_its_step(values):
     np.testing.assert_allclose(unpacked(column), values, rtol=1e-9, atol=spread / 65000 + 1e-12)
 
 
-def test_gaps_stay_gaps():
+def test_gaps_stay_gaps_and_places_that_a_column_lacks_stay_such():
     values = np.array([1.0, np.nan, 3.0, np.inf])
-    np.testing.assert_allclose(unpacked(packed(values)), [1.0, np.nan, 3.0, np.nan])
+    np.testing.assert_allclose(unpacked(packed(values)), [1.0, np.nan, 3.0, np.inf])
     assert np.isnan(unpacked(packed(np.full(3, np.nan)))).all()
 
 
