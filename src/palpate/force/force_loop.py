@@ -29,7 +29,8 @@ from palpate.force.flat import (
     state_in,
 )
 from palpate.force.gains import Gains, load_gains
-from palpate.force.law import AIR, LEARNING, LOCKED
+from palpate.force.law import LEARNING, LOCKED
+from palpate.force.watching import AIR
 
 if TYPE_CHECKING:
     from palpate.force.certificate import Certificate

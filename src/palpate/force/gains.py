@@ -28,16 +28,21 @@ ALPHA = 0.42
 Measured by benchmarks/force/first_touches.py: 0.45 overshoots by 9 % on the stiffest surfaces, 0.36 is a
 quarter slower.
 """
-LAW = "cautious 2"
-"""Changes with the law; a certificate of another one is refused."""
-_TOUCH = 0.45
-"""Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch; a damping ratio of 1 doubles it."""
+LAW = "cautious adaptive control 3"
+"""Its name in adaptive control (a gain that the estimate's uncertainty lowers), and which form of it.
+
+A certificate of another one is refused.
+"""
+_TOUCH = 0.5
+"""Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch; on a surface with a damping ratio of 1
+the damping's 2 v sqrt(K m) is then F_d."""
 _BRISK = 1.15
 """Of the speed that the law itself asks for at the cap; 1.3 overshoots by 7.6 % there, 1.6 by 13.6 %
 (benchmarks/force/first_touches.py)."""
 _SLOWEST = 0.02
 """K_u below which the speed limit, not the gain, rules, as a share of alpha F_d/(theta v_max)."""
 _FORGOTTEN = 5.0
+"""Decay times of the sensor's low-pass after which an edge counts as forgotten: e^-5 of it, 0.7 %, is left."""
 
 
 class Gains(Table):
