@@ -79,15 +79,15 @@ def test_a_tip_that_lies_on_the_surface_at_the_start_does_not_jump():
 def test_without_the_bound_it_is_worse():
     gains = gains_of("ur5e", 10.0, noise=0.6)
     world = world_of(gains.arm, noise=0.6)
-    peaks = {}
+    high = {}
     for bounding in (1.0, 0.0):
         control = gains.cautious()._replace(bounding=bounding)
         runs = [
-            pressed(world, surface(5e3), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(8)
+            pressed(world, surface(5e3), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(24)
         ]
-        peaks[bounding] = max(runs)
-    assert peaks[1.0] < 11.0
-    assert peaks[0.0] > 11.5
+        high[bounding] = sum(peak > 10.5 for peak in runs)
+    assert high[1.0] <= 2  # noise of 6 % of the force
+    assert high[0.0] >= 5
 
 
 def test_a_surface_that_begins_where_noise_looked_like_one_is_not_taken_for_soft():

@@ -258,7 +258,7 @@ def begun(law, known, before, stage, w, f, starts):
             slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
         else:
             line = latest(starts, explained(starts) - spread_of(law, w))
-            pace = law.cap * law.theta / law.tick * (f.y - f.y0)
+            pace = 2.0 * law.cap * law.theta * line.u / (line.n * line.n * law.period)
             slow = fit_of(line, law.cap, origin, pace, w.rest, spread_of(law, w))
             since, found = line.n * law.period / law.tick, slow.solved()
             std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
