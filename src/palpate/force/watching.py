@@ -9,11 +9,11 @@ from palpate.force.onset import NO_STARTS, explained, later
 AIR = 0.0
 """The phase before a touch."""
 CONTACT = 7.0
-"""Evidence of a contact, a cumulative sum: white noise in the air comes to it once in e^14/2 theta, some six hours."""
+"""Evidence of a contact, a cumulative sum, that a touch begins with, and with none of which it ends."""
 EVIDENT = 28.0
 """What a line through the readings has to explain, in variances of a reading, for a contact.
 
-White noise in the air comes to it once in some seven hours, as seldom as to `CONTACT`; to 20 once in five minutes
+White noise in the air comes to it once in some seven hours, to 20 once in five minutes
 (benchmarks/force/false_alarms.py).
 """
 
@@ -79,8 +79,9 @@ def watched(law, state, starts, force):
 
 @law
 def evident(law, state, starts, mean, slow, force):
-    """A cumulative sum (Page): it grows while the force is above the noise of its mean over theta, and falls below.
+    """All of it as soon as a reading and its mean, or a line, stand out; else a cumulative sum (Page).
 
+    It grows while the force is above the noise of its mean over theta, and falls below.
     In contact what it has to be above is also a third of what it was: a loss shows within half of theta.
     """
     w, unit = state.watch, sqrt(2.0 * state.watch.tide)
@@ -92,7 +93,10 @@ def evident(law, state, starts, mean, slow, force):
         return CONTACT
     least = unit if state.stage.phase == AIR else max(unit, 0.3 * slow)
     step = max(min((above - least) / unit, 3.0 * sigma / unit), -2.0 * CONTACT)
-    return max(min(w.evidence + law.tick / law.theta * step, CONTACT), 0.0)
+    most = (
+        0.9 * CONTACT if state.stage.phase == AIR else CONTACT
+    )  # alone it makes no contact: it knows no surface
+    return max(min(w.evidence + law.tick / law.theta * step, most), 0.0)
 
 
 @law
