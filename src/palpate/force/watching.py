@@ -67,6 +67,8 @@ def watched(law, state, starts, force):
     age, gap = (0.0, w.age + 1.0) if fresh else (w.age + 1.0, w.gap)
     if state.stage.phase != AIR:
         return Watch(force, mean, slow, w.rest, w.variance, w.tide, evidence, age, gap)
+    if explained(starts) > 0.5 * EVIDENT * spread_of(law, w):  # a ramp is no noise
+        return Watch(force, mean, slow, w.rest, w.variance, w.tide, evidence, age, gap)
     rest = w.rest
     if evidence < 0.3 * CONTACT:
         rest += law.tick / (min(state.ticks * law.tick, 1.0) + law.period) * (force - rest)
