@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from palpate._jit import law
 from palpate._vector import Mat3, Vec3
+from palpate.force.contact_evidence import Watch
 from palpate.force.law import Backstop, Cautious, CautiousState, Follow, Learned, Stage
 from palpate.force.onset import Line, Starts
 from palpate.force.regression import Fit
-from palpate.force.watching import Watch
 
 
 def flattened(tree: Any) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from palpate._jit import kernel, law
 from palpate.errors import InputError
 from palpate.files import write_text
+from palpate.force.contact_evidence import AIR
 from palpate.force.flat import (
     BOUND,
     FOUND,
@@ -30,7 +31,6 @@ from palpate.force.flat import (
 )
 from palpate.force.gains import Gains, load_gains
 from palpate.force.law import LEARNING, LOCKED
-from palpate.force.watching import AIR
 
 if TYPE_CHECKING:
     from palpate.force.certificate import Certificate

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, sqrt
+from palpate.force.contact_evidence import AIR, CONTACT, Watch, listened, spread_of, watched
 from palpate.force.onset import NO_STARTS, Starts, explained, latest
 from palpate.force.regression import AXIS_B, AXIS_K, BOTH, NOTHING, Fit, fit_of, fit_through, without_offset
-from palpate.force.watching import AIR, CONTACT, Watch, listened, spread_of, watched
 
 LEARNING, LOCKED = 1.0, 2.0
 """Phases after `AIR`."""
