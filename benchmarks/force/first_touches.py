@@ -17,6 +17,12 @@ from touches import Rig, share
 
 from palpate.force.expected import OVERSHOOT, RISES, rise, settling_bound, softest
 
+KNOWN = 3.5
+"""Rises before which no law tells a touch from noise.
+
+The ramp's energy is then 3.5^3/3 = 14 variances, 2 ln 1000: one false alarm in a thousand looks.
+"""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -57,6 +63,9 @@ def report(name: str, touches: int, noise: tuple[float, float], seed: int) -> No
     within = settling <= bound
     print(
         f"  within 4 lags + travel + 4 B/K       {share(within.mean())}; elsewhere {share(within[~quick].mean())}"
+    )
+    print(
+        f"    and the {KNOWN:g} rises in which it is known  {share((settling <= bound + KNOWN * rises)[~quick].mean())}"
     )
     inside = inside > 0.0
     early, late = settling <= told - RISES * rises, settling <= told

@@ -221,7 +221,7 @@ def test_a_bad_identification_is_one_line(capsys, elsewhere, text, says):
 def test_bad_words_to_certify(capsys, elsewhere, words, says):
     (elsewhere / "gains.toml").write_text(gains_of("fr3").to_toml())
     text = (elsewhere / "gains.toml").read_text()
-    (elsewhere / "bad.toml").write_text(text.replace("cautious 2", "cautious 0"))
+    (elsewhere / "bad.toml").write_text(text.replace("control 3", "control 0"))
     assert says in refused(capsys, "certify", *words)
 
 

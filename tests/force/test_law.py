@@ -9,7 +9,7 @@ from force.gained import gains_of
 from palpate._vector import Vec3
 from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
 from palpate.force.law import LOCKED
-from palpate.force.regression import AXIS_K, PRIOR, Fit, fit_from, without_offset
+from palpate.force.regression import AXIS_K, PRIOR, Fit, fit_through, without_offset
 from palpate.force.touching import touch
 from palpate.force.worlds import pressed, surface, world_of
 
@@ -48,12 +48,14 @@ def test_compiled_and_plain_are_one_law():
 
 
 def test_the_bound_stays_above_the_stiffness():
-    for seed in range(6):
+    seen, least = gains_of("ur5e").arm.seen(5e3), []
+    for seed in range(20):
         rows = run("ur5e", 5e3, 30.0, seed=seed)
-        seen = gains_of("ur5e").arm.seen(5e3)
-        # One and a half standard deviations, while the force is still low; the proof asks for half.
-        assert rows[rows[:, 0] > 5.0, 1].min() > 0.75 * seen
+        least.append(rows[rows[:, 0] > 5.0, 1].min() / seen)
         assert rows[-200:, 1].min() > seen
+    # One and a half standard deviations, while the force is still low; the proof asks for half.
+    assert min(least) > 0.5
+    assert np.median(least) > 0.75
 
 
 def test_in_the_air_it_approaches_and_learns_nothing():
@@ -77,15 +79,15 @@ def test_a_tip_that_lies_on_the_surface_at_the_start_does_not_jump():
 def test_without_the_bound_it_is_worse():
     gains = gains_of("ur5e", 10.0, noise=0.6)
     world = world_of(gains.arm, noise=0.6)
-    peaks = {}
+    high = {}
     for bounding in (1.0, 0.0):
         control = gains.cautious()._replace(bounding=bounding)
         runs = [
-            pressed(world, surface(5e3), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(8)
+            pressed(world, surface(5e3), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(24)
         ]
-        peaks[bounding] = max(runs)
-    assert peaks[1.0] < 11.0
-    assert peaks[0.0] > 11.5
+        high[bounding] = sum(peak > 10.5 for peak in runs)
+    assert high[1.0] <= 2  # noise of 6 % of the force
+    assert high[0.0] >= 5
 
 
 def test_a_surface_that_begins_where_noise_looked_like_one_is_not_taken_for_soft():
@@ -154,7 +156,7 @@ def test_the_fit_is_least_squares_with_its_prior():
     rng = np.random.default_rng(0)
     phi = rng.normal(size=(200, 3))
     force = phi @ [0.4, 0.1, 2.0] + 0.01 * rng.normal(size=200)
-    fit = fit_from(1.0, 10.0)
+    fit = fit_through(0.0, 1.0, 10.0)
     for row, f in zip(phi, force, strict=True):
         fit = fit.taking(Vec3(*row), f, 1e4, 1.0)
     N = 1e4 * phi.T @ phi + np.array(PRIOR) + np.diag([0.0, 0.0, 0.01])
@@ -165,7 +167,7 @@ def test_the_fit_is_least_squares_with_its_prior():
 
 def test_dropping_the_offset_keeps_what_is_known_of_the_slopes():
     rng = np.random.default_rng(1)
-    fit = fit_from(0.0, 100.0)
+    fit = fit_through(0.0, 0.0, 100.0)
     for _ in range(50):
         phi = rng.normal(size=3)
         fit = fit.taking(Vec3(*phi), float(phi @ [0.5, 0.2, 3.0]), 1e6, 1.0)

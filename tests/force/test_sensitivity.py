@@ -6,7 +6,7 @@ import pytest
 
 from force.gained import gains_of
 from palpate.force.gains import ALPHA
-from palpate.force.law import DAMPED
+from palpate.force.law import least_for
 from palpate.force.sampled_loop import SampledLoop
 from palpate.force.sensitivity import MOST, PEAK, relief_of, sensitivity
 
@@ -20,7 +20,7 @@ def test_damping_is_lead_so_that_a_bound_of_the_stiffness_is_enough(name, most, 
     gains = gains_of(name)
     felt = gains.arm.seen(K) if gains.arm.kind == "position" else K
     for ratio in RATIOS:
-        bound = max(felt, DAMPED * felt * (1.0 + ratio))
+        bound = max(felt, least_for(gains.cautious(), felt * (1.0 + ratio)))
         peak = sensitivity(SampledLoop(gains.arm), gains.gain_at(bound), felt, ratio * gains.theta * felt)
         assert peak < most + 0.01
 

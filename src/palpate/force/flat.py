@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from palpate._jit import law
 from palpate._vector import Mat3, Vec3
-from palpate.force.law import Backstop, Cautious, CautiousState, Follow, Learned, Stage, Watch
+from palpate.force.contact_evidence import Watch
+from palpate.force.law import Backstop, Cautious, CautiousState, Follow, Learned, Stage
+from palpate.force.onset import Line, Starts
 from palpate.force.regression import Fit
 
 
@@ -58,9 +60,25 @@ def state_in(a):
         Follow(vector_in(a, 11), a[14], a[15], a[16], a[17]),
         Stage(a[18], a[19], a[20], a[21]),
         Learned(fit_in(a, 22), fit_in(a, 34), a[46], a[47], vector_in(a, 48), vector_in(a, 51)),
-        a[54],
-        Backstop(a[55], a[56], a[57], a[58], a[59], a[60]),
+        starts_in(a, 54),
+        a[91],
+        Backstop(a[92], a[93], a[94], a[95], a[96], a[97]),
     )
+
+
+@law
+def starts_in(a, i):
+    """Starts from 37 numbers."""
+    return Starts(
+        a[i], line_in(a, i + 1), line_in(a, i + 7), line_in(a, i + 13), line_in(a, i + 19), line_in(a, i + 25),
+        line_in(a, i + 31),
+    )  # fmt: skip
+
+
+@law
+def line_in(a, i):
+    """A line from six numbers."""
+    return Line(a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5])
 
 
 @law
@@ -85,6 +103,24 @@ def put_fit(a, i, fit):
 
 
 @law
+def put_line(a, i, line):
+    """Six numbers into an array."""
+    a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5] = line.x, line.n, line.u, line.uu, line.f, line.uf
+
+
+@law
+def put_starts(a, i, s):
+    """37 numbers into an array."""
+    a[i] = s.readings
+    put_line(a, i + 1, s.newest)
+    put_line(a, i + 7, s.a)
+    put_line(a, i + 13, s.b)
+    put_line(a, i + 19, s.c)
+    put_line(a, i + 25, s.d)
+    put_line(a, i + 31, s.oldest)
+
+
+@law
 def put_state(a, s):
     """The state into an array."""
     a[0], a[1] = s.ticks, s.desired
@@ -99,11 +135,12 @@ def put_state(a, s):
     a[46], a[47] = k.since, k.origin
     put_vector(a, 48, k.found)
     put_vector(a, 51, k.std)
-    a[54] = s.bound
-    a[55], a[56], a[57], a[58], a[59], a[60] = b.care, b.sign, b.peak, b.before, b.swings, b.calm
+    put_starts(a, 54, s.starts)
+    a[91] = s.bound
+    a[92], a[93], a[94], a[95], a[96], a[97] = b.care, b.sign, b.peak, b.before, b.swings, b.calm
 
 
-STATE = 61
+STATE = 98
 """Numbers of a state."""
-LAST, VARIANCE, TIDE, PHASE, SINCE, FOUND, STD, BOUND = 2, 6, 7, 18, 46, 48, 51, 54
+LAST, VARIANCE, TIDE, PHASE, SINCE, FOUND, STD, BOUND = 2, 6, 7, 18, 46, 48, 51, 91
 """Where some of them are."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from palpate._jit import kernel, law
 from palpate.errors import InputError
 from palpate.files import write_text
+from palpate.force.contact_evidence import AIR
 from palpate.force.flat import (
     BOUND,
     FOUND,
@@ -29,7 +30,7 @@ from palpate.force.flat import (
     state_in,
 )
 from palpate.force.gains import Gains, load_gains
-from palpate.force.law import AIR, LEARNING, LOCKED
+from palpate.force.law import LEARNING, LOCKED
 
 if TYPE_CHECKING:
     from palpate.force.certificate import Certificate
@@ -51,11 +52,14 @@ TROUBLES = {
     "the tip was held",
 }
 FARTHEST = 3.0
-"""Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer."""
+"""Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer.
+
+Chosen: the proof lets the stiffness be wrong by a factor of 2, and half of that again is room for friction.
+"""
 LEAST = 8.0
 """Standard deviations of the noise: the least force that may be asked for, and the least that counts as a pull."""
 NEAR = 0.05
-"""Of F_d: an error that counts, and a change of the force that starts the count anew."""
+"""Of F_d: an error that counts, and a change of the force that starts the count anew; the band of what is settled."""
 # Behind the law's own state: ticks without a good reading, ticks since the reading changed, the trouble of this tick,
 # how far the command has gone in vain [N], and from which force.
 _BLIND, _UNCHANGED, _TROUBLE, _VAIN, _FROM, EXTRA = STATE, STATE + 1, STATE + 2, STATE + 3, STATE + 4, 5

@@ -13,28 +13,30 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, sqrt
-from palpate.force.regression import AXIS_B, AXIS_K, BOTH, NOTHING, Fit, fit_from, fit_through, without_offset
+from palpate.force.contact_evidence import AIR, CONTACT, Watch, listened, spread_of, watched
+from palpate.force.onset import NO_STARTS, Starts, explained, latest
+from palpate.force.regression import AXIS_B, AXIS_K, BOTH, NOTHING, Fit, fit_of, fit_through, without_offset
 
-AIR, LEARNING, LOCKED = 0.0, 1.0, 2.0
-"""Phases."""
+LEARNING, LOCKED = 1.0, 2.0
+"""Phases after `AIR`."""
 PLAIN = 2.5
 """Standard deviations above which a stiffness, or a damping, is a surface and not noise in the air.
 
 Measured by benchmarks/force/first_touches.py: with 2 noise passes for a soft surface once in some thousand touches
 (22 % over, --arms ur5e --touches 1000 --seed 2), with 1.5 oftener (37 %).
 """
-DOUBTED = 1.5
-"""Evidence up to which a contact may still begin later: odds of e^3, twenty to one.
+SURE = 4.0
+"""Readings for which K_u stays where it was at a touch: what they refute was an edge, not a ramp.
 
-With none, noise before the touch counts as contact, and a surface as too soft: 42 % over in one of 10 000 touches
-(benchmarks/force/first_touches.py --arms fr3).
+Measured by benchmarks/force/first_touches.py: with none a stiff surface that was felt one reading ago counts as soft,
+and is pressed 38 % too hard.
 """
-CONTACT = 7.0
-"""Evidence of a contact, a cumulative sum: white noise in the air comes to it once in e^14/2 theta, some six hours."""
 DAMPED = 0.52
-"""Least share of K + B/theta that K_u has to be: above the half that the proof of the adapting law allows.
+"""Least share of K + B/theta, beside the arm's own spring, that K_u has to be: above the half that the adapting law's
+proof allows.
 
-With alpha 0.42 the sensitivity is then below 1.56 for every B/K, tests/force/test_sensitivity.py.
+With alpha 0.42 the sensitivity is then below 1.56 for every B/K, 1.67 for a torque arm
+(tests/force/test_sensitivity.py).
 """
 STEP = 0.02
 """Relative change of the desired force in a tick above which it is a step, which the error follows."""
@@ -105,6 +107,7 @@ class Cautious(NamedTuple):
             Follow(ZERO3, 0.0, 0.0, 0.0, 0.0),
             Stage(AIR, 0.0, 0.0, 0.0),
             Learned(fit, fit, 0.0, 0.0, ZERO3, ZERO3),
+            NO_STARTS,
             self.cap,
             Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         )
@@ -112,10 +115,11 @@ class Cautious(NamedTuple):
     def step(self, state, desired, force, position):
         """One tick: speed of the commanded position [m/s], from the forces [N] and the measured position [m]."""
         before = state.desired if state.ticks > 0.0 else desired
-        watch = watched(self, state, force)
         follow = followed(self, state, position)
+        starts = listened(self, state, follow, force)
+        watch = watched(self, state, starts, force)
         stage = staged(self, state.stage, watch, desired, before, force)
-        known = begun(self, state.known, state.stage, stage, watch, follow)
+        known = begun(self, state.known, state.stage, stage, watch, follow, starts)
         known = taken(self, known, state, stage, watch, follow, force)
         bound = bounded(self, state.bound, stage, watch, known)
         backstop = guarded(self, state.backstop, stage, watch, desired, before)
@@ -126,26 +130,13 @@ class Cautious(NamedTuple):
         firm = stage.firm * self.tick > self.theta or bound < 0.5 * self.cap
         limit = self.speed if stage.phase != AIR and firm else self.approach
         speed = max(min(u + forward, limit), -self.speed) if stage.phase != AIR else self.approach
-        return speed, CautiousState(state.ticks + 1.0, desired, watch, follow, stage, known, bound, backstop)
+        return speed, CautiousState(
+            state.ticks + 1.0, desired, watch, follow, stage, known, starts, bound, backstop
+        )  # fmt: skip
 
     def told(self, state):
         """K_u [N/m]."""
         return state.bound
-
-
-@part
-class Watch(NamedTuple):
-    """The force's readings and their noise."""
-
-    last: float
-    mean: float  # over 4 ms [N]
-    slow: float  # over theta [N]
-    rest: float  # of readings in the air [N]
-    variance: float  # of a reading [N^2]
-    tide: float  # of the mean over theta [N^2]
-    evidence: float  # of a contact
-    age: float  # ticks since the last fresh reading; 0 if this one is
-    gap: float  # ticks between the last two
 
 
 @part
@@ -201,6 +192,7 @@ class CautiousState(NamedTuple):
     follow: Follow
     stage: Stage
     known: Learned
+    starts: Starts
     bound: float  # K_u [N/m]
     backstop: Backstop
 
@@ -211,44 +203,6 @@ def gain(law, bound):
     felt = law.compliance * bound
     lag = law.theta * (1.0 - law.relief * (felt + 0.5) / (felt + 1.0))
     return law.alpha / lag * (law.compliance + 1.0 / bound)
-
-
-@law
-def watched(law, state, force):
-    """This tick's reading, and what noise there is: in the air the force is at rest but for that."""
-    w = state.watch
-    if state.ticks < 1.0:
-        return Watch(force, force, 0.0, 0.0, w.variance, w.tide, 0.0, 0.0, law.period / law.tick)
-    fresh = force != w.last or w.age * law.tick > 1.5 * law.period
-    mean = w.mean + law.tick / (0.004 + law.tick) * (force - w.mean)
-    slow = w.slow + law.tick / (law.theta + law.tick) * (force - w.slow)
-    evidence = evident(law, state, mean, slow, force)
-    age, gap = (0.0, w.age + 1.0) if fresh else (w.age + 1.0, w.gap)
-    if state.stage.phase != AIR:
-        return Watch(force, mean, slow, w.rest, w.variance, w.tide, evidence, age, gap)
-    rest = w.rest
-    if evidence < 0.3 * CONTACT:
-        rest += law.tick / (min(state.ticks * law.tick, 1.0) + law.period) * (force - rest)
-        rest = max(min(rest, law.noise), -law.noise)
-    off, drift = force - rest, slow - rest
-    variance = w.variance + law.tick / 0.3 * (min(off * off, 9.0 * w.variance) - w.variance)
-    tide = w.tide + law.tick * (min(drift * drift, 9.0 * w.tide) - w.tide)
-    return Watch(force, mean, slow, rest, variance, tide, evidence, age, gap)
-
-
-@law
-def evident(law, state, mean, slow, force):
-    """A cumulative sum (Page): it grows while the force is above the noise of its mean over theta, and falls below.
-
-    In contact what it has to be above is also a third of what it was: a loss shows within half of theta.
-    """
-    w, unit = state.watch, sqrt(2.0 * state.watch.tide)
-    sigma, above = sqrt(w.variance), force - w.rest
-    if state.stage.phase == AIR and above > 4.0 * sigma and mean - w.rest > 3.2 * sigma:
-        return CONTACT
-    least = unit if state.stage.phase == AIR else max(unit, 0.3 * slow)
-    step = max(min((above - least) / unit, 3.0 * sigma / unit), -2.0 * CONTACT)
-    return max(min(w.evidence + law.tick / law.theta * step, CONTACT), 0.0)
 
 
 @law
@@ -280,17 +234,15 @@ def staged(law, stage, w, desired, before, force):
 
 
 @law
-def begun(law, known, before, stage, w, f):
-    """What is known as this stage begins: nothing until the force leaves the noise, a quarter after a step.
+def begun(law, known, before, stage, w, f, starts):
+    """What is known as this stage begins: in the air nothing, at a touch what its start tells, after a step a quarter.
 
-    A contact begins where the evidence last was doubted, a stiff one where the force last was within the noise: there
-    it is at rest, but for the noise and for what comes between two readings.
+    A stiff contact begins where the force last was within the noise: there it is at rest, but for the noise and for
+    what comes between two readings.
     """
     sigma = sqrt(w.variance)
     slow, fast, since, origin, found, std = known
-    if stage.phase == AIR and w.evidence <= DOUBTED:
-        damped = Vec3(0.0, law.cap * law.theta / law.tick * (f.y - f.y0), 1.0)
-        slow = fit_from(w.rest, sigma).taking(damped, w.rest, 0.25 / (sigma * sigma), 1.0)
+    if stage.phase == AIR:
         since, origin, found, std = 0.0, f.y, ZERO3, ZERO3
     if stage.firm == 0.0:
         x = law.cap * (f.y - 0.004 / law.tick * (f.y - f.y0) - origin)
@@ -304,8 +256,12 @@ def begun(law, known, before, stage, w, f):
                 law.cap * (f.y - back - origin), w.rest + 0.5 * sigma, sigma + level / readings
             )
             slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
-        elif stage.firm * law.tick >= law.memory:
-            slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
+        else:
+            line = latest(starts, explained(starts) - spread_of(law, w))
+            pace = 2.0 * law.cap * law.theta * line.u / (line.n * line.n * law.period)
+            slow = fit_of(line, law.cap, origin, pace, w.rest, spread_of(law, w))
+            since, found = line.n * law.period / law.tick, slow.solved()
+            std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
     if before.phase == LOCKED and stage.phase == LEARNING:
         slow = without_offset(slow, 0.25)
     return Learned(slow, fast, since, origin, found, std)
@@ -342,7 +298,7 @@ def bounded(law, bound, stage, w, known):
     """K_u at this tick."""
     if stage.phase == AIR:
         return law.cap
-    if min(known.since, stage.since) * law.tick < law.memory:
+    if known.since * law.tick < law.memory or stage.since * law.tick < SURE * law.period:
         return bound
     now = bound if stage.phase == LOCKED else from_slow(law, known)
     p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
@@ -366,7 +322,13 @@ def from_slow(law, known):
 @law
 def highest(law, p, alone, both):
     """What K_u has to be for an estimate with room for K alone, and for K + B/theta [N/m]."""
-    return law.cap * max(p.x + alone, DAMPED * (p.x + p.y + both))
+    return max(law.cap * (p.x + alone), least_for(law, max(law.cap * (p.x + p.y + both), 0.0)))
+
+
+@law
+def least_for(law, whole):
+    """K_u at which 1/(1/K_s + 1/K_u) is the least share of that of K + B/theta that there may be [N/m]."""
+    return DAMPED * whole / (1.0 + (1.0 - DAMPED) * law.compliance * whole)
 
 
 @law

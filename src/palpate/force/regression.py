@@ -43,10 +43,26 @@ class Fit(NamedTuple):
 
 
 @law
-def fit_from(offset, std):
-    """What is known at a touch: nothing of K and B, and of the offset that it is this +- std [N]."""
-    c = 1.0 / (std * std)
-    return Fit(PRIOR + c * Mat3(ZERO3, ZERO3, AXIS_C), Vec3(0.0, 0.0, c * offset))
+def fit_of(line, unit, origin, pace, rest, variance):
+    """What a line through even motion told, see `Line`: its step is damping, or a start that is late, or both.
+
+    Args:
+        line: sums over the readings.
+        unit: of stiffness, the cap [N/m].
+        origin: of the fit's position [m].
+        pace: theta dx/dt in the unit [N].
+        rest: force at rest [N].
+        variance: of a reading [N^2].
+    """
+    _, level, _ = line.solved()
+    d, w = line.x - origin, 1.0 / variance
+    n, f = line.n, line.f + line.n * rest
+    x = unit * (line.u + n * d)
+    xx = unit * unit * (line.uu + 2.0 * d * line.u + n * d * d)
+    xf = unit * (line.uf + d * line.f) + x * rest
+    N = Mat3(Vec3(xx, pace * x, x), Vec3(pace * x, n * pace * pace, n * pace), Vec3(x, n * pace, n))
+    late = fit_through(unit * d, rest + 0.5 * level, 0.5 * level + sqrt(variance / n))
+    return Fit(w * N + late.N, w * Vec3(xf, pace * f, f) + late.r)
 
 
 @law

@@ -1,0 +1,102 @@
+"""Since when there is contact: lines fitted to the force from several starts back, the likeliest of which is taken.
+
+In the air the tip moves evenly, so that a touch is a step (damping, times the speed) and a ramp (stiffness) from some
+place on, and nothing before. For each of six starts, every one about twice as far back as the one before, the line
+through the force since then is fitted; the rest of the past counts as air. That is the profile likelihood of the start
+(generalised likelihood ratio), with starts so dense that at most an eighth of the evidence is lost.
+"""
+
+from typing import NamedTuple
+
+from palpate._jit import law, part
+
+
+@part
+class Line(NamedTuple):
+    """Sums over the readings since a start: number, way from there [m], way squared, force [N], their product."""
+
+    x: float
+    n: float
+    u: float
+    uu: float
+    f: float
+    uf: float
+
+    def taking(self, x, force):
+        """With one more reading."""
+        u = x - self.x
+        return Line(self.x, self.n + 1.0, self.u + u, self.uu + u * u, self.f + force, self.uf + u * force)
+
+    def solved(self):
+        """Slope [N/m], force at the start [N] and what both explain of the sum of squares [N^2]; neither negative."""
+        spread = self.n * self.uu - self.u * self.u
+        if not (spread > 1e-9 * self.n * self.uu):  # the tip stands: there is no slope
+            level = max(self.f / max(self.n, 1.0), 0.0)
+            return 0.0, level, level * self.f
+        slope = (self.n * self.uf - self.u * self.f) / spread
+        level = (self.f - slope * self.u) / self.n
+        if level < 0.0:
+            slope, level = max(self.uf / self.uu, 0.0), 0.0
+        elif slope < 0.0:
+            slope, level = 0.0, max(self.f / self.n, 0.0)
+        return slope, level, slope * self.uf + level * self.f
+
+
+EMPTY = Line(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@part
+class Starts(NamedTuple):
+    """Lines from six starts; the newest is not asked until it has become the second."""
+
+    readings: float
+    newest: Line
+    a: Line
+    b: Line
+    c: Line
+    d: Line
+    oldest: Line
+
+
+NO_STARTS = Starts(0.0, EMPTY, EMPTY, EMPTY, EMPTY, EMPTY, EMPTY)
+
+
+@law
+def later(starts, every, x, force):
+    """With one more reading; each `every` readings there is a new start, and every second of them moves one back."""
+    n, new, a, b, c, d, old = starts
+    if n % (32.0 * every) == 0.0:
+        old = d
+    if n % (16.0 * every) == 0.0:
+        d = c
+    if n % (8.0 * every) == 0.0:
+        c = b
+    if n % (4.0 * every) == 0.0:
+        b = a
+    if n % (2.0 * every) == 0.0:
+        a = new
+    if n % every == 0.0:
+        new = Line(x, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Starts(
+        n + 1.0, new.taking(x, force), a.taking(x, force), b.taking(x, force), c.taking(x, force),
+        d.taking(x, force), old.taking(x, force),
+    )  # fmt: skip
+
+
+@law
+def explained(starts):
+    """What the likeliest line explains of the sum of squares [N^2]."""
+    _, _, a, b, c, d, old = starts
+    return max(a.solved()[2], b.solved()[2], c.solved()[2], d.solved()[2], old.solved()[2])
+
+
+@law
+def latest(starts, least):
+    """The line of the latest start that explains as much as that [N^2]; an earlier one has air in it, and is flat."""
+    if starts.a.solved()[2] >= least:
+        return starts.a
+    if starts.b.solved()[2] >= least:
+        return starts.b
+    if starts.c.solved()[2] >= least:
+        return starts.c
+    return starts.d if starts.d.solved()[2] >= least else starts.oldest
