@@ -15,12 +15,24 @@ from palpate.thesis.claims import Claim, count_in_words, counted, with_wholes
 from palpate.thesis.conditions import rougher
 from palpate.thesis.figure import studies, study
 from palpate.thesis.force_control.tracking import FOAM, RUBBER, SINE
-from palpate.thesis.inference import archive, contradictions, findings, infer, judge, sampler, search
+from palpate.thesis.inference import (
+    archive,
+    contradictions,
+    findings,
+    infer,
+    judge,
+    result,
+    sampler,
+    search,
+    tables,
+)
 from palpate.thesis.inference.archive import Tried
-from palpate.thesis.inference.posterior import marginals
+from palpate.thesis.inference.directed import bred
+from palpate.thesis.inference.posterior import marginals, worth
+from palpate.thesis.inference.predictive import drawn_shares, judged_shares
 from palpate.thesis.inference.sampler import Settings, sample
 from palpate.thesis.inference.search import MISS, Job, Search, Threads, Workers
-from palpate.thesis.inference.sentences import CHEAP_FIRST, HOLDS, searched, sentences
+from palpate.thesis.inference.sentences import HOLDS, TELLING_FIRST, searched, sentences
 from palpate.thesis.inference.trial import Trial
 from palpate.thesis.laboratory import files
 from palpate.thesis.laboratory.laboratory import CHOSEN, Laboratory, checked, drawn, values
@@ -134,7 +146,7 @@ def test_sentences_are_claims_of_their_figures_and_each_has_a_law():
     assert {s.id for s in sentences()} == set(HOLDS)
     assert len(sentences()) == len(HOLDS)
     assert {s.figure for s in sentences()} <= {s.NUMBER for s in studies()}
-    assert {s.figure for s in searched(calibrating=False)} == set(CHEAP_FIRST)
+    assert {s.figure for s in searched(calibrating=False)} == set(TELLING_FIRST)
 
 
 def gaussian(points, _):
@@ -266,8 +278,99 @@ def test_contradictions_are_pairs_that_were_expected_and_never_seen():
         i: Tried(i, (0.5,), (bool(a), not a, bool(rng.random() < 0.5), False)) for i, a in enumerate(first)
     }
     table = contradictions.table(("a", "not a", "by chance", "never"), rows)
-    assert [(p.first, p.second) for p in table.pairs()] == [("a", "not a")]
+    (found,) = table.never_together()
+    assert found.ids == ("a", "not a")
+    assert found.parts == (first.sum(), (~first).sum())
+    assert found.expected == pytest.approx(first.sum() * (~first).sum() / 200)
+    assert found.excluded
     assert [x.id for x in table.alone() if x.true == 0] == ["never"]
+
+
+def test_three_sentences_may_exclude_each_other_though_each_two_do_not():
+    rng = np.random.default_rng(5)
+    cases = ((True, True, False), (True, False, True), (False, True, True), (False, False, False))
+    rows = {i: Tried(i, (0.5,), cases[rng.integers(4)]) for i in range(400)}
+    (found,) = contradictions.table(("a", "b", "c"), rows).never_together()
+    assert found.ids == ("a", "b", "c")
+    # each two hold in a quarter of all, each one in half: n (1/4)^3 / (1/2)^3
+    assert found.expected == pytest.approx(400 / 8, rel=0.2)
+    assert found.excluded
+    few = contradictions.table(("a", "b", "c"), {i: rows[i] for i in range(20)}).never_together()
+    assert not any(one.excluded for one in few)
+
+
+class Rule:
+    """Makes each sentence true where its share of the prior lies above a level."""
+
+    def __init__(self, level: float):
+        self.level, self.asked = level, 0
+
+    def tried(self, jobs, ids):
+        for job in jobs:
+            self.asked += 1
+            yield Tried(job.number, job.shares, tuple(job.shares[int(id_)] > self.level for id_ in ids))
+
+
+def halves_apart(level: float) -> contradictions.Table:
+    points = np.random.default_rng(6).random((60, 8))
+    points[:, 1] = np.where(points[:, 0] > level, level * points[:, 1], points[:, 1])
+    rows = {i: Tried(i, tuple(p), (p[0] > level, p[1] > level)) for i, p in enumerate(points)}
+    return contradictions.table(("0", "1"), rows)
+
+
+def test_what_only_looked_like_a_contradiction_is_bred_away():
+    among = halves_apart(0.7)
+    assert [one.ids for one in among.never_together()] == [("0", "1")]
+    found = bred(("0", "1"), among, Rule(0.7), 96, 1)
+    assert found.most == 2
+    assert min(found.shares[:2]) > 0.7
+    assert found.tries < 96
+
+
+def test_what_cannot_be_is_not_bred():
+    class Never(Rule):
+        def tried(self, jobs, ids):
+            for one in super().tried(jobs, ids):
+                first = one.verdicts[0]
+                yield Tried(one.number, one.shares, (first, not first))
+
+    runner = Never(0.5)
+    found = bred(("0", "1"), halves_apart(0.5), runner, 40, 1)
+    assert (found.most, found.tries, runner.asked) == (1, 40, 40)
+
+
+def test_relatives_are_worth_less_than_strangers():
+    rng = np.random.default_rng(7)
+    of = rng.standard_normal((400, 5))
+    strangers = sampler.Sample(of, np.zeros(400), (), np.arange(400))
+    assert worth(strangers) == pytest.approx(400.0, rel=0.01)
+    families = np.repeat(np.arange(40), 10)
+    copies = sampler.Sample(of[families], np.zeros(400), (), families)
+    assert worth(copies) == pytest.approx(40.0, rel=0.05)
+    assert worth(sampler.Sample(of, np.zeros(400), (), np.zeros(400, dtype=int))) == pytest.approx(1.0)
+    # families that forgot their ancestor are strangers again: 40 of them know it to a fifth
+    forgot = sampler.Sample(of, np.zeros(400), (), families)
+    assert np.median(worth(forgot)) == pytest.approx(400.0, rel=0.4)
+
+
+def test_the_sampler_tells_what_lies_before_it():
+    told = []
+    sample(gaussian, np.zeros(3, dtype=bool), Settings(40, 4, 2, 3), lambda *one: told.append(one))
+    assert told[0] == (0.0, 160)
+    assert [count for _, count in told[1:]] == [80] * (len(told) - 1)
+    assert told[-1][0] == 1.0
+
+
+def test_a_share_is_told_with_its_spread():
+    of = [s for s in sentences() if s.figure in {"6.1", "6.2"}]
+    rows = {i: Tried(i, (0.5,), (i < 2,) * len(of)) for i in range(4)}
+    rows[4] = Tried(4, (0.5,), (True,))  # given up
+    found = drawn_shares("some", contradictions.table([s.id for s in of], rows), of)
+    assert found.laboratories == 4
+    assert (found.calibration.mean, found.calibration.of) == (0.5, 3)
+    assert found.validation.spread == pytest.approx(math.sqrt(1.0 / 3.0))
+    one = judge.Judged(CHOSEN, 10, {s.id: 3 for s in of})
+    assert judged_shares("one", one, of).validation.mean == pytest.approx(0.3)
 
 
 def test_verdicts_that_were_given_up_are_not_taken_for_no():
@@ -292,7 +395,7 @@ def test_marginals_say_what_is_told():
 
 def test_the_best_of_a_posterior_misses_fewest():
     points = np.linspace(0.1, 0.9, 3)[:, None] * np.ones(len(UNKNOWNS))
-    found = sampler.Sample(points, np.array([-2.0, -1.0, -1.0]), ())
+    found = sampler.Sample(points, np.array([-2.0, -1.0, -1.0]), (), np.arange(3))
     assert infer.best(found) == drawn(points[1])
 
 
@@ -347,19 +450,32 @@ def test_the_command_line_refuses_what_it_cannot_do(tmp_path, capsys, monkeypatc
 def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkeypatch):
     some = tuple(s for s in sentences() if s.figure in {"6.1", "6.8", "4.4"})
     monkeypatch.setattr(judge, "SEEDS", (0,))
-    monkeypatch.setattr(judge, "sentences", lambda: some)
-    monkeypatch.setattr(findings, "sentences", lambda: some)
-    monkeypatch.setattr(infer, "sentences", lambda: some)
-    run = infer.Inference(tmp_path / "lab", Settings(8, 2, 1, 5), Stub(), "palpate laboratory --seed 5")
-    result = run.run()
+    for module in (judge, findings, infer, result, tables):
+        monkeypatch.setattr(module, "sentences", lambda: some)
+    monkeypatch.setattr(
+        infer, "searched", lambda *, calibrating: tuple(s for s in some if s.calibrates or not calibrating)
+    )
+    parts = []
+    run = infer.Inference(
+        tmp_path / "lab",
+        Settings(8, 2, 1, 5),
+        Stub(),
+        "palpate laboratory --seed 5",
+        told=lambda *one: parts.append(one),
+    )
+    told = run.run()
     found = msgspec.json.decode((tmp_path / "lab" / "found.json").read_bytes())
-    assert found["true"]["inferred from all"]["all"] == {"true": result.by_all.count(some), "of": len(some)}
-    assert files.named(str(tmp_path / "lab" / "inferred.toml")) == result.by_all.laboratory
+    assert found["true"]["inferred from all"]["all"] == {"true": told.by_all.count(some), "of": len(some)}
+    assert files.named(str(tmp_path / "lab" / "inferred.toml")) == told.by_all.laboratory
     assert "posterior" in (tmp_path / "lab" / "index.html").read_text()
+    assert "| hand-chosen bench |" in (tmp_path / "lab" / "found.md").read_text()
+    assert parts[0] == ("all sentences, prior", 0, 16)
+    assert [one for one in parts if one[1] > one[2]] == []
+    assert {row["name"] for row in found["predictive"]} >= {"drawn from the posterior of the half"}
     again = infer.Inference(
         tmp_path / "lab", Settings(8, 2, 1, 5), Stub(after=0), "palpate laboratory --seed 5"
     )
-    assert again.run().by_all == result.by_all
+    assert again.run().by_all == told.by_all
 
 
 def test_the_page_is_made_anew_only_by_the_same_search(tmp_path):

@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
 """Log-likelihoods of points, shape (n, d) -> (n,). Where one falls below its floor, the second argument of shape (n,),
 any number below the floor will do: the point is refused either way."""
+Begun = Callable[[float, int], None]
+"""Told at each temperature the power of the likelihood, and of how many points it will be asked there."""
 JITTER = 0.02
 """Added to each coordinate that moves, as a share of its prior: without it differences span what they began with."""
 LEAP = 0.1
@@ -57,9 +59,15 @@ class Sample:
     points: Array  # (particles, d)
     likelihood: Array  # logarithms, (particles,)
     stages: tuple[Stage, ...]
+    ancestors: NDArray[np.int64]  # the point of the prior that each comes from, (particles,)
 
 
-def sample(evaluate: Evaluate, redrawn: NDArray[np.bool_], settings: Settings) -> Sample:
+def sample(
+    evaluate: Evaluate,
+    redrawn: NDArray[np.bool_],
+    settings: Settings,
+    begun: Begun = lambda _power, _count: None,
+) -> Sample:
     """Points of the posterior under an even prior on the unit cube (Del Moral, Doucet and Jasra, 2006).
 
     From points of Sobol's sequence the likelihood's power grows from 0 to 1 so fast that the weights stay worth half
@@ -70,9 +78,11 @@ def sample(evaluate: Evaluate, redrawn: NDArray[np.bool_], settings: Settings) -
         evaluate: the likelihood; asked in the same order whenever the settings are the same.
         redrawn: coordinates whose neighbours mean nothing, shape (d,); they are drawn anew.
         settings: sizes and seed.
+        begun: told of each temperature, the prior's too.
     """
     rng = np.random.default_rng(settings.seed)
     points = prior(settings, len(redrawn))
+    begun(0.0, len(points))
     likelihood = evaluate(points, np.full(len(points), -np.inf))
     stages: list[Stage] = []
     beta, ancestor = 0.0, np.arange(len(points))
@@ -83,10 +93,11 @@ def sample(evaluate: Evaluate, redrawn: NDArray[np.bool_], settings: Settings) -
         effective = 1.0 / float(np.sum(weights**2))
         kept = _resampled(weights, settings.particles, rng)
         points, likelihood, ancestor = points[kept], likelihood[kept], ancestor[kept]
+        begun(beta, settings.moves * settings.particles)
         accepted = [_swept(evaluate, points, likelihood, redrawn, beta, rng) for _ in range(settings.moves)]
         distinct = len(np.unique(points, axis=0))
         stages.append(Stage(beta, effective, float(np.mean(accepted)), distinct, len(np.unique(ancestor))))
-    return Sample(points, likelihood, tuple(stages))
+    return Sample(points, likelihood, tuple(stages), ancestor)
 
 
 def prior(settings: Settings, dimensions: int) -> Array:
