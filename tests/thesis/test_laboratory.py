@@ -2,12 +2,14 @@
 
 import math
 import re
+from dataclasses import replace
 
 import msgspec
 import numpy as np
 import pytest
 
 from palpate.bench import Experiment, build, changed, load
+from palpate.bench.sequence import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.studies.cluster import Cluster
@@ -37,9 +39,18 @@ from palpate.thesis.inference.trial import Trial
 from palpate.thesis.laboratory import files
 from palpate.thesis.laboratory.laboratory import CHOSEN, Laboratory, checked, drawn, values
 from palpate.thesis.laboratory.surfaces import own_damping, stiffening
-from palpate.thesis.laboratory.unknowns import BY_NAME, LISTING, RELAXING, STIFFENING, UNKNOWNS
+from palpate.thesis.laboratory.unknowns import (
+    BY_NAME,
+    LINEAR,
+    LISTING,
+    RELAXING,
+    STIFFENING,
+    UNKNOWNS,
+    Unknown,
+)
 from palpate.thesis.least_squares import press_runs
 from palpate.thesis.measure import measure
+from palpate.thesis.neural_identifier.network import Press
 from palpate.thesis.runs import Runs
 from studies.cluster import local_cluster
 
@@ -89,6 +100,59 @@ def test_a_laboratory_changes_what_it_names():
     assert e.elastic is not None
     assert e.elastic.stiffness == 1e5
     assert e.friction.asymmetry == 0.2
+
+
+TRIED = {
+    "foam press": press_runs.PLAIN,
+    "rubber press": press_runs.RUBBER,
+    "steps on foam": FOAM,
+    "steps on rubber": RUBBER,
+    "sine on foam": changed(FOAM, SINE),
+}
+IN_THE_NETWORK = {"amplitude", "weights", "start"}  # of the identifier, which thinks after the run
+
+
+@pytest.mark.parametrize(
+    "unknown", [u for u in UNKNOWNS if u.name not in IN_THE_NETWORK], ids=lambda u: u.name
+)
+def test_every_unknown_enters_some_experiment(unknown: Unknown):
+    law = {"foam_branch": RELAXING, "foam_branch_time": RELAXING, "foam_exponent": STIFFENING}
+    base = replace(drawn([0.4] * len(UNKNOWNS)), foam_law=law.get(unknown.name, LINEAR))
+    other = replace(base, **{unknown.name: unknown.at(0.9)})
+    assert any(base.of(e) != other.of(e) for e in TRIED.values())
+
+
+@pytest.mark.parametrize(
+    ("case", "of"),
+    [
+        ("foam press", {"foam_law": STIFFENING}),
+        ("foam press", {"foam_law": RELAXING}),
+        ("foam press", {"roughness": 50.0}),
+        ("foam press", {"arm_stiffness": 1e5, "arm_frequency": 30.0}),
+        ("foam press", {"asymmetry": 0.3}),
+        ("foam press", {"beyond": 0.2}),
+        ("sine on foam", {"restart": 0.0}),
+        ("steps on foam", {"controller_weights": 2.0}),
+    ],
+    ids=str,
+)
+def test_what_no_figure_had_tried_changes_the_runs(case: str, of: dict[str, float]):
+    press = 5.5 if "restart" in of else 0.5  # the clock starts anew after 5 s
+    short = changed(TRIED[case], {"run.press": press, "run.steps": 5})
+    bench, other = (build(lab.of(short)).run(60.0, 0, press=press) for lab in (CHOSEN, Laboratory(**of)))
+    force = [record["force_measured"][record["phase"] == CONTACT] for record in (bench, other)]
+    rows = min(map(len, force))
+    assert rows > 100
+    assert not np.allclose(force[0][:rows], force[1][:rows])
+
+
+def test_the_identifiers_unknowns_enter_its_answer():
+    t = np.arange(4000) * 1e-3
+    inputs = np.column_stack([4e-3 * t / 4.0, np.full(4000, 1e-3), np.zeros(4000)])
+    press = Press("foam", inputs, 20.0 * t / 4.0, 5000.0, np.zeros((4000, 3)))
+    base = Trial(Laboratory(start=1.0))._answer(press)
+    for of in ({"amplitude": 80.0}, {"weights": 1.5}, {"start": 2.0}):
+        assert Trial(Laboratory(**{"start": 1.0, **of}))._answer(press) != base
 
 
 def test_foams_of_all_laws_sink_in_alike_from_5_to_20_N():
@@ -342,14 +406,14 @@ def test_what_cannot_be_is_not_bred():
 def test_relatives_are_worth_less_than_strangers():
     rng = np.random.default_rng(7)
     of = rng.standard_normal((400, 5))
-    strangers = sampler.Sample(of, np.zeros(400), (), np.arange(400))
+    strangers = sampler.Sample(of, np.zeros(400), (), of, np.arange(400))
     assert worth(strangers) == pytest.approx(400.0, rel=0.01)
     families = np.repeat(np.arange(40), 10)
-    copies = sampler.Sample(of[families], np.zeros(400), (), families)
+    copies = sampler.Sample(of, np.zeros(400), (), of[families], families)
     assert worth(copies) == pytest.approx(40.0, rel=0.05)
-    assert worth(sampler.Sample(of, np.zeros(400), (), np.zeros(400, dtype=int))) == pytest.approx(1.0)
+    assert worth(sampler.Sample(of, np.zeros(400), (), of, np.zeros(400, dtype=int))) == pytest.approx(1.0)
     # families that forgot their ancestor are strangers again: 40 of them know it to a fifth
-    forgot = sampler.Sample(of, np.zeros(400), (), families)
+    forgot = sampler.Sample(of, np.zeros(400), (), of, families)
     assert np.median(worth(forgot)) == pytest.approx(400.0, rel=0.4)
 
 
@@ -357,8 +421,8 @@ def test_the_sampler_tells_what_lies_before_it():
     told = []
     sample(gaussian, np.zeros(3, dtype=bool), Settings(40, 4, 2, 3), lambda *one: told.append(one))
     assert told[0] == (0.0, 160)
-    assert [count for _, count in told[1:]] == [80] * (len(told) - 1)
-    assert told[-1][0] == 1.0
+    assert [count for _, count in told[1:-1]] == [80] * (len(told) - 2)
+    assert told[-1] == (1.0, 240)
 
 
 def test_a_share_is_told_with_its_spread():
@@ -393,10 +457,10 @@ def test_marginals_say_what_is_told():
     assert re.fullmatch(r"[\d.]+ \([\d.]+ to [\d.]+\) times the bench's", found[0].in_words())
 
 
-def test_the_best_of_a_posterior_misses_fewest():
-    points = np.linspace(0.1, 0.9, 3)[:, None] * np.ones(len(UNKNOWNS))
-    found = sampler.Sample(points, np.array([-2.0, -1.0, -1.0]), (), np.arange(3))
-    assert infer.best(found) == drawn(points[1])
+def test_the_best_of_a_posterior_miss_fewest_and_differ():
+    points = np.linspace(0.1, 0.9, 4)[[0, 1, 1, 2, 3], None] * np.ones(len(UNKNOWNS))
+    found = sampler.Sample(points, np.array([-2.0, -1.0, -1.0, -1.0, -3.0]), (), points, np.arange(5))
+    assert infer.best(found) == [drawn(points[i]) for i in (1, 3, 0, 4)]
 
 
 def test_a_figure_is_measured_in_another_laboratory(tmp_path):
@@ -472,6 +536,7 @@ def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkey
     assert parts[0] == ("all sentences, prior", 0, 16)
     assert [one for one in parts if one[1] > one[2]] == []
     assert {row["name"] for row in found["predictive"]} >= {"drawn from the posterior of the half"}
+    monkeypatch.setattr(infer, "present", lambda *_: None)  # the page once is enough
     again = infer.Inference(
         tmp_path / "lab", Settings(8, 2, 1, 5), Stub(after=0), "palpate laboratory --seed 5"
     )

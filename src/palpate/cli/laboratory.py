@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def laboratory(
     *,
     out: Path = Path("runs/laboratory"),
-    particles: Annotated[int, Parameter(validator=validators.Number(gte=8, lte=100_000))] = 64,
+    particles: Annotated[int, Parameter(validator=validators.Number(gte=8, lte=100_000))] = 128,
     moves: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1000))] = 2,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=2**31 - 1))] = 1,
     cores: Annotated[int | None, Parameter(validator=validators.Number(gte=1, lte=1024))] = None,
@@ -42,7 +42,7 @@ def laboratory(
         out: folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there is
             gone on with.
         particles: points of the posterior; it begins with four times as many of the prior.
-        moves: of each particle at each temperature.
+        moves: of each particle at each temperature; three times as many at the last.
         seed: of everything drawn.
         cores: that try laboratories side by side; all when left out.
         half: search by the calibration half alone, in a third of the time; what it finds is looked at by all.

@@ -71,13 +71,13 @@ def _told(result: Result) -> str:
 
 
 def _worth(sample: Sample) -> str:
-    last, own = sample.stages[-1], worth(sample)
+    own, visited = worth(sample), len(np.unique(sample.visited, axis=0))
     return (
-        f"The posterior is {len(sample.points)} particles, {last.distinct} of which differ; they come from "
-        f"{last.ancestors} points of the prior. The mean of an unknown is known as from {np.median(own):.0f} "
-        f"independent laboratories (median of the unknowns; {own.min():.0f} to {own.max():.0f}). The fewer there are, "
-        "the more a narrow range tells where the search went, and the less what the thesis tells; more --particles are "
-        "surer."
+        f"The posterior is {len(sample.points)} particles, which visited {visited} laboratories; they come from "
+        f"{sample.stages[-1].ancestors} points of the prior. The mean of an unknown is known as from "
+        f"{np.median(own):.0f} independent laboratories (median of the unknowns; {own.min():.0f} to {own.max():.0f}). "
+        "The fewer there are, the more a narrow range tells where the search went, and the less what the thesis tells; "
+        "more --particles are surer."
     )
 
 
@@ -95,7 +95,7 @@ def drawn_figure(sample: Sample) -> Figure:
         style.plain(axis)
         count = len(unknown.choices) or bins
         axis.hist(
-            sample.points[:, i], bins=count, range=(0.0, 1.0), density=True, color=style.SERIES[0], alpha=0.8
+            sample.visited[:, i], bins=count, range=(0.0, 1.0), density=True, color=style.SERIES[0], alpha=0.8
         )
         axis.axhline(1.0, color=style.MEASURED, linewidth=1.0)
         axis.set_title(unknown.name.replace("_", " "), fontsize=8, loc="left")

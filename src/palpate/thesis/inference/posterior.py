@@ -60,7 +60,7 @@ def worth(sample: Sample) -> Array:
     The variance of a mean is estimated by families, the particles of one ancestor, which are taken to be independent of
     each other and of nothing else (Chan and Lai, 2013): many moves make relatives strangers, few do not.
     """
-    away = sample.points - sample.points.mean(axis=0)
+    away = sample.visited - sample.visited.mean(axis=0)
     families = np.array([away[sample.ancestors == one].sum(axis=0) for one in np.unique(sample.ancestors)])
     most, count = len(away), len(families)
     if count == 1:

@@ -57,8 +57,9 @@ class Result:
         half: the posterior by the half that calibrates.
         all: by all sentences; None where only the half was asked for.
         bench: the hand-chosen laboratory, judged.
-        by_half, by_all: the laboratory of each posterior that misses fewest sentences, over ten seeds.
+        by_half, by_all: the best laboratory of each posterior, by the sentences it was inferred from, over ten seeds.
         bred: the laboratory that was bred for as many sentences as can be had, over ten seeds.
+        judged: all laboratories that were looked at over ten seeds.
         predictive: what laboratories drawn make of the sentences.
         sets: sentences never true together, each set searched for by itself.
         table: verdicts of all laboratories that were tried.
@@ -70,6 +71,7 @@ class Result:
     by_half: Judged
     by_all: Judged
     bred: Judged
+    judged: Sequence[Judged]
     predictive: Sequence[Predictive]
     sets: Sequence[Contradiction]
     table: Table
@@ -80,11 +82,6 @@ class Result:
         return self.half if self.all is None else self.all
 
     @property
-    def judged(self) -> tuple[Judged, ...]:
-        """All laboratories over ten seeds."""
-        return self.bench, self.by_half, self.by_all, self.bred
-
-    @property
     def better(self) -> bool:
         """Whether the laboratory by half is better than the bench on the half that was held out."""
         return self.by_half.count(judge.validation()) > self.bench.count(judge.validation())
@@ -92,7 +89,7 @@ class Result:
     @property
     def largest(self) -> Judged:
         """The laboratory with the largest set of sentences that hold at once over ten seeds."""
-        return max(self.judged[::-1], key=lambda j: j.count(sentences()))
+        return max(self.judged, key=lambda j: j.count(sentences()))
 
     @property
     def never(self) -> list[Alone]:
@@ -145,7 +142,7 @@ def as_json(result: Result, command: str) -> dict[str, Any]:
         "predictive": [asdict(one) for one in result.predictive],
         "laboratories": {name: values(one.laboratory) for name, one in laboratories(result).items()},
         "largest": [s.id for s in sentences() if result.largest.true(s)],
-        "posterior": [_told_of(m) for m in marginals(result.posterior.points)],
+        "posterior": [_told_of(m) for m in marginals(result.posterior.visited)],
         "never": [{**asdict(a), "reason": reasons().get(a.id, "")} for a in result.never],
         "never_together": [_told_together(c) for c in result.contradictions],
         "tried": len(result.table.true),

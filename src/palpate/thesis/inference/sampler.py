@@ -23,6 +23,9 @@ LEAP = 0.1
 TOGETHER = 0.25
 """Share of the coordinates that move at once."""
 
+LAST = 3
+"""Times as many moves at the last temperature: there each of them adds to the posterior."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -35,10 +38,14 @@ class Settings:
         seed: of everything drawn.
     """
 
-    particles: int = 64
+    particles: int = 128
     first: int = 4
     moves: int = 2
     seed: int = 1
+
+    def at(self, power: float) -> int:
+        """Moves of each particle at this power of the likelihood; where it stands after the last is the posterior."""
+        return self.moves if power < 1.0 else LAST * self.moves
 
 
 @dataclass(frozen=True)
@@ -54,12 +61,21 @@ class Stage:
 
 @dataclass(frozen=True)
 class Sample:
-    """The posterior as points of equal weight."""
+    """The posterior as points of equal weight.
 
-    points: Array  # (particles, d)
-    likelihood: Array  # logarithms, (particles,)
+    Args:
+        points: where the particles stand in the end, shape (particles, d).
+        likelihood: logarithms, shape (particles,).
+        stages: the temperatures.
+        visited: where they stood after each move at the last temperature, shape (n, d): the posterior.
+        ancestors: the point of the prior that each of these comes from, shape (n,).
+    """
+
+    points: Array
+    likelihood: Array
     stages: tuple[Stage, ...]
-    ancestors: NDArray[np.int64]  # the point of the prior that each comes from, (particles,)
+    visited: Array
+    ancestors: NDArray[np.int64]
 
 
 def sample(
@@ -93,11 +109,14 @@ def sample(
         effective = 1.0 / float(np.sum(weights**2))
         kept = _resampled(weights, settings.particles, rng)
         points, likelihood, ancestor = points[kept], likelihood[kept], ancestor[kept]
-        begun(beta, settings.moves * settings.particles)
-        accepted = [_swept(evaluate, points, likelihood, redrawn, beta, rng) for _ in range(settings.moves)]
+        begun(beta, settings.at(beta) * settings.particles)
+        accepted, visited = [], []
+        for _ in range(settings.at(beta)):
+            accepted.append(_swept(evaluate, points, likelihood, redrawn, beta, rng))
+            visited.append(points.copy())
         distinct = len(np.unique(points, axis=0))
         stages.append(Stage(beta, effective, float(np.mean(accepted)), distinct, len(np.unique(ancestor))))
-    return Sample(points, likelihood, tuple(stages), ancestor)
+    return Sample(points, likelihood, tuple(stages), np.vstack(visited), np.tile(ancestor, len(visited)))
 
 
 def prior(settings: Settings, dimensions: int) -> Array:

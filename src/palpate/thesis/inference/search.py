@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -191,6 +191,7 @@ def borrowed(path: Path, head: Head, of: Sequence[Sentence], wanted: Sequence[Se
     }
 
 
+@cache
 def stamp() -> str:
     """Hash of the sources that a trial consists of."""
     here = Path(__file__).parent

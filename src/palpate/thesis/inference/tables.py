@@ -60,7 +60,7 @@ def posterior(result: Result) -> Table:
     """Of each unknown."""
     rows = [
         [m.unknown.name.replace("_", " "), _prior(m.unknown), m.in_words(), m.verdict]
-        for m in marginals(result.posterior.points)
+        for m in marginals(result.posterior.visited)
     ]
     head = ("unknown", "prior", "posterior: middle (5 to 95 %)", "the thesis tells it?")
     return Table("What the thesis tells of its laboratory", head, rows)
@@ -80,7 +80,7 @@ def _searches(result: Result) -> Table:
         *(
             "by",
             "particles",
-            "that differ",
+            "laboratories they visited",
             "ancestors in the prior",
             "worth: median of the unknowns (least)",
         ),
@@ -92,7 +92,7 @@ def _searches(result: Result) -> Table:
 def _sizes(sample: Sample) -> Sequence[str]:
     misses, last, own = -sample.likelihood / MISS, sample.stages[-1], worth(sample)
     effective = f"{np.median(own):.0f} ({own.min():.0f})"
-    numbers = (len(sample.points), last.distinct, last.ancestors)
+    numbers = (len(sample.points), len(np.unique(sample.visited, axis=0)), last.ancestors)
     ends = f"{last.accepted:.0%}", f"{misses.min():.0f}", f"{misses.max():.0f}"
     return (*map(str, numbers), effective, str(len(sample.stages)), *ends)
 
