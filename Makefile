@@ -67,7 +67,8 @@ leaderboard: .venv/dev.stamp ## put force controllers to the same touches again,
 laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and put what was found into docs/laboratory.md; resumable
 	$(BIN)/palpate laboratory --particles 128 --seed 1 --out runs/laboratory
 	cp runs/laboratory/inferred.toml src/palpate/thesis/laboratory/shipped/inferred.toml
-	$(BIN)/python benchmarks/laboratory/document.py runs/laboratory/found.md --markdown docs/laboratory.md
+	$(BIN)/palpate thesis --laboratory inferred --out runs/thesis-inferred --force
+	$(BIN)/python benchmarks/laboratory/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean --strict
