@@ -29,9 +29,10 @@ from palpate.thesis.inference import (
     tables,
 )
 from palpate.thesis.inference.archive import Tried
-from palpate.thesis.inference.directed import bred
+from palpate.thesis.inference.directed import Bred, bred
 from palpate.thesis.inference.posterior import marginals, worth
 from palpate.thesis.inference.predictive import drawn_shares, judged_shares
+from palpate.thesis.inference.result import EXCLUDED, IMPOSSIBLE, NOT_FOUND, Contradiction, reasons
 from palpate.thesis.inference.sampler import Settings, sample
 from palpate.thesis.inference.search import MISS, Job, Search, Threads, Workers
 from palpate.thesis.inference.sentences import HOLDS, TELLING_FIRST, searched, sentences
@@ -401,6 +402,23 @@ def test_what_cannot_be_is_not_bred():
     runner = Never(0.5)
     found = bred(("0", "1"), halves_apart(0.5), runner, 40, 1)
     assert (found.most, found.tries, runner.asked) == (1, 40, 40)
+
+
+def test_a_contradiction_is_called_what_is_known_of_it():
+    ids = tuple(s.id for s in searched(calibrating=False))
+    law, plain = next(iter(reasons())), f"{ids[0]} + {ids[1]}"
+    for names in reasons():
+        parts = names.split(" + ")
+        assert [i for i in ids if i in parts] == parts, "unknown names, or not in the order of the search"
+
+    def one(names: str, expected: float, most: int) -> Contradiction:
+        together = contradictions.Together(tuple(names.split(" + ")), (9, 9), 20, expected, 10.0)
+        return Contradiction(together, Bred(96, most, ()))
+
+    assert one(law, 4.0, 1).verdict == IMPOSSIBLE
+    assert one(plain, 12.0, 1).verdict == EXCLUDED
+    assert one(plain, 4.0, 1).verdict == NOT_FOUND
+    assert not one(law, 12.0, 2).stands
 
 
 def test_relatives_are_worth_less_than_strangers():

@@ -66,8 +66,15 @@ def _told(result: Result) -> str:
     return (
         f"On the half that was held out, the laboratory inferred from the other half {better} the hand-chosen bench, "
         f"which {follows}. The largest set of sentences found true at once has {result.largest.count(sentences())} of "
-        f"{len(sentences())}; {len(result.table.true)} laboratories were tried."
+        f"{len(sentences())}; {len(result.table.true)} laboratories were tried. "
+        f"{_never(len(result.never))}"
     )
+
+
+def _never(count: int) -> str:
+    if not count:
+        return "Each sentence that was searched for is true in some of them."
+    return f"{count} {'sentence is' if count == 1 else 'sentences are'} true in none of them."
 
 
 def _worth(sample: Sample) -> str:

@@ -21,7 +21,7 @@ from palpate.thesis.inference.sampler import Sample
 from palpate.thesis.inference.sentences import Sentence, sentences
 from palpate.thesis.laboratory.laboratory import values
 
-NOT_FOUND, EXCLUDED, IMPOSSIBLE = "not found", "exclude each other", "impossible"
+NOT_FOUND, EXCLUDED, IMPOSSIBLE = "not found", "exclude each other", "impossible in the ranges"
 
 
 @dataclass(frozen=True)
