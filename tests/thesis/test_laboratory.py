@@ -421,6 +421,25 @@ def test_a_contradiction_is_called_what_is_known_of_it():
     assert not one(law, 12.0, 2).stands
 
 
+def test_a_laboratory_is_better_only_beyond_chance():
+    validation = [s.id for s in judge.validation()]
+
+    def against(only_there: int, only_here: int) -> result.Result:
+        there = dict.fromkeys((s.id for s in sentences()), 0)
+        here = dict(there)
+        there.update(dict.fromkeys(validation[:only_there], 10))
+        here.update(dict.fromkeys(validation[only_there : only_there + only_here], 10))
+        none = sampler.Sample(*([()] * 5))
+        lab, bench = judge.Judged(CHOSEN, 10, there), judge.Judged(CHOSEN, 10, here)
+        return result.Result(none, None, bench, lab, lab, lab, (), (), (), None)
+
+    assert against(5, 4).held_out == (5, 4)
+    assert against(5, 4).by_chance == pytest.approx(0.5)  # of nine heads or tails five or more
+    assert not against(5, 4).better
+    assert against(5, 0).by_chance == pytest.approx(1.0 / 32.0)
+    assert against(5, 0).better
+
+
 def test_relatives_are_worth_less_than_strangers():
     rng = np.random.default_rng(7)
     of = rng.standard_normal((400, 5))

@@ -61,12 +61,13 @@ def _rows(table: Table) -> str:
 
 
 def _told(result: Result) -> str:
-    better = "is better than" if result.better else "is not better than"
-    follows = "could take its place" if result.better else "stays the default"
+    there, here = result.held_out
+    follows = "It could take its place." if result.better else "The bench stays the default."
     return (
-        f"On the half that was held out, the laboratory inferred from the other half {better} the hand-chosen bench, "
-        f"which {follows}. The largest set of sentences found true at once has {result.largest.count(sentences())} of "
-        f"{len(sentences())}; {len(result.table.true)} laboratories were tried. "
+        f"On the half that was held out, {there} sentences are true only in the laboratory inferred from the other "
+        f"half, {here} only on the hand-chosen bench; were it no better, chance would make it look as good with a "
+        f"probability of {result.by_chance:.2g}. {follows} The largest set of sentences found true at once has "
+        f"{result.largest.count(sentences())} of {len(sentences())}; {len(result.table.true)} laboratories were tried. "
         f"{_never(len(result.never))}"
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -12,7 +13,7 @@ import msgspec
 import numpy as np
 
 from palpate.thesis.inference import judge
-from palpate.thesis.inference.contradictions import Alone, Table, Together
+from palpate.thesis.inference.contradictions import CHANCE, Alone, Table, Together
 from palpate.thesis.inference.directed import Bred
 from palpate.thesis.inference.judge import Judged
 from palpate.thesis.inference.posterior import Marginal, marginals, worth
@@ -82,9 +83,21 @@ class Result:
         return self.half if self.all is None else self.all
 
     @property
+    def held_out(self) -> tuple[int, int]:
+        """Sentences of the half held out that are true only in the laboratory by half, and only on the bench."""
+        there, here = ({s.id for s in judge.validation() if j.true(s)} for j in (self.by_half, self.bench))
+        return len(there - here), len(here - there)
+
+    @property
+    def by_chance(self) -> float:
+        """How probable so good a laboratory is on the half held out, were it no better than the bench: a sign test."""
+        there, here = self.held_out
+        return sum(math.comb(there + here, k) for k in range(there, there + here + 1)) / 2.0 ** (there + here)
+
+    @property
     def better(self) -> bool:
-        """Whether the laboratory by half is better than the bench on the half that was held out."""
-        return self.by_half.count(judge.validation()) > self.bench.count(judge.validation())
+        """Whether the laboratory by half is better than the bench on the half held out, beyond chance."""
+        return self.by_chance <= CHANCE
 
     @property
     def largest(self) -> Judged:
@@ -134,7 +147,12 @@ def as_json(result: Result, command: str) -> dict[str, Any]:
     """The page's numbers."""
     return {
         "command": command,
-        "better_on_validation_half": result.better,
+        "held_out": {
+            "only_inferred": result.held_out[0],
+            "only_bench": result.held_out[1],
+            "by_chance": result.by_chance,
+            "better": result.better,
+        },
         "true": {
             name: {half: {"true": one.count(of), "of": len(of)} for half, of in halves().items()}
             for name, one in laboratories(result).items()
