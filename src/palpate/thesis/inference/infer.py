@@ -25,11 +25,11 @@ STATE, ALL, HALF, PREDICTED = "inference.json", "all.jsonl", "half.jsonl", "pred
 JUDGED, BRED = "judged.json", "bred.json"
 PREDICTIVE = 20_000_000
 """Number of the first laboratory whose sentences are predicted, so that its noise is none that a search has seen."""
-SURELY, TRIES = 12, 96
+SURELY, TRIES = 6, 64
 """Sets of each size that are searched for by themselves, those that chance explains least; and laboratories for
 each of them."""
 
-CANDIDATES = 4
+CANDIDATES = 3
 """Laboratories of a posterior that are looked at over ten seeds: which of those that miss fewest sentences in one run
 is best, the sentences that it was inferred from say over ten."""
 
@@ -111,7 +111,11 @@ class Inference:
 
     def _tables(self, half: Sample) -> tuple[Table, Table, Table]:
         """Of the prior, of the posterior by half, and of every laboratory that was tried, each once."""
-        predicted = self._search("posterior of the half, by all sentences", calibrating=False)
+
+        def progress(_power: float, done: int, of: int) -> None:
+            self.told("posterior of the half, by all sentences", done, of)
+
+        predicted = Search(searched(calibrating=False), self.settings, self.runner, progress)
         predicted.watched(self.folder / PREDICTED, half.points, PREDICTIVE)
         begun = self.settings.first * self.settings.particles
         ids = tuple(s.id for s in predicted.sentences)
