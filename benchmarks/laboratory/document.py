@@ -23,11 +23,12 @@ def main() -> None:
     """The document without its first line, which says who made it, and the count of the claims."""
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("laboratory", type=Path)
-    asked.add_argument("--thesis", type=Path, required=True)
+    asked.add_argument("--thesis", type=Path)
     asked.add_argument("--markdown", type=Path, required=True)
     words = asked.parse_args()
     found = (words.laboratory / DOCUMENT).read_text("utf-8").partition("\n")[2].strip()
-    body = f"{MARKS[0]}\n\n{found}\n\n{_thesis(words.laboratory, words.thesis)}\n\n{MARKS[1]}"
+    parts = [MARKS[0], found, *([_thesis(words.laboratory, words.thesis)] if words.thesis else []), MARKS[1]]
+    body = "\n\n".join(parts)
     text = words.markdown.read_text("utf-8")
     new, count = re.subn(f"{MARKS[0]}.*?{MARKS[1]}", lambda _: body, text, flags=re.DOTALL)
     assert count == 1, f"{words.markdown} has no marks for what was found"

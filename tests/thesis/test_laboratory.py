@@ -431,7 +431,7 @@ def test_a_laboratory_is_better_only_beyond_chance():
         here.update(dict.fromkeys(validation[only_there : only_there + only_here], 10))
         none = sampler.Sample(*([()] * 5))
         lab, bench = judge.Judged(CHOSEN, 10, there), judge.Judged(CHOSEN, 10, here)
-        return result.Result(none, None, bench, lab, lab, lab, (), (), (), None)
+        return result.Result(none, None, bench, lab, lab, (), (), (), None)
 
     assert against(5, 4).held_out == (5, 4)
     assert against(5, 4).by_chance == pytest.approx(0.5)  # of nine heads or tails five or more

@@ -10,7 +10,6 @@ import numpy as np
 from palpate.files import MADE, kept_folder, signed, write_json, write_text
 from palpate.thesis.inference import archive, contradictions, judge, search
 from palpate.thesis.inference.contradictions import Table
-from palpate.thesis.inference.directed import Bred
 from palpate.thesis.inference.findings import present
 from palpate.thesis.inference.kept import Book, Nest, Told
 from palpate.thesis.inference.predictive import drawn_shares, judged_shares
@@ -92,9 +91,9 @@ class Inference:
 
     def _result(self, half: Sample, whole: Sample | None) -> Result:
         prior, posterior, table = self._tables(half)
-        sets, most = self._bred(table)
+        sets = self._bred(table)
         book = Book(self.folder / JUDGED, self.threads, self.told)
-        bench, bred = book.judged(CHOSEN), book.judged(drawn(most.shares))
+        bench = book.judged(CHOSEN)
         of_half = [book.judged(one) for one in best(half)]
         of_all = [] if whole is None else [book.judged(one) for one in best(whole)]
         by_half = max(of_half, key=lambda one: one.count(judge.calibration()))
@@ -106,8 +105,8 @@ class Inference:
             judged_shares("inferred from the half: its best", by_half, of),
             judged_shares("hand-chosen bench", bench, of),
         )
-        judged = (bench, bred, *of_half, *of_all)
-        return Result(half, whole, bench, by_half, by_all, bred, judged, shares, sets, table)
+        judged = (bench, *of_half, *of_all)
+        return Result(half, whole, bench, by_half, by_all, judged, shares, sets, table)
 
     def _tables(self, half: Sample) -> tuple[Table, Table, Table]:
         """Of the prior, of the posterior by half, and of every laboratory that was tried, each once."""
@@ -132,8 +131,8 @@ class Inference:
             contradictions.joined(whole, posterior, contradictions.table(half_ids, later)),
         )
 
-    def _bred(self, table: Table) -> tuple[list[Contradiction], Bred]:
-        """Each of the surest contradictions, searched for by itself; and the most sentences that could be had."""
+    def _bred(self, table: Table) -> list[Contradiction]:
+        """Each of the surest contradictions, searched for by itself."""
         never = table.never_together()
         some = [one for size in (2, 3) for one in [n for n in never if len(n.ids) == size][:SURELY]]
         nest = Nest(self.folder / BRED, table, self.runner, self.settings.seed)
@@ -141,8 +140,7 @@ class Inference:
         for i, one in enumerate(some):
             self.told("bred for what was never true together", i, len(some))
             found.append(Contradiction(one, nest.bred(one.ids, TRIES)))
-        self.told("bred for all sentences", 0, 1)
-        return found, nest.bred(table.ids, 2 * TRIES)
+        return found
 
 
 def best(sample: Sample) -> list[Laboratory]:

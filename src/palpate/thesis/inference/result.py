@@ -59,7 +59,6 @@ class Result:
         all: by all sentences; None where only the half was asked for.
         bench: the hand-chosen laboratory, judged.
         by_half, by_all: the best laboratory of each posterior, by the sentences it was inferred from, over ten seeds.
-        bred: the laboratory that was bred for as many sentences as can be had, over ten seeds.
         judged: all laboratories that were looked at over ten seeds.
         predictive: what laboratories drawn make of the sentences.
         sets: sentences never true together, each set searched for by itself.
@@ -71,7 +70,6 @@ class Result:
     bench: Judged
     by_half: Judged
     by_all: Judged
-    bred: Judged
     judged: Sequence[Judged]
     predictive: Sequence[Predictive]
     sets: Sequence[Contradiction]
@@ -127,7 +125,7 @@ def laboratories(result: Result) -> dict[str, Judged]:
     found = {"hand-chosen bench": result.bench, "inferred from the half": result.by_half}
     if result.all is not None:
         found["inferred from all"] = result.by_all
-    return {**found, "bred for all": result.bred}
+    return found
 
 
 def samples(result: Result) -> dict[str, Sample]:
