@@ -28,7 +28,7 @@ SURELY, TRIES = 6, 64
 """Sets of each size that are searched for by themselves, those that chance explains least; and laboratories for
 each of them."""
 
-CANDIDATES = 3
+CANDIDATES = 2
 """Laboratories of a posterior that are looked at over ten seeds: which of those that miss fewest sentences in one run
 is best, the sentences that it was inferred from say over ten."""
 

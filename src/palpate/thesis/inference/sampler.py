@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,10 +120,13 @@ def sample(
     return Sample(points, likelihood, tuple(stages), np.vstack(visited), np.tile(ancestor, len(visited)))
 
 
+@cache
 def prior(settings: Settings, dimensions: int) -> Array:
-    """The points of the prior that sampling begins with, shape (n, d)."""
+    """The points of the prior that sampling begins with, shape (n, d); not to be written to."""
     sobol = Sobol(dimensions, settings.seed)
-    return np.array([sobol.point(i) for i in range(settings.first * settings.particles)])
+    points = np.array([sobol.point(i) for i in range(settings.first * settings.particles)])
+    points.flags.writeable = False
+    return points
 
 
 def _step(likelihood: Array, room: float, wanted: float) -> float:
