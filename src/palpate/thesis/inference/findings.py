@@ -110,7 +110,14 @@ def drawn_figure(sample: Sample) -> Figure:
         axis.set(xlim=(0.0, 1.0), yticks=[])
         if unknown.choices:
             middles = (np.arange(count) + 0.5) / count
-            axis.set_xticks(middles, [named(unknown, v).split()[0] for v in unknown.choices], fontsize=6)
+            axis.set_xticks(
+                middles,
+                [
+                    named(unknown, v).removeprefix("the ").removeprefix("seed ").split()[0]
+                    for v in unknown.choices
+                ],
+                fontsize=6,
+            )
         else:
             axis.set_xticks([0.0, 1.0], [f"{unknown.low:g}", f"{unknown.high:g}"], fontsize=6)
     return drawing
