@@ -7,6 +7,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from palpate.bench import Experiment, build, changed, load
 from palpate.bench.sequence import CONTACT
@@ -49,7 +50,7 @@ from palpate.thesis.laboratory.unknowns import (
     UNKNOWNS,
     Unknown,
 )
-from palpate.thesis.least_squares import press_runs
+from palpate.thesis.least_squares import panels, press_runs
 from palpate.thesis.measure import measure
 from palpate.thesis.neural_identifier.network import Press
 from palpate.thesis.runs import Runs
@@ -548,6 +549,15 @@ def test_the_command_line_refuses_what_it_cannot_do(tmp_path, capsys, monkeypatc
 
 
 @pytest.mark.long
+def test_a_press_that_ended_before_the_slot_leaves_its_panel_alone():
+    axis = Figure().subplots()
+    panels.calm_limits(axis, np.array([1.0, 3.0]), np.empty(0), np.full(3, np.nan))
+    assert axis.get_ylim() == pytest.approx((0.5, 3.5))
+    before = axis.get_ylim()
+    panels.calm_limits(axis, np.empty(0))
+    assert axis.get_ylim() == before
+
+
 def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkeypatch):
     some = tuple(s for s in sentences() if s.figure in {"6.1", "6.8", "4.4"})
     monkeypatch.setattr(judge, "SEEDS", (0,))
