@@ -434,7 +434,7 @@ def test_a_laboratory_is_better_only_beyond_chance():
         lab, bench = judge.Judged(CHOSEN, 10, there), judge.Judged(CHOSEN, 10, here)
         return result.Result(none, None, bench, lab, lab, (), (), (), None)
 
-    assert against(5, 4).held_out == (5, 4)
+    assert against(5, 4).cross_validation == (5, 4)
     assert against(5, 4).by_chance == pytest.approx(0.5)  # of nine heads or tails five or more
     assert not against(5, 4).better
     assert against(5, 0).by_chance == pytest.approx(1.0 / 32.0)

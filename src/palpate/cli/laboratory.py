@@ -16,7 +16,7 @@ from palpate.cli.study import Lines
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from palpate.thesis.inference.kept import Told
+    from palpate.thesis.inference.kept import Progress as Told
     from palpate.thesis.inference.result import Result
     from palpate.thesis.inference.search import Runner
 

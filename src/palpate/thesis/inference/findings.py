@@ -61,7 +61,7 @@ def _rows(table: Table) -> str:
 
 
 def _told(result: Result) -> str:
-    there, here = result.held_out
+    there, here = result.cross_validation
     follows = "It could take its place." if result.better else "The bench stays the default."
     return (
         f"On the half that was held out, {there} sentences are true only in the laboratory inferred from the other "

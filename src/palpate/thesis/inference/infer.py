@@ -11,7 +11,7 @@ from palpate.files import MADE, kept_folder, signed, write_json, write_text
 from palpate.thesis.inference import archive, contradictions, judge, search
 from palpate.thesis.inference.contradictions import Table
 from palpate.thesis.inference.findings import present
-from palpate.thesis.inference.kept import Book, Nest, Told
+from palpate.thesis.inference.kept import Book, Nest, Progress
 from palpate.thesis.inference.predictive import drawn_shares, judged_shares
 from palpate.thesis.inference.result import Contradiction, Result
 from palpate.thesis.inference.sampler import Sample, Settings
@@ -53,7 +53,7 @@ class Inference:
     command: str
     threads: int = 1
     half: bool = False
-    told: Told = lambda _what, _done, _of: None
+    told: Progress = lambda _what, _done, _of: None
 
     def run(self, *, force: bool = False) -> Result:
         """Goes on from where the folder stands.

@@ -22,7 +22,7 @@ from palpate.thesis.laboratory.laboratory import Laboratory
 T = TypeVar("T")
 
 
-class Told(Protocol):
+class Progress(Protocol):
     """Told what is under way, and how many laboratories of how many are done in it."""
 
     def __call__(self, what: str, done: int, of: int, /) -> None:
@@ -42,7 +42,7 @@ class _Rows(msgspec.Struct):
 class Book:
     """Laboratories that were judged, kept in a file."""
 
-    def __init__(self, path: Path, threads: int, told: Told):
+    def __init__(self, path: Path, threads: int, told: Progress):
         self._path, self._threads, self._told = path, threads, told
         self._stamp = search.stamp()
         self._rows = {row.key: row.held for row in _kept(path, _Rows, _Rows([])).rows}

@@ -81,7 +81,7 @@ class Result:
         return self.half if self.all is None else self.all
 
     @property
-    def held_out(self) -> tuple[int, int]:
+    def cross_validation(self) -> tuple[int, int]:
         """Sentences of the half held out that are true only in the laboratory by half, and only on the bench."""
         there, here = ({s.id for s in judge.validation() if j.true(s)} for j in (self.by_half, self.bench))
         return len(there - here), len(here - there)
@@ -89,7 +89,7 @@ class Result:
     @property
     def by_chance(self) -> float:
         """How probable so good a laboratory is on the half held out, were it no better than the bench: a sign test."""
-        there, here = self.held_out
+        there, here = self.cross_validation
         return sum(math.comb(there + here, k) for k in range(there, there + here + 1)) / 2.0 ** (there + here)
 
     @property
@@ -146,8 +146,8 @@ def as_json(result: Result, command: str) -> dict[str, Any]:
     return {
         "command": command,
         "held_out": {
-            "only_inferred": result.held_out[0],
-            "only_bench": result.held_out[1],
+            "only_inferred": result.cross_validation[0],
+            "only_bench": result.cross_validation[1],
             "by_chance": result.by_chance,
             "better": result.better,
         },
