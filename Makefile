@@ -64,9 +64,11 @@ trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put t
 leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
 	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
 
-laboratory: .venv/run.stamp ## infer the thesis' laboratory from half of its figures again, and ship it; resumable
-	$(BIN)/palpate laboratory --half --particles 32 --seed 1 --out runs/laboratory
+laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and put what was found into docs/laboratory.md; resumable
+	$(BIN)/palpate laboratory --particles 128 --seed 1 --out runs/laboratory
 	cp runs/laboratory/inferred.toml src/palpate/thesis/laboratory/shipped/inferred.toml
+	$(BIN)/palpate thesis --laboratory inferred --out runs/thesis-inferred --force
+	$(BIN)/python benchmarks/laboratory/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean --strict

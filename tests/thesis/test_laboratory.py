@@ -2,12 +2,15 @@
 
 import math
 import re
+from dataclasses import replace
 
 import msgspec
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from palpate.bench import Experiment, build, changed, load
+from palpate.bench.sequence import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.studies.cluster import Cluster
@@ -15,19 +18,41 @@ from palpate.thesis.claims import Claim, count_in_words, counted, with_wholes
 from palpate.thesis.conditions import rougher
 from palpate.thesis.figure import studies, study
 from palpate.thesis.force_control.tracking import FOAM, RUBBER, SINE
-from palpate.thesis.inference import archive, contradictions, findings, infer, judge, sampler, search
+from palpate.thesis.inference import (
+    archive,
+    contradictions,
+    findings,
+    infer,
+    judge,
+    result,
+    sampler,
+    search,
+    tables,
+)
 from palpate.thesis.inference.archive import Tried
-from palpate.thesis.inference.posterior import marginals
+from palpate.thesis.inference.directed import Bred, bred
+from palpate.thesis.inference.posterior import marginals, worth
+from palpate.thesis.inference.predictive import drawn_shares, judged_shares
+from palpate.thesis.inference.result import EXCLUDED, IMPOSSIBLE, NOT_FOUND, Contradiction, reasons
 from palpate.thesis.inference.sampler import Settings, sample
 from palpate.thesis.inference.search import MISS, Job, Search, Threads, Workers
-from palpate.thesis.inference.sentences import CHEAP_FIRST, HOLDS, searched, sentences
+from palpate.thesis.inference.sentences import HOLDS, TELLING_FIRST, searched, sentences
 from palpate.thesis.inference.trial import Trial
 from palpate.thesis.laboratory import files
 from palpate.thesis.laboratory.laboratory import CHOSEN, Laboratory, checked, drawn, values
 from palpate.thesis.laboratory.surfaces import own_damping, stiffening
-from palpate.thesis.laboratory.unknowns import BY_NAME, LISTING, RELAXING, STIFFENING, UNKNOWNS
-from palpate.thesis.least_squares import press_runs
+from palpate.thesis.laboratory.unknowns import (
+    BY_NAME,
+    LINEAR,
+    LISTING,
+    RELAXING,
+    STIFFENING,
+    UNKNOWNS,
+    Unknown,
+)
+from palpate.thesis.least_squares import panels, press_runs
 from palpate.thesis.measure import measure
+from palpate.thesis.neural_identifier.network import Press
 from palpate.thesis.runs import Runs
 from studies.cluster import local_cluster
 
@@ -77,6 +102,59 @@ def test_a_laboratory_changes_what_it_names():
     assert e.elastic is not None
     assert e.elastic.stiffness == 1e5
     assert e.friction.asymmetry == 0.2
+
+
+TRIED = {
+    "foam press": press_runs.PLAIN,
+    "rubber press": press_runs.RUBBER,
+    "steps on foam": FOAM,
+    "steps on rubber": RUBBER,
+    "sine on foam": changed(FOAM, SINE),
+}
+IN_THE_NETWORK = {"amplitude", "weights", "start"}  # of the identifier, which thinks after the run
+
+
+@pytest.mark.parametrize(
+    "unknown", [u for u in UNKNOWNS if u.name not in IN_THE_NETWORK], ids=lambda u: u.name
+)
+def test_every_unknown_enters_some_experiment(unknown: Unknown):
+    law = {"foam_branch": RELAXING, "foam_branch_time": RELAXING, "foam_exponent": STIFFENING}
+    base = replace(drawn([0.4] * len(UNKNOWNS)), foam_law=law.get(unknown.name, LINEAR))
+    other = replace(base, **{unknown.name: unknown.at(0.9)})
+    assert any(base.of(e) != other.of(e) for e in TRIED.values())
+
+
+@pytest.mark.parametrize(
+    ("case", "of"),
+    [
+        ("foam press", {"foam_law": STIFFENING}),
+        ("foam press", {"foam_law": RELAXING}),
+        ("foam press", {"roughness": 50.0}),
+        ("foam press", {"arm_stiffness": 1e5, "arm_frequency": 30.0}),
+        ("foam press", {"asymmetry": 0.3}),
+        ("foam press", {"beyond": 0.2}),
+        ("sine on foam", {"restart": 0.0}),
+        ("steps on foam", {"controller_weights": 2.0}),
+    ],
+    ids=str,
+)
+def test_what_no_figure_had_tried_changes_the_runs(case: str, of: dict[str, float]):
+    press = 5.5 if "restart" in of else 0.5  # the clock starts anew after 5 s
+    short = changed(TRIED[case], {"run.press": press, "run.steps": 5})
+    bench, other = (build(lab.of(short)).run(60.0, 0, press=press) for lab in (CHOSEN, Laboratory(**of)))
+    force = [record["force_measured"][record["phase"] == CONTACT] for record in (bench, other)]
+    rows = min(map(len, force))
+    assert rows > 100
+    assert not np.allclose(force[0][:rows], force[1][:rows])
+
+
+def test_the_identifiers_unknowns_enter_its_answer():
+    t = np.arange(4000) * 1e-3
+    inputs = np.column_stack([4e-3 * t / 4.0, np.full(4000, 1e-3), np.zeros(4000)])
+    press = Press("foam", inputs, 20.0 * t / 4.0, 5000.0, np.zeros((4000, 3)))
+    base = Trial(Laboratory(start=1.0))._answer(press)
+    for of in ({"amplitude": 80.0}, {"weights": 1.5}, {"start": 2.0}):
+        assert Trial(Laboratory(**{"start": 1.0, **of}))._answer(press) != base
 
 
 def test_foams_of_all_laws_sink_in_alike_from_5_to_20_N():
@@ -134,7 +212,7 @@ def test_sentences_are_claims_of_their_figures_and_each_has_a_law():
     assert {s.id for s in sentences()} == set(HOLDS)
     assert len(sentences()) == len(HOLDS)
     assert {s.figure for s in sentences()} <= {s.NUMBER for s in studies()}
-    assert {s.figure for s in searched(calibrating=False)} == set(CHEAP_FIRST)
+    assert {s.figure for s in searched(calibrating=False)} == set(TELLING_FIRST)
 
 
 def gaussian(points, _):
@@ -266,8 +344,135 @@ def test_contradictions_are_pairs_that_were_expected_and_never_seen():
         i: Tried(i, (0.5,), (bool(a), not a, bool(rng.random() < 0.5), False)) for i, a in enumerate(first)
     }
     table = contradictions.table(("a", "not a", "by chance", "never"), rows)
-    assert [(p.first, p.second) for p in table.pairs()] == [("a", "not a")]
+    (found,) = table.never_together()
+    assert found.ids == ("a", "not a")
+    assert found.parts == (first.sum(), (~first).sum())
+    assert found.expected == pytest.approx(first.sum() * (~first).sum() / 200)
+    assert found.excluded
     assert [x.id for x in table.alone() if x.true == 0] == ["never"]
+
+
+def test_three_sentences_may_exclude_each_other_though_each_two_do_not():
+    rng = np.random.default_rng(5)
+    cases = ((True, True, False), (True, False, True), (False, True, True), (False, False, False))
+    rows = {i: Tried(i, (0.5,), cases[rng.integers(4)]) for i in range(400)}
+    (found,) = contradictions.table(("a", "b", "c"), rows).never_together()
+    assert found.ids == ("a", "b", "c")
+    # each two hold in a quarter of all, each one in half: n (1/4)^3 / (1/2)^3
+    assert found.expected == pytest.approx(400 / 8, rel=0.2)
+    assert found.excluded
+    few = contradictions.table(("a", "b", "c"), {i: rows[i] for i in range(20)}).never_together()
+    assert not any(one.excluded for one in few)
+
+
+class Rule:
+    """Makes each sentence true where its share of the prior lies above a level."""
+
+    def __init__(self, level: float):
+        self.level, self.asked = level, 0
+
+    def tried(self, jobs, ids):
+        for job in jobs:
+            self.asked += 1
+            yield Tried(job.number, job.shares, tuple(job.shares[int(id_)] > self.level for id_ in ids))
+
+
+def halves_apart(level: float) -> contradictions.Table:
+    points = np.random.default_rng(6).random((60, 8))
+    points[:, 1] = np.where(points[:, 0] > level, level * points[:, 1], points[:, 1])
+    rows = {i: Tried(i, tuple(p), (p[0] > level, p[1] > level)) for i, p in enumerate(points)}
+    return contradictions.table(("0", "1"), rows)
+
+
+def test_what_only_looked_like_a_contradiction_is_bred_away():
+    among = halves_apart(0.7)
+    assert [one.ids for one in among.never_together()] == [("0", "1")]
+    found = bred(("0", "1"), among, Rule(0.7), 96, 1)
+    assert found.most == 2
+    assert min(found.shares[:2]) > 0.7
+    assert found.tries < 96
+
+
+def test_what_cannot_be_is_not_bred():
+    class Never(Rule):
+        def tried(self, jobs, ids):
+            for one in super().tried(jobs, ids):
+                first = one.verdicts[0]
+                yield Tried(one.number, one.shares, (first, not first))
+
+    runner = Never(0.5)
+    found = bred(("0", "1"), halves_apart(0.5), runner, 40, 1)
+    assert (found.most, found.tries, runner.asked) == (1, 40, 40)
+
+
+def test_a_contradiction_is_called_what_is_known_of_it():
+    ids = tuple(s.id for s in searched(calibrating=False))
+    law, plain = next(iter(reasons())), f"{ids[0]} + {ids[1]}"
+    for names in reasons():
+        parts = names.split(" + ")
+        assert [i for i in ids if i in parts] == parts, "unknown names, or not in the order of the search"
+
+    def one(names: str, expected: float, most: int) -> Contradiction:
+        together = contradictions.Together(tuple(names.split(" + ")), (9, 9), 20, expected, 10.0)
+        return Contradiction(together, Bred(96, most, ()))
+
+    assert one(law, 4.0, 1).verdict == IMPOSSIBLE
+    assert one(plain, 12.0, 1).verdict == EXCLUDED
+    assert one(plain, 4.0, 1).verdict == NOT_FOUND
+    assert not one(law, 12.0, 2).stands
+
+
+def test_a_laboratory_is_better_only_beyond_chance():
+    validation = [s.id for s in judge.validation()]
+
+    def against(only_there: int, only_here: int) -> result.Result:
+        there = dict.fromkeys((s.id for s in sentences()), 0)
+        here = dict(there)
+        there.update(dict.fromkeys(validation[:only_there], 10))
+        here.update(dict.fromkeys(validation[only_there : only_there + only_here], 10))
+        none = sampler.Sample(*([()] * 5))
+        lab, bench = judge.Judged(CHOSEN, 10, there), judge.Judged(CHOSEN, 10, here)
+        return result.Result(none, None, bench, lab, lab, (), (), (), None)
+
+    assert against(5, 4).cross_validation == (5, 4)
+    assert against(5, 4).by_chance == pytest.approx(0.5)  # of nine heads or tails five or more
+    assert not against(5, 4).better
+    assert against(5, 0).by_chance == pytest.approx(1.0 / 32.0)
+    assert against(5, 0).better
+
+
+def test_relatives_are_worth_less_than_strangers():
+    rng = np.random.default_rng(7)
+    of = rng.standard_normal((400, 5))
+    strangers = sampler.Sample(of, np.zeros(400), (), of, np.arange(400))
+    assert worth(strangers) == pytest.approx(400.0, rel=0.01)
+    families = np.repeat(np.arange(40), 10)
+    copies = sampler.Sample(of, np.zeros(400), (), of[families], families)
+    assert worth(copies) == pytest.approx(40.0, rel=0.05)
+    assert worth(sampler.Sample(of, np.zeros(400), (), of, np.zeros(400, dtype=int))) == pytest.approx(1.0)
+    # families that forgot their ancestor are strangers again: 40 of them know it to a fifth
+    forgot = sampler.Sample(of, np.zeros(400), (), of, families)
+    assert np.median(worth(forgot)) == pytest.approx(400.0, rel=0.4)
+
+
+def test_the_sampler_tells_what_lies_before_it():
+    told = []
+    sample(gaussian, np.zeros(3, dtype=bool), Settings(40, 4, 2, 3), lambda *one: told.append(one))
+    assert told[0] == (0.0, 160)
+    assert [count for _, count in told[1:-1]] == [80] * (len(told) - 2)
+    assert told[-1] == (1.0, 240)
+
+
+def test_a_share_is_told_with_its_spread():
+    of = [s for s in sentences() if s.figure in {"6.1", "6.2"}]
+    rows = {i: Tried(i, (0.5,), (i < 2,) * len(of)) for i in range(4)}
+    rows[4] = Tried(4, (0.5,), (True,))  # given up
+    found = drawn_shares("some", contradictions.table([s.id for s in of], rows), of)
+    assert found.laboratories == 4
+    assert (found.calibration.mean, found.calibration.of) == (0.5, 3)
+    assert found.validation.spread == pytest.approx(math.sqrt(1.0 / 3.0))
+    one = judge.Judged(CHOSEN, 10, {s.id: 3 for s in of})
+    assert judged_shares("one", one, of).validation.mean == pytest.approx(0.3)
 
 
 def test_verdicts_that_were_given_up_are_not_taken_for_no():
@@ -290,10 +495,10 @@ def test_marginals_say_what_is_told():
     assert re.fullmatch(r"[\d.]+ \([\d.]+ to [\d.]+\) times the bench's", found[0].in_words())
 
 
-def test_the_best_of_a_posterior_misses_fewest():
-    points = np.linspace(0.1, 0.9, 3)[:, None] * np.ones(len(UNKNOWNS))
-    found = sampler.Sample(points, np.array([-2.0, -1.0, -1.0]), ())
-    assert infer.best(found) == drawn(points[1])
+def test_the_best_of_a_posterior_miss_fewest_and_differ():
+    points = np.linspace(0.1, 0.9, 4)[[0, 1, 1, 2, 3], None] * np.ones(len(UNKNOWNS))
+    found = sampler.Sample(points, np.array([-2.0, -1.0, -1.0, -1.0, -3.0]), (), points, np.arange(5))
+    assert infer.best(found) == [drawn(points[i]) for i in (1, 3, 0, 4)[: infer.CANDIDATES]]
 
 
 def test_a_figure_is_measured_in_another_laboratory(tmp_path):
@@ -344,22 +549,45 @@ def test_the_command_line_refuses_what_it_cannot_do(tmp_path, capsys, monkeypatc
 
 
 @pytest.mark.long
+def test_a_press_that_ended_before_the_slot_leaves_its_panel_alone():
+    axis = Figure().subplots()
+    panels.calm_limits(axis, np.array([1.0, 3.0]), np.empty(0), np.full(3, np.nan))
+    assert axis.get_ylim() == pytest.approx((0.5, 3.5))
+    before = axis.get_ylim()
+    panels.calm_limits(axis, np.empty(0))
+    assert axis.get_ylim() == before
+
+
 def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkeypatch):
     some = tuple(s for s in sentences() if s.figure in {"6.1", "6.8", "4.4"})
     monkeypatch.setattr(judge, "SEEDS", (0,))
-    monkeypatch.setattr(judge, "sentences", lambda: some)
-    monkeypatch.setattr(findings, "sentences", lambda: some)
-    monkeypatch.setattr(infer, "sentences", lambda: some)
-    run = infer.Inference(tmp_path / "lab", Settings(8, 2, 1, 5), Stub(), "palpate laboratory --seed 5")
-    result = run.run()
+    for module in (judge, findings, infer, result, tables):
+        monkeypatch.setattr(module, "sentences", lambda: some)
+    monkeypatch.setattr(
+        infer, "searched", lambda *, calibrating: tuple(s for s in some if s.calibrates or not calibrating)
+    )
+    parts = []
+    run = infer.Inference(
+        tmp_path / "lab",
+        Settings(8, 2, 1, 5),
+        Stub(),
+        "palpate laboratory --seed 5",
+        told=lambda *one: parts.append(one),
+    )
+    told = run.run()
     found = msgspec.json.decode((tmp_path / "lab" / "found.json").read_bytes())
-    assert found["true"]["inferred from all"]["all"] == {"true": result.by_all.count(some), "of": len(some)}
-    assert files.named(str(tmp_path / "lab" / "inferred.toml")) == result.by_all.laboratory
+    assert found["true"]["inferred from all"]["all"] == {"true": told.by_all.count(some), "of": len(some)}
+    assert files.named(str(tmp_path / "lab" / "inferred.toml")) == told.by_all.laboratory
     assert "posterior" in (tmp_path / "lab" / "index.html").read_text()
+    assert "| hand-chosen bench |" in (tmp_path / "lab" / "found.md").read_text()
+    assert parts[0] == ("all sentences, prior", 0, 16)
+    assert [one for one in parts if one[1] > one[2]] == []
+    assert {row["name"] for row in found["predictive"]} >= {"drawn from the posterior of the half"}
+    monkeypatch.setattr(infer, "present", lambda *_: None)  # the page once is enough
     again = infer.Inference(
         tmp_path / "lab", Settings(8, 2, 1, 5), Stub(after=0), "palpate laboratory --seed 5"
     )
-    assert again.run().by_all == result.by_all
+    assert again.run().by_all == told.by_all
 
 
 def test_the_page_is_made_anew_only_by_the_same_search(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,11 +11,13 @@ from cyclopts import Parameter, validators
 
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import console, place, say, show_table
+from palpate.cli.study import Lines
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from palpate.thesis.inference.findings import Result
+    from palpate.thesis.inference.kept import Progress as Told
+    from palpate.thesis.inference.result import Result
     from palpate.thesis.inference.search import Runner
 
 
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 def laboratory(
     *,
     out: Path = Path("runs/laboratory"),
-    particles: Annotated[int, Parameter(validator=validators.Number(gte=8, lte=100_000))] = 64,
+    particles: Annotated[int, Parameter(validator=validators.Number(gte=8, lte=100_000))] = 128,
     moves: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1000))] = 2,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=2**31 - 1))] = 1,
     cores: Annotated[int | None, Parameter(validator=validators.Number(gte=1, lte=1024))] = None,
@@ -40,7 +42,7 @@ def laboratory(
         out: folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there is
             gone on with.
         particles: points of the posterior; it begins with four times as many of the prior.
-        moves: of each particle at each temperature.
+        moves: of each particle at each temperature; three times as many at the last.
         seed: of everything drawn.
         cores: that try laboratories side by side; all when left out.
         half: search by the calibration half alone, in a third of the time; what it finds is looked at by all.
@@ -86,23 +88,32 @@ def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
 
 
 @contextmanager
-def _progress(screen: Console) -> Iterator[Callable[[str, int], None]]:
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+def _progress(screen: Console) -> Iterator[Told]:
+    """A bar for each part of the work, with the time left in it; without a terminal a line now and then."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
-    with Progress(*columns, console=screen, transient=True) as progress:
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    watched = screen.is_terminal
+    with Progress(*columns, console=screen, transient=True, disable=not watched) as progress:
         bar = progress.add_task("compiling", total=None)
+        parts: dict[str, Lines] = {}
 
-        def told(what: str, count: int) -> None:
-            progress.update(bar, description=f"{what}: {count} laboratories")
+        def told(what: str, done: int, of: int) -> None:
+            if what not in parts:
+                parts[what] = Lines(screen, of, f"in {what}")
+                progress.reset(bar, total=of, description=what)
+            progress.update(bar, completed=done)
+            if not watched:
+                parts[what].show(done)
 
         yield told
 
 
 def _tell(result: Result, folder: Path, command: str, as_json: bool) -> None:
     from palpate.report.page import Table
-    from palpate.thesis.inference.findings import PAGE, halves, laboratories
-    from palpate.thesis.inference.findings import as_json as numbers
+    from palpate.thesis.inference.findings import PAGE
+    from palpate.thesis.inference.result import as_json as numbers
+    from palpate.thesis.inference.result import halves, laboratories
 
     if as_json:
         print_answer(numbers(result, command))

@@ -191,8 +191,8 @@ class Lines:
 
     EVERY = 60.0
 
-    def __init__(self, screen: Console, total: int):
-        self._screen, self._total = screen, total
+    def __init__(self, screen: Console, total: int, what: str = "runs"):
+        self._screen, self._total, self._what = screen, total, what
         self._begun = self._told = time.monotonic()
         self._first: int | None = None
 
@@ -206,7 +206,9 @@ class Lines:
             return
         self._told = now
         left = (now - self._begun) / (finished - self._first) * (self._total - finished)
-        self._screen.print(f"{finished} of {self._total} runs, some {in_words(left)} left", soft_wrap=True)
+        self._screen.print(
+            f"{finished} of {self._total} {self._what}, some {in_words(left)} left", soft_wrap=True
+        )
 
 
 def _tell(found: Findings, folder: Path, as_json: bool) -> None:

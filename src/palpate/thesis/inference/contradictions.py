@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 
 from palpate.thesis.inference.archive import Tried
 
-EXPECTED = 10.0
-"""Laboratories in which two sentences would both hold if they had nothing to do with each other; with fewer, that none
-was found says nothing (at 10, chance alone finds none once in 20,000)."""
+CHANCE = 0.05
+"""How probable it may be that chance alone leaves one of all sets of a size without a laboratory."""
+LARGEST = 3
+"""Sentences in a set, at most: of larger ones too few laboratories make every part true."""
 
 
 @dataclass(frozen=True)
@@ -26,13 +28,28 @@ class Alone:
 
 
 @dataclass(frozen=True)
-class Pair:
-    """Two sentences that were never true together, though each was by itself."""
+class Together:
+    """Sentences that were never true together, though all but any one of them were.
 
-    first: str
-    second: str
-    expected: float  # laboratories with both, were they independent
+    Args:
+        ids: of the sentences.
+        parts: laboratories that made true, of two sentences, each; of three, each two: all but the first, the second,
+            the third.
+        tried: laboratories by which all of them are known.
+        expected: laboratories that would make all true, had they no more to do with each other than their parts have.
+        enough: what `expected` has to be for chance to leave no such set without a laboratory.
+    """
+
+    ids: tuple[str, ...]
+    parts: tuple[int, ...]
     tried: int
+    expected: float
+    enough: float
+
+    @property
+    def excluded(self) -> bool:
+        """Whether they exclude each other, beyond what chance makes of so many laboratories."""
+        return self.expected >= self.enough
 
 
 @dataclass(frozen=True)
@@ -40,6 +57,7 @@ class Table:
     """Verdicts of laboratories, rows, on sentences, columns; `known` where it was not given up before."""
 
     ids: tuple[str, ...]
+    shares: NDArray[np.float64]  # of the priors, where the laboratories lie
     true: NDArray[np.bool_]
     known: NDArray[np.bool_]
 
@@ -50,34 +68,56 @@ class Table:
             for i, id_ in enumerate(self.ids)
         ]
 
-    def pairs(self) -> list[Pair]:
-        """Pairs that exclude each other, the surest first."""
-        found = (self._pair(i, j) for i, j in combinations(range(len(self.ids)), 2))
-        return sorted((p for p in found if p is not None), key=lambda p: -p.expected)
+    def counts(self) -> NDArray[np.int64]:
+        """How many sentences each laboratory makes true, of those that are known."""
+        return np.asarray((self.true & self.known).sum(axis=1))
 
-    def _pair(self, i: int, j: int) -> Pair | None:
-        both = self.known[:, i] & self.known[:, j]
-        first, second, tried = self.true[both, i], self.true[both, j], int(both.sum())
-        expected = float(first.mean() * second.mean() * tried) if tried else 0.0
-        if expected < EXPECTED or bool((first & second).any()):
-            return None
-        return Pair(self.ids[i], self.ids[j], expected, tried)
+    def never_together(self) -> list[Together]:
+        """Sets of two and three that no laboratory made true, the surest of each size first."""
+        found = [one for size in range(2, min(LARGEST, len(self.ids)) + 1) for one in self._sets(size)]
+        return sorted(found, key=lambda one: (len(one.ids), -one.expected))
+
+    def _sets(self, size: int) -> Iterator[Together]:
+        enough = math.log(math.comb(len(self.ids), size) / CHANCE)
+        for columns in combinations(range(len(self.ids)), size):
+            both = self.known[:, columns].all(axis=1)
+            true = self.true[both][:, columns]
+            if not len(true) or true.all(axis=1).any():
+                continue
+            parts = tuple(int(np.delete(true, i, axis=1).all(axis=1).sum()) for i in range(size))
+            if all(parts):
+                told = parts[::-1] if size == 2 else parts
+                yield Together(
+                    tuple(self.ids[i] for i in columns), told, len(true), _expected(true, parts), enough
+                )
+
+
+def _expected(true: NDArray[np.bool_], parts: Sequence[int]) -> float:
+    """Laboratories with all, if each part is as frequent as it is and nothing else ties them (Kirkwood, 1935)."""
+    n, alone = len(true), true.mean(axis=0)
+    shares = np.array(parts) / n
+    return float(n * np.prod(shares) / (np.prod(alone) if len(parts) > 2 else 1.0))
 
 
 def table(ids: Sequence[str], tried: Mapping[int, Tried]) -> Table:
     """The table of an archive."""
-    rows = [tried[number].verdicts for number in sorted(tried)]
-    true = np.zeros((len(rows), len(ids)), dtype=np.bool_)
+    some = [tried[number] for number in sorted(tried)]
+    true = np.zeros((len(some), len(ids)), dtype=np.bool_)
     known = np.zeros_like(true)
-    for i, verdicts in enumerate(rows):
-        true[i, : len(verdicts)] = verdicts
-        known[i, : len(verdicts)] = True
-    return Table(tuple(ids), true, known)
+    for i, one in enumerate(some):
+        true[i, : len(one.verdicts)] = one.verdicts
+        known[i, : len(one.verdicts)] = True
+    return Table(tuple(ids), np.array([one.shares for one in some]), true, known)
 
 
-def joined(whole: Table, part: Table) -> Table:
-    """Both tables one above the other, by the columns of `whole`; what only it has is not known in `part`."""
-    at = [whole.ids.index(id_) for id_ in part.ids]
-    true, known = (np.zeros((len(part.true), len(whole.ids)), dtype=np.bool_) for _ in range(2))
-    true[:, at], known[:, at] = part.true, part.known
-    return Table(whole.ids, np.vstack([whole.true, true]), np.vstack([whole.known, known]))
+def joined(whole: Table, *parts: Table) -> Table:
+    """Tables one above the other, by the columns of `whole`; what only it has is not known in the others."""
+    true, known = [whole.true], [whole.known]
+    for part in parts:
+        at = [whole.ids.index(id_) for id_ in part.ids]
+        for stack, some in ((true, part.true), (known, part.known)):
+            wide = np.zeros((len(some), len(whole.ids)), dtype=np.bool_)
+            wide[:, at] = some
+            stack.append(wide)
+    shares = [one.shares for one in (whole, *parts) if len(one.shares)]
+    return Table(whole.ids, np.vstack(shares), np.vstack(true), np.vstack(known))

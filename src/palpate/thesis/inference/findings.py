@@ -1,88 +1,35 @@
-"""What an inference found, as a page, a figure and JSON."""
+"""What an inference found, as a page, a document, a figure and JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from functools import cache
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import msgspec
 import numpy as np
 
-from palpate.files import signed, write_json, write_text
+from palpate.files import MADE, signed, write_json, write_text
 from palpate.report import style
-from palpate.report.page import Table as Shown
-from palpate.report.page import page
-from palpate.thesis.inference import judge
-from palpate.thesis.inference.contradictions import Alone, Pair, Table
-from palpate.thesis.inference.judge import Judged
-from palpate.thesis.inference.posterior import Marginal, marginals, named
+from palpate.report.page import Table, page
+from palpate.thesis.inference import tables
+from palpate.thesis.inference.posterior import named, worth
+from palpate.thesis.inference.result import Result, as_json
 from palpate.thesis.inference.sampler import Sample
-from palpate.thesis.inference.search import MISS, WRONG
-from palpate.thesis.inference.sentences import Sentence, sentences
-from palpate.thesis.laboratory.laboratory import values
-from palpate.thesis.laboratory.unknowns import UNKNOWNS, Unknown
+from palpate.thesis.inference.search import WRONG
+from palpate.thesis.inference.sentences import sentences
+from palpate.thesis.laboratory.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGE, FIGURE, FOUND = "index.html", "posterior.png", "found.json"
-
-
-@dataclass(frozen=True)
-class Result:
-    """What was found.
-
-    Args:
-        half: the posterior by the half that calibrates.
-        all: by all sentences; None where only the half was asked for.
-        bench: the hand-chosen laboratory, judged.
-        by_half, by_all: the laboratory of each posterior that misses fewest sentences, over ten seeds.
-        table: verdicts of all laboratories that were tried.
-    """
-
-    half: Sample
-    all: Sample | None
-    bench: Judged
-    by_half: Judged
-    by_all: Judged
-    table: Table
-
-    @property
-    def posterior(self) -> Sample:
-        """By as many sentences as were asked for."""
-        return self.half if self.all is None else self.all
-
-    @property
-    def better(self) -> bool:
-        """Whether the laboratory by half is better than the bench on the half that was held out."""
-        return self.by_half.count(judge.validation()) > self.bench.count(judge.validation())
-
-    @property
-    def largest(self) -> Judged:
-        """The laboratory with the largest set of sentences that hold at once over ten seeds."""
-        return max((self.by_all, self.by_half, self.bench), key=lambda j: j.count(sentences()))
-
-    @property
-    def never(self) -> list[Alone]:
-        """Sentences that no laboratory of the search made true, nor one of those that were judged."""
-        found = {s.id for j in (self.bench, self.by_half, self.by_all) for s in sentences() if j.held[s.id]}
-        return [one for one in self.table.alone() if one.true == 0 and one.id not in found]
-
-    @property
-    def contradictions(self) -> list[Pair]:
-        """Pairs of sentences that no laboratory made true together."""
-        held = [{s.id for s in sentences() if j.true(s)} for j in (self.bench, self.by_half, self.by_all)]
-        return [p for p in self.table.pairs() if not any({p.first, p.second} <= ids for ids in held)]
+PAGE, DOCUMENT, FIGURE, FOUND = "index.html", "found.md", "posterior.png", "found.json"
 
 
 def present(result: Result, folder: Path, command: str) -> None:
-    """Writes page, figure and JSON into the folder."""
+    """Writes page, document, figure and JSON into the folder."""
     style.save(drawn_figure(result.posterior), folder / FIGURE)
     write_json(folder / FOUND, signed(as_json(result, command)))
+    notes, found = [_told(result), _worth(result.posterior)], tables.found(result)
     whole = page(
         title="The thesis' laboratory, inferred",
         about=(
@@ -90,174 +37,56 @@ def present(result: Result, folder: Path, command: str) -> None:
             f"{len(UNKNOWNS)} unknowns under which most of them are true at once; a sentence is taken to be wrong "
             f"about its own laboratory with a probability of {100 * WRONG:g} %. No threshold of a claim is changed."
         ),
-        notes=[_told(result), _worth(result.posterior)],
-        tables=[
-            _counts(result),
-            _posterior(result),
-            *_never(result),
-            *_pairs(result),
-            _sentences(result),
-            _searches(result),
-            _ranges(),
-        ],
+        notes=notes,
+        tables=[*found, *tables.details(result)],
         figures={
             folder / FIGURE: "The posterior of each unknown in shares of its prior (grey: the prior itself)."
         },
         command=command,
     )
     write_text(folder / PAGE, whole)
+    write_text(folder / DOCUMENT, document(notes, found, command))
+
+
+def document(notes: Sequence[str], shown: Sequence[Table], command: str) -> str:
+    """Notes and tables as Markdown."""
+    shown_parts = (part for table in shown for part in (f"### {table.title}", _rows(table)))
+    parts = [f"{MADE} laboratory", f"Of `{command}`.", *notes, *shown_parts]
+    return "\n\n".join(parts) + "\n"
+
+
+def _rows(table: Table) -> str:
+    lines = [table.head, ["---"] * len(table.head), *table.rows]
+    return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
 
 
 def _told(result: Result) -> str:
-    better = "is better than" if result.better else "is not better than"
-    follows = "could take its place" if result.better else "stays the default"
+    there, here = result.cross_validation
+    follows = "It could take its place." if result.better else "The bench stays the default."
     return (
-        f"On the half that was held out, the laboratory inferred from the other half {better} the hand-chosen bench, "
-        f"which {follows}. The largest set of sentences found true at once has {result.largest.count(sentences())} of "
-        f"{len(sentences())}."
+        f"On the half that was held out, {there} sentences are true only in the laboratory inferred from the other "
+        f"half, {here} only on the hand-chosen bench; were it no better, chance would make it look as good with a "
+        f"probability of {result.by_chance:.2g}. {follows} The largest set of sentences found true at once has "
+        f"{result.largest.count(sentences())} of {len(sentences())}; {len(result.table.true)} laboratories were tried. "
+        f"{_never(len(result.never))}"
     )
+
+
+def _never(count: int) -> str:
+    if not count:
+        return "Each sentence that was searched for is true in some of them."
+    return f"{count} {'sentence is' if count == 1 else 'sentences are'} true in none of them."
 
 
 def _worth(sample: Sample) -> str:
-    last = sample.stages[-1]
+    own, visited = worth(sample), len(np.unique(sample.visited, axis=0))
     return (
-        f"The posterior is {len(sample.points)} particles, {last.distinct} of which differ; they come from "
-        f"{last.ancestors} points of the prior, and are worth at least so many independent laboratories. With few of "
-        "them a narrow range tells where the search went as much as what the thesis tells; more --particles are surer."
+        f"The posterior is {len(sample.points)} particles, which visited {visited} laboratories; they come from "
+        f"{sample.stages[-1].ancestors} points of the prior. The mean of an unknown is known as from "
+        f"{np.median(own):.0f} independent laboratories (median of the unknowns; {own.min():.0f} to {own.max():.0f}). "
+        "The fewer there are, the more a narrow range tells where the search went, and the less what the thesis tells; "
+        "more --particles are surer."
     )
-
-
-def halves() -> dict[str, tuple[Sentence, ...]]:
-    """The two halves and all."""
-    return {"calibration": judge.calibration(), "validation": judge.validation(), "all": sentences()}
-
-
-def laboratories(result: Result) -> dict[str, Judged]:
-    """Those that are compared."""
-    found = {"hand-chosen bench": result.bench, "inferred from the half": result.by_half}
-    return found if result.all is None else {**found, "inferred from all": result.by_all}
-
-
-def _counts(result: Result) -> Shown:
-    rows = [
-        [name, *(f"{one.count(of)} of {len(of)}" for of in halves().values())]
-        for name, one in laboratories(result).items()
-    ]
-    head = ("laboratory", "true in the half that calibrates", "in the half held out", "in all")
-    return Shown("Sentences that are true, over ten seeds", head, rows)
-
-
-def _posterior(result: Result) -> Shown:
-    rows = [
-        [m.unknown.name.replace("_", " "), _prior(m.unknown), m.in_words(), m.verdict]
-        for m in marginals(result.posterior.points)
-    ]
-    head = ("unknown", "prior", "posterior: middle (5 to 95 %)", "the thesis tells it?")
-    return Shown("What the thesis tells of its laboratory", head, rows)
-
-
-def _ranges() -> Shown:
-    rows = [[unknown.name.replace("_", " "), unknown.reason] for unknown in UNKNOWNS]
-    return Shown("Why these unknowns, and these ranges", ("unknown", "reason"), rows)
-
-
-def _prior(unknown: Unknown) -> str:
-    if unknown.prior == "any seed":
-        return "any"
-    if unknown.choices:
-        return " or ".join(named(unknown, v) for v in unknown.choices)
-    return f"{unknown.low:g} to {unknown.high:g} {unknown.unit}, {unknown.prior}".replace(" ,", ",")
-
-
-@cache
-def reasons() -> dict[str, str]:
-    """Why a sentence is never true, or two exclude each other: by its name, or both joined by " + "."""
-    text = resources.files("palpate.thesis.inference").joinpath("reasons.toml").read_text("utf-8")
-    return msgspec.toml.decode(text, type=dict[str, str])
-
-
-def _never(result: Result) -> list[Shown]:
-    rows = [[a.id, f"{a.tried}", reasons().get(a.id, "not found")] for a in result.never]
-    head = ("sentence", "laboratories tried", "shortest reason")
-    return [Shown("Sentences that no laboratory in the ranges made true", head, rows)] if rows else []
-
-
-def _pairs(result: Result) -> list[Shown]:
-    rows = [
-        [
-            p.first,
-            p.second,
-            f"{p.expected:.0f} of {p.tried}",
-            reasons().get(f"{p.first} + {p.second}", "not found"),
-        ]
-        for p in result.contradictions
-    ]
-    head = ("sentence", "never together with", "expected together, were they independent", "shortest reason")
-    return [Shown("Sentences that exclude each other", head, rows)] if rows else []
-
-
-def _sentences(result: Result) -> Shown:
-    alone = {a.id: a for a in result.table.alone()}
-    rows = []
-    for s in sentences():
-        share = f"{alone[s.id].true} of {alone[s.id].tried}" if s.id in alone else "not searched"
-        marks = [_mark(one, s) for one in laboratories(result).values()]
-        rows.append([s.id, s.figure, "calibration" if s.calibrates else "validation", *marks, share])
-    head = (
-        "sentence",
-        "figure",
-        "half",
-        *laboratories(result),
-        "laboratories of the search that made it true",
-    )
-    return Shown("Sentence by sentence: seeds of ten for which it holds", head, rows)
-
-
-def _mark(one: Judged, sentence: Sentence) -> str:
-    return f"{one.held[sentence.id]}{' true' if one.true(sentence) else ''}"
-
-
-def _searches(result: Result) -> Shown:
-    samples = {"the calibration half": result.half, "all": result.all}
-    rows = [[name, *_sizes(sample)] for name, sample in samples.items() if sample is not None]
-    head = (
-        *("by", "particles", "that differ", "ancestors in the prior"),
-        *("temperatures", "moves accepted at the last", "fewest misses", "most"),
-    )
-    return Shown("The searches", head, rows)
-
-
-def _sizes(sample: Sample) -> Sequence[str]:
-    misses = -sample.likelihood / MISS
-    last = sample.stages[-1]
-    numbers = (len(sample.points), last.distinct, last.ancestors, len(sample.stages))
-    return (*map(str, numbers), f"{last.accepted:.0%}", f"{misses.min():.0f}", f"{misses.max():.0f}")
-
-
-def as_json(result: Result, command: str) -> dict[str, Any]:
-    """The page's numbers."""
-    return {
-        "command": command,
-        "better_on_validation_half": result.better,
-        "true": {
-            name: {half: {"true": one.count(of), "of": len(of)} for half, of in halves().items()}
-            for name, one in laboratories(result).items()
-        },
-        "laboratories": {name: values(one.laboratory) for name, one in laboratories(result).items()},
-        "posterior": [_told_of(m) for m in marginals(result.posterior.points)],
-        "never": [asdict(a) for a in result.never],
-        "never_together": [asdict(p) for p in result.contradictions],
-        "stages_of_half": [asdict(stage) for stage in result.half.stages],
-        "stages_of_all": [asdict(stage) for stage in result.all.stages] if result.all else None,
-        "sentences": {
-            s.id: {name: one.held[s.id] for name, one in laboratories(result).items()} for s in sentences()
-        },
-    }
-
-
-def _told_of(m: Marginal) -> dict[str, Any]:
-    own = {"low": m.low, "middle": m.middle, "high": m.high, "width": m.width}
-    return {"unknown": m.unknown.name, "unit": m.unknown.unit, **own, "verdict": m.verdict}
 
 
 def drawn_figure(sample: Sample) -> Figure:
@@ -274,14 +103,21 @@ def drawn_figure(sample: Sample) -> Figure:
         style.plain(axis)
         count = len(unknown.choices) or bins
         axis.hist(
-            sample.points[:, i], bins=count, range=(0.0, 1.0), density=True, color=style.SERIES[0], alpha=0.8
+            sample.visited[:, i], bins=count, range=(0.0, 1.0), density=True, color=style.SERIES[0], alpha=0.8
         )
         axis.axhline(1.0, color=style.MEASURED, linewidth=1.0)
         axis.set_title(unknown.name.replace("_", " "), fontsize=8, loc="left")
         axis.set(xlim=(0.0, 1.0), yticks=[])
         if unknown.choices:
             middles = (np.arange(count) + 0.5) / count
-            axis.set_xticks(middles, [named(unknown, v).split()[0] for v in unknown.choices], fontsize=6)
+            axis.set_xticks(
+                middles,
+                [
+                    named(unknown, v).removeprefix("the ").removeprefix("seed ").split()[0]
+                    for v in unknown.choices
+                ],
+                fontsize=6,
+            )
         else:
             axis.set_xticks([0.0, 1.0], [f"{unknown.low:g}", f"{unknown.high:g}"], fontsize=6)
     return drawing

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
-from palpate.errors import InputError
 from palpate.files import MADE, kept_folder, signed, write_json, write_text
 from palpate.thesis.inference import archive, contradictions, judge, search
 from palpate.thesis.inference.contradictions import Table
-from palpate.thesis.inference.findings import Result, present
-from palpate.thesis.inference.judge import Judged, judged
+from palpate.thesis.inference.findings import present
+from palpate.thesis.inference.kept import Book, Nest, Progress
+from palpate.thesis.inference.predictive import drawn_shares, judged_shares
+from palpate.thesis.inference.result import Contradiction, Result
 from palpate.thesis.inference.sampler import Sample, Settings
 from palpate.thesis.inference.search import Runner, Search
 from palpate.thesis.inference.sentences import searched, sentences
 from palpate.thesis.laboratory.files import text
 from palpate.thesis.laboratory.laboratory import CHOSEN, Laboratory, drawn
 
-STATE, ALL, HALF, JUDGED = "inference.json", "all.jsonl", "half.jsonl", "judged.json"
+STATE, ALL, HALF, PREDICTED = "inference.json", "all.jsonl", "half.jsonl", "predicted.jsonl"
+JUDGED, BRED = "judged.json", "bred.json"
+PREDICTIVE = 20_000_000
+"""Number of the first laboratory whose sentences are predicted, so that its noise is none that a search has seen."""
+SURELY, TRIES = 6, 64
+"""Sets of each size that are searched for by themselves, those that chance explains least; and laboratories for
+each of them."""
+
+CANDIDATES = 2
+"""Laboratories of a posterior that are looked at over ten seeds: which of those that miss fewest sentences in one run
+is best, the sentences that it was inferred from say over ten."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +44,7 @@ class Inference:
         command: that is told in the files.
         threads: for what is looked at over ten seeds.
         half: only the half that calibrates is searched for; the shorter of both searches.
-        told: what is under way, and how many laboratories are done in it.
+        told: how far it is.
     """
 
     folder: Path
@@ -44,7 +53,7 @@ class Inference:
     command: str
     threads: int = 1
     half: bool = False
-    told: Callable[[str, int], None] = field(default=lambda _, __: None)
+    told: Progress = lambda _what, _done, _of: None
 
     def run(self, *, force: bool = False) -> Result:
         """Goes on from where the folder stands.
@@ -54,9 +63,9 @@ class Inference:
         """
         with kept_folder(self.folder, STATE, force=force):
             write_json(self.folder / STATE, signed({"command": self.command, "finished": False}))
-            everything = self._search(calibrating=False)
+            everything = self._search("all sentences", calibrating=False)
             everything.survey(self.folder / ALL)
-            half = self._search(calibrating=True).run(self.folder / HALF)
+            half = self._half()
             whole = None if self.half else everything.run(self.folder / ALL)
             result = self._result(half, whole)
             about = f"{len(sentences())} sentences of the thesis; {result.by_all.count(sentences())} hold."
@@ -65,78 +74,80 @@ class Inference:
             present(result, self.folder, self.command)
         return result
 
-    def _search(self, *, calibrating: bool) -> Search:
-        of, everything = searched(calibrating=calibrating), searched(calibrating=False)
-        name = "calibrating half" if calibrating else "all sentences"
+    def _search(self, name: str, *, calibrating: bool) -> Search:
+        def progress(power: float, done: int, of: int) -> None:
+            self.told(
+                f"{name}, likelihood to the power of {power:.2g}" if power else f"{name}, prior", done, of
+            )
 
-        def progress(count: int) -> None:
-            self.told(name, count)
+        return Search(searched(calibrating=calibrating), self.settings, self.runner, progress)
 
-        other = {}
-        if calibrating:
-            head = Search(everything, self.settings, self.runner).head()
-            other = search.borrowed(self.folder / ALL, head, everything, of)
-        return Search(of, self.settings, self.runner, progress, other)
-
-    def _table(self) -> Table:
-        """Of every laboratory that was tried; those of the prior once, by all sentences."""
-        (of_all, whole, _), (of_half, half, _) = (archive.read(self.folder / name) for name in (ALL, HALF))
-        begun = self.settings.first * self.settings.particles
-        later = {number: tried for number, tried in half.items() if number >= begun}
-        return contradictions.joined(
-            contradictions.table(of_all.sentences, whole), contradictions.table(of_half.sentences, later)
+    def _half(self) -> Sample:
+        everything, half = (
+            self._search("calibrating half", calibrating=of_half) for of_half in (False, True)
         )
+        lent = search.borrowed(self.folder / ALL, everything.head(), everything.sentences, half.sentences)
+        return replace(half, borrowed=lent).run(self.folder / HALF)
 
     def _result(self, half: Sample, whole: Sample | None) -> Result:
-        book = _Book(self.folder / JUDGED, self.threads, lambda n: self.told("over ten seeds", n))
+        prior, posterior, table = self._tables(half)
+        sets = self._bred(table)
+        book = Book(self.folder / JUDGED, self.threads, self.told)
         bench = book.judged(CHOSEN)
-        by_half = book.judged(best(half))
-        by_all = by_half if whole is None else book.judged(best(whole))
-        return Result(
-            half,
-            whole,
-            bench,
-            by_half,
-            by_all,
-            self._table(),
+        of_half = [book.judged(one) for one in best(half)]
+        of_all = [] if whole is None else [book.judged(one) for one in best(whole)]
+        by_half = max(of_half, key=lambda one: one.count(judge.calibration()))
+        by_all = max(of_all, key=lambda one: one.count(sentences()), default=by_half)
+        of = searched(calibrating=False)
+        shares = (
+            drawn_shares("drawn from the prior", prior, of),
+            drawn_shares("drawn from the posterior of the half", posterior, of),
+            judged_shares("inferred from the half: its best", by_half, of),
+            judged_shares("hand-chosen bench", bench, of),
+        )
+        judged = (bench, *of_half, *of_all)
+        return Result(half, whole, bench, by_half, by_all, judged, shares, sets, table)
+
+    def _tables(self, half: Sample) -> tuple[Table, Table, Table]:
+        """Of the prior, of the posterior by half, and of every laboratory that was tried, each once."""
+
+        def progress(_power: float, done: int, of: int) -> None:
+            self.told("posterior of the half, by all sentences", done, of)
+
+        predicted = Search(searched(calibrating=False), self.settings, self.runner, progress)
+        predicted.watched(self.folder / PREDICTED, half.points, PREDICTIVE)
+        begun = self.settings.first * self.settings.particles
+        ids = tuple(s.id for s in predicted.sentences)
+        _, of_all, _ = archive.read(self.folder / ALL)
+        _, of_half, _ = archive.read(self.folder / HALF)
+        _, drawn_, _ = archive.read(self.folder / PREDICTED)
+        whole, posterior = contradictions.table(ids, of_all), contradictions.table(ids, drawn_)
+        prior = contradictions.table(ids, {n: tried for n, tried in of_all.items() if n < begun})
+        later = {n: tried for n, tried in of_half.items() if n >= begun}
+        half_ids = tuple(s.id for s in searched(calibrating=True))
+        return (
+            prior,
+            posterior,
+            contradictions.joined(whole, posterior, contradictions.table(half_ids, later)),
         )
 
-
-def best(sample: Sample) -> Laboratory:
-    """The laboratory of a posterior that misses fewest sentences; the first of several."""
-    return drawn(sample.points[int(np.argmax(sample.likelihood))].tolist())
-
-
-class _Row(msgspec.Struct):
-    key: str
-    held: dict[str, int]
-
-
-class _Rows(msgspec.Struct):
-    rows: list[_Row]
+    def _bred(self, table: Table) -> list[Contradiction]:
+        """Each of the surest contradictions, searched for by itself."""
+        never = table.never_together()
+        some = [one for size in (2, 3) for one in [n for n in never if len(n.ids) == size][:SURELY]]
+        nest = Nest(self.folder / BRED, table, self.runner, self.settings.seed)
+        found = []
+        for i, one in enumerate(some):
+            self.told("bred for what was never true together", i, len(some))
+            found.append(Contradiction(one, nest.bred(one.ids, TRIES)))
+        return found
 
 
-class _Book:
-    """Laboratories that were judged, kept in a file."""
-
-    def __init__(self, path: Path, threads: int, told: Callable[[int], None]):
-        self._path, self._threads, self._told = path, threads, told
-        self._stamp = search.stamp()
-        self._rows: dict[str, dict[str, int]] = {}
-        if path.exists():
-            try:
-                rows = msgspec.json.decode(path.read_bytes(), type=_Rows).rows
-            except msgspec.DecodeError as error:
-                raise InputError(f"{path} is spoiled ({error}); remove it, and it is made anew") from error
-            self._rows = {row.key: row.held for row in rows}
-
-    def judged(self, laboratory: Laboratory) -> Judged:
-        """A laboratory over all seeds; what the file knows is not done again."""
-        key = f"{self._stamp} {sorted((k, str(v)) for k, v in asdict(laboratory).items())}"
-        if key not in self._rows:
-            one = judged(laboratory, threads=self._threads)
-            self._rows[key] = dict(one.held)
-            rows = [{"key": k, "held": held} for k, held in self._rows.items()]
-            write_json(self._path, signed({"rows": rows}))
-            self._told(len(self._rows))
-        return Judged(laboratory, len(judge.SEEDS), self._rows[key])
+def best(sample: Sample) -> list[Laboratory]:
+    """The laboratories of a posterior that miss fewest sentences, no two alike; the first of equals."""
+    points: list[list[float]] = []
+    for i in np.argsort(-sample.likelihood, kind="stable"):
+        point = sample.points[i].tolist()
+        if len(points) < CANDIDATES and point not in points:
+            points.append(point)
+    return [drawn(point) for point in points]

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.thesis.inference.sampler import Sample
 from palpate.thesis.laboratory.unknowns import LAWS, LISTING, UNKNOWNS, Unknown
 
 TOLD, HARDLY = 0.5, 0.8
 """The middle nine tenths of the posterior take at most this share of the prior's: told; hardly; beyond, not told."""
 MIDDLE = (0.05, 0.5, 0.95)
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,22 @@ class Marginal:
         return f"{middle} ({low} to {high}){unit}"
 
 
+def worth(sample: Sample) -> Array:
+    """As many independent laboratories would know the mean of each unknown as well, shape (d,).
+
+    The variance of a mean is estimated by families, the particles of one ancestor, which are taken to be independent of
+    each other and of nothing else (Chan and Lai, 2013): many moves make relatives strangers, few do not.
+    """
+    away = sample.visited - sample.visited.mean(axis=0)
+    families = np.array([away[sample.ancestors == one].sum(axis=0) for one in np.unique(sample.ancestors)])
+    most, count = len(away), len(families)
+    if count == 1:
+        return np.ones(away.shape[1])
+    between = (families**2).sum(axis=0) * count / (count - 1.0)
+    within = (away**2).sum(axis=0)
+    return np.clip(np.where(between > 0.0, most * within / np.maximum(between, 1e-300), most), 1.0, most)
+
+
 def named(unknown: Unknown, value: float) -> str:
     """A value of one of a few in words."""
     if unknown.name == "foam_law":
@@ -61,12 +79,12 @@ def named(unknown: Unknown, value: float) -> str:
     return f"{value:g}"
 
 
-def marginals(points: NDArray[np.float64]) -> list[Marginal]:
+def marginals(points: Array) -> list[Marginal]:
     """Of each unknown, from points of the posterior in shares of the prior, shape (n, d)."""
     return [_marginal(unknown, points[:, i]) for i, unknown in enumerate(UNKNOWNS)]
 
 
-def _marginal(unknown: Unknown, shares: NDArray[np.float64]) -> Marginal:
+def _marginal(unknown: Unknown, shares: Array) -> Marginal:
     if unknown.choices:
         values, counts = np.unique([unknown.at(float(s)) for s in shares], return_counts=True)
         best = int(np.argmax(counts))

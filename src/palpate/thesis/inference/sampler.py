@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,17 @@ Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
 """Log-likelihoods of points, shape (n, d) -> (n,). Where one falls below its floor, the second argument of shape (n,),
 any number below the floor will do: the point is refused either way."""
+Begun = Callable[[float, int], None]
+"""Told at each temperature the power of the likelihood, and of how many points it will be asked there."""
 JITTER = 0.02
 """Added to each coordinate that moves, as a share of its prior: without it differences span what they began with."""
 LEAP = 0.1
 """Share of the moves that go by a whole difference, from one mode to another (ter Braak, 2006)."""
 TOGETHER = 0.25
 """Share of the coordinates that move at once."""
+
+LAST = 3
+"""Times as many moves at the last temperature: there each of them adds to the posterior."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +39,14 @@ class Settings:
         seed: of everything drawn.
     """
 
-    particles: int = 64
+    particles: int = 128
     first: int = 4
     moves: int = 2
     seed: int = 1
+
+    def at(self, power: float) -> int:
+        """Moves of each particle at this power of the likelihood; where it stands after the last is the posterior."""
+        return self.moves if power < 1.0 else LAST * self.moves
 
 
 @dataclass(frozen=True)
@@ -52,14 +62,29 @@ class Stage:
 
 @dataclass(frozen=True)
 class Sample:
-    """The posterior as points of equal weight."""
+    """The posterior as points of equal weight.
 
-    points: Array  # (particles, d)
-    likelihood: Array  # logarithms, (particles,)
+    Args:
+        points: where the particles stand in the end, shape (particles, d).
+        likelihood: logarithms, shape (particles,).
+        stages: the temperatures.
+        visited: where they stood after each move at the last temperature, shape (n, d): the posterior.
+        ancestors: the point of the prior that each of these comes from, shape (n,).
+    """
+
+    points: Array
+    likelihood: Array
     stages: tuple[Stage, ...]
+    visited: Array
+    ancestors: NDArray[np.int64]
 
 
-def sample(evaluate: Evaluate, redrawn: NDArray[np.bool_], settings: Settings) -> Sample:
+def sample(
+    evaluate: Evaluate,
+    redrawn: NDArray[np.bool_],
+    settings: Settings,
+    begun: Begun = lambda _power, _count: None,
+) -> Sample:
     """Points of the posterior under an even prior on the unit cube (Del Moral, Doucet and Jasra, 2006).
 
     From points of Sobol's sequence the likelihood's power grows from 0 to 1 so fast that the weights stay worth half
@@ -70,9 +95,11 @@ def sample(evaluate: Evaluate, redrawn: NDArray[np.bool_], settings: Settings) -
         evaluate: the likelihood; asked in the same order whenever the settings are the same.
         redrawn: coordinates whose neighbours mean nothing, shape (d,); they are drawn anew.
         settings: sizes and seed.
+        begun: told of each temperature, the prior's too.
     """
     rng = np.random.default_rng(settings.seed)
     points = prior(settings, len(redrawn))
+    begun(0.0, len(points))
     likelihood = evaluate(points, np.full(len(points), -np.inf))
     stages: list[Stage] = []
     beta, ancestor = 0.0, np.arange(len(points))
@@ -83,16 +110,23 @@ def sample(evaluate: Evaluate, redrawn: NDArray[np.bool_], settings: Settings) -
         effective = 1.0 / float(np.sum(weights**2))
         kept = _resampled(weights, settings.particles, rng)
         points, likelihood, ancestor = points[kept], likelihood[kept], ancestor[kept]
-        accepted = [_swept(evaluate, points, likelihood, redrawn, beta, rng) for _ in range(settings.moves)]
+        begun(beta, settings.at(beta) * settings.particles)
+        accepted, visited = [], []
+        for _ in range(settings.at(beta)):
+            accepted.append(_swept(evaluate, points, likelihood, redrawn, beta, rng))
+            visited.append(points.copy())
         distinct = len(np.unique(points, axis=0))
         stages.append(Stage(beta, effective, float(np.mean(accepted)), distinct, len(np.unique(ancestor))))
-    return Sample(points, likelihood, tuple(stages))
+    return Sample(points, likelihood, tuple(stages), np.vstack(visited), np.tile(ancestor, len(visited)))
 
 
+@cache
 def prior(settings: Settings, dimensions: int) -> Array:
-    """The points of the prior that sampling begins with, shape (n, d)."""
+    """The points of the prior that sampling begins with, shape (n, d); not to be written to."""
     sobol = Sobol(dimensions, settings.seed)
-    return np.array([sobol.point(i) for i in range(settings.first * settings.particles)])
+    points = np.array([sobol.point(i) for i in range(settings.first * settings.particles)])
+    points.flags.writeable = False
+    return points
 
 
 def _step(likelihood: Array, room: float, wanted: float) -> float:

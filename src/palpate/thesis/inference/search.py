@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -28,8 +28,13 @@ if TYPE_CHECKING:
     from palpate.studies.cluster import Cluster
 
 Array = NDArray[np.float64]
-WRONG = 0.05
-"""How probable it is that a sentence does not hold in the very laboratory that it was written in: one in twenty."""
+Progress = Callable[[float, int, int], None]
+MOST_WRONG = 0.5
+"""At most so probable is it that a sentence does not hold in the very laboratory it was written in: beyond, it would
+tell the contrary of what it says."""
+WRONG = 0.5 * MOST_WRONG
+"""How probable it is, not knowing which sentence is how reliable: the mean of an even prior from 0 to `MOST_WRONG`,
+each sentence having a probability of its own. Integrated over, that is all that remains of it."""
 MISS = math.log((1.0 - WRONG) / WRONG)
 """What a sentence that does not hold takes off the log-likelihood."""
 
@@ -84,14 +89,14 @@ class Search:
         sentences: that decide, in the order in which they are tried.
         settings: of the sampler.
         runner: who tries.
-        progress: told how many laboratories are tried.
+        progress: told the power of the likelihood, and how many laboratories of how many are done there.
         borrowed: verdicts of these sentences from another search that began with the same laboratories.
     """
 
     sentences: Sequence[Sentence]
     settings: Settings
     runner: Runner
-    progress: Callable[[int], None] = lambda _: None
+    progress: Progress = lambda _power, _done, _of: None
     borrowed: Mapping[int, Tried] = field(default_factory=dict)
 
     def run(self, path: Path) -> Sample:
@@ -102,13 +107,19 @@ class Search:
         """
         with archive.opened(path, self.head()) as book:
             redrawn = np.array([unknown.redrawn for unknown in UNKNOWNS])
-            return sampler.sample(_Asked(self, book), redrawn, self.settings)
+            asked = _Asked(self, book)
+            return sampler.sample(asked, redrawn, self.settings, asked.begin)
 
     def survey(self, path: Path) -> None:
         """Tries the laboratories of the prior alone, with which `run` begins."""
+        self.watched(path, sampler.prior(self.settings, len(UNKNOWNS)), 0)
+
+    def watched(self, path: Path, points: Array, first: int) -> None:
+        """Tries these laboratories, shape (n, d), each by all sentences, numbered from `first` on."""
         with archive.opened(path, self.head()) as book:
-            points = sampler.prior(self.settings, len(UNKNOWNS))
-            _Asked(self, book)(points, np.full(len(points), -np.inf))
+            asked = _Asked(self, book, first)
+            asked.begin(0.0, len(points))
+            asked(points, np.full(len(points), -np.inf))
 
     def head(self) -> Head:
         """What tells its archive from any other."""
@@ -126,6 +137,13 @@ class _Asked:
     search: Search
     book: Archive
     number: int = 0
+    power: float = 0.0
+    done: int = 0  # at this power
+    of: int = 0
+
+    def begin(self, power: float, count: int) -> None:
+        """From now on at this power of the likelihood, so many laboratories."""
+        self.power, self.done, self.of = power, 0, count
 
     def __call__(self, points: Array, floor: Array) -> Array:
         allowed = np.floor(-floor / MISS + 1e-9)
@@ -138,13 +156,19 @@ class _Asked:
             other = self.search.borrowed.get(job.number)
             if other is not None and other.shares == job.shares and job.number not in self.book.known:
                 self.book.add(other)
-        self._try([job for job in jobs if job.number not in self.book.known])
+        missing = [job for job in jobs if job.number not in self.book.known]
+        self._tell(len(jobs) - len(missing))
+        self._try(missing)
         return np.array([-MISS * self._misses(job) for job in jobs])
 
     def _try(self, jobs: Sequence[Job]) -> None:
         for tried in self.search.runner.tried(jobs, tuple(s.id for s in self.search.sentences)):
             self.book.add(tried)
-            self.search.progress(len(self.book.known))
+            self._tell(1)
+
+    def _tell(self, more: int) -> None:
+        self.done += more
+        self.search.progress(self.power, self.done, self.of)
 
     def _misses(self, job: Job) -> float:
         """Of the sentences; of one that was given up, more than are allowed."""
@@ -167,6 +191,7 @@ def borrowed(path: Path, head: Head, of: Sequence[Sentence], wanted: Sequence[Se
     }
 
 
+@cache
 def stamp() -> str:
     """Hash of the sources that a trial consists of."""
     here = Path(__file__).parent
@@ -176,8 +201,11 @@ def stamp() -> str:
 
 
 def attempt(job: Job, ids: Sequence[str], stopped: Callable[[], bool] = lambda: False) -> Tried:
-    """One laboratory, sentence by sentence in the order of their names, until it misses more than are allowed."""
-    trial = Trial(drawn(job.shares), stopped=stopped)
+    """One laboratory, sentence by sentence in the order of their names, until it misses more than are allowed.
+
+    Each has a noise of its own, so that what is found does not hang on one draw of it.
+    """
+    trial = Trial(drawn(job.shares), job.number, stopped=stopped)
     verdicts: list[bool] = []
     missed = 0
     for id_ in ids:

@@ -80,9 +80,12 @@ def _lines(
 
 
 def calm_limits(axis: Axes, *curves: Array, margin: float = 0.25) -> None:
-    """The panel's scale from curves without their first moments."""
-    low = min(float(np.nanmin(c)) for c in curves)
-    high = max(float(np.nanmax(c)) for c in curves)
+    """The panel's scale from curves without their first moments; a press that ended before has none."""
+    seen = [c for c in curves if np.isfinite(c).any()]
+    if not seen:
+        return
+    low = min(float(np.nanmin(c)) for c in seen)
+    high = max(float(np.nanmax(c)) for c in seen)
     room = margin * max(high - low, 1e-9)
     axis.set_ylim(low - room, high + room)
 

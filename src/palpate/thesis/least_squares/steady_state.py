@@ -74,16 +74,21 @@ def by_ratios(press: Record) -> dict[str, Array]:
     f, x = press["force_measured"], press["displacement"]
     v, a = press["vx_raw"][moving], press["ax_measured"][moving]
     stiffness = f[rest] / x[rest]
-    left = f[moving] - np.median(stiffness) * x[moving]
+    left = f[moving] - _middle(stiffness) * x[moving]
     seen = (np.abs(v) > LEAST_VELOCITY) & (np.abs(a) <= np.median(np.abs(a)))
     damping = left[seen] / v[seen]
-    left = left - np.median(damping) * v
+    left = left - _middle(damping) * v
     seen = np.abs(a) > LEAST_ACCELERATION
     inertia = left[seen] / a[seen]
     return {
         key: np.percentile(values, QUANTILES) if len(values) else np.full(len(QUANTILES), np.nan)
         for key, values in (("K", stiffness), ("B", damping), ("M", inertia))
     }
+
+
+def _middle(values: Array) -> float:
+    """The median; not a number of none, as where nothing moved."""
+    return float(np.median(values)) if len(values) else float("nan")
 
 
 def found_claim(

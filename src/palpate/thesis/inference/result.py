@@ -1,0 +1,192 @@
+"""What an inference found, and its numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from palpate.thesis.inference import judge
+from palpate.thesis.inference.contradictions import CHANCE, Alone, Table, Together
+from palpate.thesis.inference.directed import Bred
+from palpate.thesis.inference.judge import Judged
+from palpate.thesis.inference.posterior import Marginal, marginals, worth
+from palpate.thesis.inference.predictive import Predictive
+from palpate.thesis.inference.sampler import Sample
+from palpate.thesis.inference.sentences import Sentence, sentences
+from palpate.thesis.laboratory.laboratory import values
+
+NOT_FOUND, EXCLUDED, IMPOSSIBLE = "not found", "exclude each other", "impossible in the ranges"
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Sentences that were never true together, and what a search for just them came to."""
+
+    together: Together
+    bred: Bred
+
+    @property
+    def stands(self) -> bool:
+        """Whether the search for them found none either."""
+        return self.bred.most < len(self.together.ids)
+
+    @property
+    def reason(self) -> str:
+        """The shortest one, if one is known."""
+        return reasons().get(" + ".join(self.together.ids), "")
+
+    @property
+    def verdict(self) -> str:
+        """In words: impossible where a law says so, excluded where numbers do, else not found."""
+        if self.reason:
+            return IMPOSSIBLE
+        return EXCLUDED if self.together.excluded else NOT_FOUND
+
+
+@dataclass(frozen=True)
+class Result:
+    """What was found.
+
+    Args:
+        half: the posterior by the half that calibrates.
+        all: by all sentences; None where only the half was asked for.
+        bench: the hand-chosen laboratory, judged.
+        by_half, by_all: the best laboratory of each posterior, by the sentences it was inferred from, over ten seeds.
+        judged: all laboratories that were looked at over ten seeds.
+        predictive: what laboratories drawn make of the sentences.
+        sets: sentences never true together, each set searched for by itself.
+        table: verdicts of all laboratories that were tried.
+    """
+
+    half: Sample
+    all: Sample | None
+    bench: Judged
+    by_half: Judged
+    by_all: Judged
+    judged: Sequence[Judged]
+    predictive: Sequence[Predictive]
+    sets: Sequence[Contradiction]
+    table: Table
+
+    @property
+    def posterior(self) -> Sample:
+        """By as many sentences as were asked for."""
+        return self.half if self.all is None else self.all
+
+    @property
+    def cross_validation(self) -> tuple[int, int]:
+        """Sentences of the half held out that are true only in the laboratory by half, and only on the bench."""
+        there, here = ({s.id for s in judge.validation() if j.true(s)} for j in (self.by_half, self.bench))
+        return len(there - here), len(here - there)
+
+    @property
+    def by_chance(self) -> float:
+        """How probable so good a laboratory is on the half held out, were it no better than the bench: a sign test."""
+        there, here = self.cross_validation
+        return sum(math.comb(there + here, k) for k in range(there, there + here + 1)) / 2.0 ** (there + here)
+
+    @property
+    def better(self) -> bool:
+        """Whether the laboratory by half is better than the bench on the half held out, beyond chance."""
+        return self.by_chance <= CHANCE
+
+    @property
+    def largest(self) -> Judged:
+        """The laboratory with the largest set of sentences that hold at once over ten seeds."""
+        return max(self.judged, key=lambda j: j.count(sentences()))
+
+    @property
+    def never(self) -> list[Alone]:
+        """Sentences that no laboratory of the search made true, nor one of those that were judged."""
+        found = {s.id for j in self.judged for s in sentences() if j.held[s.id]}
+        return [one for one in self.table.alone() if one.true == 0 and one.id not in found]
+
+    @property
+    def contradictions(self) -> list[Contradiction]:
+        """Sets of sentences that no laboratory made true together, in any run."""
+        held = [{s.id for s in sentences() if j.true(s)} for j in self.judged]
+        return [c for c in self.sets if c.stands and not any(set(c.together.ids) <= ids for ids in held)]
+
+
+def halves() -> dict[str, tuple[Sentence, ...]]:
+    """The two halves and all."""
+    return {"calibration": judge.calibration(), "validation": judge.validation(), "all": sentences()}
+
+
+def laboratories(result: Result) -> dict[str, Judged]:
+    """Those that are compared."""
+    found = {"hand-chosen bench": result.bench, "inferred from the half": result.by_half}
+    if result.all is not None:
+        found["inferred from all"] = result.by_all
+    return found
+
+
+def samples(result: Result) -> dict[str, Sample]:
+    """The searches."""
+    found = {"the calibration half": result.half}
+    return found if result.all is None else {**found, "all sentences": result.all}
+
+
+@cache
+def reasons() -> dict[str, str]:
+    """Why a sentence is never true, or several exclude each other: by its name, or all joined by " + "."""
+    text = resources.files("palpate.thesis.inference").joinpath("reasons.toml").read_text("utf-8")
+    return msgspec.toml.decode(text, type=dict[str, str])
+
+
+def as_json(result: Result, command: str) -> dict[str, Any]:
+    """The page's numbers."""
+    return {
+        "command": command,
+        "held_out": {
+            "only_inferred": result.cross_validation[0],
+            "only_bench": result.cross_validation[1],
+            "by_chance": result.by_chance,
+            "better": result.better,
+        },
+        "true": {
+            name: {half: {"true": one.count(of), "of": len(of)} for half, of in halves().items()}
+            for name, one in laboratories(result).items()
+        },
+        "predictive": [asdict(one) for one in result.predictive],
+        "laboratories": {name: values(one.laboratory) for name, one in laboratories(result).items()},
+        "largest": [s.id for s in sentences() if result.largest.true(s)],
+        "posterior": [_told_of(m) for m in marginals(result.posterior.visited)],
+        "never": [{**asdict(a), "reason": reasons().get(a.id, "")} for a in result.never],
+        "never_together": [_told_together(c) for c in result.contradictions],
+        "tried": len(result.table.true),
+        "searches": {name: _told_search(sample) for name, sample in samples(result).items()},
+        "sentences": {
+            s.id: {name: one.held[s.id] for name, one in laboratories(result).items()} for s in sentences()
+        },
+    }
+
+
+def _told_of(m: Marginal) -> dict[str, Any]:
+    own = {"low": m.low, "middle": m.middle, "high": m.high, "width": m.width}
+    return {"unknown": m.unknown.name, "unit": m.unknown.unit, **own, "verdict": m.verdict}
+
+
+def _told_together(c: Contradiction) -> dict[str, Any]:
+    return {
+        "sentences": list(c.together.ids),
+        "laboratories": c.together.tried,
+        "parts": list(c.together.parts),
+        "expected": c.together.expected,
+        "bred": c.bred.tries,
+        "verdict": c.verdict,
+        "reason": c.reason,
+    }
+
+
+def _told_search(sample: Sample) -> dict[str, Any]:
+    own = worth(sample)
+    effective = {"least": float(own.min()), "median": float(np.median(own)), "most": float(own.max())}
+    return {"effective": effective, "stages": [asdict(stage) for stage in sample.stages]}
