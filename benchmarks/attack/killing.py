@@ -140,6 +140,7 @@ def _ran(*words: str, cwd: Path, largest: int | None = None) -> subprocess.Compl
         capture_output=True,
         text=True,
         timeout=600,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},  # half of it would be read by every later process
         preexec_fn=limit,
     )
 

@@ -279,13 +279,17 @@ def test_a_place_that_may_not_be_written_is_one_line(program):
 
 
 def cramped(folder: Path, most: int) -> subprocess.CompletedProcess:
-    """`palpate thesis 3.7` where no file can grow beyond so many bytes."""
+    """`palpate thesis 3.7` where no file can grow beyond so many bytes.
+
+    It leaves no bytecode: what Python could write half of it would be read by every later process.
+    """
     resource = pytest.importorskip("resource")
     return subprocess.run(
         [sys.executable, "-m", "palpate", "thesis", "3.7", "--out", str(folder)],
         capture_output=True,
         text=True,
         check=False,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
     )
 
