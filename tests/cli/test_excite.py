@@ -37,6 +37,7 @@ def test_the_contract_of_json(capsys, elsewhere):
     code, found = ask(capsys, *ASKED)
     assert code == 0
     assert set(found) == {
+        "command", "options", "files", "version",
         "kind", "feasible", "duration_s", "settle_s", "mean_N", "wave", "asked", "reached", "surfaces", "remedies",
     }  # fmt: skip
     assert found["feasible"] is True

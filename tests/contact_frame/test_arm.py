@@ -59,8 +59,8 @@ def test_a_tool_heavier_than_all_is_rejected():
 
 def in_series(stiffness: float, seed: int = 0, **press):
     """A press whose position is that of the joints: the arm gives way by f / stiffness."""
-    flat = pressed(seed=seed, **press)
-    return record(flat["time"], flat["position"] + flat["force"] / stiffness, flat["force"])
+    flat, true = pressed(seed=seed, **press), pressed(seed=seed, **{**press, "noise": 0.0})
+    return record(flat["time"], flat["position"] + true["force"] / stiffness, flat["force"])
 
 
 def test_a_press_on_a_rigid_wall_is_the_arm():

@@ -254,4 +254,6 @@ def test_the_limits_are_options(tmp_path, capsys):
     assert main(words) == 2
     assert "more than 1e-06 GB" in capsys.readouterr().err
     assert main(["topics", str(path), "--json"]) == 0
-    assert set(json.loads(capsys.readouterr().out)) == {"entries", "troubles", "identify"}
+    assert set(json.loads(capsys.readouterr().out)) == {
+        "command", "options", "files", "version", "entries", "troubles", "identify",
+    }  # fmt: skip
