@@ -183,6 +183,7 @@ def test_options_that_were_saved_make_the_command_short_and_never_move_an_arm(fo
         kept = (here / "cell.toml").read_text()
         assert "wire" not in kept
         assert "dry-run" not in kept
+        assert "\nforce =" not in kept  # to palpate identify, which takes the same file, it is a column
         capsys.readouterr()
         time.sleep(1.2)  # the stand-in takes another master a second after the last one's silence
         at = words[words.index("--wire") + 1]

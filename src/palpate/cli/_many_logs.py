@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palpate.cli._answer import print_answer
 from palpate.cli._edge import INTERRUPTED
 from palpate.cli._one_log import OneLog, answered
+from palpate.cli._program import command
 from palpate.cli._terminal import console, place, say
 from palpate.errors import InputError, PalpateError
 
@@ -74,9 +76,9 @@ def _row(log: Path, asked: OneLog) -> LogRow:
     try:
         found, source = asked.identified(log)
     except (PalpateError, OSError, MemoryError) as error:
-        return LogRow(
-            Source(str(log), asked.options), None, " ".join((str(error) or type(error).__name__).split())
-        )
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        source = Source(str(log), asked.options, command=command(), made=now)
+        return LogRow(source, None, " ".join((str(error) or type(error).__name__).split()))
     return LogRow(source, _light(found))
 
 

@@ -58,14 +58,16 @@ class CellOptions:
         if self.save_options is not None:
             check_place(self.save_options, "--save-options", ending=".toml")
 
-    def save(self, parts: Iterable[Any]) -> None:
+    def save(self, parts: Iterable[Any], command: str = "") -> None:
         """Write what was said, if that was asked.
 
         Args:
             parts: dataclasses of options.
+            command: whose options they are: what is of one call of it is not kept.
         """
         if self.save_options is not None:
-            kept = {name: value for name, value in options_given(parts).items() if name not in _NEVER}
+            once = _NEVER | _TYPED.get(command, set())
+            kept = {name: value for name, value in options_given(parts).items() if name not in once}
             write_text(self.save_options, _toml(kept))
 
 

@@ -203,7 +203,7 @@ def only(part: SimulatedOptions | WireOptions | LimitOptions, of: str) -> None:
     """
     given = next(iter(options_given((part,))), None)
     if given is not None:
-        raise InputError(f"--{given} is of {of}; leave it out, or the other arm")
+        raise InputError(f"--{given} is of {of}, or leave out --{given}")
 
 
 def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple[Task, Limits]:

@@ -74,15 +74,18 @@ def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> No
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    drawn = RichTable(
-        title=table.title or None, title_justify="left", title_style="italic", box=box.SIMPLE_HEAD
-    )
+    if table.title:
+        console.print(Text(table.title, style="italic"))
+    drawn = RichTable(box=box.SIMPLE_HEAD, show_edge=False, show_header=any(table.head))
     for i, title in enumerate(table.head):
-        drawn.add_column(title, justify="left" if i == 0 or styles else "right", overflow="fold")
+        drawn.add_column(
+            title, justify="left" if i == 0 or styles or table.read(i) else "right", overflow="fold"
+        )
     for i, row in enumerate(table.rows):
         last = Text(row[-1], style=styles[i] if styles else "")
         drawn.add_row(*row[:-1], last)
     console.print(drawn)
+    console.print()
 
 
 def place(console: Console, what: str, where: object) -> None:

@@ -42,7 +42,7 @@ def press(
     A real arm is first looked at, and it is said what would be done; --dry-run moves nothing:
 
     palpate press --dry-run --wire rtde:192.168.0.10 --gains gains.toml --force 20:N --normal 0,0,-1 --force-limit 40:N
-    --speed-limit 20:mm/s --travel-limit 10:mm --time-limit 20:s --save-options my-cell.toml
+    --speed-limit 50:mm/s --travel-limit 10:mm --time-limit 20:s --save-options my-cell.toml
 
     The same without --dry-run moves it, after it has asked; options that were saved need not be typed again:
 
@@ -59,7 +59,6 @@ def press(
     asked, simulated = asked or AskOptions(), simulated or SimulatedOptions()
     wire, limits, cell = wire or WireOptions(), limits or LimitOptions(), cell or CellOptions()
     cell.check()
-    cell.save((asked, simulated, wire, limits))
     if wire.recover is not None:
         from palpate.wires import recover
 
@@ -67,12 +66,15 @@ def press(
         return 0
     if wire.wire is None:
         for part in (wire, limits):
-            only(part, "a real arm, and no --wire leads to one")
-        return _simulated(asked, simulated, json)
-    only(simulated, "a simulated arm, and --wire leads to a real one")
-    from palpate.cli._press_wire import press_over
+            only(part, "a real arm, and no --wire leads to one; add --wire")
+        code = _simulated(asked, simulated, json)
+    else:
+        only(simulated, "a simulated arm, and --wire leads to a real one; leave out --wire")
+        from palpate.cli._press_wire import press_over
 
-    return press_over(asked, wire, limits, json=json)
+        code = press_over(asked, wire, limits, json=json)
+    cell.save((asked, simulated, wire, limits), "press")
+    return code
 
 
 def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:

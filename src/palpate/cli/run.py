@@ -49,7 +49,7 @@ class DrawnOptions:
         Write a film of the arm too, arm.gif; it takes some ten seconds.
     """
 
-    figures: Annotated[tuple[str, ...], FLAG] = ("png",)
+    figures: Annotated[tuple[str, ...], Parameter(negative=(), show_default=", ".join)] = ("png",)
     dpi: int | None = None
     movie: Annotated[bool, FLAG] = False
 

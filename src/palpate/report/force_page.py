@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import UTC, datetime
-from functools import partial
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,9 +15,9 @@ from palpate.force.steps import BAND, frequency_response
 from palpate.force.telling import UNCOVERED
 from palpate.force.tuning import RIGID, Tuning
 from palpate.report import style
+from palpate.report.figure_panels.panels import panels_of, shown_in
 from palpate.report.force_table import rows
-from palpate.report.page import Table, embedded, render
-from palpate.report.svg import svg
+from palpate.report.page import Table, render
 from palpate.text import shown
 
 if TYPE_CHECKING:
@@ -46,11 +45,13 @@ def page(told: Tuning, command: str = "palpate tune") -> str:
             Table("What there is to know", ("", ""), rows(told)),
             Table("Not covered by a proof", ("",), [(text,) for text in UNCOVERED]),
         ],
-        figures=[
-            _figure("Where it is proved stable, and what is touched", partial(one, _intervals, told, 1.6)),
-            _figure("The press at both ends, its stiffness known", partial(one, steps, told, 2.6)),
-            _figure("Nyquist's curve on the stiffest surface", partial(one, _nyquist, told, 4.0)),
-        ],
+        **shown_in(
+            [
+                _figure("Where it is proved stable, and what is touched", one(_intervals, told, 1.6)),
+                _figure("The press at both ends, its stiffness known", one(steps, told, 2.6)),
+                _figure("Nyquist's curve on the stiffest surface", one(_nyquist, told, 4.0)),
+            ]
+        ),
         source=told.gains.to_toml(),
         source_title="The gains",
         room="tune",
@@ -67,8 +68,8 @@ def one(drawn: Callable[[Axes, Tuning], None], told: Tuning, height: float) -> F
     return figure
 
 
-def _figure(caption: str, drawn: Callable[[], Figure]) -> dict[str, str]:
-    return {"source": embedded(svg(drawn()), "image/svg+xml"), "caption": caption}
+def _figure(caption: str, drawing: Figure) -> dict[str, Any]:
+    return {"panels": panels_of(drawing), "caption": caption}
 
 
 def _intervals(axis: Axes, told: Tuning) -> None:

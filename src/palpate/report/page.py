@@ -19,6 +19,14 @@ class Table:
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
 
+    def read(self, column: int) -> bool:
+        """Whether a column holds sentences, which begin at its left, and not figures, which end at its right."""
+        return any(len(row[column]) > _SENTENCE for row in self.rows)
+
+
+_SENTENCE = 32
+"""Letters of a cell from which on it is a sentence; a value with its interval and unit is shorter."""
+
 
 def page(
     *,

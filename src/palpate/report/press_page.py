@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,15 +14,22 @@ from palpate.press.summary import Asked
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.arm_film import film
+from palpate.report.figure_panels.panels import panels_of, shown_in
 from palpate.report.numbers import NONE, plain, with_half
-from palpate.report.page import Table, captioned, embedded, render
+from palpate.report.page import Table, embedded, render
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: Path) -> None:
     """Writes figures, film.svg and report.html into a folder."""
-    figures = {folder / "arm.png": _arm(record, asked, folder / "arm.png")}
-    figures[folder / "force.png"] = _force(record, asked, folder / "force.png")
-    figures[folder / "torque.png"] = _torque(record, asked, folder / "torque.png")
+    figures = []
+    for name, draw in (("force", _force), ("torque", _torque), ("arm", _arm)):
+        with style.inked():
+            drawing, caption = draw(record, asked)
+            style.save(drawing, folder / f"{name}.png")
+            figures.append({"panels": panels_of(drawing), "caption": caption})
     moving = film(record, asked.arm, asked.place)
     write_text(folder / "film.svg", moving)
     first = {
@@ -40,9 +48,11 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
         about=about,
         notes=notes(summary),
         tables=tables(summary),
-        figures=[first, *captioned(figures)],
+        **shown_in([first, *figures]),
         source="",
+        room="press",
         command=summary["command"],
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     write_text(folder / "report.html", page)
 
@@ -113,7 +123,7 @@ def _identified_table(found: dict[str, Any], truth: dict[str, Any]) -> Table:
     return Table("The surface, as palpate identify finds it", ("", "95 %", "verdict", "truth", "why"), rows)
 
 
-def _arm(record: Record, asked: Asked, path: Path) -> str:
+def _arm(record: Record, asked: Asked) -> tuple[Figure, str]:
     """The arm from two sides at the end."""
     from matplotlib.figure import Figure
 
@@ -131,11 +141,11 @@ def _arm(record: Record, asked: Asked, path: Path) -> str:
         axis.plot(bones[:, i], bones[:, j], "-o", color=style.INK, linewidth=4, markersize=6)
         axis.plot(bones[-1, i], bones[-1, j], "o", color=style.F)
         axis.set(xlabel=f"{names[0]} [m]", ylabel=f"{names[1]} [m]", aspect="equal")
-    style.save(drawing, path)
-    return "The arm at the end of the press from two sides: joints, tip, and the surface around it."
+    caption = "The arm at the end of the press from two sides: joints, tip, and the surface around it."
+    return drawing, caption
 
 
-def _force(record: Record, asked: Asked, path: Path) -> str:
+def _force(record: Record, asked: Asked) -> tuple[Figure, str]:
     drawing, (force, depth) = style.figure(2, height=2.1)
     t, pressing = record["t"], record["phase"] == CONTACT
     force.plot(t, record["force_sampled"], color=style.MEASURED, linewidth=0.7, label="reading")
@@ -150,18 +160,17 @@ def _force(record: Record, asked: Asked, path: Path) -> str:
     depth.axhline(0.0, color=style.QUIET, linewidth=0.8)
     depth.set(xlabel="time [s]", ylabel="depth [mm]")
     style.legend(depth)
-    style.save(drawing, path)
-    return (
+    caption = (
         "Force and depth of the tip. Where encoders sit before elastic drive trains, they see more than the surface's "
         "own deformation."
     )
+    return drawing, caption
 
 
-def _torque(record: Record, asked: Asked, path: Path) -> str:
+def _torque(record: Record, asked: Asked) -> tuple[Figure, str]:
     drawing, (axis,) = style.figure(1, height=2.8)
     for i, name in enumerate(asked.arm.names, start=1):
         axis.plot(record["t"], record[f"torque{i}"], linewidth=1.0, label=style.literal(name))
     axis.set(xlabel="time [s]", ylabel="torque [N m]")
     style.legend(axis, ncols=4)
-    style.save(drawing, path)
-    return "Torque on each link, its weight included."
+    return drawing, "Torque on each link, its weight included."

@@ -106,7 +106,7 @@ def count_in_words(claims: Sequence[Claim]) -> str:
     found = counted(claims)
     parts = [("reproduced", "reproduced"), ("differs", "differ"), ("not checkable", "not checkable")]
     told = ", ".join(f"{found[verdict]} {word}" for verdict, word in parts)
-    return f"{found.total()} claims measured: {told}"
+    return f"{found.total()} claim{'s' * (found.total() != 1)} measured: {told}"
 
 
 def _name(claim: Claim) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 from palpate.report.figure_panels.panels import panel_scripts
 from palpate.report.look.assets import data
 from palpate.report.page import render
-from palpate.thesis.claims import Done, counted
+from palpate.thesis.claims import Done, count_in_words, counted
 
 TONES = {"reproduced": "ok", "differs": "warn", "not checkable": "none"}
 _CHAPTERS = (("2.", "Earlier schemes"), ("3.", "The bench"), ("4.", "The controllers"))
@@ -33,7 +33,8 @@ def index_page(
         missing: numbers of those still to come.
         command: that measures them.
     """
-    verdicts = counted([claim for one in done for claim in one.claims])
+    claims = [claim for one in done for claim in one.claims]
+    verdicts = counted(claims)
     return render(
         "index.html",
         "palpate.thesis",
@@ -42,6 +43,7 @@ def index_page(
         title="The thesis, measured again",
         chapters=_chapters(done),
         count=verdicts.total(),
+        told=count_in_words(claims),
         verdicts=verdicts,
         tones=TONES,
         panels=data(dict(panels)),

@@ -122,7 +122,7 @@ def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
     if not gains.approach <= limits.speed <= gains.arm.limits.speed:
         raise InputError(
             f"the speed limit must lie between the certified approach of {1e3 * gains.approach:.3g} mm/s and the arm's"
-            f" {1e3 * gains.arm.limits.speed:g} mm/s, got {1e3 * limits.speed:g} mm/s"
+            f" {1e3 * gains.arm.limits.speed:g} mm/s, got {1e3 * limits.speed:g} mm/s; at twice the limit the arm stops"
         )
     if not (task.hold > 0.0 and task.hold + TARE < limits.seconds):
         raise InputError(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from palpate.report.figure_panels.artists import Kind, NotLines, kind_of, label_of, look_of
 from palpate.report.figure_panels.labels import plain, title, unit
 from palpate.report.figure_panels.lines import chart_of
-from palpate.report.look.assets import CHARTS, scripts
+from palpate.report.look.assets import CHARTS, TABLES, data, scripts
 from palpate.report.page import embedded
 from palpate.report.svg import svg
 
@@ -45,6 +45,13 @@ def panel_scripts() -> tuple[str, ...]:
     """What draws the panels of a page; it has them as JSON by the id of the element that holds them, in `#panels`."""
     own = (resources.files("palpate.report.figure_panels") / "panels.js").read_text(encoding="utf-8")
     return (*scripts(*CHARTS), own)
+
+
+def shown_in(figures: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What `page.html` takes to show figures, each an image (`source`) or `panels` of `panels_of`, with a caption."""
+    drawn = {str(i): one["panels"] for i, one in enumerate(figures, 1) if "panels" in one}
+    codes = (*scripts(*TABLES), *panel_scripts()) if drawn else scripts(*TABLES)
+    return {"figures": figures, "panels": data(drawn) if drawn else "", "scripts": codes}
 
 
 def _names(axes: Sequence[Axes]) -> dict[Kind, str]:

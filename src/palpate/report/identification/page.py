@@ -278,15 +278,16 @@ def _octaves(found: Identification) -> list[list[str]]:
 
 
 def _models(found: Identification) -> list[dict[str, Any]]:
+    chosen = [math.isclose(c.rmse, found.rmse, rel_tol=1e-9) for c in found.comparison]
     return [
         {
-            "name": c.model,
-            "chosen": math.isclose(c.rmse, found.rmse, rel_tol=1e-9),
+            "name": found.model if taken else c.model,  # the mass may have been taken out of it since
+            "chosen": taken,
             "r2": f"{c.r2:.4f}",
             "rmse": plain(c.rmse, 3),
             "note": shown(c.note),
         }
-        for c in found.comparison
+        for c, taken in zip(found.comparison, chosen, strict=True)
     ]
 
 

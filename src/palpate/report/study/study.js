@@ -232,18 +232,18 @@
     const [low, high] = bulk(all.flat().map(([d]) => d).filter((d) => Math.abs(d) < infinite)), room = 0.06 * (high - low) || 1;
     const row = 62, left = 8;
     const p = panel(host, { alt: "differences surface by surface", x: { label: `${comparison.label}, less that of ${ref.name}`, low: Math.min(0, low - room), high: Math.max(0, high + room), log: false },
-      y: { label: `← ${most ? "worse" : "better"}   ${most ? "better" : "worse"} than ${ref.name} →`, low: 0, high: 1, log: false, names: [""], places: [0] }, height: row * others.length + 34, left });
+      y: { label: `← ${most ? "worse" : "better"} · ${most ? "better" : "worse"} than ${ref.name} →`, low: 0, high: 1, log: false, names: [""], places: [0] }, height: row * others.length + 34, left });
     put(p.ink, "line", { class: "zero", x1: p.sx(0), x2: p.sx(0), y1: p.inner[3], y2: p.inner[2] });
     others.forEach((entrant, k) => {
       const top = p.inner[3] + k * row, middle = top + 32, bins = {};
-      put(p.svg, "text", { x: left + 2, y: top + 12, class: "name" }, entrant.name.length > 48 ? `${entrant.name.slice(0, 47)}…` : entrant.name);
+      put(p.svg, "text", { x: left + 6, y: top + 12, class: "name" }, entrant.name.length > 48 ? `${entrant.name.slice(0, 47)}…` : entrant.name);
       for (const [d, i] of all[k]) {
         const x = clipped(p.sx(d), p.inner[0] + 4, p.inner[1] - 4), bin = Math.round(x / 3);
         bins[bin] = (bins[bin] || 0) + 1;
         const place = Object.entries(comparison.conditions).map(([name, values]) => `${name} ${typeof values[i] === "number" ? figure(values[i]) : values[i]}`).join(", ");
         const aside = Math.min(Math.floor(bins[bin] / 2) * 2.4, 15) * (bins[bin] % 2 ? 1 : -1), failed = Math.abs(d) === infinite;
         if (failed) { put(p.ink, "text", { class: "cross bad", x, y: middle + aside + 4, "text-anchor": "middle" }, "×"); p.points.push({ x, y: middle + aside, text: `${place}: ${(d > 0) === !most ? entrant.name : ref.name} failed` }); }
-        else dot(p, x, middle + aside, 1.9, { class: "cloud" }, `${place}: ${signed(d)}`);
+        else dot(p, x, middle + aside, all[k].length > 50 ? 1.9 : 3, { class: "cloud" }, `${place}: ${signed(d)}`);
       }
       const sorted = all[k].map(([d]) => d).sort((a, b) => a - b), pair = entrant.pairs[reference];
       if (pair && pair.median != null) {
