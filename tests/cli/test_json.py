@@ -1,12 +1,12 @@
 """`--json` of every command: one object and nothing else, with the keys that docs/json.md says."""
 
 import json
-import re
 import shutil
 
 import numpy as np
 import pytest
 
+from cli import json_keys
 from cli.test_payload import write
 from cli.test_run import text_of
 from contact_frame.turning_tool import Tool, log_of, six
@@ -64,13 +64,7 @@ def place(tmp_path_factory, root):
 
 @pytest.fixture(scope="module")
 def documented(root):
-    """By heading of docs/json.md, the keys of its table."""
-    text = (root / "docs" / "json.md").read_text(encoding="utf-8")
-    parts = re.split(r"^## ", text, flags=re.MULTILINE)[1:]
-    return {
-        part.partition("\n")[0].strip(): set(re.findall(r"^\| `(\w+)` \|", part, re.MULTILINE))
-        for part in parts
-    }
+    return json_keys.documented(root)
 
 
 def asked(capsys, words):

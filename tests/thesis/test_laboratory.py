@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from cli.json_keys import documented
 from palpate.bench import Experiment, build, changed, load
 from palpate.bench.sequence import CONTACT
 from palpate.cli import main
@@ -558,7 +559,7 @@ def test_a_press_that_ended_before_the_slot_leaves_its_panel_alone():
     assert axis.get_ylim() == before
 
 
-def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkeypatch):
+def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkeypatch, root):
     some = tuple(s for s in sentences() if s.figure in {"6.1", "6.8", "4.4"})
     monkeypatch.setattr(judge, "SEEDS", (0,))
     for module in (judge, findings, infer, result, tables):
@@ -576,6 +577,7 @@ def test_an_inference_ends_with_a_laboratory_that_is_read_again(tmp_path, monkey
     )
     told = run.run()
     found = msgspec.json.decode((tmp_path / "lab" / "found.json").read_bytes())
+    assert set(found) | {"seed"} == documented(root)["laboratory"] | {"command", "written_by"}
     assert found["true"]["inferred from all"]["all"] == {"true": told.by_all.count(some), "of": len(some)}
     assert files.named(str(tmp_path / "lab" / "inferred.toml")) == told.by_all.laboratory
     assert "posterior" in (tmp_path / "lab" / "index.html").read_text()

@@ -14,6 +14,7 @@ import time
 import numpy as np
 import pytest
 
+from cli.json_keys import documented
 from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
@@ -49,12 +50,13 @@ def refused(capsys, *words):
     return printed.err
 
 
-def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folder, here, capsys):
+def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folder, here, capsys, root):
     with arm(folder, "--stiffness", "4000") as (_, address):
         code, told = press(
             capsys, folder, address, "--yes", "--record", "rec", "--seconds", "3", "--probe", "0.2"
         )
     assert code == 0, told["ended"]
+    assert set(told) == documented(root)["press, a real arm"] | {"command", "version", "options", "files"}
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
     assert told["lateness"]["ticks"] > 200
     assert told["lateness"]["p50_s"] <= told["lateness"]["p99_s"] <= told["lateness"]["p99.9_s"]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, validators
 
@@ -53,6 +53,7 @@ def laboratory(
     """
     from palpate.bench.speed import cores as all_cores
     from palpate.thesis.inference.infer import Inference
+    from palpate.thesis.inference.result import as_json as numbers
     from palpate.thesis.inference.sampler import Settings
 
     command = (
@@ -67,7 +68,7 @@ def laboratory(
     except KeyboardInterrupt:
         say(f"interrupted; what is tried is saved in {out}, and the same command goes on from there")
         return 130
-    _tell(result, out, command, json)
+    _tell(result, out, {"seed": seed, **numbers(result, command)} if json else None)
     return 0
 
 
@@ -109,14 +110,13 @@ def _progress(screen: Console) -> Iterator[Told]:
         yield told
 
 
-def _tell(result: Result, folder: Path, command: str, as_json: bool) -> None:
+def _tell(result: Result, folder: Path, found: Mapping[str, Any] | None) -> None:
     from palpate.report.page import Table
     from palpate.thesis.inference.findings import PAGE
-    from palpate.thesis.inference.result import as_json as numbers
     from palpate.thesis.inference.result import halves, laboratories
 
-    if as_json:
-        print_answer(numbers(result, command))
+    if found is not None:
+        print_answer(found)
         return
     screen = console()
     rows = [

@@ -114,6 +114,7 @@ def summary(
     return {
         "study": plan.study.title,
         "runs": len(plan),
+        "seeds": list(plan.parts[0].seeds),
         "results": dict(Counter(frame["result"].to_list()).most_common()),
         "metric": best.metric if best else None,
         "best": [
