@@ -95,7 +95,7 @@ const palpate = (() => {
   /* A chart in `host`.
      spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, text,
      tone}], shades [[from, to, colour]], keys of the legend that are no series, series [{label, kind, colour, of}] or [{..., kind: "band",
-     low, high}], where `of`, `low` and `high` name columns, and a `silent` one has no place in the legend; `x_of` names that of x; log
+     low, high}], where `of`, `low` and `high` name columns (of a line `within` does, its range, which is read with it), and a `silent` one has no place in the legend; `x_of` names that of x; log
      is "x", "y" or "xy". A series may have its own width, dash, alpha, or dots [px] in place of a line. */
   const chart = (host, spec, columns, group = new Group()) => {
     const self = { marks: spec.marks || [] };
@@ -151,7 +151,10 @@ const palpate = (() => {
         if (one.kind === "band" && one.silent) k += 2;
         else if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i], digits)} to ${figure(data[k][i], digits)}`); k += 2; }
         else if (one.silent) k++;
-        else parts.push(`${one.label} ${figure(there(data[k++], i), digits)}`);
+        else {
+          const ends = one.within && [one.within.low, one.within.high].map((name) => figure(there(columns[name], i), digits));
+          parts.push(`${one.label} ${figure(there(data[k++], i), digits)}${ends ? ` (${ends.join(" to ")})` : ""}`);
+        }
       }
       read.textContent = parts.join("  ·  ");
     };
@@ -191,7 +194,7 @@ const palpate = (() => {
     };
     let ready = false;
     const plot = new uPlot({
-      width: Math.max(160, box.clientWidth), height: height(), padding: [8, 8, 0, 0], legend: { show: false },
+      width: Math.max(160, box.clientWidth), height: height(), padding: [8, 14, 0, 0], legend: { show: false },
       cursor: { y: false, drag: { x: true, y: false, setScale: true }, points: { show: false },
         bind: { dblclick: () => () => full() } },
       scales: { x: { time: false, distr: logarithmic.x ? 3 : 1, range: (_, low, high) => [low, high] },

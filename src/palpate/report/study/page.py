@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from palpate.report.look.assets import TABLES, data, scripts
+from palpate.report.look.assets import CHARTS, TABLES, data, scripts
 from palpate.report.page import Table, captioned, render
 
 
@@ -62,6 +62,6 @@ def study_page(of: StudyPage) -> str:
         command=of.command,
         study=of.study,
         origin=of.origin,
-        scripts=(*scripts(*TABLES), own) if worth else scripts(*TABLES),
+        scripts=(*scripts(*TABLES, *CHARTS), own) if worth else scripts(*TABLES),
         made=datetime.now(UTC).isoformat(timespec="seconds"),
     )

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from palpate.report.look.columns import ABSENT
 from palpate.report.look.tokens import MAPS, OUTCOMES
-from palpate.report.study.axes import Array, Scale, decades
+from palpate.report.study.axes import COLORS, Array, Scale, decades
 from palpate.report.study.clouds import Cloud, Points, middles
 from palpate.report.study.lines import Curve, Line
 from palpate.report.study.maps import Heat
@@ -64,14 +65,43 @@ def _points(one: Points, words: Sequence[str]) -> dict[str, Any]:
 
 
 def curve(one: Curve) -> dict[str, Any]:
-    """Lines over a parameter."""
-    return {
+    """Lines over a parameter; where it has numbers, also as `palpate.chart` draws them."""
+    found = {
         "kind": "curve",
         "title": one.title,
         "x": scale(one.x),
         "log": one.log,
         "series": [_line(line) for line in one.lines],
     }
+    return found | (chart(one) if one.x.numeric else {})
+
+
+def chart(one: Curve) -> dict[str, Any]:
+    """Lines over numbers as `{"spec", "columns"}` of `palpate.chart`: each with a mark at its places and its range."""
+    x = np.unique(np.concatenate([line.x for line in one.lines])) if one.lines else np.zeros(0)
+    columns: dict[str, Any] = {"t": numbers(x)}
+    series: list[dict[str, Any]] = []
+    own = 0
+    for number, line in enumerate(one.lines):
+        names = {key: f"{key}{number}" for key in ("of", "low", "high")}
+        rows = dict(zip(names.values(), (line.middle, line.low, line.high), strict=True))
+        columns |= {name: _at(x, line.x, values) for name, values in rows.items()}
+        look = {"colour": "ink", "kind": "known"} if line.reference else {"colour": f"s{own % len(COLORS)}"}
+        own += not line.reference
+        ends = {"low": names["low"], "high": names["high"]}
+        series += [
+            {"kind": "band", "colour": look["colour"], "silent": True, **ends},
+            {"label": line.label, "kind": "own", "of": names["of"], "within": ends, **look},
+            {"colour": look["colour"], "kind": "own", "of": names["of"], "dots": 6, "silent": True},
+        ]
+    spec = {"title": one.title, "x": one.x.label, "unit": " ", "height": 190, "series": series}
+    return {"spec": spec, "columns": columns}
+
+
+def _at(x: Array, places: Array, values: Array) -> list[Any]:
+    """Values at some of the places x; what has none is absent, so that a line goes on over it."""
+    known = dict(zip(places.tolist(), numbers(values), strict=True))
+    return [known.get(place, ABSENT) for place in x.tolist()]
 
 
 def _line(one: Line) -> dict[str, Any]:

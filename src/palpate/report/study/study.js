@@ -1,5 +1,5 @@
-/* The figures of a study: settings against each other surface by surface, clouds, curves and maps; drawn as SVG, so that
-   light and dark, narrow and wide are the style sheet's work. */
+/* The figures of a study: settings against each other surface by surface, clouds, curves and maps. Curves over numbers are
+   charts that can be zoomed; all else is drawn as SVG, so that light and dark, narrow and wide are the style sheet's work. */
 "use strict";
 (() => {
   const held = document.getElementById("study");
@@ -152,31 +152,35 @@
     curve(host, panels, label) {
       const every = panels.flatMap((one) => one.series.flatMap((s) => [...s.y, ...s.low, ...s.high]));
       const log = panels.every((one) => one.log) && finite(every).every((v) => v > 0), [low, high] = bulk(every), room = 0.05 * (high - low);
+      const group = new palpate.Group();
       for (const one of panels) {
-        const places = finite(one.x.places), wide = one.x.names.length ? 0.4 : 0;
+        if (one.spec) {
+          const box = make("figure", { class: "panel" });
+          host.append(box);
+          const out = log ? 0 : finite(one.series.flatMap((s) => [...s.y, ...s.low, ...s.high])).filter((v) => v > high || v < low).length;
+          palpate.chart(box, { ...one.spec, y: label, alt: `${label} over ${one.x.label}`, log: `${one.x.log ? "x" : ""}${log ? "y" : ""}`,
+            range: log ? [low / 1.2, high * 1.2] : [low - room, high + room], caption: out ? `${out} beyond` : "" },
+            Object.fromEntries(Object.entries(one.columns).map(([name, column]) => [name, palpate.unpacked(column)])), group);
+          continue;
+        }
+        const places = finite(one.x.places), wide = 0.4;
         const p = panel(host, { title: one.title, alt: `${label} over ${one.x.label}`, x: { ...one.x, low: Math.min(...places) - wide, high: Math.max(...places) + wide },
           y: { label, low: log ? low : low - room, high: log ? high : high + room, log } });
         let k = 0;
         one.series.forEach((s, number) => {
-          const tone = s.reference ? "ref" : `s${k++ % 6}`, aside = wide ? 7 * (number - (one.series.length - 1) / 2) : 0;
-          if (!wide) {
-            const rows = s.x.map((x, i) => [x, s.low[i], s.high[i]]).filter((r) => r[1] != null);
-            const end = (v) => clipped(p.sy(v), p.inner[3], p.inner[2]).toFixed(1);
-            if (rows.length > 1) put(p.ink, "path", { class: `band ${tone}`, d: `M${rows.map((r) => `${p.sx(r[0]).toFixed(1)} ${end(r[2])}`).join("L")}L${rows.reverse().map((r) => `${p.sx(r[0]).toFixed(1)} ${end(r[1])}`).join("L")}Z` });
-            path(p, s.x, s.y, { class: `line ${tone}` });
-          }
+          const tone = s.reference ? "ref" : `s${k++ % 6}`, aside = 7 * (number - (one.series.length - 1) / 2);
           s.x.forEach((x, i) => {
             if (s.y[i] == null) return;
             const px = p.sx(x) + aside, py = clipped(p.sy(s.y[i]), p.inner[3], p.inner[2]);
-            if (wide) put(p.ink, "line", { class: `line ${tone}`, x1: px, x2: px, y1: clipped(p.sy(s.low[i]), p.inner[3], p.inner[2]), y2: clipped(p.sy(s.high[i]), p.inner[3], p.inner[2]) });
-            dot(p, px, py, 3, { class: `mark ${tone}` }, `${s.label}: ${figure(s.y[i])} (${figure(s.low[i])} to ${figure(s.high[i])}) at ${one.x.names[i] || figure(x)}`);
+            put(p.ink, "line", { class: `line ${tone}`, x1: px, x2: px, y1: clipped(p.sy(s.low[i]), p.inner[3], p.inner[2]), y2: clipped(p.sy(s.high[i]), p.inner[3], p.inner[2]) });
+            dot(p, px, py, 3, { class: `mark ${tone}` }, `${s.label}: ${figure(s.y[i])} (${figure(s.low[i])} to ${figure(s.high[i])}) at ${one.x.names[i]}`);
           });
         });
         beyond(p, finite(every).filter((v) => v > high || v < low).length);
       }
       let k = 0;
       const names = panels.length ? panels[0].series.map((s) => [s.label, s.reference ? "ref" : `s${k++ % 6}`]) : [];
-      return names.length > 1 ? legend(names) : null;
+      return names.length > 1 && !panels[0].spec ? legend(names) : null;
     },
     map(host, panels, label) {
       const every = panels.flatMap((one) => (one.colours ? [] : one.values)), [low, high] = bulk(every);
@@ -296,6 +300,7 @@
   const places = () => study.comparisons.filter((c) => c.metric === study.metrics[state.metric].name);
   const show = () => {
     const metric = study.metrics[state.metric];
+    palpate.repaints.clear();
     controls.replaceChildren(); versus.replaceChildren(); drawn.replaceChildren();
     if (study.metrics.length > 1) choice(controls, "measure", study.metrics.map((m) => m.name), state.metric, (i) => { state.metric = i; state.reference = 0; show(); });
     const own = places();
