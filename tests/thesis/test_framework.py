@@ -19,7 +19,7 @@ from palpate.cli import main
 from palpate.errors import InputError
 from palpate.thesis.claims import Claim, decided, spread, with_wholes
 from palpate.thesis.figure import studies, study
-from palpate.thesis.measure import STATE, measure
+from palpate.thesis.measure import STATE, Written, measure
 from palpate.thesis.page import chapter_of
 from palpate.thesis.runs import Runs
 
@@ -91,7 +91,7 @@ def toy(number: str, done: list[str], fails: type[BaseException] | None = None) 
 
 
 def measured(numbers: list, folder: Path, **options):
-    options = {"command": "palpate thesis", **options}
+    options = {"written": Written(options.pop("command", "palpate thesis")), **options}
     return measure(numbers, Runs(options.pop("seeds", SEEDS)), folder, **options)
 
 
@@ -141,7 +141,7 @@ def test_there_is_one_count_of_claims(tmp_path, capsys):
     good = sum(claim["verdict"] == "reproduced" for claim in claims)
     page = (tmp_path / "t" / "index.html").read_text("utf-8")
     assert f"{len(claims)} claims measured: {good} reproduced" in told
-    assert f"Of {len(claims)} claims, {good} are reproduced" in page
+    assert re.search(rf"Of {len(claims)} claims, {good} (is|are) reproduced", page)
     assert f"all<b>{len(claims)}</b>" in page
     assert page.count('<article class="claim"') == len(claims)
     for claim in claims:
@@ -305,6 +305,16 @@ def test_a_disk_that_is_full_leaves_nothing_half_written_and_can_be_gone_on_from
     one_line(cramped(tmp_path / "again", page - 1000))
     assert "3.7.png" in names(tmp_path / "again")
     assert "index.html" not in names(tmp_path / "again")
+
+
+def test_figures_are_written_as_asked(program, tmp_path):
+    told = program(
+        "thesis", "3.7", "--out", tmp_path / "t", "--figures", "svg", "--figures", "pdf", "--dpi", "60"
+    )
+    assert told.returncode == 0
+    assert {"3.7.png", "3.7.svg", "3.7.pdf"} <= names(tmp_path / "t")
+    assert "png, svg, pdf" in one_line(program("thesis", "3.7", "--out", tmp_path / "u", "--figures", "bmp"))
+    assert not (tmp_path / "u").exists()
 
 
 def test_every_study_offers_what_the_protocol_asks_for():

@@ -52,7 +52,7 @@ from palpate.thesis.laboratory.unknowns import (
     Unknown,
 )
 from palpate.thesis.least_squares import panels, press_runs
-from palpate.thesis.measure import measure
+from palpate.thesis.measure import Written, measure
 from palpate.thesis.neural_identifier.network import Press
 from palpate.thesis.runs import Runs
 from studies.cluster import local_cluster
@@ -504,7 +504,7 @@ def test_the_best_of_a_posterior_miss_fewest_and_differ():
 
 def test_a_figure_is_measured_in_another_laboratory(tmp_path):
     runs = Runs(range(2), laboratory=Laboratory(noise=0.15))
-    (done,) = measure([study("4.4")], runs, tmp_path / "thesis", command="palpate thesis 4.4")
+    (done,) = measure([study("4.4")], runs, tmp_path / "thesis", written=Written("palpate thesis 4.4"))
     (claim,) = done.claims
     assert claim.verdict == "differs"
     assert "noise 0.15" in claim.note

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter, Token
+from cyclopts import Parameter, Token
 
 from palpate.cli._answer import print_answer
+from palpate.cli._figures import DRAWN, FigureOptions
 from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
 from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
@@ -34,40 +35,18 @@ def whole_number(_: Any, tokens: Sequence[Token]) -> int:
     return int(token.value)
 
 
-@Parameter(name="*", group=Group("What is drawn", sort_key=4))
+@Parameter(name="*", group=DRAWN)
 @dataclass(frozen=True, kw_only=True)
-class DrawnOptions:
-    """How figures are written.
+class DrawnOptions(FigureOptions):
+    """How figures are written, and a film.
 
     Parameters
     ----------
-    figures
-        As what they are written: png, svg, pdf; may be given again.
-    dpi
-        Of a PNG; 110 if not given.
     movie
         Write a film of the arm too, arm.gif; it takes some ten seconds.
     """
 
-    figures: Annotated[tuple[str, ...], Parameter(negative=(), show_default=", ".join)] = ("png",)
-    dpi: int | None = None
     movie: Annotated[bool, FLAG] = False
-
-    @property
-    def endings(self) -> tuple[str, ...]:
-        """Of the figures' files."""
-        return tuple(f".{kind.lower().lstrip('.')}" for kind in self.figures)
-
-    def check(self) -> None:
-        """Finds a figure that cannot be written before any work is done."""
-        from palpate.report.style import FORMATS, check_dpi
-
-        check_dpi(self.dpi)
-        for ending in self.endings:
-            if ending not in FORMATS:
-                raise InputError(
-                    f"--figures must be of {', '.join(kind[1:] for kind in FORMATS)}, got {ending[1:]!r}"
-                )
 
 
 def run(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter, validators
 
+from palpate.cli._figures import FigureOptions
 from palpate.cli._terminal import console, place, print_lines, say, show_table
 from palpate.errors import InputError
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from palpate.thesis.claims import Done
     from palpate.thesis.figure import Study
+    from palpate.thesis.measure import Written
     from palpate.thesis.runs import Runs
 
 COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
@@ -36,6 +38,7 @@ def thesis(
     list_: Annotated[bool, Parameter(group=_MEASURED, name="--list", negative="")] = False,
     out: Annotated[Path | None, Parameter(group=_WRITTEN)] = None,
     force: Annotated[bool, Parameter(group=_WRITTEN, negative=())] = False,
+    drawn: FigureOptions | None = None,
 ) -> int:
     """Measure the thesis again: each figure, each claim, with spread over the seeds and a verdict.
 
@@ -62,6 +65,7 @@ def thesis(
     """
     from palpate.thesis.figure import studies
     from palpate.thesis.laboratory.files import named
+    from palpate.thesis.measure import Written
     from palpate.thesis.runs import Runs
 
     if list_:
@@ -70,6 +74,8 @@ def thesis(
         for known in everything:
             print_lines(f"{known.NUMBER:<{width}}{known.TITLE}")
         return 0
+    drawn = drawn or FigureOptions()
+    drawn.check()
     lab = named(laboratory)
     chosen = _chosen(figure, laboratory, in_all=lab.chosen)
     parts = ["thesis", figure, None if lab.chosen else Path(laboratory).stem]
@@ -77,7 +83,8 @@ def thesis(
     where = "" if lab.chosen else f" --laboratory {laboratory}"
     command = f"palpate thesis{'' if figure is None else ' ' + figure}{where} --seeds {seeds}"
     try:
-        _measure(chosen, folder, Runs(range(seeds), laboratory=lab), command, force)
+        written = Written(command, drawn.endings, drawn.dpi)
+        _measure(chosen, folder, Runs(range(seeds), laboratory=lab), written, force)
     except KeyboardInterrupt:
         say(f"interrupted; what is measured is saved in {folder}, and the same command goes on from there")
         return 130
@@ -100,7 +107,7 @@ def _chosen(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[St
     return [s for s in studies() if s.NUMBER in known and figure in (None, s.NUMBER)]
 
 
-def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, command: str, force: bool) -> None:
+def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, written: Written, force: bool) -> None:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     from palpate.cli._waiting import COMPILING
@@ -121,7 +128,7 @@ def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, command: str, fo
             progress.console.print(f"going on in {folder}: {done} of {len(chosen)} are measured already")
 
         runs = replace(runs, waiting=waiting)
-        done = measure(chosen, runs, folder, command=command, force=force, started=started, resumed=resumed)
+        done = measure(chosen, runs, folder, written=written, force=force, started=started, resumed=resumed)
     _tell(screen, done, folder)
 
 

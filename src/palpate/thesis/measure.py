@@ -25,6 +25,21 @@ STATE = "thesis.json"
 PANELS = ".panels.json"
 
 
+@dataclass(frozen=True)
+class Written:
+    """How a measurement is written.
+
+    Args:
+        command: that makes it again, for its page.
+        endings: of the figures' files; the page shows a PNG where a figure has no panels of its own.
+        dpi: of a PNG; the usual one if None.
+    """
+
+    command: str
+    endings: tuple[str, ...] = (".png",)
+    dpi: int | None = None
+
+
 @dataclass
 class State:
     """What the folder holds, and for which sources and seeds."""
@@ -40,7 +55,7 @@ def measure(
     runs: Runs,
     folder: Path,
     *,
-    command: str,
+    written: Written,
     force: bool = False,
     started: Callable[[Study], None] = lambda _: None,
     resumed: Callable[[int], None] = lambda _: None,
@@ -56,25 +71,26 @@ def measure(
         InputError: the folder holds anything else, and `force` is off; another process is writing there.
     """
     with kept_folder(folder, STATE, force=force):
-        state = _state(studies, runs, folder, command)
+        state = _state(studies, runs, folder, written.command)
         _write_state(state, folder)  # from now on the folder is known for what it is
         if state.done:
             resumed(len(state.done))
         for study in studies:
             if study.NUMBER not in state.done:
                 started(study)
-                state.done[study.NUMBER] = _measured(study, runs, folder)
+                state.done[study.NUMBER] = _measured(study, runs, folder, written)
                 _write(state, folder)
     return [state.done[number] for number in state.wanted]
 
 
-def _measured(study: Study, runs: Runs, folder: Path) -> Done:
+def _measured(study: Study, runs: Runs, folder: Path, written: Written) -> Done:
     begun = time.perf_counter()
     data = study.run(runs)
     claims = [_noted(claim, runs) for claim in study.check(data)]
     with style.inked():
         drawing = study.plot(data)
-        style.save(drawing, folder / f"{study.NUMBER}.png")
+        for ending in dict.fromkeys((".png", *written.endings)):
+            style.save(drawing, folder / f"{study.NUMBER}{ending}", written.dpi)
         write_json(folder / f"{study.NUMBER}{PANELS}", signed({"panels": panels_of(drawing)}))
     return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
 

@@ -1,0 +1,45 @@
+"""How the figures of a folder of results are written: options of every command that writes one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from cyclopts import Group, Parameter
+
+from palpate.errors import InputError
+
+DRAWN = Group("What is drawn", sort_key=4)
+
+
+@Parameter(name="*", group=DRAWN)
+@dataclass(frozen=True, kw_only=True)
+class FigureOptions:
+    """How figures are written.
+
+    Parameters
+    ----------
+    figures
+        As what they are written: png, svg, pdf; may be given again.
+    dpi
+        Of a PNG; 110 if not given.
+    """
+
+    figures: Annotated[tuple[str, ...], Parameter(negative=(), show_default=", ".join)] = ("png",)
+    dpi: int | None = None
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """Of the figures' files."""
+        return tuple(f".{kind.lower().lstrip('.')}" for kind in self.figures)
+
+    def check(self) -> None:
+        """Finds a figure that cannot be written before any work is done."""
+        from palpate.report.style import FORMATS, check_dpi
+
+        check_dpi(self.dpi)
+        for ending in self.endings:
+            if ending not in FORMATS:
+                raise InputError(
+                    f"--figures must be of {', '.join(kind[1:] for kind in FORMATS)}, got {ending[1:]!r}"
+                )
