@@ -141,7 +141,7 @@ def test_there_is_one_count_of_claims(tmp_path, capsys):
     good = sum(claim["verdict"] == "reproduced" for claim in claims)
     page = (tmp_path / "t" / "index.html").read_text("utf-8")
     assert f"{len(claims)} claims measured: {good} reproduced" in told
-    assert re.search(rf"Of {len(claims)} claims, {good} (is|are) reproduced", page)
+    assert f"{len(claims)} claims measured: {good} reproduced" in page
     assert f"all<b>{len(claims)}</b>" in page
     assert page.count('<article class="claim"') == len(claims)
     for claim in claims:
