@@ -508,7 +508,7 @@ def test_a_figure_is_measured_in_another_laboratory(tmp_path):
     (claim,) = done.claims
     assert claim.verdict == "differs"
     assert "noise 0.15" in claim.note
-    assert "Of 1 claims" in (tmp_path / "thesis" / "index.html").read_text()
+    assert "1 claim measured" in (tmp_path / "thesis" / "index.html").read_text()
     rows = msgspec.json.decode((tmp_path / "thesis" / "claims.json").read_bytes())
     assert [r["group"] for r in rows] == [False]
 
