@@ -42,13 +42,6 @@ def folders(tmp_path_factory):
     return made
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("CYCLONEDDS_URI", ALONE)
-    return tmp_path
-
-
 @contextmanager
 def standing(kind, folders, *words):
     """An arm of this kind in a process of its own; yields it and the words of a press with it."""

@@ -23,13 +23,6 @@ def folder(tmp_path_factory):
     return made
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("CYCLONEDDS_URI", ALONE)
-    return tmp_path
-
-
 @contextmanager
 def node(folder, *words):
     where = ("--domain", DOMAIN, "--arm", folder / "arm.toml", "--stiffness", 4000, "--seconds", 60)

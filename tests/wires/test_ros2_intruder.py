@@ -28,13 +28,6 @@ def folder(tmp_path_factory):
     return made
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("CYCLONEDDS_URI", ALONE)
-    return tmp_path
-
-
 @contextmanager
 def intruder(kind):
     """A writer at the wrench's topic, of messages of this kind, and the time by the arm's own clock [ns]."""

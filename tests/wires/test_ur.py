@@ -31,12 +31,6 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
 def address():
     """Of the loopback, of its own for each process that tests."""
     return f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.9"

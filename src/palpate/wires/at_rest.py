@@ -15,6 +15,7 @@ from palpate.wires.protocol import Sense, Wire
 Array = NDArray[np.float64]
 
 _FEWEST = 20
+"""Readings, at least: they tell the noise's deviation to 1/sqrt(2 n), 16 %, and `_check` wants eight of them."""
 _TRIES = 4
 """Half seconds more in which a busy computer may get readings that follow on each other: starved, it misses most."""
 _PATIENCE = 10.0
