@@ -170,3 +170,12 @@ def test_confidently_wrong_is_far_off_or_many_half_widths():
     assert not judged("K", 101, (100.9, 101.1), (100, 100)).wrong
     assert judged("M", 0.1, (0.09, 0.11), (0.0, 0.0)).wrong
     assert judged("K", 100, (95, 105), (90, 200), defined=False).holds
+
+
+@pytest.mark.parametrize("cell", ["friction/held-steady", "kelvin-voigt/payload", "kelvin-voigt/encoder"])
+def test_no_answer_is_wrong_on_these_logs_again(cell):
+    """Friction that holds as a spring, air beside a tool's inertia, a motion of a few counts of its encoder."""
+    found = score(Cell(*cell.split("/")), 906)
+    assert found.outcome == "answered"
+    assert found.working
+    assert [answer.name for answer in found.answers if not answer.holds] == []
