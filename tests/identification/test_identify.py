@@ -165,11 +165,13 @@ def test_a_lag_is_not_taken_for_a_mass_below_zero():
 
 
 def test_a_mass_that_is_asked_for_where_there_is_none_spares_the_stiffness():
-    found = identify(pressed(k=3000.0, b=60.0, seed=2), model="kelvin-voigt-mass")
-    assert "model-rejected" not in found.codes
-    assert found.parameters["K"].verdict is Verdict.IDENTIFIED
-    assert holds(found.parameters["K"], 3000)
-    assert found.parameters["M"].verdict is not Verdict.IDENTIFIED
+    all_found = [identify(pressed(k=3000.0, b=60.0, seed=seed), model="kelvin-voigt-mass") for seed in range(4)]
+    for found in all_found:
+        assert "model-rejected" not in found.codes
+        assert found.parameters["K"].verdict is Verdict.IDENTIFIED
+        assert found.parameters["M"].verdict is not Verdict.IDENTIFIED
+    # All four intervals of 95 % hold in 81 % of cases, three at least in 98.6 %.
+    assert sum(holds(found.parameters["K"], 3000) for found in all_found) >= 3
 
 
 def test_noise_of_the_position_is_not_taken_for_a_small_mass():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from palpate.errors import InputError
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
-from palpate.identification.free_motion import FreeMotion, free_motion_of
+from palpate.identification.free_motion import Drift, FreeMotion, free_motion_of
 from palpate.identification.options import NOTHING_SAID, Options
 from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned
@@ -52,6 +52,7 @@ class Contacts:
         signed: whether it is known which way each channel counts: as told, as it is, or turned round by what a stretch
             out of contact shows.
         payload: mass that the force has in the air, counted into the surface; None if it has none.
+        drift: of the force, straight lines of which were taken out; None if the log shows none.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -64,6 +65,7 @@ class Contacts:
     clear: bool = True
     signed: bool = True
     payload: Payload | None = None
+    drift: Drift | None = None
 
 
 def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
@@ -80,9 +82,11 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
         )
     chain = Chain(cutoff or highest, channels.dt)
     air = None if options.bonded else _air(channels, chain, options.assumed_lag)
+    drift = None
     if air is not None and air.drifts:
+        drift = Drift(air.stays * channels.dt, air.levels)
         channels = _without_drift(channels, air)
-    contacts = find_contacts(channels, chain, air, options)
+    contacts = replace(find_contacts(channels, chain, air, options), drift=drift)
     if not contacts.spans:
         return channels, chain, contacts
     chosen = cutoff or _chosen_cutoff(channels, contacts)
@@ -91,7 +95,7 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
     size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
     fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
-    again = find_contacts(fewer, narrow, air, options)
+    again = replace(find_contacts(fewer, narrow, air, options), drift=drift)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
 
 

@@ -38,6 +38,39 @@ _MIDDLE = (0.05, 0.95)
 """Of the force's range, between which it is the surface's for sure."""
 
 
+_BENDS = 3
+"""Ways of a drift to bend between two stays in the air: the first three have five sixths of a random walk's power."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """What the force drifts by while nothing is touched, and what it may drift by in between.
+
+    Args:
+        times: of the stays in the air [s], shape (s,), two at least.
+        levels: of the force there [N], shape (s,).
+    """
+
+    times: Array
+    levels: Array
+
+    def bends(self, times: Array) -> Array:
+        """Ways that it may bend beside straight lines from stay to stay [N], of deviation 1 each, shape (m, _BENDS).
+
+        Those of a random walk that is seen at the stays alone (Karhunen and Loeve's modes of Brown's bridge).
+
+        Args:
+            times: at which [s], shape (m,).
+        """
+        apart = np.diff(self.times)
+        walk = float(np.sqrt(np.sum(np.diff(self.levels) ** 2) / np.sum(apart)))  # N over a root of time
+        at = np.clip(np.searchsorted(self.times, times) - 1, 0, len(apart) - 1)
+        share = np.clip((times - self.times[at]) / apart[at], 0.0, 1.0)
+        order = np.pi * np.arange(1, _BENDS + 1)
+        found: Array = (walk * np.sqrt(2 * apart[at]))[:, None] * np.sin(share[:, None] * order) / order
+        return found
+
+
 @dataclass(frozen=True)
 class FreeMotion:
     """A stretch of positions without a surface.

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
+from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.budget import Spread
 from palpate.identification.estimators.fit import Fit
-from palpate.identification.estimators.robust import Answer
 from palpate.identification.result import DynamicStiffness, Press, Tangent
 
 Array = NDArray[np.float64]

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.identification.estimators.answer import Answer
+from palpate.identification.estimators.question import lag_open
 from palpate.identification.estimators.recovery import unrecovered
-from palpate.identification.estimators.robust import Answer, answer, lag_open
+from palpate.identification.estimators.robust import answer
 from palpate.identification.models import (
     KELVIN_VOIGT,
     KELVIN_VOIGT_MASS,

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit, Prediction
 from palpate.identification.estimators.recovery import unrecovered
-from palpate.identification.estimators.robust import Answer
 from palpate.identification.evidence import stiffness_of
 from palpate.identification.prior import LAG, Lag
 from palpate.identification.result import Parameter, Verdict, WorkingPoint
@@ -226,11 +226,10 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
             warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
     damping = parameters.get("B")
     if damping is not None and damping.verdict is not Verdict.IDENTIFIED:
-        main = next(iter(damping.budget), "")
         if "below zero" in damping.reason:
             text = f"B: {damping.reason}; a lag T of the force counts as -K T: calibrate it and give --lag"
             warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
-        elif main == "lag" and not lag.known:
+        elif not lag.known and damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
             reach = 1.96 * lag.std * abs(found["K"]) if "K" in found.names else 0.0
             text = (
                 f"a lag T of the force counts as a damping of -K T, and nobody has calibrated it: B is known to"

@@ -26,12 +26,20 @@ _NORMAL = 1.96
 """Deviations of a 95 % interval."""
 
 
+_ALONE = 1e-8
+"""Share of a direction that all other stretches have: below it, one stretch alone tells it and shows nothing of it."""
+
+
 @dataclass(frozen=True)
 class Spread:
-    """A variance of each parameter, shape (p,), and the degrees of freedom that it was estimated with."""
+    """A variance of each parameter, shape (p,), and the degrees of freedom that it was estimated with, (p,) or one."""
 
     variance: Array
-    freedom: float = np.inf
+    freedom: Array | float = np.inf
+
+    def of(self, places: list[int]) -> Spread:
+        """Of some of the parameters."""
+        return Spread(self.variance[places], np.broadcast_to(self.freedom, self.variance.shape)[places])
 
 
 Budget = dict[str, Spread]
@@ -93,18 +101,43 @@ def of_octaves(system: System, solution: Solution) -> Spread:
 def of_stretches(system: System, solution: Solution) -> Spread:
     """Variance by how far each stretch of the log pulls the answer, beyond the answer's own.
 
-    The covariance that holds for stretches of any correlation within (Liang and Zeger, 1986): the infinitesimal
-    jackknife. Leaving a stretch out would say nothing where it alone has the motion.
+    The covariance that holds for stretches of any correlation within (Liang and Zeger, 1986). What an answer is bent by
+    one stretch, that stretch does not show: its residuals are scaled by how much they were so made smaller, and where
+    few stretches have what tells a parameter, there are few degrees of freedom (Bell and McCaffrey, 2002: CR2).
     """
     products = system.stretches[0]
     count = len(products)
     if count < 2:
         return Spread(np.zeros(system.size))
     weight = np.where(system.lines > 0, 1 / solution.noise, 0.0)
-    full = np.append(-solution.theta, 1.0)
-    pull = np.einsum("o,goij,j->gi", weight, products[:, :, :-1, :], full) @ solution.cov
-    variance = count / (count - 1) * (pull**2).sum(axis=0)
-    return Spread(np.maximum(variance - np.diag(solution.cov), 0.0), count - 1.0)
+    summed = np.einsum("o,goij->gij", weight, products)
+    normal, pull = summed[:, :-1, :-1], summed[:, :-1, :] @ np.append(-solution.theta, 1.0)
+    scaled = (
+        np.stack([_scaling(own, solution.cov).T for own in normal]) @ solution.cov
+    )  # (g, p, p): from pull to theta
+    variance = (np.einsum("gi,gij->gj", pull, scaled) ** 2).sum(axis=0)
+    seen = np.einsum("gki,gkl,gli->gi", scaled, normal, scaled)
+    crossed = np.einsum("gki,gkl->gil", scaled, normal)  # (g, p, p)
+    tied = np.einsum("gil,lm,him->igh", crossed, solution.cov, crossed)
+    tied = np.eye(count) * seen.T[:, :, None] - tied
+    trace, square = np.einsum("igg->i", tied), np.einsum("igh,ihg->i", tied, tied)
+    freedom = np.where(square > 0, trace**2 / np.maximum(square, 1e-300), count - 1.0)
+    return Spread(np.maximum(variance - np.diag(solution.cov), 0.0), np.clip(freedom, 1.0, count - 1.0))
+
+
+def _scaling(normal: Array, cov: Array) -> Array:
+    """What the pull of a stretch of such a normal matrix is scaled with: the inverse root of I - H, shape (p, p)."""
+    size = np.sqrt(np.maximum(np.diag(cov), 1e-300))
+    own = normal * np.outer(size, size)
+    value, vector = np.linalg.eigh(own)
+    kept = value > 1e-10 * max(float(value[-1]), 1e-300)
+    root, vector = np.sqrt(value[kept]), vector[:, kept]
+    half = vector * root
+    left = np.eye(len(root)) - half.T @ (cov / np.outer(size, size)) @ half
+    less, turn = np.linalg.eigh(left)
+    scale = turn * np.where(less > _ALONE, 1 / np.sqrt(np.maximum(less, _ALONE)), 0.0) @ turn.T
+    found: Array = (half @ scale @ (vector / root).T) * np.outer(1 / size, size)
+    return found
 
 
 def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Spread:
@@ -178,9 +211,9 @@ def half_widths(budget: Budget) -> Array:
     from scipy.special import stdtrit
 
     variance = np.array([part.variance for part in budget.values()])
-    freedom = np.array([part.freedom for part in budget.values()])
+    freedom = np.array([np.broadcast_to(part.freedom, part.variance.shape) for part in budget.values()])
     total = variance.sum(axis=0)
     share = variance / np.where(total > 0, total, 1.0)
-    loss = (share**2 / freedom[:, None]).sum(axis=0)
+    loss = (share**2 / freedom).sum(axis=0)
     found: Array = stdtrit(1 / np.clip(loss, 1e-9, 1.0), 0.975) * np.sqrt(total)
     return found

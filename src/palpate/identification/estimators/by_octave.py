@@ -100,6 +100,29 @@ def solve(system: System, noise: Array, use: NDArray[np.bool_] | None = None) ->
     return Solution(*solved(normal, right), noise)
 
 
+def held(system: System, values: dict[int, float]) -> Solution:
+    """Estimate the other parameters and the noise levels with some parameters held where they are.
+
+    Args:
+        system: of the log.
+        values: of the parameters that are held, by place.
+    """
+    places = list(values)
+    free = [i for i in range(system.size) if i not in values]
+    fewer = np.zeros((system.size + 1, len(free) + 1))
+    fewer[[*free, -1], range(len(free) + 1)] = 1.0
+    fewer[places, -1] = -np.array(list(values.values()))
+    products, lines = system.stretches
+    own = System(
+        fewer.T @ system.products @ fewer, system.lines, (fewer.T @ products @ fewer, lines),
+        system.prior_mean[free], system.prior_weight[free],
+    )  # fmt: skip
+    found = estimate(own)
+    theta, cov = -fewer[:-1, -1], np.zeros((system.size, system.size))
+    theta[free], cov[np.ix_(free, free)] = found.theta, found.cov
+    return Solution(theta, cov, found.noise)
+
+
 def estimate(system: System) -> Solution:
     """Estimate parameters and noise levels: least squares, then reweighted by what is left in each octave."""
     force = system.products[:, -1, -1]
@@ -137,7 +160,7 @@ def _levels(system: System, solution: Solution) -> Array:
 def _shares(system: System) -> tuple[Array, Array]:
     """Weight of each stretch in an octave's level, (groups, octaves), and the lines that such a mean rests on."""
     products, lines = system.stretches
-    power = np.where(lines > 0, products[:, :, -1, -1], 0.0)
+    power = np.where(lines > 0, np.maximum(products[:, :, -1, -1], 0.0), 0.0)
     share = power / np.maximum(power.sum(axis=0), 1e-300)
     spread = np.sum(share**2 / np.maximum(lines, 1.0), axis=0)
     return share, np.where(spread > 0, 1 / np.maximum(spread, 1e-300), 0.0)

@@ -321,15 +321,43 @@ def _moved(
     return _evaluate(model, motion, force, nonlinear, lag, known)
 
 
-def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag, known: Prior) -> Fit:
-    parameter = _lag_parameter(motion, lag)
-    outer = [*model.nonlinear, parameter]
-    slopes = _slopes(model, motion, point, outer)
+def linearised(
+    model: Model, motion: Motion, force: Array, nonlinear: dict[str, float], lag: float
+) -> tuple[dict[str, float], Array, Array]:
+    """A model about its nonlinear parameters and a lag, and the linear ones that fit best there.
+
+    Args:
+        model: which.
+        motion: the position.
+        force: filtered, at the motion's rows, shape (n,).
+        nonlinear: parameters, by name.
+        lag: of the force [s].
+
+    Returns:
+        All parameters by name, the lag last; the predicted force's derivatives by them, shape (n, p); what the model
+        leaves of the force, shape (n,).
+    """
+    point = _evaluate(model, motion, force, nonlinear, lag, NOTHING)
+    values = [*point.theta.tolist(), *(nonlinear[parameter.name] for parameter in model.nonlinear), lag]
+    return dict(zip(_names(model), values, strict=True)), _jacobian(model, motion, point), point.residuals
+
+
+def _names(model: Model) -> tuple[str, ...]:
+    return (*model.linear, *(parameter.name for parameter in model.nonlinear), LAG)
+
+
+def _jacobian(model: Model, motion: Motion, point: _Point) -> Array:
+    """Derivatives of the predicted force by all parameters and the lag, shape (n, p)."""
+    slopes = _slopes(model, motion, point, [*model.nonlinear, _lag_parameter(motion, Lag(point.lag))])
     for i, own in enumerate(model.nonlinear):
         if own.logarithmic:
             slopes[:, i] /= point.nonlinear[own.name]
-    jacobian = np.column_stack([point.columns, slopes])
-    names = (*model.linear, *(k.name for k in model.nonlinear), LAG)
+    return np.column_stack([point.columns, slopes])
+
+
+def _finish(model: Model, motion: Motion, force: Array, point: _Point, lag: Lag, known: Prior) -> Fit:
+    jacobian = _jacobian(model, motion, point)
+    names = _names(model)
     noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.std == 0))
     theta = np.array([*point.theta, *(point.nonlinear[k.name] for k in model.nonlinear), point.lag])
     level = float(np.sqrt(point.rss / max(len(force) - len(point.theta), 1)))

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from palpate.identification.estimators.robust import Answer
+from palpate.identification.estimators.answer import Answer
 
 
 def unrecovered(found: Answer) -> str:

@@ -1,0 +1,298 @@
+"""The question that a model puts to a log: its columns by octave, linear about some parameters and a lag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.estimators import budget as causes
+from palpate.identification.estimators.answer import Answer
+from palpate.identification.estimators.budget import Spread
+from palpate.identification.estimators.by_octave import Solution, System, system_of, worth
+from palpate.identification.estimators.effects import FRICTION, effect_columns
+from palpate.identification.estimators.fit import Prediction, fit, linearised, slope_of_lag
+from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of, white_lines
+from palpate.identification.models import Model, Motion
+from palpate.identification.prior import LAG, mass_std
+from palpate.identification.problem import Problem
+
+Array = NDArray[np.float64]
+
+_SEEN = 10.0
+"""Power of the position over that of its noise below which an octave is left out: it would be off by a tenth."""
+_ROUNDED = 100.0
+"""Last digits of a position that its way through the filters may round."""
+
+
+def lag_open(problem: Problem) -> bool:
+    """Whether neither a calibration nor the sensor's own low-pass tells the lag."""
+    return not problem.lag.known and not problem.motion.matched
+
+
+@dataclass(frozen=True)
+class Question:
+    problem: Problem
+    model: Model
+    lag: float
+    at: dict[str, float]
+    names: tuple[str, ...]
+    own: int
+    prior: dict[str, tuple[float, float]]
+    segments: list[Segment]
+    octaves: Octaves
+    use: NDArray[np.bool_]
+    system: System
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        model: Model,
+        segments: list[Segment],
+        theta: dict[str, float],
+    ) -> Question:
+        """Linearise the model about some parameters, and sum its columns by octave.
+
+        Args:
+            problem: of the log.
+            model: which.
+            segments: rows without a gap.
+            theta: the parameters, the other forces' and the lag's among them; what is not is looked for (those that
+                the force is not linear in), zero (the others), or its prior's value (the lag).
+        """
+        motion = problem.motion
+        dt = float(np.median(np.diff(problem.time)))
+        lag = theta.get(LAG, problem.lag.value)
+        at, own, target = _linearised(problem, model, lag, theta)
+        free = list(own)
+        effects = effect_columns(motion, model, lag, segments)
+        drift = problem.contacts.drift
+        bends = drift.bends(problem.time).T if drift is not None else ()
+        bending = {f"drift {i}": column for i, column in enumerate(bends)}
+        if LAG in own:
+            moved = _moved_by_lag(effects, theta, segments, dt)
+            own, target = own | {LAG: own[LAG] + moved}, target + moved * lag
+        columns = [*own.values(), *effects.values(), *bending.values(), target, motion.moved(0, lag)]
+        prior = dict.fromkeys(bending, (0.0, 1.0))
+        if LAG in free:
+            prior[LAG] = (problem.lag.value, problem.lag.std)
+        if problem.lag.mass is not None and "M" in free:
+            prior["M"] = (problem.lag.mass[0], mass_std(problem.lag.mass))
+        whole = octaves_of(np.column_stack(columns), segments, dt, longest_of(segments))
+        octaves = Octaves(whole.products[:, :, :-1, :-1], whole.lines, whole.frequency)
+        places = {free.index(name): k for name, k in model.derivatives.items()} if not model.nonlinear else {}
+        use = _seen(motion, dt, whole, {-1: 0, **places})
+        names = (*free, *effects, *bending)
+        system = system_of(octaves.only(use), names, prior)
+        return cls(problem, model, lag, at, names, len(free), prior, segments, octaves, use, system)
+
+    @property
+    def searched(self) -> dict[int, float]:
+        """Parameters that the force is not linear in and the lag, by place: where the columns are formed."""
+        at = {name: self.at[name] for name in (p.name for p in self.model.nonlinear)} | {LAG: self.lag}
+        return {self.names.index(name): value for name, value in at.items() if name in self.names}
+
+    def moved(self, theta: Array, step: Array) -> dict[str, float]:
+        """Parameters with those that are searched a step farther, within their limits.
+
+        Args:
+            theta: shape (p,).
+            step: of those that are searched, shape (s,).
+        """
+        found = dict(zip(self.names, theta.tolist(), strict=True))
+        lag = self.problem.lag
+        limits = {LAG: (lag.value - 3 * lag.std, lag.value + 3 * lag.std)}
+        limits |= {p.name: (p.low, p.high) for p in self.model.nonlinear}
+        for place, change in zip(self.searched, step.tolist(), strict=True):
+            name = self.names[place]
+            low, high = limits[name]
+            found[name] = float(
+                np.clip(found[name] + change, max(low, found[name] / 3) if low > 0 else low, high)
+            )
+        return found
+
+    def misfit(self, solution: Solution) -> float:
+        """-2 log of the likelihood, but for a constant: of a solution's noise levels, and the prior of the lag.
+
+        Args:
+            solution: with what is searched held.
+        """
+        seen, std = self.system.lines > 0, self.problem.lag.std
+        prior = ((self.lag - self.problem.lag.value) / std) ** 2 if std > 0 else 0.0
+        return float(self.system.lines[seen] @ np.log(solution.noise[seen])) + prior
+
+    @property
+    def dt(self) -> float:
+        """From row to row [s]."""
+        return float(np.median(np.diff(self.problem.time)))
+
+    def answered(self, solution: Solution) -> Answer:
+        """The answer with its budget."""
+        sensor, told = self._sensor(solution)
+        budget = causes.of_noise(self.system, solution, self.names, self.own, LAG)
+        budget["position noise"] = causes.of_position_noise(self.system, solution, self._position_noise())
+        budget["octaves"] = causes.of_octaves(self.system, solution)
+        budget["repetition"] = causes.of_stretches(self.system, solution)
+        sensors = np.minimum(sensor + self._by_position(solution), solution.noise)
+        budget["unexplained"] = causes.of_unexplained(self.system, solution, sensors, told)
+        explained, left = self._explained(solution, sensor)
+        if lag_open(self.problem) and {"K", "B", LAG} <= set(self.names):
+            budget["lag"] = self._lag_of_damping(solution, budget["lag"])
+        kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
+        names = tuple(self.names[i] for i in kept)
+        budget = {cause: part.of(kept) for cause, part in budget.items()}
+        values = self.at or dict(zip(self.names, solution.theta.tolist(), strict=True))
+        predicted = Prediction.of(self.model, self.problem.motion, self.problem.force, values, self.lag)
+        noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
+        cov = solution.cov[np.ix_(kept, kept)]
+        return Answer(
+            names, solution.theta[kept], cov, budget, predicted, explained, left, noise, self.problem
+        )
+
+    def _line(self) -> Array:
+        """Power of the position's noise in a line of each octave, shape (octaves,)."""
+        motion = self.problem.motion
+        return _line_of_noise(motion, self.octaves.frequency) * motion.chain.dt / self.dt
+
+    def _by_position(self, solution: Solution) -> Array:
+        """Variance of a line by what the model makes of the position's noise in each octave, shape (octaves,)."""
+        if self.model.nonlinear:
+            return np.zeros(len(self.octaves.frequency))
+        omega = 2j * np.pi * self.octaves.frequency
+        own = dict(zip(self.names, solution.theta.tolist(), strict=True))
+        stiffness = sum(own[name] * omega**i for name, i in self.model.derivatives.items())
+        found: Array = np.abs(stiffness) ** 2 * self._line()
+        return found
+
+    def _position_noise(self) -> Array:
+        """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p)."""
+        frequency = self.octaves.frequency
+        power = self._line() * self.system.lines
+        found = np.zeros((len(frequency), len(self.names), len(self.names)))
+        own = self.model.derivatives if not self.model.nonlinear else {}
+        for a, i in own.items():
+            for b, j in own.items():
+                if (i + j) % 2 == 0:  # the others are in quadrature
+                    at = self.names.index(a), self.names.index(b)
+                    found[:, *at] = power * (2 * np.pi * frequency) ** (i + j) * (-1) ** ((i - j) // 2)
+        return found
+
+    def _lag_of_damping(self, solution: Solution, found: Spread) -> Spread:
+        """A lag T counts as a damping of -K T: B knows of a lag nobody has calibrated what the prior says, no more.
+
+        Whatever else shifts the force in time moves the lag that a fit finds, and B with it.
+        """
+        variance = found.variance.copy()
+        i = self.names.index("B")
+        by_prior = (solution.theta[self.names.index("K")] * self.problem.lag.std) ** 2
+        variance[i] = max(variance[i], by_prior)
+        return Spread(variance, found.freedom)
+
+    def _sensor(self, solution: Solution) -> tuple[Array, Array]:
+        """Variance of a line by the sensor's own noise in each octave, and the lines that tell it, shape (octaves,).
+
+        Out of contact it is seen; where the log has no such stretch, it is what the quietest octaves have in common.
+        """
+        longest = longest_of(self.segments)
+        gain = white_lines(self.problem.motion.chain.force_gain, self.dt, longest, self.octaves)
+        rest = self._rest(longest)
+        if rest is None:
+            own = self.octaves.total[:, -1, -1] / np.maximum(self.octaves.all_lines, 1.0)
+            level = np.where(self.use, solution.noise, own)
+            lines = np.where(self.use, worth(self.system), self.octaves.all_lines)
+        else:
+            lines = rest.all_lines
+            level = rest.total[:, 0, 0] / np.maximum(lines, 1.0)
+        sensor = causes.white_level(level / gain, lines) * gain
+        told = np.full(len(sensor), float(lines.sum()))
+        if rest is not None:
+            louder = (lines > 0) & (level > sensor)
+            sensor, told = np.where(louder, level, sensor), np.where(louder, lines, told)
+        return np.minimum(sensor, solution.noise), told
+
+    def _rest(self, longest: int) -> Octaves | None:
+        """The force out of contact by the octaves of the contacts; None if there is too little of it."""
+        if not self.problem.free:
+            return None
+        edges = np.cumsum([0, *(len(f) for f in self.problem.free)])
+        stretches = [Segment(int(a), int(b)) for a, b in pairwise(edges)]
+        found = octaves_of(np.concatenate(self.problem.free)[:, None], stretches, self.dt, longest)
+        return found if found.lines.any() else None
+
+    def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float]:
+        """Share of the force's variance in contact that the model's own columns account for, noise left aside."""
+        total = self.system.products.sum(axis=0)
+        full = np.zeros(total.shape[0])
+        full[: self.own], full[-1] = -solution.theta[: self.own], 1.0
+        offset = np.zeros_like(full)
+        offset[-1] = 1.0
+        if LAG in self.names:  # the target counts the lag from zero
+            at = self.names.index(LAG)
+            offset[at] = -self.lag
+        noise = float(sensor @ self.system.lines)
+        left = max(float(full @ total @ full) - noise, 0.0)
+        whole = max(float(offset @ total @ offset) - noise, 1e-300)
+        count = max(float(self.system.lines.sum()), 1.0)
+        return 1 - left / whole, float(np.sqrt(left / count))
+
+
+def _linearised(
+    problem: Problem, model: Model, lag: float, theta: dict[str, float]
+) -> tuple[dict[str, float], dict[str, Array], Array]:
+    """Where a nonlinear model is linearised, the columns of the parameters, and the force that they add up to.
+
+    The lag is among the parameters unless it is exact.
+    """
+    motion, asks = problem.motion, problem.lag.std > 0
+    if not model.nonlinear:
+        named = zip(model.linear, model.columns(motion, {}, lag), strict=True)
+        own = {name: column for name, column in named if name != "offset"}
+        if not asks:
+            return {}, own, problem.force
+        slope = slope_of_lag(model, motion, theta, lag)
+        return {}, {**own, LAG: slope}, problem.force + slope * lag
+    nonlinear = {p.name: theta[p.name] for p in model.nonlinear if p.name in theta}
+    if len(nonlinear) < len(model.nonlinear):
+        fitted = fit(model, motion, problem.force, replace(problem.lag, value=lag, std=0.0))
+        nonlinear = {p.name: fitted[p.name] for p in model.nonlinear}
+    at, jacobian, residuals = linearised(model, motion, problem.force, nonlinear, lag)
+    free = {name: i for i, name in enumerate(at) if name != "offset" and (name != LAG or asks)}
+    own = {name: jacobian[:, i] for name, i in free.items()}
+    return at, own, residuals + jacobian[:, list(free.values())] @ [at[name] for name in free]
+
+
+def _moved_by_lag(
+    effects: dict[str, Array], theta: dict[str, float], segments: list[Segment], dt: float
+) -> Array:
+    """Derivative of the other forces by the lag [N/s], shape (m,): they are as late as the force of the contact."""
+    force = np.column_stack(list(effects.values())) @ [theta.get(name, 0.0) for name in effects]
+    found = np.zeros(len(force))
+    for s in segments:
+        found[s.first : s.last] = -np.gradient(force[s.first : s.last], dt)
+    return found
+
+
+def _line_of_noise(motion: Motion, frequency: Array) -> Array:
+    """Power of the filtered position's noise in a line at frequencies [Hz]."""
+    line: Array = motion.noise.power(frequency, motion.chain.dt) * motion.chain.position_gain(frequency) ** 2
+    return line
+
+
+def _seen(motion: Motion, dt: float, octaves: Octaves, derivatives: dict[int, int]) -> NDArray[np.bool_]:
+    """Octaves up to the first in which a column is mostly the position's noise, which pulls its parameter to zero.
+
+    Args:
+        motion: of the log.
+        dt: from row to row [s].
+        octaves: of the columns.
+        derivatives: place of a column, and which derivative of the position it is.
+    """
+    line, chain = _line_of_noise(motion, octaves.frequency), motion.chain
+    rounding = (_ROUNDED * np.finfo(float).eps * float(np.abs(motion.position).max())) ** 2
+    noise = octaves.all_lines * np.maximum(line * chain.dt / dt, rounding)
+    power = np.stack([octaves.total[:, place, place] for place in derivatives])
+    least = np.stack([noise * (2 * np.pi * octaves.frequency) ** (2 * k) for k in derivatives.values()])
+    return np.logical_and.accumulate(np.all(power >= _SEEN * least, axis=0))
