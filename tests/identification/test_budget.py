@@ -11,7 +11,7 @@ from scipy.stats import t as student
 from identification.test_by_octave import DT, ROWS, level, system
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import HIDDEN_SHARE, Spread
-from palpate.identification.estimators.by_octave import estimate, solve
+from palpate.identification.estimators.by_octave import System, estimate, solve
 from palpate.identification.estimators.octaves import PERIODS
 
 NOISE = 0.1
@@ -37,6 +37,39 @@ def of_stretches(each, seed=0):
     asked = system(column, force + np.random.default_rng([seed, 2]).normal(0, NOISE, ROWS))
     whole = estimate(asked)
     return causes.of_stretches(asked, whole), whole
+
+
+def by_residuals(columns, target, groups):
+    """Variance and degrees of freedom of CR2 over the rows (Bell and McCaffrey, 2002), for noise of variance 1."""
+    cov = np.linalg.inv(columns.T @ columns)
+    hat = columns @ cov @ columns.T
+    residuals = target - hat @ target
+    weights = np.zeros((groups.max() + 1, columns.shape[1], len(columns)))
+    for g in range(len(weights)):
+        own = groups == g
+        value, vector = np.linalg.eigh(np.eye(own.sum()) - hat[np.ix_(own, own)])
+        weights[g][:, own] = cov @ columns[own].T @ (vector / np.sqrt(value)) @ vector.T
+    spread = weights @ (np.eye(len(columns)) - hat)  # of the rows' noise
+    tied = np.einsum("gpn,hpn->pgh", spread, spread)
+    freedom = np.einsum("pgg->p", tied) ** 2 / np.einsum("pgh,pgh->p", tied, tied)
+    return ((weights @ residuals) ** 2).sum(axis=0), freedom, np.diag(cov)
+
+
+def test_stretches_of_unlike_leverage_count_as_bell_and_mccaffrey_have_it():
+    rng = np.random.default_rng(4)
+    groups = np.repeat(np.arange(5), 12)
+    columns = rng.normal(size=(60, 2)) * np.where(groups == 2, 8.0, 1.0)[:, None]
+    target = columns @ [1.0, 2.0] + rng.normal(size=60) * np.where(groups == 2, 3.0, 1.0)
+    variance, freedom, own = by_residuals(columns, target, groups)
+    rows = np.column_stack([columns, target])
+    products = np.stack([rows[groups == g].T @ rows[groups == g] for g in range(5)])[:, None]
+    asked = System(
+        products.sum(axis=0), np.array([60.0]), (products, np.full((5, 1), 12.0)), np.zeros(2), np.zeros(2)
+    )
+    found = causes.of_stretches(asked, solve(asked, np.ones(1)))
+    assert found.freedom == pytest.approx(np.clip(freedom, 1, 4), rel=1e-6)
+    assert found.variance == pytest.approx(np.maximum(variance - own, 0), rel=1e-6)
+    assert freedom.max() < 2  # one stretch has nearly all that tells them
 
 
 def test_stretches_that_differ_have_the_variance_of_their_mean():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.estimators.by_octave import estimate, solve, system_of
+from palpate.identification.estimators.by_octave import estimate, held, solve, system_of
 from palpate.identification.estimators.octaves import Segment, longest_of, octaves_of
 
 DT = 1e-2
@@ -138,3 +138,12 @@ def test_octaves_that_do_not_count_are_as_if_there_were_none():
     some = solve(asked, level(asked), use)
     cut = replace(asked, products=np.where(use[:, None, None], asked.products, 0.0))
     np.testing.assert_allclose(some.theta, solve(cut, level(cut)).theta, rtol=1e-12)
+
+
+def test_a_parameter_that_is_held_leaves_the_others_as_if_its_force_were_taken_off():
+    own, force = two_columns()
+    found = held(system(own, force), {1: -1.5})
+    alone = estimate(system(own[:, :1], force + 1.5 * own[:, 1]))
+    assert found.theta == pytest.approx([alone.theta[0], -1.5], rel=1e-6)
+    assert found.noise == pytest.approx(alone.noise, rel=1e-6)
+    assert found.cov == pytest.approx(np.diag([alone.cov[0, 0], 0.0]), rel=1e-6)

@@ -172,9 +172,18 @@ def test_confidently_wrong_is_far_off_or_many_half_widths():
     assert judged("K", 100, (95, 105), (90, 200), defined=False).holds
 
 
-@pytest.mark.parametrize("cell", ["friction/held-steady", "kelvin-voigt/payload", "kelvin-voigt/encoder"])
+@pytest.mark.parametrize(
+    "cell",
+    [
+        "friction/held-steady",  # friction that holds as a spring
+        "kelvin-voigt/payload",  # air beside a tool's inertia
+        "kelvin-voigt/encoder",  # a motion of a few counts
+        "standard-linear/drift",  # a force that drifts along a bent line, and a relaxation time to be found beside it
+        "stiffening/jitter",  # a lag that nobody knows, behind a stiffness that goes with depth
+        "mass/high-rate",  # octaves in which the acceleration is noise and the position is not
+    ],
+)
 def test_no_answer_is_wrong_on_these_logs_again(cell):
-    """Friction that holds as a spring, air beside a tool's inertia, a motion of a few counts of its encoder."""
     found = score(Cell(*cell.split("/")), 906)
     assert found.outcome == "answered"
     assert found.working

@@ -9,7 +9,7 @@ import pytest
 
 from identification.synthetic_contacts import coloured, force_of, pressed, record
 from palpate.identification import identify
-from palpate.identification.free_motion import free_motion_of
+from palpate.identification.free_motion import Drift, free_motion_of
 from palpate.logs import read_log
 
 PRESS = Path(__file__).parents[2] / "examples" / "data" / "press.csv"
@@ -89,3 +89,16 @@ def test_many_presses_are_as_many_contacts():
     force = force_of(x, lambda d, v: 2000 * d + 8 * v, 1 / 125)
     force += np.random.default_rng(0).normal(0, 0.03, len(t))
     assert len(identify(record(t, x, force)).contacts) == 60
+
+
+def test_a_drift_bends_between_its_stays_as_a_random_walk_does():
+    drift = Drift(np.array([0.0, 4.0, 6.0]), np.array([1.0, 3.0, 4.0]))
+    walk = (2.0**2 + 1.0**2) / 6  # N^2/s
+    times = np.linspace(0.0, 6.0, 1201)
+    bends = drift.bends(times)
+    assert bends[[0, 800, 1200]] == pytest.approx(0.0, abs=1e-12)
+    for begin, end in ((0, 800), (800, 1200)):
+        span = times[end] - times[begin]
+        # Mean variance of Brown's bridge over its span: walk span/6; its first three modes have 83 % of it.
+        mean = np.mean(np.sum(bends[begin:end] ** 2, axis=1))
+        assert mean == pytest.approx(0.827 * walk * span / 6, rel=0.005)

@@ -165,7 +165,9 @@ def test_a_lag_is_not_taken_for_a_mass_below_zero():
 
 
 def test_a_mass_that_is_asked_for_where_there_is_none_spares_the_stiffness():
-    all_found = [identify(pressed(k=3000.0, b=60.0, seed=seed), model="kelvin-voigt-mass") for seed in range(4)]
+    all_found = [
+        identify(pressed(k=3000.0, b=60.0, seed=seed), model="kelvin-voigt-mass") for seed in range(4)
+    ]
     for found in all_found:
         assert "model-rejected" not in found.codes
         assert found.parameters["K"].verdict is Verdict.IDENTIFIED

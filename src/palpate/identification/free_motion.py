@@ -135,8 +135,9 @@ def free_motion_of(
     limit = _limit(way * position, max(found))
     stays = stays_in(way * position < limit)
     middle = np.array([(a + b - 1) / 2 for a, b in stays]) * size + (size - 1) / 2
-    levels = np.array([float(np.median(force[a:b])) for a, b in stays])
-    rest = float(np.median(np.concatenate([force[a:b] for a, b in stays])))
+    rows, stay = _rows_of(stays)
+    levels = _medians(force[rows], stay)
+    rest = float(np.median(force[rows]))
     noise = _noise(force, levels, stays)
     return FreeMotion(
         way, way * limit, rest, middle, levels, _differ(levels, stays, noise), float(np.sqrt(noise.variance))
@@ -154,8 +155,8 @@ def _in_contact(force: Array, position: Array, ends: tuple[float, float]) -> flo
 
 def _noise(force: Array, levels: Array, stays: list[tuple[int, int]]) -> Noise:
     """Of the force in the air."""
-    own = np.concatenate([force[a:b] - level for (a, b), level in zip(stays, levels, strict=True)])
-    return noise_of(own, np.arange(len(own)), len(stays))
+    rows, stay = _rows_of(stays)
+    return noise_of(force[rows] - levels[stay], np.arange(len(rows)), len(stays))
 
 
 def _differ(levels: Array, stays: list[tuple[int, int]], noise: Noise) -> bool:
@@ -222,6 +223,20 @@ def stays_in(inside: Rows) -> list[tuple[int, int]]:
     return [(a, b) for a, b in pairs if b - a >= _FEWEST]
 
 
+def _rows_of(stays: list[tuple[int, int]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows of all stays, and the number of each one's stay."""
+    rows = [np.arange(a, b) for a, b in stays]
+    return np.concatenate(rows), np.repeat(np.arange(len(rows)), [len(own) for own in rows])
+
+
+def _medians(values: Array, number: NDArray[np.intp]) -> Array:
+    """Of the values of each number from 0 on."""
+    from scipy.ndimage import median
+
+    found: Array = median(values, number, np.arange(int(number[-1]) + 1))
+    return found
+
+
 def _slope(
     force: Array, position: Array, stays: list[tuple[int, int]], white: float, bound: float
 ) -> tuple[float, float] | None:
@@ -230,8 +245,9 @@ def _slope(
     What is more than a bound of deviations from the middle of its stay may be left out: a force that is read late has
     a touch in it that the position no longer shows.
     """
-    x = np.concatenate([position[a:b] - position[a:b].mean() for a, b in stays])
-    f = np.concatenate([force[a:b] - np.median(force[a:b]) for a, b in stays])
+    at, stay = _rows_of(stays)
+    x = position[at] - (np.bincount(stay, position[at]) / np.bincount(stay))[stay]
+    f = force[at] - _medians(force[at], stay)[stay]
     far = (
         np.abs(f) > bound * 1.4826 * float(np.median(np.abs(f)))
         if np.isfinite(bound)

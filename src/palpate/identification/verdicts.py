@@ -21,9 +21,11 @@ _FAR = 2.0
 _NOTHING = 1e4
 """Half-widths over the value beyond which no bounds are worth printing."""
 _SHAPE = ("n", "tau", "x0")
+"""Parameters without force in their unit: no calibration of force or position scales them."""
 _NUISANCE = ("x0", "y0")
 """Where the surface is, and how a branch was stretched when the log began: found, not asked for."""
-"""Parameters without force in their unit: no calibration of force or position scales them."""
+_IN_TIME = ("B", "M", "K1", "tau")
+"""Parameters that a shift of the force in time is taken for."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ def verdicts(
         parameters = _showing(parameters, found, point)
     elif point is not None and {"K", "M"} <= set(found.names):
         parameters = _agreeing(parameters, found, point)
-    parameters = _of_lag(parameters, found, lag, terms)
+    parameters = _passive(_of_lag(parameters, found, lag, terms))
     if not choice.problem.contacts.signed:
         parameters = {name: _refused(p, _UNSIGNED) for name, p in parameters.items()}
     if found.fit.model.of_power and choice.problem.contacts.bonded:
@@ -182,7 +184,7 @@ def _contradicted(
 
 
 def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> dict[str, Parameter]:
-    """No B or M rests on a lag that nobody calibrated and that is far from any sensor's."""
+    """Nothing that is seen in time alone rests on a lag that nobody calibrated and that is far from any sensor's."""
     if lag.known or LAG not in found.names or abs(found[LAG] - lag.value) <= _FAR * lag.std:
         return parameters
     reason = (
@@ -192,9 +194,24 @@ def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Te
     refused = {
         name: Parameter(None, None, None, p.unit, Verdict.REJECTED, reason, None, p.budget)
         for name, p in parameters.items()
-        if name in ("B", "M")
+        if name in _IN_TIME
     }
     return parameters | refused
+
+
+def _passive(parameters: dict[str, Parameter]) -> dict[str, Parameter]:
+    """Where one of B and M is below zero for sure, a force that the model has not is in both."""
+    negative = [name for name in ("B", "M") if name in parameters and "below zero" in parameters[name].reason]
+    if len(negative) != 1:
+        return parameters
+    reason = (
+        f"{negative[0]} is below zero for sure: a force of the motion is in the log that the model has not"
+    )
+    return parameters | {
+        name: replace(_refused(p, reason), verdict=Verdict.REJECTED)
+        for name, p in parameters.items()
+        if name in ("B", "M") and p.verdict is Verdict.IDENTIFIED
+    }
 
 
 _UNSIGNED = (
@@ -221,7 +238,7 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
         if abs(at - lag.value) > _FAR * lag.std or at + found.half_of(LAG) < low:
             text = (
                 f"the fit asks for a lag of {1e3 * at:.3g} ms of the force, farther than sensors have:"
-                " something else moves the force in time; B and M are refused"
+                " something else moves the force in time; what a shift in time is taken for is refused"
             )
             warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
     damping = parameters.get("B")
