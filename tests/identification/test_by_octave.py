@@ -144,6 +144,7 @@ def test_a_parameter_that_is_held_leaves_the_others_as_if_its_force_were_taken_o
     own, force = two_columns()
     found = held(system(own, force), {1: -1.5})
     alone = estimate(system(own[:, :1], force + 1.5 * own[:, 1]))
-    assert found.theta == pytest.approx([alone.theta[0], -1.5], rel=1e-6)
-    assert found.noise == pytest.approx(alone.noise, rel=1e-6)
-    assert found.cov == pytest.approx(np.diag([alone.cov[0, 0], 0.0]), rel=1e-6)
+    # But for the weak prior, which goes with the power of the force.
+    assert found.theta == pytest.approx([alone.theta[0], -1.5], rel=1e-4)
+    assert found.noise == pytest.approx(alone.noise, rel=1e-4)
+    assert found.cov == pytest.approx(np.diag([alone.cov[0, 0], 0.0]), rel=1e-4)
