@@ -28,6 +28,8 @@ _LONGEST_BLOCK = 0.25
 """Of a median [s]: longer ones would hold whole presses of a long log."""
 _CLEAR = 3.0
 """Deviations of the free force below the threshold: noise cut at its own height stays below two, however coloured."""
+_SEVERAL = 3
+"""Readings at rest that are a loss of contact: fewer may be a bounce of the noise."""
 _FEWEST = 20
 _ROUNDS = 3
 _SIGNED = 0.6
@@ -135,6 +137,15 @@ def find_contacts(
     level = _resting(sign * force, sign * rest, top)
     threshold = _threshold(sign * force, level, top)
     spans = _spans(sign * force, level, top, threshold, chain)
+    whole = len(spans)
+    if air is not None and payload is None:
+        spans = _long(_between_losses(channels, sign, (level, top), air, spans, chain), chain)
+    if whole and not spans:
+        text = (
+            "the probe leaves the surface again and again, and what is between is too short for the filter:"
+            " press deeper, move slower or log faster"
+        )
+        return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     if not spans:
         text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
@@ -297,5 +308,48 @@ def _spans(force: Array, rest: float, peak: float, threshold: float, chain: Chai
             spans[-1] = (spans[-1][0], int(end))
         else:
             spans.append((int(begin), int(end)))
+    return [(b, e) for b, e in _long(spans, chain) if force[b:e].max() > rest + _REACHED * (peak - rest)]
+
+
+def _long(spans: list[tuple[int, int]], chain: Chain) -> list[tuple[int, int]]:
+    """Those that last longer than the filter needs to settle."""
     least = max(20, int(2 * chain.settling / chain.dt))
-    return [(b, e) for b, e in spans if e - b >= least and force[b:e].max() > rest + _REACHED * (peak - rest)]
+    return [(b, e) for b, e in spans if e - b >= least]
+
+
+def _between_losses(
+    channels: Channels,
+    sign: float,
+    levels: tuple[float, float],
+    air: FreeMotion,
+    spans: list[tuple[int, int]],
+    chain: Chain,
+) -> list[tuple[int, int]]:
+    """The spans without what the readings before any filter show as air: the position moves and the force does not.
+
+    A filter joins what a probe that bounces does between two touches.
+
+    Args:
+        channels: as read.
+        sign: of the force.
+        levels: of the force at rest and at its peak [N].
+        air: of the log.
+        spans: behind the filter.
+        chain: the filter, whose delay a span begins with.
+    """
+    rest, peak = levels
+    force, position = sign * channels.force, channels.position
+    free = force[air.way * position < air.way * air.limit] - rest
+    noise = 1.4826 * float(np.median(np.abs(free))) if len(free) else 0.0
+    delay, found = round(chain.delay / chain.dt), []
+    for begin, end in spans:
+        slope = (peak - rest) / (float(np.ptp(position[begin:end])) or np.inf)
+        edges = np.diff(np.r_[0, (force[begin:end] < rest + _CLEAR * noise).astype(np.int8), 0])
+        first = begin
+        for off, on in zip(np.flatnonzero(edges > 0) + begin, np.flatnonzero(edges < 0) + begin, strict=True):
+            moved = float(np.ptp(position[off:on]))
+            if begin < off and on < end and on - off >= _SEVERAL and moved * slope > 2 * _CLEAR * noise:
+                found.append((first, int(off)))
+                first = int(on) + delay
+        found.append((first, end))
+    return found

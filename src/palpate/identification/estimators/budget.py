@@ -66,7 +66,26 @@ def of_noise(system: System, solution: Solution, names: tuple[str, ...], own: in
         by_lag[i] = 0.0
     others = np.maximum(whole - alone, 0.0)
     noise = np.maximum(whole - by_lag - others, 0.0)
-    return {"noise": Spread(noise), "lag": Spread(np.minimum(by_lag, whole)), "other forces": Spread(others)}
+    freedom = _freedom(system, solution)
+    return {
+        "noise": Spread(noise, freedom),
+        "lag": Spread(np.minimum(by_lag, whole)),
+        "other forces": Spread(others, freedom),
+    }
+
+
+def _freedom(system: System, solution: Solution) -> Array:
+    """Degrees of freedom of each parameter's variance, shape (p,): of the noise levels of the octaves that it rests on.
+
+    Each level has as many as its octave has lines that no parameter takes (Satterthwaite, 1946).
+    """
+    weight = np.where(system.lines > 0, 1 / solution.noise, 0.0)
+    normal = weight[:, None, None] * system.products[:, :-1, :-1]
+    used = np.einsum("oij,ij->o", normal, solution.cov)
+    free = np.maximum(worth(system) - used, 1.0)
+    rests = np.einsum("ki,oij,kj->ok", solution.cov, normal, solution.cov)
+    share = rests / np.maximum(rests.sum(axis=0), 1e-300)
+    return np.asarray(1 / np.maximum((share**2 / free[:, None]).sum(axis=0), 1e-9))
 
 
 def of_position_noise(system: System, solution: Solution, noise: Array) -> Spread:

@@ -31,6 +31,8 @@ _LINE = 4
 _STILL = 0.02
 """Share of the highest speed below which a probe rests: encoders and loops leave a per cent or so."""
 _SHOWN = 400
+_NORMAL = 1.96
+"""Deviations of a 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -272,7 +274,8 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
     if not strokes:
         return None
     loading = max(strokes, key=lambda stroke: len(stroke.depth))
-    tangent = [t for level in _LEVELS if (t := _tangent(strokes, level)) is not None]
+    later = strokes_in(problem, lag + problem.lag.std, segments) if problem.lag.std > 0 else strokes
+    tangent = [t for level in _LEVELS if (t := _tangent(strokes, later, level)) is not None]
     back = way_out(problem, lag, segments)
     return Press(
         tuple(t for t in tangent if t.half < abs(t.stiffness)),
@@ -284,7 +287,22 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
     )
 
 
-def _tangent(strokes: list[Stroke], level: float) -> Tangent | None:
+def _tangent(strokes: list[Stroke], later: list[Stroke], level: float) -> Tangent | None:
+    """Slope of the ways in about a share of the force; with it what it moves by if the force is later than assumed.
+
+    Args:
+        strokes: the ways in.
+        later: the same, the force later by a deviation of the lag's prior.
+        level: the share.
+    """
+    found, other = _tangent_of(strokes, level), _tangent_of(later, level)
+    if found is None or other is None:
+        return None
+    by_lag = _NORMAL * (other.stiffness - found.stiffness)
+    return replace(found, half=float(np.hypot(found.half, by_lag)))
+
+
+def _tangent_of(strokes: list[Stroke], level: float) -> Tangent | None:
     slopes, variances, forces, by_speed = [], [], [], []
     for stroke in strokes:
         loss = _of_speed(stroke)

@@ -64,8 +64,16 @@ def working_point(
     rest = 0.0 if problem.counted else problem.contacts.resting
     contacts = problem.contacts
     stiffness = replace(_judged(value, half, tolerance, unit), budget=_largest(budget, half))
-    if not contacts.signed or (contacts.bonded and value < 0):
-        reason = f"{stiffness.reason}; which way force and position count is not known (--force-sign)"
+    against = ""
+    if not contacts.signed or (contacts.bonded and value < 0 and not options.bonded):
+        against = "which way force and position count is not known (--force-sign)"
+    elif value < 0 and not options.bonded:
+        against = (
+            "the force falls as the probe goes in: either the surface gives way, or it moves, and then this is the"
+            " stiffness of what holds the probe"
+        )
+    if against:
+        reason = f"{stiffness.reason}; {against}"
         stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
     return WorkingPoint(
         stiffness,

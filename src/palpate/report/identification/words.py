@@ -73,6 +73,12 @@ def sentence(found: Identification) -> str:
         lost = _loss(found, point)
         start = f"{lost}, but no stiffness" if lost else "The log shows no stiffness"
         return f"{start} {where} ({own.reason}); {next_step(limit, point.source)}."
+    if own.ci95[1] < 0 and own.verdict is not Verdict.IDENTIFIED:
+        number = quantity(-own.value, own.unit, (own.ci95[1] - own.ci95[0]) / 2)
+        return (
+            f"The force falls by {number} as the probe goes in, {where}: either the surface gives way, or it moves, and"
+            " then this is the stiffness of what holds the probe."
+        )
     only = "" if own.verdict is Verdict.IDENTIFIED else f", known to {_share(own)} only,"
     return (
         f"The stiffness is {formatted(own)}{only} {where}; what limits it most is {cause(limit, point.source)}:"
