@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from palpate.identification.filters.position_noise import position_noise
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.free_motion import FreeMotion
-from palpate.identification.least_squares import noise_of, quantile
+from palpate.identification.least_squares import noise_of
+from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.sampling import Channels
 
 Array = NDArray[np.float64]
@@ -20,6 +22,8 @@ _SEEN = 10.0
 """Power of the acceleration over that of the position's noise in it, at least: the mass would be off by a tenth."""
 _FEWEST = 20
 """Rows of a stay in the air that its own level is taken from."""
+_LEAST = 0.05
+"""Share of the acceleration's power that a part of the motion needs to tell the mass again."""
 _MOST = 0.5
 _OTHERS = 2.0
 """Share of the force's power that the acceleration accounts for at least, and over that of speed or place: as measured
@@ -76,11 +80,28 @@ def payload_of(
     others = (own(chain(channels.position, k, lag)) for k in ((1, 0) if alone else (1,)))
     if size <= _SEEN * len(motion) * float(spread) or not _of_inertia(force, motion, others):
         return None
-    mass = float(motion @ force) / size
-    noise = noise_of(force - mass * motion, np.arange(len(force)), len(stays) + 1)
-    std = float(np.sqrt(noise.variance * len(force) / noise.effective / size))
-    half = quantile(noise.effective, len(stays) + 1) * std
-    return Payload(mass, half / 1.96) if abs(mass) > half else None
+    noise = noise_of(force - float(motion @ force) / size * motion, np.arange(len(force)), len(stays) + 1)
+    level = noise.variance * len(force) / noise.effective
+    mean = _of_parts(force, motion, stays, level)
+    return Payload(mean.value, mean.half / 1.96) if abs(mean.value) > mean.half else None
+
+
+def _of_parts(force: Array, motion: Array, stays: list[tuple[int, int]], level: float) -> Mean:
+    """The mass that both halves of each stay tell: a tone in the force goes with some of the motion, not with all.
+
+    Args:
+        force: in the stays, one after the other, shape (n,) [N].
+        motion: acceleration there, shape (n,) [m/s^2].
+        stays: for their lengths.
+        level: of the noise: variance of a mass is this over the sum of the motion's squares.
+    """
+    ends = np.cumsum([0, *(b - a for a, b in stays)])
+    edges = np.sort(np.concatenate([ends, (ends[:-1] + ends[1:]) // 2]))
+    parts = [(motion[a:b] - motion[a:b].mean(), force[a:b]) for a, b in pairwise(edges.tolist())]
+    size = np.array([float(own @ own) for own, _ in parts])
+    told = size > _LEAST * size.sum()
+    masses = np.array([float(own @ f) for own, f in parts])[told] / size[told]
+    return random_effects(masses, level / size[told])
 
 
 def _of_inertia(force: Array, motion: Array, others: Iterable[Array]) -> bool:

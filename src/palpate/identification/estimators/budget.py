@@ -84,7 +84,8 @@ def _freedom(system: System, solution: Solution) -> Array:
     used = np.einsum("oij,ij->o", normal, solution.cov)
     free = np.maximum(worth(system) - used, 1.0)
     rests = np.einsum("ki,oij,kj->ok", solution.cov, normal, solution.cov)
-    share = rests / np.maximum(rests.sum(axis=0), 1e-300)
+    whole = rests.sum(axis=0)
+    share = np.clip(rests / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
     return np.asarray(1 / np.maximum((share**2 / free[:, None]).sum(axis=0), 1e-9))
 
 
