@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.budget import HIDDEN_SHARE
 from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.evidence.press import Slope, slope_of, strokes_in, unseen
 from palpate.identification.in_series import slope_without_series
@@ -58,10 +57,7 @@ def working_point(
     else:
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
-        force, depth = float(problem.force[inside].mean()), float(depths.mean())
-        dynamic = float(np.hypot(octave.storage, octave.loss))
-        budget = {**octave.budget, "unexplained": HIDDEN_SHARE * _bent(problem, lag, inside) * dynamic}
-        half = float(np.hypot(half, budget["unexplained"]))
+        budget, force, depth = octave.budget, float(problem.force[inside].mean()), float(depths.mean())
     if problem.contacts.bonded and not options.bonded:  # nothing tells that the first reading is in contact
         budget = {**budget, "unseen way": abs(value) * unseen(problem)}
         half = float(np.hypot(half, budget["unseen way"]))
@@ -76,6 +72,10 @@ def working_point(
             "the force falls as the probe goes in: either the surface gives way, or it moves, and then this is the"
             " stiffness of what holds the probe"
         )
+    elif not use_press and (bent := _bent(problem, lag, inside)) > THIRD:
+        against = (
+            f"no linear impedance follows {bent:.0%} of the force's amplitude: keep the motion near one depth"
+        )
     if against:
         reason = f"{stiffness.reason}; {against}"
         stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
@@ -86,26 +86,6 @@ def working_point(
         float(frequency),
         "press" if use_press else "octave",
         again,
-    )
-
-
-def _bent(problem: Problem, lag: float, inside: NDArray[np.intp]) -> float:
-    """Share of the force's amplitude in contact, beyond its noise, that no linear impedance follows.
-
-    A force that bends with the depth, or ends in the air, is at every frequency at once. What of it is at harmonics of
-    the motion is seen; as much may be at the motion's own.
-    """
-    spans, force = problem.spans[inside], problem.force[inside]
-    columns = np.column_stack([problem.motion.moved(k, lag)[inside] for k in range(3)])
-    for number in np.unique(spans):
-        own = spans == number
-        columns[own] -= columns[own].mean(axis=0)
-        force = np.where(own, force - force[own].mean(), force)
-    size = np.sqrt((columns**2).sum(axis=0))
-    left = force - columns @ (np.linalg.lstsq(columns / size, force, rcond=None)[0] / size)
-    noise = problem.free_noise or 0.0
-    return float(
-        np.sqrt(max(float(left @ left) / len(left) - noise**2, 0.0) / max(float(force.var()), 1e-300))
     )
 
 
