@@ -72,10 +72,6 @@ def working_point(
             "the force falls as the probe goes in: either the surface gives way, or it moves, and then this is the"
             " stiffness of what holds the probe"
         )
-    elif not use_press and (bent := _bent(problem, lag, inside)) > THIRD:
-        against = (
-            f"no linear impedance follows {bent:.0%} of the force's amplitude: keep the motion near one depth"
-        )
     if against:
         reason = f"{stiffness.reason}; {against}"
         stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
