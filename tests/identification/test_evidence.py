@@ -223,7 +223,7 @@ def steady():
 
 
 def headline(steady, *spectrum, tolerance=0.25):
-    return working_point(steady, spectrum, Options.of(tolerance=tolerance), "N/m")
+    return working_point(steady, spectrum, Options.of(tolerance=tolerance), "N/m", 0.0)
 
 
 def test_the_headline_is_the_octave_with_most_motion(steady):
@@ -266,7 +266,7 @@ def test_the_press_is_the_headline_where_no_octave_is_known_well():
     assert found.stiffness.ci95[0] < 5000 < found.stiffness.ci95[1]
     asked = problem(record(time, x, force), 0.0)
     poor = [octave(0.25, 5000, 4000, 0.9)]
-    point = working_point(asked, poor, Options.of(), "N/m")
+    point = working_point(asked, poor, Options.of(), "N/m", 0.0)
     assert point.source == "press"
     assert point.stiffness.value == pytest.approx(5000, rel=0.02)
 
@@ -313,7 +313,7 @@ def test_several_presses_foretell_the_next():
     x, force = np.concatenate(x), np.concatenate(force)
     log = record(np.arange(len(x)) * DT, x, force + rng.normal(0, 0.02, len(x)))
     asked = problem(log, 0.0)
-    point = working_point(asked, [], Options.of(), "N/m")
+    point = working_point(asked, [], Options.of(), "N/m", 0.0)
     low, high = point.prediction95
     mean_low, mean_high = point.stiffness.ci95
     assert low < mean_low < point.stiffness.value < mean_high < high

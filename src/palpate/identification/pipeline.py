@@ -91,7 +91,7 @@ def identify(
     if not (contacts.clear or bonded or follows):
         text = f"the force (rms {choice.answer.unexplained:.3g} N) does not follow the position: nothing seems touched"
         return nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
-    evidence = evidence_of(problem, options, terms.stiffness_unit)
+    evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer.hidden)
     if series_stiffness is not None:
         choice = replace(choice, answer=in_series.without_series(choice.answer, series_stiffness, series_std))
         holds = in_series.fit_without_series(holds, series_stiffness, series_std)

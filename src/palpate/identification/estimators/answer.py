@@ -27,6 +27,7 @@ class Answer:
         fit: what the model predicts with them.
         explained: share of the force's variance in contact that the model alone accounts for.
         unexplained: rms of what is left beyond the sensor's noise [N].
+        hidden: share of the force's amplitude in contact that the other forces beside the model do not explain either.
         sensor: mean square of the sensor's own noise [N^2].
         problem: the rows that it was fitted to.
     """
@@ -38,6 +39,7 @@ class Answer:
     fit: Prediction
     explained: float
     unexplained: float
+    hidden: float
     sensor: float
     problem: Problem
 

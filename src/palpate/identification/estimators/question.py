@@ -138,7 +138,7 @@ class Question:
         budget["repetition"] = causes.of_stretches(self.system, solution)
         sensors = np.minimum(sensor + self._by_position(solution), solution.noise)
         budget["unexplained"] = causes.of_unexplained(self.system, solution, sensors, told)
-        explained, left = self._explained(solution, sensor)
+        explained, left, hidden = self._explained(solution, sensors)
         if lag_open(self.problem) and {"K", "B", LAG} <= set(self.names):
             budget["lag"] = self._lag_of_damping(solution, budget["lag"])
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
@@ -149,7 +149,7 @@ class Question:
         noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
         return Answer(
-            names, solution.theta[kept], cov, budget, predicted, explained, left, noise, self.problem
+            names, solution.theta[kept], cov, budget, predicted, explained, left, hidden, noise, self.problem
         )
 
     def _line(self) -> Array:
@@ -222,8 +222,13 @@ class Question:
         found = octaves_of(np.concatenate(self.problem.free)[:, None], stretches, self.dt, longest)
         return found if found.lines.any() else None
 
-    def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float]:
-        """Share of the force's variance in contact that the model's own columns account for, noise left aside."""
+    def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float, float]:
+        """What the model explains of the force in contact, noise left aside.
+
+        Returns:
+            Share of the variance that the model's own columns account for; rms of what they leave [N]; share of the
+            amplitude that nothing accounts for, the other forces included.
+        """
         total = self.system.products.sum(axis=0)
         full = np.zeros(total.shape[0])
         full[: self.own], full[-1] = -solution.theta[: self.own], 1.0
@@ -236,7 +241,8 @@ class Question:
         left = max(float(full @ total @ full) - noise, 0.0)
         whole = max(float(offset @ total @ offset) - noise, 1e-300)
         count = max(float(self.system.lines.sum()), 1.0)
-        return 1 - left / whole, float(np.sqrt(left / count))
+        beyond = float(np.maximum(solution.noise - sensor, 0.0) @ self.system.lines)
+        return 1 - left / whole, float(np.sqrt(left / count)), float(np.sqrt(beyond / whole))
 
 
 def _linearised(

@@ -19,11 +19,14 @@ from palpate.identification.estimators.by_octave import Solution, estimate, held
 from palpate.identification.estimators.effects import TOUCH
 from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.estimators.question import Question
+from palpate.identification.filters.bandwidth import highest_motion
 from palpate.identification.models import Model, from_surface
 from palpate.identification.prior import LAG
 from palpate.identification.problem import Problem
 
 _ROUNDS = 12
+_STARTS = 9
+"""Lags at most that a search may begin from."""
 _FOUND = 0.25
 """Share of its deviation by which a surface, a lag or a nonlinear parameter may still move: it adds a sixteenth to the
 variance."""
@@ -60,7 +63,7 @@ def _in_contact(problem: Problem, model: Model) -> tuple[Question, Solution]:
     if problem.lag.std > 0 and not model.nonlinear:  # its column needs parameters that are roughly right
         exact = Question.of(replace(problem, lag=replace(problem.lag, std=0.0)), model, segments, {})
         about = dict(zip(exact.names, estimate(exact.system).theta.tolist(), strict=True))
-    best = question = Question.of(problem, model, segments, about)
+    best = question = _start(Question.of(problem, model, segments, about))
     places, least = list(question.searched), np.inf
     for _ in range(_ROUNDS if places else 0):
         here = held(question.system, question.searched)
@@ -76,6 +79,33 @@ def _in_contact(problem: Problem, model: Model) -> tuple[Question, Solution]:
             break
         question = Question.of(problem, model, segments, best.moved(theta, step))
     return best, estimate(best.system)
+
+
+def _start(question: Question) -> Question:
+    """The likeliest of some lags within two deviations of the prior, a radian of the fastest motion apart at most.
+
+    Nearer to each other no two lags fit, one by taking a mass or a damping for the other.
+    """
+    problem, lag = question.problem, question.problem.lag
+    band = highest_motion(problem.motion)
+    if lag.std == 0 or not np.isfinite(band):
+        return question
+    reach = 2 * lag.std
+    count = 1 + int(np.ceil(2 * reach * 2 * np.pi * band))
+    if count < 3:  # all of them are about where it starts
+        return question
+    fixed = {name: question.at[name] for name in question.at if name != LAG}
+    likeliest = question
+    least = question.misfit(held(question.system, question.searched))
+    for at in np.linspace(lag.value - reach, lag.value + reach, min(count, _STARTS)):
+        other = Question.of(problem, question.model, question.segments, fixed | {LAG: float(at)})
+        here = held(other.system, other.searched)
+        if other.misfit(here) < least:
+            likeliest, least = other, other.misfit(here)
+            about = dict(zip(other.names, here.theta.tolist(), strict=True))
+    if likeliest is question:
+        return question
+    return Question.of(problem, question.model, question.segments, about)
 
 
 def _over_approach(

@@ -20,13 +20,14 @@ Array = NDArray[np.float64]
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
 
 
-def evidence_of(problem: Problem, options: Options, unit: str) -> Evidence:
+def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) -> Evidence:
     """Dynamic stiffness, press and working point of the surface.
 
     Args:
         problem: of the log.
         options: with the tolerance, and the stiffness in series with the surface.
         unit: of a stiffness.
+        hidden: share of the force's amplitude in contact that nothing explains, beyond its noise.
     """
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
@@ -39,7 +40,7 @@ def evidence_of(problem: Problem, options: Options, unit: str) -> Evidence:
         series = options.series_stiffness, options.series_std
         spectrum = in_series.spectrum_without_series(spectrum, *series)
         press = None if press is None else in_series.press_without_series(press, *series)
-    point = working_point(whole, spectrum, options, unit)
+    point = working_point(whole, spectrum, options, unit, hidden)
     return spectrum, press, point
 
 

@@ -215,12 +215,15 @@ def _by_filter(stroke: Stroke, slope: float, variance: float) -> float:
     depth, force = stroke.read
     if len(depth) < _LINE:
         return abs(slope)
-    rows = _upper(force)
-    depth, force = depth[rows], force[rows]
-    if len(depth) < _LINE or np.ptp(depth) <= 0:
+    return _apart(depth, force, _upper(force), slope, variance)
+
+
+def _apart(depth: Array, force: Array, rows: NDArray[np.intp], slope: float, variance: float) -> float:
+    """By how much a slope contradicts that of some readings [N/m]; all of it, if they are too few for one."""
+    if len(rows) < _LINE or np.ptp(depth[rows]) <= 0:
         return abs(slope)
-    own, doubt, _ = _line(depth, force)
-    return max(abs(own - slope) - 1.96 * float(np.sqrt(variance + doubt)), 0.0)
+    own, doubt, _ = _line(depth[rows], force[rows])
+    return max(abs(own - slope) - _NORMAL * float(np.sqrt(variance + doubt)), 0.0)
 
 
 def unseen(problem: Problem) -> float:
@@ -303,12 +306,11 @@ def _tangent(strokes: list[Stroke], later: list[Stroke], level: float) -> Tangen
 
 
 def _tangent_of(strokes: list[Stroke], level: float) -> Tangent | None:
-    slopes, variances, forces, by_speed = [], [], [], []
+    slopes, variances, forces, by_speed, by_filter = [], [], [], [], []
     for stroke in strokes:
         loss = _of_speed(stroke)
         low, high = np.percentile(stroke.force, [2, 98])
-        share = (stroke.force - low) / (high - low or 1.0)
-        rows = np.flatnonzero(np.abs(share - level) < _WIDE)
+        rows = _about(stroke.force, low, high, level)
         if len(rows) < _FEWEST or np.ptp(stroke.depth[rows]) <= 0:
             continue
         slope, variance, _ = _line(stroke.depth[rows], stroke.force[rows])
@@ -317,11 +319,21 @@ def _tangent_of(strokes: list[Stroke], level: float) -> Tangent | None:
         variances.append(variance)
         by_speed.append((slope - at_rest) / 2)
         forces.append(float(low + level * (high - low)))
+        if stroke.read is not None:
+            depth, force = stroke.read
+            by_filter.append(_apart(depth, force, _about(force, low, high, level), slope, variance))
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
-    half = float(np.hypot(mean.half, np.mean(by_speed)))
-    return Tangent(float(np.mean(forces)), mean.value, half)
+    others = np.mean(by_speed), np.mean(by_filter) if by_filter else 0.0
+    return Tangent(
+        float(np.mean(forces)), mean.value, float(np.sqrt(mean.half**2 + sum(o**2 for o in others)))
+    )
+
+
+def _about(force: Array, low: float, high: float, level: float) -> NDArray[np.intp]:
+    """Rows about a share of the force between two ends."""
+    return np.flatnonzero(np.abs((force - low) / (high - low or 1.0) - level) < _WIDE)
 
 
 def _of_speed(stroke: Stroke) -> float:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.identification.estimators.budget import HIDDEN_SHARE
 from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.evidence.press import Slope, slope_of, strokes_in, unseen
 from palpate.identification.in_series import slope_without_series
@@ -26,11 +27,13 @@ def working_point(
     spectrum: Sequence[DynamicStiffness],
     options: Options,
     unit: str,
+    hidden: float,
 ) -> WorkingPoint | None:
     """The most excited octave whose interval is within the tolerance; else the press; else the narrower of them.
 
     An octave whose storage falls below a lower one's by more than both half-widths shows something other than the
-    surface (a probe that follows it, an inertia), and is passed over.
+    surface (a probe that follows it, an inertia), and is passed over. A force that nothing explains, as where the probe
+    bounces, is at every frequency at once: as much of it as is seen may be at the octave's own.
     """
     lag, tolerance = problem.lag.value, options.tolerance
     segments = segments_of(problem.motion.rows, problem.spans)
@@ -57,7 +60,9 @@ def working_point(
     else:
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
-        budget, force, depth = octave.budget, float(problem.force[inside].mean()), float(depths.mean())
+        force, depth = float(problem.force[inside].mean()), float(depths.mean())
+        unseen_force = HIDDEN_SHARE * hidden * float(np.hypot(octave.storage, octave.loss))
+        budget, half = {**octave.budget, "unexplained": unseen_force}, float(np.hypot(half, unseen_force))
     if problem.contacts.bonded and not options.bonded:  # nothing tells that the first reading is in contact
         budget = {**budget, "unseen way": abs(value) * unseen(problem)}
         half = float(np.hypot(half, budget["unseen way"]))
