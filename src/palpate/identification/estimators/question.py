@@ -34,6 +34,22 @@ def lag_open(problem: Problem) -> bool:
 
 @dataclass(frozen=True)
 class Question:
+    """A model put to a log.
+
+    Args:
+        problem: of the log.
+        model: which.
+        lag: of the force that its columns are formed at [s].
+        at: its parameters that they are formed about; none for a model that is linear in all of them.
+        names: of the parameters: the model's own, then those of other forces.
+        own: how many are the model's.
+        prior: mean and deviation of what is known of some of them.
+        segments: rows without a gap.
+        octaves: sums of the columns with each other; the force that they add up to is the last.
+        use: octaves that count, shape (octaves,).
+        system: the normal equations of those.
+    """
+
     problem: Problem
     model: Model
     lag: float
@@ -54,7 +70,7 @@ class Question:
         segments: list[Segment],
         theta: dict[str, float],
     ) -> Question:
-        """Linearise the model about some parameters, and sum its columns by octave.
+        """Linearise a model about some parameters, and sum its columns by octave.
 
         Args:
             problem: of the log.
