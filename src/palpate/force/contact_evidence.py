@@ -10,12 +10,14 @@ AIR = 0.0
 """The phase before a touch."""
 CONTACT = 7.0
 """Evidence of a contact, a cumulative sum, that a touch begins with, and with none of which it ends."""
-EVIDENT = 28.0
+EVIDENT = 32.0
 """What a line through the readings has to explain, in variances of a reading, for a contact.
 
 White noise in the air comes to it once in some seven hours, to 20 once in five minutes
 (benchmarks/force/false_alarms.py).
 """
+MEMORY = 1.0
+"""Of the force at rest in the air [s]."""
 
 
 @part
@@ -55,6 +57,12 @@ def readings_of(law):
 
 
 @law
+def behind(law, state):
+    """Readings behind the mean in the air."""
+    return min(state.ticks * law.tick, MEMORY) / law.period + 1.0
+
+
+@law
 def watched(law, state, starts, force):
     """This tick's reading, and what noise there is: in the air the force is at rest but for that."""
     w = state.watch
@@ -67,15 +75,16 @@ def watched(law, state, starts, force):
     age, gap = (0.0, w.age + 1.0) if fresh else (w.age + 1.0, w.gap)
     if state.stage.phase != AIR:
         return Watch(force, mean, slow, w.rest, w.variance, w.tide, evidence, age, gap)
-    if explained(starts) > 0.5 * EVIDENT * spread_of(law, w):  # a ramp is no noise
+    if explained(starts, behind(law, state)) > 0.5 * EVIDENT * spread_of(law, w):  # a ramp is no noise
         return Watch(force, mean, slow, w.rest, w.variance, w.tide, evidence, age, gap)
     rest = w.rest
     if evidence < 0.3 * CONTACT:
-        rest += law.tick / (min(state.ticks * law.tick, 1.0) + law.period) * (force - rest)
+        rest += law.tick / (min(state.ticks * law.tick, MEMORY) + law.period) * (force - rest)
         rest = max(min(rest, law.noise), -law.noise)
     off, drift = force - rest, slow - rest
-    variance = w.variance + law.tick / 0.3 * (min(off * off, 9.0 * w.variance) - w.variance)
-    tide = w.tide + law.tick * (min(drift * drift, 9.0 * w.tide) - w.tide)
+    span = min(state.ticks * law.tick, 3.0)
+    variance = w.variance + law.tick / (0.3 + span) * (min(off * off, 9.0 * w.variance) - w.variance)
+    tide = w.tide + law.tick / (1.0 + span) * (min(drift * drift, 9.0 * w.tide) - w.tide)
     return Watch(force, mean, slow, rest, variance, tide, evidence, age, gap)
 
 
@@ -91,7 +100,7 @@ def evident(law, state, starts, mean, slow, force):
     if state.stage.phase == AIR and above > 4.0 * sigma and mean - w.rest > 3.2 * sigma:
         return CONTACT
     asked = state.stage.phase == AIR and starts.readings > 2.0 * readings_of(law)
-    if asked and explained(starts) > EVIDENT * spread_of(law, w):
+    if asked and explained(starts, behind(law, state)) > EVIDENT * spread_of(law, w):
         return CONTACT
     least = unit if state.stage.phase == AIR else max(unit, 0.3 * slow)
     step = max(min((above - least) / unit, 3.0 * sigma / unit), -2.0 * CONTACT)
