@@ -61,8 +61,8 @@ def stiffening(gains: Gains, step: Step, error: float, overshoot: float = OVERSH
     """How many times stiffer, as felt, a surface may become while the force is so far below F_d.
 
     For a lag theta whatever comes is decided by readings of before, so that the tip goes on as it would have: on a
-    surface n times stiffer the force then rises n times as far: by n (F(t + theta) - F(t)). theta stands for the lag as a
-    whole, so that this is what to expect and no bound: half as stiff is below `overshoot`, twice as stiff above
+    surface n times stiffer the force then rises n times as far, by n (F(t + theta) - F(t)). theta stands for the whole
+    lag, so that this is what to expect and no bound: half as stiff is below `overshoot`, twice as stiff above
     (benchmarks/force/disturbed.py).
 
     Args:

@@ -36,7 +36,7 @@ def places(part: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
 
 def _made(name: str, text: str, names: dict[str, Any]) -> Callable[..., Any]:
     exec(compile(text, __file__, "exec"), names)  # noqa: S102 -- made of fields of our own parts alone
-    return law(names[name])  # type: ignore[no-any-return]
+    return law(names[name])
 
 
 def _parts(part: type) -> dict[str, type]:
