@@ -6,8 +6,8 @@
 Stiffness 1e2 ... 1e6 N/m and damping ratio 0.01 ... 1 (of 1 kg, or of the torque arm's tip) even in their logarithms,
 force 10 ... 40 N, the sensor's clock at any phase. Settled: the true force within 5 % of F_d for good, within 4 s of
 the start of the run; timed from the first touch. Every touch is kept as it ends: the same command goes on where it
-stopped. `knowing` is the same gain from an exact K and B from the first touch on, and `told` from 3.5 rises after it:
-what no law of this gain and approach beats.
+stopped. `knowing` is the same gain from an exact K and B from the first touch on, and `told` from when that stands out
+of the noise: what no law of this gain and approach beats.
 """
 
 from __future__ import annotations
@@ -26,18 +26,17 @@ from touches import Key, Rig, resumed, share
 from palpate.force.expected import OVERSHOOT, RISES, rise, settling_bound, softest
 
 KNOWN = 3.5
-"""Rises before which no law tells a touch from noise.
-
-The ramp's energy is then 3.5^3/3 = 14 variances, 2 ln 1000: one false alarm in a thousand looks.
-"""
+"""Rises before which no law tells a touch from noise."""
+ENERGY = KNOWN**3 / 3.0
+"""Of a ramp by then, in variances of a reading: 14 = 2 ln 1000, one false alarm in a thousand looks."""
 
 LAWS = {
     "cautious": "the cautious law",
     "knowing": "its gain with K, B and the place of the surface known",
-    "told": f"its gain with K and B known, and the touch after {KNOWN:g} rises",
+    "told": f"its gain with K and B known, and the touch once its energy is {ENERGY:.0f} variances",
 }
-KNOWING = {"knowing": 0.0, "told": KNOWN}
-"""Rises after which a touch is known to the laws that know the surface."""
+KNOWING = {"knowing": 0.0, "told": ENERGY}
+"""Energy with which a touch is known to the laws that know the surface."""
 
 
 def main() -> None:

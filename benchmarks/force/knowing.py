@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from palpate._jit import part
-from palpate.force.expected import rise
 from palpate.force.gains import Gains
 from palpate.force.law import least_for
 
@@ -32,16 +33,28 @@ class Knowing(NamedTuple):
         return self.bound
 
 
-def knowing(gains: Gains, draw: Any, rises: float) -> Knowing:
+def knowing(gains: Gains, draw: Any, energy: float) -> Knowing:
     """For this surface.
 
     Args:
         gains: of the cautious law.
         draw: the touch.
-        rises: after the touch, from which on it is known.
+        energy: of the force, in variances of a reading, at which the touch is known.
     """
     felt = draw.K if gains.arm.kind == "torque" else gains.arm.seen(draw.K)
     whole = felt * (1.0 + draw.B / draw.K / gains.theta)
     best = max(felt, least_for(gains.cautious(), whole))
-    depth = gains.approach * rises * rise(gains, draw.K)
+    moved = 1.0 if gains.arm.kind == "position" else gains.arm.seen(draw.K) / draw.K  # of the command, as measured
+    depth = moved * gains.approach * known_after(gains, draw, energy)
     return Knowing(gains.gain_at(best), gains.approach, gains.arm.limits.speed, depth, best)
+
+
+def known_after(gains: Gains, draw: Any, energy: float) -> float:
+    """When n v^2/sigma^2 (K^2 t^3/3 + K B t^2 + B^2 t) comes to it, the force being K v t + B v in the approach [s]."""
+    sensor, share = gains.arm.sensor, gains.arm.seen(draw.K) / draw.K
+    K, B = share * draw.K, share * share * draw.B
+    whole = energy * draw.noise**2 / (sensor.sampling * gains.approach**2)
+    roots = np.roots([K * K / 3.0, K * B, B * B, -whole])
+    return (
+        float(max(roots.real[np.abs(roots.imag) < 1e-9 * np.abs(roots)].max(), 0.0)) if energy > 0.0 else 0.0
+    )

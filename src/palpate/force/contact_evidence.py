@@ -13,9 +13,11 @@ CONTACT = 7.0
 EVIDENT = 32.0
 """What a line through the readings has to explain, in variances of a reading, for a contact.
 
-White noise in the air comes to it once in some seven hours, to 20 once in five minutes
-(benchmarks/force/false_alarms.py).
+Measured by benchmarks/force/false_alarms.py: white noise comes to it in one of some thousand approaches of ten seconds, to
+28 five times as often; a ramp comes to it 5 % later.
 """
+EDGE, LEVEL = 4.0, 3.2
+"""Standard deviations above which a reading, and with it the mean over 4 ms, are a contact; from the same."""
 MEMORY = 1.0
 """Of the force at rest in the air [s]."""
 
@@ -97,7 +99,7 @@ def evident(law, state, starts, mean, slow, force):
     """
     w, unit = state.watch, sqrt(2.0 * state.watch.tide)
     sigma, above = sqrt(w.variance), force - w.rest
-    if state.stage.phase == AIR and above > 4.0 * sigma and mean - w.rest > 3.2 * sigma:
+    if state.stage.phase == AIR and above > EDGE * sigma and mean - w.rest > LEVEL * sigma:
         return CONTACT
     asked = state.stage.phase == AIR and starts.readings > 2.0 * readings_of(law)
     if asked and explained(starts, behind(law, state)) > EVIDENT * spread_of(law, w):

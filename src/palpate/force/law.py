@@ -13,7 +13,18 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, sqrt
-from palpate.force.contact_evidence import AIR, CONTACT, EVIDENT, Watch, behind, listened, spread_of, watched
+from palpate.force.contact_evidence import (
+    AIR,
+    CONTACT,
+    EDGE,
+    EVIDENT,
+    LEVEL,
+    Watch,
+    behind,
+    listened,
+    spread_of,
+    watched,
+)
 from palpate.force.onset import NO_STARTS, Starts, explained, latest
 from palpate.force.regression import AXIS_B, AXIS_K, BOTH, NOTHING, Fit, fit_of, fit_through, without_offset
 
@@ -249,7 +260,7 @@ def begun(law, known, before, stage, w, f, starts, air):
         x = law.cap * (f.y - 0.004 / law.tick * (f.y - f.y0) - origin)
         fast = fit_through(x, w.rest + 0.5 * sigma, sigma)
     if before.phase == AIR and stage.phase == LEARNING:
-        if w.mean - w.rest > 3.2 * sigma and stage.firm * law.tick < law.memory:
+        if w.mean - w.rest > LEVEL * sigma and stage.firm * law.tick < law.memory:
             readings = stage.firm * law.tick / law.period + 1.0
             back = (stage.firm + 0.004 / law.tick) * (f.y - f.y0)
             level = w.mean - w.rest
@@ -276,7 +287,7 @@ def taken(law, known, state, stage, w, f, force):
         return Learned(known.slow, known.fast, since, known.origin, known.shown, known.found, known.std)
     rate = (f.y - f.y0) / law.tick
     phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
-    if state.bound >= law.cap and known.std.z > 0.0 and force - known.found @ phi > 4.0 * sqrt(w.variance):
+    if state.bound >= law.cap and known.std.z > 0.0 and force - known.found @ phi > EDGE * sqrt(w.variance):
         return Learned(
             known.fast, known.fast, stage.firm, known.origin, 0.0, ZERO3, ZERO3
         )  # refuted: it begins here
