@@ -38,8 +38,8 @@ FIGURES = {
 }
 ABOUT = """# Figures of the force law
 
-Of `{law}`. `make force-figures` makes this page; what the figures say stands in [force](force.md). Where a figure is missing, it has
-not been made of this form of the law."""
+Of `{law}`. `make force-figures` makes this page; what the figures say stands in [force](force.md). A figure that is
+missing has not been made of this form of the law."""
 
 
 def main() -> None:

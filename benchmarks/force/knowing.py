@@ -44,7 +44,9 @@ def knowing(gains: Gains, draw: Any, energy: float) -> Knowing:
     felt = draw.K if gains.arm.kind == "torque" else gains.arm.seen(draw.K)
     whole = felt * (1.0 + draw.B / draw.K / gains.theta)
     best = max(felt, least_for(gains.cautious(), whole))
-    moved = 1.0 if gains.arm.kind == "position" else gains.arm.seen(draw.K) / draw.K  # of the command, as measured
+    moved = (
+        1.0 if gains.arm.kind == "position" else gains.arm.seen(draw.K) / draw.K
+    )  # of the command, as measured
     depth = moved * gains.approach * known_after(gains, draw, energy)
     return Knowing(gains.gain_at(best), gains.approach, gains.arm.limits.speed, depth, best)
 
