@@ -19,14 +19,17 @@ from palpate.force.gains import LAW
 
 HERE = Path(__file__).parent
 FIGURES = {
-    "First touches": "first_touches.py --touches 5000",
-    "Laws that know the surface": "first_touches.py --touches 1000 --laws knowing told",
-    "False alarms": "false_alarms.py --hours 50",
+    "First touches: UR5e": "first_touches.py --touches 5000 --arms ur5e",
+    "First touches: FR3": "first_touches.py --touches 3000 --arms fr3",
+    "A law that knows the surface": "first_touches.py --touches 1000 --laws knowing",
+    "Known, the touch told: UR5e": "first_touches.py --touches 1000 --laws told --arms ur5e",
+    "Known, the touch told: FR3": "first_touches.py --touches 1000 --laws told --arms fr3",
+    "False alarms": "false_alarms.py --hours 50 --arms ur5e",
     "Wrong priors, changes, sways, curves: UR5e": "disturbed.py --touches 100 --arms ur5e",
     "Wrong priors, changes, sways, curves: FR3": "disturbed.py --touches 100 --arms fr3",
     "Hours": "hours.py --runs 10",
     "The thesis' arm": "on_the_bench.py --seeds 1 --controllers foam-cautious",
-    "The thesis' arm, friction twice": "on_the_bench.py --seeds 1 --controllers foam-cautious --friction 2",
+    "The thesis' arm, friction twice": "on_the_bench.py --friction 2 --seeds 1 --controllers foam-cautious",
     "The thesis' arm, surfaces that sway or change": "moving_on_the_bench.py --seeds 1 --controllers foam-cautious",
     "Dither": "dither.py --seeds 5 --arms ur5e",
     "Learning": "learning.py --seeds 5 --arms ur5e",
@@ -72,7 +75,7 @@ def make(name: str) -> None:
 
 def section(name: str) -> str:
     """A study as it stands in the page."""
-    text = kept(name).read_text(encoding="utf-8").strip("\n")
+    text = "\n".join(line for line in kept(name).read_text(encoding="utf-8").splitlines() if line.strip())
     return f"## {name}\n\n`python benchmarks/force/{FIGURES[name]}`\n\n```text\n{text}\n```"
 
 
