@@ -13,7 +13,7 @@ CONTACT = 7.0
 EVIDENT = 32.0
 """What a line through the readings has to explain, in variances of a reading, for a contact.
 
-Measured by benchmarks/force/false_alarms.py: white noise comes to it in one of some thousand approaches of ten
+Measured by benchmarks/force/false_alarms.py: white noise comes to it in one of some six thousand approaches of ten
 seconds, to 28 five times as often; a ramp comes to it 5 % later.
 """
 EDGE, LEVEL = 4.0, 3.2
