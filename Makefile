@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench live attack soak trust leaderboard laboratory docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench live attack soak trust leaderboard force-figures laboratory docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -63,6 +63,9 @@ trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put t
 
 leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
 	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
+
+force-figures: .venv/dev.stamp ## make every figure of the force law that is missing, and the page of them; an hour, resumable
+	$(BIN)/python benchmarks/force/figures.py
 
 laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and put what was found into docs/laboratory.md; resumable
 	$(BIN)/palpate laboratory --particles 128 --seed 1 --out runs/laboratory

@@ -14,6 +14,9 @@ import numpy as np
 from rich.progress import track
 from touches import Draw, Rig, share
 
+from palpate.force.expected import OVERSHOOT, STIFFENING_AT, stiffening
+from palpate.force.steps import step_of
+
 PRIORS = (("as told", 1.0, 1.0), ("cap x 20", 20.0, 1.0), ("cap / 20", 0.05, 1.0), ("theta x 2", 1.0, 2.0),
           ("theta / 2", 1.0, 0.5), ("cap / 10, theta / 2", 0.1, 0.5))  # fmt: skip
 CHANGES = ((7e3, 62e3), (62e3, 7e3), (1e3, 1e6), (1e6, 1e3))
@@ -32,6 +35,7 @@ def main() -> None:
         print(f"\n{rig.arm.title}")
         priors(rig, told)
         changes(rig, told.seed)
+        stiffening_surfaces(rig, told.seed)
         sways(rig, told.seed)
         curved(rig, told)
 
@@ -81,6 +85,27 @@ def changes(rig: Rig, seed: int) -> None:
         again = (outside[-1] + 1) / rig.arm.rate if len(outside) else 0.0
         what = f"{K / 1e3:g} -> {later / 1e3:g} kN/m"
         print(f"    {what:<20}{force.max():8.2f} N{force.min():8.2f} N{again:8.3f} s{stepped:9.2f} N")
+
+
+def stiffening_surfaces(rig: Rig, seed: int) -> None:
+    """From 3 kN/m, at the tick at which the force comes within 5 % or passes a half; without damping, little noise."""
+    print(
+        "  stiffer, as felt, while the force is below F_d: largest force; what is decided before a reading tells"
+    )
+    K, gains = 3e3, rig.gains(20.0, 0.01)
+    draw, felt = Draw(K, 1e-3, 20.0, 0.01, 0.0, 0.0), rig.arm.seen(K)
+    step = step_of(gains, felt if rig.arm.kind == "position" else K)
+    still = rig.run(draw, gains.cautious(), [seed, 4], approach=gains.approach)[:, 0]
+    for error in STIFFENING_AT:
+        at = int(np.argmax(still > (1.0 - error) * 20.0))
+        most = stiffening(gains, step, error)
+        for times in (0.5 * most, most, 2.0 * most):
+            rows = rig.run(
+                draw, gains.cautious(), [seed, 4], approach=gains.approach, later=rig.arm.surface(times * felt),
+                change=(at + 1) / rig.arm.rate, depth=still[at] / K,
+            )  # fmt: skip
+            over, decided = rows[:, 0].max() / 20.0 - 1.0, times / most * (OVERSHOOT + error) - error
+            print(f"    {times:4.1f} times at {100 * error:2.0f} % off {share(over):>12}{share(decided):>12}")
 
 
 def sways(rig: Rig, seed: int) -> None:

@@ -1,8 +1,10 @@
-"""How often white noise in the air is taken for a contact by the lines through the readings.
+"""How often the law takes noise in the air for a contact, and what it makes of it.
 
-    python benchmarks/force/false_alarms.py [--hours 100] [--seed 0]
+    python benchmarks/force/false_alarms.py [--hours 100] [--arms ur5e fr3] [--seed 0]
 
-A UR5e's sensor, 480 readings a second, for which starts are eight readings apart.
+The tip moves evenly at the speed of the approach and meets nothing; readings are white noise of 0.1 N. Counted are the
+contacts that the law begins, by the kind of evidence, and those in which it believes in a surface: K_u falls below half
+of the cap, and the tip would leave the speed of the approach.
 """
 
 from __future__ import annotations
@@ -11,29 +13,32 @@ import argparse
 
 import numpy as np
 from rich.progress import track
+from touches import Rig
 
 from palpate._jit import kernel, law
-from palpate.force.onset import NO_STARTS, explained, later
+from palpate.force.contact_evidence import AIR
 
-EVERY, SAMPLING, PART = 8.0, 480, 360
-"""Readings between starts; a second [Hz]; length of a run [s]."""
-LEVELS = np.arange(14.0, 33.0, 2.0)
+PART = 10
+"""Length of an approach [s]."""
+FORCE, NOISE = 20.0, 0.1
 
 
 @law
-def alarms(noise, every, levels, counts, armed):
-    """How often what is explained comes to each level, from half of it."""
-    starts = NO_STARTS
-    for k in range(len(noise)):
-        starts = later(starts, every, 1e-5 * k, noise[k])
-        if starts.readings > 2.0 * every:
-            found = explained(starts)
-            for i in range(len(levels)):
-                if found > levels[i]:
-                    counts[i] += armed[i]
-                    armed[i] = 0.0
-                elif found < 0.5 * levels[i]:
-                    armed[i] = 1.0
+def alarms(control, noise, every, counts):
+    """Contacts begun by an edge, by a line, and those with K_u below half of the cap."""
+    state, due, reading, k, before, believed = control.start(), 0.0, 0.0, 0, AIR, 0.0
+    for tick in range(int(len(noise) * every) - 1):
+        if tick >= due:
+            reading, due, k = noise[k], due + every, k + 1
+        _, state = control.step(state, FORCE, reading, control.approach * control.tick * tick)
+        phase = state.stage.phase
+        if before == AIR and phase != AIR:
+            counts[int(state.known.shown)] += 1.0
+            believed = 0.0
+        if phase != AIR and believed == 0.0 and state.bound < 0.5 * control.cap:
+            counts[2] += 1.0
+            believed = 1.0
+        before = phase
     return counts
 
 
@@ -43,13 +48,21 @@ count = kernel(alarms)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=int, default=100)
+    parser.add_argument("--arms", nargs="+", default=["ur5e", "fr3"])
     parser.add_argument("--seed", type=int, default=0)
     told = parser.parse_args()
-    rng, counts, armed = np.random.default_rng(told.seed), np.zeros(len(LEVELS)), np.ones(len(LEVELS))
-    for _ in track(range(told.hours * 3600 // PART), "air", transient=True):
-        count(rng.standard_normal(PART * SAMPLING), EVERY, LEVELS, counts, armed)
-    for level, alarm in zip(LEVELS, counts, strict=True):
-        print(f"explained {level:4.0f} variances: {int(alarm):6d} times in {told.hours} h")
+    for name in told.arms:
+        rig, counts = Rig(name), np.zeros(3)
+        sensor, control = rig.arm.sensor, rig.gains(FORCE, NOISE).cautious()
+        rng, every = np.random.default_rng(told.seed), max(rig.arm.rate / sensor.sampling, 1.0)
+        for _ in track(range(told.hours * 3600 // PART), name, transient=True):
+            readings = NOISE * rng.standard_normal(round(PART * rig.arm.rate / every))
+            count(control, readings, every, counts)
+        edge, line, believed = (int(n) for n in counts)
+        print(
+            f"{rig.arm.title}: in {told.hours} h of air {edge} contacts by an edge, {line} by a line; "
+            f"in {believed} of them K_u fell below half of the cap"
+        )
 
 
 if __name__ == "__main__":

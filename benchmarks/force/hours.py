@@ -9,13 +9,10 @@ command goes on where it stopped, and prints what there is of all runs so far.
 from __future__ import annotations
 
 import argparse
-import json
-import time
 from pathlib import Path
 
 import numpy as np
-from rich.progress import track
-from touches import Rig, share
+from touches import Rig, resumed, share
 
 GROWING = 1.2
 HOUR, TEN = 3600.0, 600.0
@@ -30,53 +27,40 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--out", type=Path, default=Path("runs/hours.jsonl"))
     told = parser.parse_args()
-    told.out.parent.mkdir(parents=True, exist_ok=True)
-    known = read(told.out)
-    waiting = [(name, i) for i in range(told.runs) for name in told.arms if (name, i) not in known]
-    started = time.monotonic()
-    for name, i in track(waiting, "hours", transient=True):
-        if time.monotonic() - started > 60.0 * told.minutes:
-            break
-        found = one_hour(Rig(name), i)
-        with told.out.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"arm": name, "run": i, **found}) + "\n")
-    tell(read(told.out), told.arms)
-
-
-def read(path: Path) -> dict[tuple[str, int], dict[str, float]]:
-    """Runs that are done, by arm and number."""
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    rows = [json.loads(line) for line in lines if line.endswith("}")]
-    return {(row["arm"], row["run"]): row for row in rows}
+    rigs = {name: Rig(name) for name in told.arms}
+    keys = [(name, 0, i) for i in range(told.runs) for name in told.arms]
+    known = resumed(told.out, keys, lambda key: one_hour(rigs[key[0]], key[2]), told.minutes)
+    for name in told.arms:
+        tell(name, [row for (arm, _, _), row in known.items() if arm == name])
 
 
 def one_hour(rig: Rig, i: int) -> dict[str, float]:
-    """rms at the end over that at the beginning, the largest error over F_d, ticks without contact."""
+    """rms at the end over that at the beginning, largest error over F_d, ticks without contact, K_u/K at the end."""
     draw = rig.draw(np.random.default_rng([0, 5, i]))
     gains = rig.gains(draw.F, draw.noise)
-    force = rig.run(draw, gains.cautious(), [0, 6, i], HOUR, approach=gains.approach)[:, 0]
-    error, first, ten = force - draw.F, round(FROM * rig.arm.rate), round(TEN * rig.arm.rate)
+    rows = rig.run(draw, gains.cautious(), [0, 6, i], HOUR, approach=gains.approach)
+    error, first, ten = rows[:, 0] - draw.F, round(FROM * rig.arm.rate), round(TEN * rig.arm.rate)
     before, after = error[first : first + ten], error[-ten:]
+    felt = draw.K if rig.arm.kind == "torque" else rig.arm.seen(draw.K)
     return {
         "K": draw.K,
         "ratio": float(np.sqrt(np.mean(after**2) / np.mean(before**2))),
         "largest": float(np.abs(error[first:]).max() / draw.F),
-        "lost": int((force[first:] <= 0.0).sum()),
+        "lost": int((rows[first:, 0] <= 0.0).sum()),
+        "bound": float(rows[-1, 1] / felt),
     }
 
 
-def tell(known: dict[tuple[str, int], dict[str, float]], arms: list[str]) -> None:
-    for name in arms:
-        rows = [row for (arm, _), row in known.items() if arm == name]
-        if not rows:
-            continue
-        growing = sum(row["ratio"] > GROWING for row in rows)
-        worst, largest = max(row["ratio"] for row in rows), max(row["largest"] for row in rows)
-        lost = sum(row["lost"] > 0 for row in rows)
-        print(
-            f"{name}: {growing} of {len(rows)} hours grow; largest ratio {worst:.3f}, largest error {share(largest)}, "
-            f"contact lost in {lost}"
-        )
+def tell(name: str, rows: list[dict[str, float]]) -> None:
+    if not rows:
+        return
+    growing = sum(row["ratio"] > GROWING for row in rows)
+    worst, largest, bound = (max(row[key] for row in rows) for key in ("ratio", "largest", "bound"))
+    lost = sum(row["lost"] > 0 for row in rows)
+    print(
+        f"{name}: {growing} of {len(rows)} hours grow; largest ratio {worst:.3f}, largest error {share(largest)}, "
+        f"largest K_u/K at the end {bound:.1f}, contact lost in {lost}"
+    )
 
 
 if __name__ == "__main__":

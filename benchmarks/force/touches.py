@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
+import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import msgspec
 import numpy as np
+from rich.progress import track
 
 from palpate.force.arm import load_arm
-from palpate.force.gains import Gains, gains_for, known_lag
+from palpate.force.gains import LAW, Gains, gains_for, known_lag
 from palpate.force.lag import sum_of_lags
 from palpate.force.worlds import pressed, surface, world_of
 
@@ -93,3 +98,39 @@ class Rig:
 def share(value: float) -> str:
     """As a percentage."""
     return f"{100.0 * value:.2f} %"
+
+
+Key = tuple[str, int, int]
+"""Arm, seed and number of a run."""
+
+
+def resumed(
+    path: Path, keys: Iterable[Key], one: Callable[[Key], dict[str, float]], minutes: float
+) -> dict[Key, dict[str, float]]:
+    """What `one` makes of each key, each row kept as it is made: the same call goes on where it stopped.
+
+    Rows of another form of the law are left where they are, and count for nothing.
+
+    Args:
+        path: a JSON row a run.
+        keys: of all runs.
+        one: a run.
+        minutes: after which no other is begun.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    known, wanted = _rows(path), list(keys)
+    began = time.monotonic()
+    with path.open("a", encoding="utf-8") as file:
+        for key in track([key for key in wanted if key not in known], "runs", transient=True):
+            if time.monotonic() - began > 60.0 * minutes:
+                break
+            known[key] = one(key)
+            file.write(json.dumps({"law": LAW, "key": key, **known[key]}) + "\n")
+            file.flush()
+    return {key: known[key] for key in wanted if key in known}
+
+
+def _rows(path: Path) -> dict[Key, dict[str, float]]:
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    rows = [json.loads(line) for line in lines if line.endswith("}")]
+    return {tuple(row.pop("key")): row for row in rows if row.pop("law") == LAW}

@@ -8,7 +8,9 @@ import pytest
 from palpate._vector import Mat3, Vec3
 from palpate.bench.build import build
 from palpate.bench.experiments.tables import changed, load
+from palpate.bench.metrics.summary import summarise
 from palpate.controllers.cautious_press import without_last_joint
+from palpate.report.run.words import alerts
 
 
 @pytest.mark.long
@@ -20,6 +22,30 @@ def test_it_settles_under_friction_on_any_surface(K, B):
     force = record["force"][record["phase"] == 1.0]
     assert abs(force[-500:].mean() - 20.0) < 0.3  # 1.5 %: half a second of noise and stick
     assert force.max() < 1.1 * 20.0
+
+
+@pytest.mark.long
+def test_with_twice_the_friction_it_settles_or_says_which_motor_cannot():
+    unsettled = 0
+    for K in (600.0, 9e3, 8e4):
+        experiment = load("foam-cautious")
+        twice = {
+            f"friction.{key}": tuple(2.0 * v for v in getattr(experiment.friction, key))
+            for key in ("coulomb", "static")
+        }
+        surface = {"kind": "kelvin-voigt", "stiffness": K, "damping": float(0.06 * np.sqrt(K)), "mass": 0.05}
+        bench = build(changed(experiment, {"surface": surface, "run.press": 4.0, "run.losses": 1, **twice}))
+        record = bench.run(60.0, seed=100, press=4.0)
+        pressing = record["phase"] == 1.0
+        force = np.convolve(record["force"][pressing], np.full(10, 0.1), "valid")
+        if np.abs(force[-1000:] - 20.0).max() < 1.0:
+            continue
+        unsettled += 1
+        assert record["saturated2"][pressing][-1000:].mean() > 0.9
+        said = alerts(summarise(record))
+        assert any("joint2" in alert["title"] and "torque limit" in alert["title"] for alert in said)
+        assert force.max() < 1.1 * 20.0
+    assert unsettled > 0  # or it proves nothing of what is said
 
 
 def test_the_last_joint_is_left_out_of_x_and_y():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from force.gained import gains_of
-from palpate.force.expected import OVERSHOOT, RISES, rise, settling_bound, softest
+from palpate.force.expected import OVERSHOOT, RISES, STIFFENING_AT, rise, settling_bound, softest, stiffening
+from palpate.force.steps import step_of
 from palpate.force.worlds import pressed, surface, world_of
 
 TOUCHES = 120
@@ -55,3 +56,25 @@ def test_the_rise_is_that_of_a_ramp_in_noise():
     slope = gains.arm.seen(K) * gains.approach
     energy = slope**2 * n * t**3 / (3.0 * gains.arm.sensor.noise**2)
     assert energy == pytest.approx(1000.0 / 3.0)
+
+
+@pytest.mark.parametrize("error", STIFFENING_AT)
+@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+def test_how_much_stiffer_a_surface_may_become_is_known_to_a_factor_of_two(name, error):
+    gains, K = gains_of(name, noise=0.01), 3e3
+    arm, world, wanted = gains.arm, world_of(gains.arm, noise=0.01), np.full(round(gains.arm.rate), 20.0)
+    felt = arm.seen(K)
+    times = stiffening(gains, step_of(gains, felt if arm.kind == "position" else K), error)
+
+    def press(**others):
+        return pressed(world, surface(K, 1e-3, **others), gains.cautious(), 0.1 * gains.approach, wanted, 3)[
+            :, 0
+        ]
+
+    still = press()
+    at = int(np.argmax(still > (1.0 - error) * 20.0))
+    change = {"change": (at + 1) * arm.tick, "depth": still[at] / K}
+    half, twice = (
+        press(later=arm.surface(n * times * felt), **change).max() / 20.0 - 1.0 for n in (0.5, 2.0)
+    )
+    assert half < OVERSHOOT < twice

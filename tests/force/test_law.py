@@ -48,14 +48,15 @@ def test_compiled_and_plain_are_one_law():
 
 
 def test_the_bound_stays_above_the_stiffness():
-    seen, least = gains_of("ur5e").arm.seen(5e3), []
+    seen, below, least = gains_of("ur5e").arm.seen(5e3), [], []
     for seed in range(20):
         rows = run("ur5e", 5e3, 30.0, seed=seed)
-        least.append(rows[rows[:, 0] > 5.0, 1].min() / seen)
+        pressing = rows[rows[:, 0] > 5.0, 1]
+        below.append(pressing[:100] < seen)
+        least.append(pressing.min() / seen)
         assert rows[-200:, 1].min() > seen
-    # One and a half standard deviations, while the force is still low; the proof asks for half.
-    assert min(least) > 0.5
-    assert np.median(least) > 0.75
+    assert min(least) > 0.5  # what the proof asks for
+    assert np.mean(below) < 1.0 / 15.0  # 1.5 standard deviations, while there is something to learn
 
 
 def test_in_the_air_it_approaches_and_learns_nothing():
@@ -83,11 +84,11 @@ def test_without_the_bound_it_is_worse():
     for bounding in (1.0, 0.0):
         control = gains.cautious()._replace(bounding=bounding)
         runs = [
-            pressed(world, surface(5e3), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(24)
+            pressed(world, surface(5e3), control, 1e-3, np.full(1000, 10.0), s)[:, 0].max() for s in range(48)
         ]
         high[bounding] = sum(peak > 10.5 for peak in runs)
-    assert high[1.0] <= 2  # noise of 6 % of the force
-    assert high[0.0] >= 5
+    # Of 48 estimates one in fifteen is more than 1.5 standard deviations too low, and half are too low at all.
+    assert high[1.0] <= 48 / 15 < high[0.0]
 
 
 def test_a_surface_that_begins_where_noise_looked_like_one_is_not_taken_for_soft():

@@ -7,6 +7,9 @@ import pytest
 
 from palpate.force.onset import EMPTY, NO_STARTS, explained, later, latest
 
+NEVER = 1e12
+"""Readings in the air without end: its mean is exact."""
+
 
 def told(force, step=1e-5, every=8.0):
     starts = NO_STARTS
@@ -34,7 +37,7 @@ def test_a_line_is_least_squares_with_neither_slope_nor_step_below_nothing():
 def test_little_is_lost_whenever_the_contact_began(age):
     ramp = np.maximum(np.arange(700) - (700 - age), 0.0)
     starts = told(ramp)
-    assert explained(starts) > 7.0 / 8.0 * float(
+    assert explained(starts, NEVER) > 7.0 / 8.0 * float(
         ramp @ ramp
     )  # an eighth, where starts are twice as far apart
 
@@ -44,7 +47,7 @@ def test_the_latest_start_is_not_too_flat():
     for age in range(40, 300, 10):
         ramp = np.maximum(np.arange(700) - (700.0 - age), 0.0) / age * 4.0 * np.sqrt(30.0 / age)
         starts = told(ramp + rng.normal(size=700))
-        line = latest(starts, explained(starts) - 1.0)
+        line = latest(starts, NEVER, explained(starts, NEVER) - 1.0)
         slopes.append(line.solved()[0] / (ramp[-1] - ramp[-2]) * 1e-5)
     assert np.median(slopes) > 0.95  # in half of the touches at least as stiff as it is
     assert min(slopes) > 0.4
@@ -52,4 +55,17 @@ def test_the_latest_start_is_not_too_flat():
 
 def test_a_tip_that_stands_has_no_slope():
     starts = told(np.ones(100), step=0.0)
-    assert latest(starts, 0.0).solved()[:2] == (0.0, pytest.approx(1.0))
+    assert latest(starts, NEVER, 0.0).solved()[:2] == (0.0, pytest.approx(1.0))
+
+
+def test_a_mean_of_few_readings_shows_no_contact():
+    """The error of the mean in the air is in every reading since: as large as it is, it stays below an alarm."""
+    rng, behind, shown = np.random.default_rng(2), 100, []
+    for _ in range(300):
+        rest = rng.normal(size=behind).mean()
+        starts = told(rng.normal(size=300) - rest)
+        shown.append((explained(starts, behind), explained(starts, NEVER)))
+    honest, naive = np.quantile(shown, 0.99, axis=0)
+    # Two degrees of freedom and six starts: chi square of 2 passes 16 in 0.03 %.
+    assert honest < 16.0
+    assert naive > 1.2 * honest

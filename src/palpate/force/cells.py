@@ -93,6 +93,7 @@ class Prover:
     parts: int = 1
     wider: float = 1.0
     _known: dict[tuple[float, ...], list[Array]] = field(default_factory=dict, compare=False)
+    _loops: dict[int, list[SampledLoop]] = field(default_factory=dict, compare=False)
 
     @property
     def exact(self) -> bool:
@@ -166,7 +167,10 @@ class Prover:
 
     def loops(self, part: int) -> list[SampledLoop]:
         """One for each corner of a part of what the inner loop may be."""
-        return [replace(self.loop, inner=corner) for corner in self.inner(part)]
+        if part not in self._loops:
+            corners = self.inner(part)
+            self._loops[part] = [self.loop if c is None else replace(self.loop, inner=c) for c in corners]
+        return self._loops[part]
 
     def contraction(self, box: Box, L: Array) -> tuple[float, float]:
         """A bound of |L^T Phi L^-T| within the box, and how far rounding may have moved it.
@@ -223,9 +227,9 @@ def _with_rest(turned: Array, rests: Array, alone: float) -> float:
         return best
     wide = rests.reshape(-1, rests.shape[2])  # all of them at once bound each of them
     for h in (0.75 * room, 0.5 * room, 0.25 * room, 0.1 * room):
-        below = np.sqrt(1.0 + 1.0 / h) * wide
-        both = [np.vstack([np.sqrt(1.0 + h) * T, below]) for T in turned]
-        best = min(best, max(float(np.linalg.norm(M, 2)) for M in both))
+        below = np.broadcast_to(np.sqrt(1.0 + 1.0 / h) * wide, (len(turned), *wide.shape))
+        both = np.concatenate([np.sqrt(1.0 + h) * turned, below], axis=1)
+        best = min(best, float(np.linalg.norm(both, 2, axis=(1, 2)).max()))
     return best
 
 

@@ -29,7 +29,7 @@ class Cell:
 
 def proved_cell(prover: Prover, box: Box) -> Cell | None:
     """The box with a norm that proves it; None if none was found."""
-    roomy = prover if prover.exact else replace(prover, wider=ROOM, _known={})
+    roomy = prover if prover.exact else replace(prover, wider=ROOM, _known={}, _loops={})
     corners = roomy.matrices(box)
     if max(map(radius, corners)) >= 1.0:
         return None

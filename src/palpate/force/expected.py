@@ -1,8 +1,11 @@
-"""What first touches are expected to come to: how long one takes, and from which stiffness on noise does not matter."""
+"""What presses are expected to come to: how long a touch takes, what noise hides, which surfaces change too much."""
 
 from __future__ import annotations
 
+import numpy as np
+
 from palpate.force.gains import Gains
+from palpate.force.steps import Step
 
 LAGS, DECAYS, RISES = 8.0, 4.0, 5.0
 """Lags of the loop, B/K, and times in which a surface rises out of the noise, that a first touch takes at most.
@@ -48,3 +51,26 @@ def softest(gains: Gains) -> float:
     """
     felt = gains.arm.sensor.noise / (gains.approach * gains.theta)
     return gains.arm.surface(felt)
+
+
+STIFFENING_AT = (0.05, 0.5)
+"""Errors over F_d at which `stiffening` is said: at the edge of what is settled, and half-way up."""
+
+
+def stiffening(gains: Gains, step: Step, error: float, overshoot: float = OVERSHOOT) -> float:
+    """How many times stiffer, as felt, a surface may become while the force is so far below F_d.
+
+    For a lag theta whatever comes is decided by readings of before, so that the tip goes on as it would have: on a
+    surface n times stiffer the force then rises n times as far, by n (F(t + theta) - F(t)). theta stands for the whole
+    lag, so that this is what to expect and no bound: half as stiff is below `overshoot`, twice as stiff above
+    (benchmarks/force/disturbed.py).
+
+    Args:
+        gains: of the loop.
+        step: the press on the surface as it was.
+        error: over F_d, when the surface changes.
+        overshoot: over F_d.
+    """
+    at = int(np.argmax(step.force > 1.0 - error))
+    later = np.interp(step.time[at] + gains.theta, step.time, step.force)
+    return float((overshoot + error) / (later - step.force[at]))

@@ -13,7 +13,18 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, sqrt
-from palpate.force.contact_evidence import AIR, CONTACT, Watch, listened, spread_of, watched
+from palpate.force.contact_evidence import (
+    AIR,
+    CONTACT,
+    EDGE,
+    EVIDENT,
+    LEVEL,
+    Watch,
+    behind,
+    listened,
+    spread_of,
+    watched,
+)
 from palpate.force.onset import NO_STARTS, Starts, explained, latest
 from palpate.force.regression import AXIS_B, AXIS_K, BOTH, NOTHING, Fit, fit_of, fit_through, without_offset
 
@@ -106,7 +117,7 @@ class Cautious(NamedTuple):
             Watch(0.0, 0.0, 0.0, 0.0, variance, 0.5 * variance * self.period / self.theta, 0.0, 0.0, 0.0),
             Follow(ZERO3, 0.0, 0.0, 0.0, 0.0),
             Stage(AIR, 0.0, 0.0, 0.0),
-            Learned(fit, fit, 0.0, 0.0, ZERO3, ZERO3),
+            Learned(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
             NO_STARTS,
             self.cap,
             Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -119,7 +130,7 @@ class Cautious(NamedTuple):
         starts = listened(self, state, follow, force)
         watch = watched(self, state, starts, force)
         stage = staged(self, state.stage, watch, desired, before, force)
-        known = begun(self, state.known, state.stage, stage, watch, follow, starts)
+        known = begun(self, state.known, state.stage, stage, watch, follow, starts, behind(self, state))
         known = taken(self, known, state, stage, watch, follow, force)
         bound = bounded(self, state.bound, stage, watch, known)
         backstop = guarded(self, state.backstop, stage, watch, desired, before)
@@ -168,6 +179,7 @@ class Learned(NamedTuple):
     fast: Fit  # over theta
     since: float  # ticks since the contact began
     origin: float  # of the position in both fits [m]
+    shown: float  # 1 where lines through the readings showed the surface
     found: Vec3  # K, B/theta in caps, offset [N]
     std: Vec3  # of K, B/theta and their sum, in caps
 
@@ -234,21 +246,21 @@ def staged(law, stage, w, desired, before, force):
 
 
 @law
-def begun(law, known, before, stage, w, f, starts):
+def begun(law, known, before, stage, w, f, starts, air):
     """What is known as this stage begins: in the air nothing, at a touch what its start tells, after a step a quarter.
 
     A stiff contact begins where the force last was within the noise: there it is at rest, but for the noise and for
     what comes between two readings.
     """
     sigma = sqrt(w.variance)
-    slow, fast, since, origin, found, std = known
+    slow, fast, since, origin, shown, found, std = known
     if stage.phase == AIR:
-        since, origin, found, std = 0.0, f.y, ZERO3, ZERO3
+        since, origin, shown, found, std = 0.0, f.y, 0.0, ZERO3, ZERO3
     if stage.firm == 0.0:
         x = law.cap * (f.y - 0.004 / law.tick * (f.y - f.y0) - origin)
         fast = fit_through(x, w.rest + 0.5 * sigma, sigma)
     if before.phase == AIR and stage.phase == LEARNING:
-        if w.mean - w.rest > 3.2 * sigma and stage.firm * law.tick < law.memory:
+        if w.mean - w.rest > LEVEL * sigma and stage.firm * law.tick < law.memory:
             readings = stage.firm * law.tick / law.period + 1.0
             back = (stage.firm + 0.004 / law.tick) * (f.y - f.y0)
             level = w.mean - w.rest
@@ -257,14 +269,14 @@ def begun(law, known, before, stage, w, f, starts):
             )
             slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
         else:
-            line = latest(starts, explained(starts) - spread_of(law, w))
+            line = latest(starts, air, explained(starts, air) - spread_of(law, w))
             pace = 2.0 * law.cap * law.theta * line.u / (line.n * line.n * law.period)
             slow = fit_of(line, law.cap, origin, pace, w.rest, spread_of(law, w))
-            since, found = line.n * law.period / law.tick, slow.solved()
+            since, shown, found = line.n * law.period / law.tick, 1.0, slow.solved()
             std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
     if before.phase == LOCKED and stage.phase == LEARNING:
         slow = without_offset(slow, 0.25)
-    return Learned(slow, fast, since, origin, found, std)
+    return Learned(slow, fast, since, origin, shown, found, std)
 
 
 @law
@@ -272,12 +284,12 @@ def taken(law, known, state, stage, w, f, force):
     """What is known with this tick's reading."""
     since = known.since + 1.0
     if w.age > 0.0 or since * law.tick < law.memory:
-        return Learned(known.slow, known.fast, since, known.origin, known.found, known.std)
+        return Learned(known.slow, known.fast, since, known.origin, known.shown, known.found, known.std)
     rate = (f.y - f.y0) / law.tick
     phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
-    if state.bound >= law.cap and known.std.z > 0.0 and force - known.found @ phi > 4.0 * sqrt(w.variance):
+    if state.bound >= law.cap and known.std.z > 0.0 and force - known.found @ phi > EDGE * sqrt(w.variance):
         return Learned(
-            known.fast, known.fast, stage.firm, known.origin, ZERO3, ZERO3
+            known.fast, known.fast, stage.firm, known.origin, 0.0, ZERO3, ZERO3
         )  # refuted: it begins here
     moving = min(max(known.found.x, 0.0), 1.0) * law.cap * rate * law.tick
     noise = 2.0 * law.theta * w.tide / (w.gap * law.tick)
@@ -286,11 +298,11 @@ def taken(law, known, state, stage, w, f, force):
     if stage.firm * law.tick >= law.memory:
         fast = fast.taking(phi, force, weight, 1.0 - law.tick / law.theta)
     if stage.phase == LOCKED:
-        return Learned(known.slow, fast, since, known.origin, known.found, known.std)
+        return Learned(known.slow, fast, since, known.origin, known.shown, known.found, known.std)
     keep = 1.0 if state.bound >= law.cap else 1.0 - law.tick / (6.0 * law.theta)
     slow = known.slow.taking(phi, force, weight, keep)
     std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
-    return Learned(slow, fast, since, known.origin, slow.solved(), std)
+    return Learned(slow, fast, since, known.origin, known.shown, slow.solved(), std)
 
 
 @law
@@ -302,7 +314,7 @@ def bounded(law, bound, stage, w, known):
         return bound
     now = bound if stage.phase == LOCKED else from_slow(law, known)
     p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
-    sure, factor = (law.z, 1.3) if stage.phase == LOCKED else (1.0, 1.0)
+    sure, factor = (sqrt(EVIDENT), 1.3) if stage.phase == LOCKED else (1.0, 1.0)
     if highest(law, p, -sure * alone, -sure * both) > factor * now:
         return min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), law.cap)
     return now
@@ -313,7 +325,7 @@ def from_slow(law, known):
     """K_u as all since the touch allows: never below the bound, and the cap unless a surface is plain to see."""
     p, sd = known.found, known.std
     room = law.z * law.bounding / (1.0 + law.eps)
-    plain = p.x + p.y > PLAIN * sd.z or p.x > PLAIN * sd.x
+    plain = known.shown > 0.0 or p.x + p.y > PLAIN * sd.z or p.x > PLAIN * sd.x
     if law.bounding > 0.0 and not plain:
         return law.cap
     return min(max((1.0 + law.eps) * highest(law, p, room * sd.x, room * sd.z), law.floor), law.cap)

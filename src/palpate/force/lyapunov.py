@@ -107,10 +107,10 @@ def _interior(matrices: Sequence[Array], basis: Array | None = None) -> Array | 
                 return P if _contracts(P, matrices) else None
             decrement = float(-gradient @ step)
             P, s = _along(P, s, step, basis, matrices)
+            if s < 0.0 and _contracts(P, matrices):
+                return P
             if decrement < 0.3:
                 break
-        if s < 0.0 and _contracts(P, matrices):
-            return P
         # On the central path s is within (sum of all sizes)/weight of the least there is.
         if s > 2.0 * n * (len(matrices) + 2) / weight or weight > _HEAVIEST:
             return None

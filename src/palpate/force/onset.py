@@ -41,6 +41,10 @@ class Line(NamedTuple):
             slope, level = 0.0, max(self.f / self.n, 0.0)
         return slope, level, slope * self.uf + level * self.f
 
+    def shown(self, behind):
+        """What it explains beside a rest that is the mean of so many readings: its own error explains as much."""
+        return self.solved()[2] / (1.0 + self.n / behind)
+
 
 EMPTY = Line(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -84,19 +88,19 @@ def later(starts, every, x, force):
 
 
 @law
-def explained(starts):
-    """What the likeliest line explains of the sum of squares [N^2]."""
+def explained(starts, behind):
+    """What the likeliest line explains of the sum of squares [N^2], see `Line.shown`."""
     _, _, a, b, c, d, old = starts
-    return max(a.solved()[2], b.solved()[2], c.solved()[2], d.solved()[2], old.solved()[2])
+    return max(a.shown(behind), b.shown(behind), c.shown(behind), d.shown(behind), old.shown(behind))
 
 
 @law
-def latest(starts, least):
+def latest(starts, behind, least):
     """The line of the latest start that explains as much as that [N^2]; an earlier one has air in it, and is flat."""
-    if starts.a.solved()[2] >= least:
+    if starts.a.shown(behind) >= least:
         return starts.a
-    if starts.b.solved()[2] >= least:
+    if starts.b.shown(behind) >= least:
         return starts.b
-    if starts.c.solved()[2] >= least:
+    if starts.c.shown(behind) >= least:
         return starts.c
-    return starts.d if starts.d.solved()[2] >= least else starts.oldest
+    return starts.d if starts.d.shown(behind) >= least else starts.oldest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from math import pi
 
 import numpy as np
@@ -55,7 +55,7 @@ class SampledLoop:
         """The same loop with so many more ticks of delay."""
         return replace(self, extra=self.extra + ticks)
 
-    @property
+    @cached_property
     def force_unit(self) -> float:
         """k0 [N/m]: forces are counted in k0 times a metre."""
         return self.arm.series if self.unit is None else self.unit
@@ -73,13 +73,13 @@ class SampledLoop:
         """The sensor's low-pass A, b, c: shapes (n, n), (n,), (n,); n is 0 where it has none."""
         return filter_of(self.arm.low_pass)
 
-    @property
+    @cached_property
     def lines(self) -> tuple[int, int]:
         """How many readings and how many commands, or torques beside a command, are kept."""
         commands = max(self.delay, 1) if self.arm.kind == "position" else self.delay + 1
         return self.arm.sensor_ticks + self.arm.unsure_ticks + self.extra, commands
 
-    @property
+    @cached_property
     def delay(self) -> int:
         """Ticks from a command to the inner loop.
 
@@ -87,7 +87,7 @@ class SampledLoop:
         """
         return self.arm.delay_ticks - self.arm.unsure_ticks
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Numbers of the state."""
         return 2 + len(self.low_pass[1]) + self.lines[0] + 1 + self.lines[1]
@@ -196,6 +196,7 @@ def held(A: Array, b: Array, time: float) -> tuple[Array, Array]:
     return both[:n, :n], both[:n, n]
 
 
+@cache
 def filter_of(low_pass: LowPass) -> tuple[Array, Array, Array]:
     """A chain of Butterworth low-passes as a continuous-time A, b, c; empty for none.
 

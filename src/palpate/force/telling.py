@@ -15,6 +15,7 @@ UNCOVERED = (
     "a reading taken between ticks: its age is counted in whole ticks",
     "the arm's own compliance between its encoders and the tip beside damping of the surface",
     "a surface that curves, but by the range of its tangent stiffness",
+    "the peak where a surface becomes stiffer under the tip: for a lag the gain is that of the one before",
 )
 
 

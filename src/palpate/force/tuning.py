@@ -14,7 +14,7 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import certify, exact_interval
-from palpate.force.expected import OVERSHOOT, RISES, rise, settling_bound, softest
+from palpate.force.expected import OVERSHOOT, RISES, STIFFENING_AT, rise, settling_bound, softest, stiffening
 from palpate.force.gains import Gains, gains_for, known_lag
 from palpate.force.lag import SOFTEST, sum_of_lags
 from palpate.force.peak import peak_bound
@@ -171,6 +171,10 @@ class Tuning(Result, shown_by="palpate.report.tuning"):
             },
             "exact": {"stiffness": list(self.exact)},
             "domain": self._domain_json(),
+            "stiffening": [
+                {"error": e, "times": stiffening(gains, self.steps[1], e), "overshoot": OVERSHOOT}
+                for e in STIFFENING_AT
+            ],
             "estimate": None
             if known is None
             else {

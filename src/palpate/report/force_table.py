@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from palpate.force.expected import OVERSHOOT, settling_bound
+from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.telling import UNCOVERED, sentence
 from palpate.force.tuning import Tuning
 
@@ -34,7 +34,7 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
         ),
         ("stable, exact", f"{low:.4g} to {high:.4g} N/m, gain held, B = 0"),
     ]
-    found.append(("first touches", _domain(told)))
+    found += [("first touches", _domain(told)), ("stiffer in a press", _stiffening(told))]
     if told.known is not None:
         a, b = told.known.stiffness
         found.append(("surface", f"{a:.4g} to {b:.4g} N/m ({told.known.source})"))
@@ -50,6 +50,14 @@ def _domain(told: Tuning) -> str:
     return (
         f"{low:.4g} to {high:.4g} N/m: 99.9 % below {100.0 * OVERSHOOT:g} % over, 99 % settle in {seconds:.3g} s "
         "+ F/(K v_max) + 4 B/K; softer ones take longer to rise out of the noise"
+    )
+
+
+def _stiffening(told: Tuning) -> str:
+    near, half = (stiffening(told.gains, told.steps[1], e) for e in STIFFENING_AT)
+    return (
+        f"over {100.0 * OVERSHOOT:g} % beyond {near:.2g} times (as felt) while the force is "
+        f"{100.0 * STIFFENING_AT[0]:g} % off, or {half:.2g} times half-way up: it rises so far before a reading tells"
     )
 
 
