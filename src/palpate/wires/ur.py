@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from palpate.errors import InputError
+from palpate.wires.aside import Aside
 from palpate.wires.protocol import Command, LostError, Sense
 from palpate.wires.turns import from_rotation_vector
 
@@ -58,7 +59,7 @@ class UrWire:
         self._address = address
         self._control: Any = None
         self._servo = way == "as=servo"
-        self._last, self._tick = -1.0, 0.008
+        self._last, self._tick, self._aside = -1.0, 0.008, Aside()
         self._turn: list[float] = []
         _check_protocol(address)
         self._receive: Any = _in_time(
@@ -118,6 +119,7 @@ class UrWire:
         if self._control is None:
             from rtde_control import RTDEControlInterface
 
+            self._aside.begin()  # of a controller that it has lost, it speaks there
             self._control = _in_time(
                 lambda: RTDEControlInterface(self._address),
                 f"the UR at {self._address} takes no control script (is it in remote control, with no other master?)",
@@ -142,6 +144,7 @@ class UrWire:
         """Speed 0, then the script's end."""
         control, self._control = self._control, None
         if control is None:
+            self._aside.end()
             return
 
         def rest() -> None:
@@ -150,6 +153,7 @@ class UrWire:
             control.disconnect()
 
         _quietly(rest)
+        self._aside.end()
 
     def close(self) -> None:
         """Disconnect."""
