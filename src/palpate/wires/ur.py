@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from palpate.errors import InputError
-from palpate.wires.aside import Aside
+from palpate.wires.aside import libraries_aside
 from palpate.wires.protocol import Command, LostError, Sense
 from palpate.wires.turns import from_rotation_vector
 
@@ -59,7 +59,7 @@ class UrWire:
         self._address = address
         self._control: Any = None
         self._servo = way == "as=servo"
-        self._last, self._tick, self._aside = -1.0, 0.008, Aside()
+        self._last, self._tick = -1.0, 0.008
         self._turn: list[float] = []
         _check_protocol(address)
         self._receive: Any = _in_time(
@@ -119,7 +119,7 @@ class UrWire:
         if self._control is None:
             from rtde_control import RTDEControlInterface
 
-            self._aside.begin()  # of a controller that it has lost, it speaks there
+            libraries_aside()  # of a controller that it has lost, it speaks there
             self._control = _in_time(
                 lambda: RTDEControlInterface(self._address),
                 f"the UR at {self._address} takes no control script (is it in remote control, with no other master?)",
@@ -128,7 +128,12 @@ class UrWire:
         return self._control
 
     def write(self, command: Command) -> None:
-        """speedL, or servoL with the orientation that the tool had at first."""
+        """speedL, or servoL with the orientation that the tool had at first.
+
+        Neither where the connection is lost: ur-rtde would wait for the controller to start again, and send it this.
+        """
+        if not self._control.isConnected():
+            raise LostError("the controller has closed the connection")
         try:
             if self._servo:
                 pose = [*command.position, *self._turn]
@@ -144,16 +149,15 @@ class UrWire:
         """Speed 0, then the script's end."""
         control, self._control = self._control, None
         if control is None:
-            self._aside.end()
             return
 
         def rest() -> None:
-            control.servoStop(_ACCELERATION) if self._servo else control.speedStop(_ACCELERATION)
-            control.stopScript()
+            if control.isConnected():
+                control.servoStop(_ACCELERATION) if self._servo else control.speedStop(_ACCELERATION)
+                control.stopScript()
             control.disconnect()
 
         _quietly(rest)
-        self._aside.end()
 
     def close(self) -> None:
         """Disconnect."""
