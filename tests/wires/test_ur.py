@@ -144,6 +144,15 @@ def test_another_way_to_move_is_refused(folder, here, capsys):
     assert "rtde:ADDRESS?as=servo" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("address", ["rtde:192.168.0.10:30004?as=servo", "franka:192.168.0.10:1337"])
+def test_a_port_is_no_part_of_an_address(address):
+    from palpate.errors import InputError
+    from palpate.wires import open_wire
+
+    with pytest.raises(InputError, match=r"has a port; .* on every controller: (rtde|franka):192.168.0.10$"):
+        open_wire(address)
+
+
 def test_turns_are_those_of_a_library():
     from scipy.spatial.transform import Rotation
 

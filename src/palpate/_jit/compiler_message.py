@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate._jit.kernels import _hand_over
-from palpate._jit.registry import OPTIONS, PACKAGE
+from palpate._jit.registry import ENTRY, PACKAGE
 
 _PLACE = re.compile(r'File "([^"\n]+\.py)", line (\d+)')
 _RAISED = re.compile(r"Raised from (\S+\.py) \((\d+)\)")
@@ -35,7 +35,7 @@ def compiled_alone(method: Callable[..., Any], *arguments: Any) -> tuple[Any, st
     import numba
 
     _hand_over()
-    dispatcher = numba.njit(**OPTIONS)(method)
+    dispatcher = numba.njit(**ENTRY)(method)
     try:
         dispatcher.compile(tuple(map(numba.typeof, arguments)))
     except Exception as error:

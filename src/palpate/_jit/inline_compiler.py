@@ -11,16 +11,77 @@ import functools
 from types import CodeType
 from typing import Any
 
-from palpate._jit.registry import INSIDE, PACKAGE
+from palpate._jit.registry import ENTRY, INSIDE, PACKAGE
 
 
 @functools.cache
 def inside() -> dict[str, Any]:
     """Numba's options for a function that only kernels call."""
-    return {**INSIDE, "pipeline_class": _compiler()}
+    return {**INSIDE, "pipeline_class": _inside_compiler()}
 
 
-def _compiler() -> type:
+@functools.cache
+def entry(superword: bool) -> dict[str, Any]:
+    """Numba's options for a kernel; see `kernel`."""
+    return {**ENTRY, "pipeline_class": _entry_compiler(superword)}
+
+
+@functools.cache
+def _flags() -> tuple[Any, type]:
+    """The flags of everything inside, and the kind of a kernel's.
+
+    Numba keeps what it has compiled by the flags of the caller, so all callers show the same ones: or a law is compiled
+    once for the kernel and once more for the laws that call it. And it asks for their hash at each call.
+    """
+    from numba.core.compiler import Flags
+    from numba.core.registry import cpu_target
+
+    class Inside(Flags):
+        """One object for all."""
+
+        __hash__ = object.__hash__
+        __eq__ = object.__eq__
+
+        def copy(self) -> Any:
+            return self
+
+    class Entered(Flags):
+        """Those of a kernel, which shows the others to what it calls."""
+
+        def copy(self) -> Any:
+            return shared
+
+    shared = Inside()
+    cpu_target.options.parse_as_flags(shared, {**INSIDE, "nopython": True})
+    return shared, Entered
+
+
+def _entry_compiler(superword: bool) -> type:
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import Compiler
+
+    class Superword(JITCodeLibrary):
+        """Code in which LLVM looks for neighbouring operations that one instruction can do."""
+
+        def _optimize_final_module(self) -> None:
+            manager, builder = self._codegen._module_pass_manager(slp_vectorize=True)
+            manager.run(self._final_module, builder)
+
+    class Entry(Compiler):
+        """Numba's compiler, but that what is called sees the flags of everything inside."""
+
+        def __init__(
+            self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, *more: Any
+        ):
+            if superword:
+                library = Superword(target.codegen(), "kernel")
+                library.enable_object_caching()
+            super().__init__(typing, target, library, args, result, _flags()[1](flags), *more)
+
+    return Entry
+
+
+def _inside_compiler() -> type:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import Compiler
 
@@ -56,8 +117,11 @@ def _compiler() -> type:
     class Inside(Compiler):
         """Numba's compiler, its result such code."""
 
-        def __init__(self, typing: Any, target: Any, library: Any, *others: Any):
-            super().__init__(typing, target, library or Swallowed(target.codegen(), "inside"), *others)
+        def __init__(
+            self, typing: Any, target: Any, library: Any, args: Any, result: Any, _: Any, *more: Any
+        ):
+            library = library or Swallowed(target.codegen(), "inside")
+            super().__init__(typing, target, library, args, result, _flags()[0], *more)
 
         def define_pipelines(self) -> list[Any]:
             own = _is_plain(self.state.func_id.code)

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from palpate._jit.inline_compiler import inside
+from palpate._jit.inline_compiler import entry, inside
 from palpate._jit.interrupts import uninterrupted
 from palpate._jit.overloads import operators_and_members
-from palpate._jit.registry import OPTIONS, laws
+from palpate._jit.registry import laws
 from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
 
 _MAKING = threading.Lock()
@@ -22,10 +22,10 @@ class NotCompiled(Exception):
 
 
 class Kernel:
-    """A function that runs compiled; `plain` is the same function as it was written."""
+    """A function that runs compiled; `plain` is the same function as it was written. See `kernel`."""
 
-    def __init__(self, function: Callable[..., Any]):
-        self.plain = function
+    def __init__(self, function: Callable[..., Any], superword: bool):
+        self.plain, self._superword = function, superword
         self._waiting: Callable[[], None] | None = None
         self._dispatcher: Any = None
         functools.update_wrapper(self, function)
@@ -35,7 +35,7 @@ class Kernel:
         """The Numba dispatcher, made when first asked for; by one thread, or each would compile its own."""
         with _MAKING:
             if self._dispatcher is None:
-                self._dispatcher = _dispatcher(self.plain, self._wait)
+                self._dispatcher = _dispatcher(self.plain, self._superword, self._wait)
         return self._dispatcher
 
     def __call__(self, *args: Any) -> Any:
@@ -71,14 +71,21 @@ class Kernel:
         return not self.compiled.stats.cache_misses
 
 
-def kernel(function: Callable[..., Any]) -> Kernel:
-    """Marks the entry of a compiled loop."""
-    return Kernel(function)
+def kernel(function: Callable[..., Any], superword: bool = False) -> Kernel:
+    """Marks the entry of a compiled loop.
+
+    Args:
+        function: as it was written.
+        superword: let the compiler do neighbouring operations by one instruction, which suits much arithmetic of small
+            vectors and a loop without any takes longer to compile for. Each number stays the same to the last bit.
+    """
+    return Kernel(function, superword)
 
 
-def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
+def _dispatcher(function: Callable[..., Any], superword: bool, wait: Callable[[], None]) -> Any:
     import numba
     from numba.core import caching
+    from numba.core.runtime import rtsys
 
     class PackageCache(caching.FunctionCache):
         def __init__(self, py_func: Callable[..., Any]):
@@ -91,13 +98,17 @@ def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
             return (text_of(sig), *machine_and_code, stamp_of(function, sig))
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
-            known = stamp_of(function, sig) is not None
+            known, found = stamp_of(function, sig) is not None, None
+            # Without what Numba imports to compile, which takes as long again as importing Numba.
+            rtsys.initialize(target_context)
             try:
-                found = super().load_overload(sig, target_context) if known else None
+                with self._guard_against_spurious_io_errors():
+                    found = self._load_overload(sig, target_context) if known else None
             except (ImportError, AttributeError):  # written by another version of these sources
                 found = None
             if found is None:
                 wait()
+                target_context.refresh()
                 _hand_over()
             return found
 
@@ -106,7 +117,7 @@ def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
                 with suppress(OSError):  # where there is no room, every process compiles anew
                     super().save_overload(sig, data)
 
-    dispatcher = numba.njit(**OPTIONS)(function)
+    dispatcher = numba.njit(**entry(superword))(function)
     try:
         dispatcher._cache = PackageCache(function)
     except RuntimeError:  # nowhere to write: every process compiles anew

@@ -8,7 +8,7 @@ from typing import Any
 
 from palpate import _vector
 from palpate._jit.inline_compiler import inside
-from palpate._jit.registry import OPTIONS, parts
+from palpate._jit.registry import parts
 
 
 @functools.cache
@@ -165,7 +165,7 @@ def _compiled_member(function: Callable[..., Any]) -> Any:
 def _member_dispatcher(function: Callable[..., Any]) -> Any:
     import numba
 
-    return numba.njit(**OPTIONS, **inside())(function)
+    return numba.njit(**inside())(function)
 
 
 @functools.cache

@@ -16,10 +16,10 @@ foreign_files: set[Path] = set()
 """Sources of the user's plug-ins, and what they import from beside them."""
 PACKAGE = Path(__file__).resolve().parent.parent
 # Division as NumPy's: no branch and no exception inside a loop.
-OPTIONS = {"error_model": "numpy", "nogil": True}
+ENTRY = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
 # What only kernels call needs no way in from outside: making those would be half of all compiling. And it stands where
 # it is called: handing a loop's hundred numbers on, and a state's back, costs as much as what is done with them.
-INSIDE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True}
+INSIDE = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True}
 
 
 def law(function: F) -> F:

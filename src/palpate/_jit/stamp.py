@@ -1,5 +1,6 @@
 """What a cached kernel depends on, as a hash: stale kernels are never run."""
 
+import functools
 import hashlib
 import re
 import sys
@@ -30,6 +31,7 @@ def sources_stamp(*files: Path) -> str:
     return digest.hexdigest()
 
 
+@functools.cache
 def _imported(text: str) -> list[Path]:
     """The package's files that a source imports names from, or as modules."""
     root = PACKAGE.parent

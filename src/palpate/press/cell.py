@@ -13,7 +13,7 @@ from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
 from palpate.robots.serial.chain import Chain, Room, axis_of, chain_motion, room_for
-from palpate.robots.serial.linear import backward, factorise, forward, product
+from palpate.robots.serial.linear import backward, factorise, forward_both, product
 from palpate.robots.serial.spatial import Wrench, cross
 
 Array = NDArray[np.float64]
@@ -212,8 +212,7 @@ def answered(cell, body, tip, touch):
     for i in range(n):
         body.yielding[i] = body.normal[i]
         body.qdd[i] = body.drive[i] - room.h[i]
-    forward(body.L, body.yielding)
-    forward(body.L, body.qdd)
+    forward_both(body.L, body.yielding, body.qdd)
     mobility = product(body.L, body.yielding, body.yielding)
     free = cell.normal @ tip.a + product(body.L, body.yielding, body.qdd)
     v = 0.0
@@ -297,5 +296,5 @@ def foreign(cell, body, touch, tip, setpoint, time, noise):
     return measured_by(cell.sensor, 1.0 / cell.steps, touch, surface, force, held, depth, time, noise)
 
 
-compiled_tick = kernel(tick)
+compiled_tick = kernel(tick, superword=True)
 compiled_foreign = kernel(foreign)

@@ -11,6 +11,7 @@ from palpate._vector import Vec3
 from palpate.contact_frame import Payload
 from palpate.contact_frame.weighed import side_of
 from palpate.press.cell import NO_TOOL, HeldTool
+from palpate.robots.serial.chain import spread_of
 from palpate.robots.serial.serial_arm import SerialArm
 
 Array = NDArray[np.float64]
@@ -49,10 +50,12 @@ def with_tool(arm: SerialArm, payload: Payload) -> SerialArm:
         + _point(chain.mass[last], chain.com[last] - com)
         + _point(mass, at - com)
     )  # fmt: skip
+    least, spread = spread_of(_changed(chain.inertia, last, moment))
     loaded = chain._replace(
         mass=_changed(chain.mass, last, whole),
         com=_changed(chain.com, last, com),
-        inertia=_changed(chain.inertia, last, moment),
+        least=least,
+        spread=spread,
     )
     return replace(arm, title=f"{arm.title} with a tool of {mass:.3g} kg", chain=loaded, scene=None)
 

@@ -37,6 +37,7 @@ def _sim(where: str) -> Wire:
 def _rtde(where: str) -> Wire:
     from palpate.wires.ur import UrWire
 
+    _check_no_port("rtde", where, "30004 and others")
     return UrWire(where)
 
 
@@ -49,7 +50,16 @@ def _ros2(where: str) -> Wire:
 def _franka(where: str) -> Wire:
     from palpate.wires.franka import FrankaWire
 
+    _check_no_port("franka", where, "1337")
     return FrankaWire(where)
+
+
+def _check_no_port(kind: str, where: str, ports: str) -> None:
+    address, colon, rest = where.partition("?")[0].partition(":")
+    if colon and ":" not in rest:  # an IPv6 address has more of them
+        raise InputError(
+            f"--wire {kind}:{where} has a port; it is {ports} on every controller: {kind}:{address}"
+        )
 
 
 _OPENERS = {"franka": _franka, "ros2": _ros2, "sim": _sim, "rtde": _rtde}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import socket
 import threading
 import time
@@ -9,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from palpate.errors import InputError
+from palpate.wires.aside import libraries_aside
 from palpate.wires.protocol import Command, LostError, Sense
 from palpate.wires.turns import from_rotation_vector
 
@@ -27,6 +29,8 @@ _WAYS = ("", "as=speed", "as=servo")
 FORM = "rtde:ADDRESS"
 _PATIENCE = 2.0
 """For which a call to stop may take [s]."""
+_HANGS = 0.5
+"""For which a command may take [s]: five times the controller's watchdog, which has stopped the arm by then."""
 _ANSWER = 8.0
 """For which opening may take [s]."""
 
@@ -58,7 +62,7 @@ class UrWire:
         self._address = address
         self._control: Any = None
         self._servo = way == "as=servo"
-        self._last, self._tick = -1.0, 0.008
+        self._last, self._tick, self._calls = -1.0, 0.008, _Calls()
         self._turn: list[float] = []
         _check_protocol(address)
         self._receive: Any = _in_time(
@@ -118,6 +122,7 @@ class UrWire:
         if self._control is None:
             from rtde_control import RTDEControlInterface
 
+            libraries_aside()  # of a controller that it has lost, it speaks there
             self._control = _in_time(
                 lambda: RTDEControlInterface(self._address),
                 f"the UR at {self._address} takes no control script (is it in remote control, with no other master?)",
@@ -126,27 +131,36 @@ class UrWire:
         return self._control
 
     def write(self, command: Command) -> None:
-        """speedL, or servoL with the orientation that the tool had at first."""
-        try:
-            if self._servo:
-                pose = [*command.position, *self._turn]
-                sent = self._control.servoL(pose, 0.0, 0.0, self._tick, _LOOKAHEAD, _GAIN)
-            else:
-                sent = self._control.speedL([*command.velocity, 0.0, 0.0, 0.0], _ACCELERATION, 0.0)
-        except RuntimeError as error:
-            raise LostError(f"a command could not be sent: {error}") from None
+        """speedL, or servoL with the orientation that the tool had at first.
+
+        Neither where the connection is lost: ur-rtde would wait for the controller to start again, and send it this.
+        """
+        if not self._control.isConnected():
+            raise LostError("the controller has closed the connection")
+        control = self._control
+        if self._servo:
+            pose = [*command.position, *self._turn]
+            sent = self._calls.do(lambda: control.servoL(pose, 0.0, 0.0, self._tick, _LOOKAHEAD, _GAIN))
+        else:
+            speed = [*command.velocity, 0.0, 0.0, 0.0]
+            sent = self._calls.do(lambda: control.speedL(speed, _ACCELERATION, 0.0))
+        if isinstance(sent, Exception):
+            raise LostError(f"a command could not be sent: {sent}")
         if not sent:
             raise LostError("the controller takes no command: is the arm stopped, or its script ended?")
 
     def stop(self) -> None:
         """Speed 0, then the script's end."""
         control, self._control = self._control, None
-        if control is None:
+        if (
+            control is None or self._calls.stuck
+        ):  # a lost connection, and the controller's watchdog has the arm
             return
 
         def rest() -> None:
-            control.servoStop(_ACCELERATION) if self._servo else control.speedStop(_ACCELERATION)
-            control.stopScript()
+            if control.isConnected():
+                control.servoStop(_ACCELERATION) if self._servo else control.speedStop(_ACCELERATION)
+                control.stopScript()
             control.disconnect()
 
         _quietly(rest)
@@ -155,6 +169,37 @@ class UrWire:
         """Disconnect."""
         self.stop()
         _quietly(self._receive.disconnect)
+
+
+class _Calls:
+    """Calls of a library that may hang, one at a time in a thread of their own; a daemon, which no exit waits for."""
+
+    def __init__(self) -> None:
+        self._asked: queue.SimpleQueue[Callable[[], Any]] = queue.SimpleQueue()
+        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.stuck = False
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        while True:
+            act = self._asked.get()
+            try:
+                self._answers.put(act())
+            except Exception as error:  # noqa: BLE001 - whatever the library throws is the wire's fault
+                self._answers.put(error)
+
+    def do(self, act: Callable[[], Any]) -> Any:
+        """What the call returns, or raises.
+
+        Raises:
+            LostError: it hangs, as ur-rtde does while it waits for a controller that has gone.
+        """
+        self._asked.put(act)
+        try:
+            return self._answers.get(timeout=_HANGS)
+        except queue.Empty:
+            self.stuck = True
+            raise LostError(f"the controller takes no command for {1e3 * _HANGS:g} ms") from None
 
 
 def _check_protocol(address: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate._jit import law, part
-from palpate._vector import ZERO3, Mat3, Vec3
+from palpate._vector import ZERO3, Mat3, Vec3, cos, sin
 from palpate.robots.serial.spatial import (
     UNIT3,
     Inertia,
@@ -19,7 +19,7 @@ from palpate.robots.serial.spatial import (
     cross,
     inertia_at,
     load_at,
-    turned,
+    squares,
     turned_about_z,
 )
 
@@ -36,7 +36,8 @@ class Chain(NamedTuple):
         slide: 1 where the joint is prismatic, 0 where it is revolute, shape (n,).
         mass: of each link [kg], shape (n,).
         com: its centre of mass in its joint's frame [m], shape (n, 3).
-        inertia: about that centre, in that frame [kg m^2], shape (n, 3, 3).
+        least: smallest principal moment of inertia about that centre [kg m^2], shape (n,).
+        spread: what the inertia has beyond it, in that frame: least 1 + a a^T + b b^T, shape (n, 2, 3).
         rotor: inertia of motor and gear, felt at the joint [kg m^2; kg where it slides], shape (n,).
         tip: in the last joint's frame [m], shape (3,).
         tip_turn: its axes there, shape (3, 3).
@@ -48,11 +49,18 @@ class Chain(NamedTuple):
     slide: Array
     mass: Array
     com: Array
-    inertia: Array
+    least: Array
+    spread: Array
     rotor: Array
     tip: Array
     tip_turn: Array
     gravity: Array
+
+    @property
+    def inertia(self) -> Array:
+        """Of each link about its centre of mass, in its joint's frame [kg m^2], shape (n, 3, 3)."""
+        a = self.spread
+        return self.least[:, None, None] * np.eye(3) + a.swapaxes(1, 2) @ a
 
 
 @part
@@ -65,6 +73,7 @@ class Room(NamedTuple):
     axes: Array  # twist of each joint at unit rate, shape (n, 6)
     loads: Array  # what moving each link takes, shape (n, 6)
     bodies: Array  # inertia of each link, shape (n, 10)
+    turns: Array  # cosine and sine of each joint's angle, shape (n, 2)
 
 
 @part
@@ -79,6 +88,13 @@ class Tip(NamedTuple):
     dw: Vec3  # Jdot qd, of the turning [rad/s^2]
 
 
+def spread_of(inertia: Array) -> tuple[Array, Array]:
+    """`least` and `spread` of a `Chain`, of inertias in any axes [kg m^2], shape (n, 3, 3)."""
+    moments, axes = np.linalg.eigh(np.asarray(inertia, dtype=float).reshape(-1, 3, 3))
+    beyond = np.sqrt(moments[:, 1:] - moments[:, :1])
+    return moments[:, 0].copy(), np.ascontiguousarray(beyond[:, :, None] * axes.swapaxes(1, 2)[:, 1:])
+
+
 def room_for(n: int) -> Room:
     """Room for an arm of n joints."""
     return Room(
@@ -88,6 +104,7 @@ def room_for(n: int) -> Room:
         np.zeros((n, 6)),
         np.zeros((n, 6)),
         np.zeros((n, 10)),
+        np.zeros((n, 2)),
     )
 
 
@@ -105,6 +122,14 @@ def matrix_at(a, i):
         Vec3(a[i, 1, 0], a[i, 1, 1], a[i, 1, 2]),
         Vec3(a[i, 2, 0], a[i, 2, 1], a[i, 2, 2]),
     )
+
+
+@law
+def moment_at(chain, i, R):
+    """Inertia of link i about its centre of mass, in the base's axes."""
+    s = chain.spread
+    a, b = R @ Vec3(s[i, 0, 0], s[i, 0, 1], s[i, 0, 2]), R @ Vec3(s[i, 1, 0], s[i, 1, 1], s[i, 1, 2])
+    return squares(chain.least[i], a, b)
 
 
 @law
@@ -150,6 +175,9 @@ def outward(chain, q, qd, room):
 
     The base accelerates against gravity, which then needs no law of its own.
     """
+    # Beforehand: a call among the vectors would put all of them from registers into memory and back.
+    for i in range(len(q)):
+        room.turns[i, 0], room.turns[i, 1] = cos(q[i]), sin(q[i])
     g = Vec3(chain.gravity[0], chain.gravity[1], chain.gravity[2])
     p, R = ZERO3, UNIT3
     V, A = Twist(ZERO3, ZERO3), Twist(ZERO3, -g)
@@ -158,7 +186,7 @@ def outward(chain, q, qd, room):
         R = R @ matrix_at(chain.turn, i)
         z = R.T.r3
         if chain.slide[i] == 0.0:
-            R = turned_about_z(R, q[i])
+            R = turned_about_z(R, room.turns[i, 0], room.turns[i, 1])
             s = Twist(z, cross(p, z))
         else:
             p = p + q[i] * z
@@ -166,7 +194,7 @@ def outward(chain, q, qd, room):
         step = qd[i] * s
         A = A + V.carries(step)
         V = V + step
-        moment = turned(R, matrix_at(chain.inertia, i))
+        moment = moment_at(chain, i, R)
         mass, centre = chain.mass[i], p + R @ vector_at(chain.com, i)
         X = inertia_at(mass, centre, moment)
         load = load_at(mass, centre, moment, V, A)

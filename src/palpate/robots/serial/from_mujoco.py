@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from palpate.errors import InputError, unknown
 from palpate.robots.serial._extra import mujoco, refusals
 from palpate.robots.serial._loading import load_mjcf
-from palpate.robots.serial.chain import Chain
+from palpate.robots.serial.chain import Chain, spread_of
 from palpate.robots.serial.serial_arm import Scene, SerialArm
 
 Array = NDArray[np.float64]
@@ -177,13 +177,15 @@ def _chain(
         at.append(R0.T @ (p - p0) - (zero * (R0.T @ R)[:, 2] if slides else 0.0))
         turn.append(R0.T @ R @ (np.eye(3) if slides else _about_z(-zero)))
         p0, R0 = p, R
+    least, spread = spread_of(np.array([moment for _, _, moment in links]))
     return Chain(
         at=np.array(at),
         turn=np.array(turn),
         slide=np.array([float(_slides(model, j)) for j in joints]),
         mass=np.array([mass for mass, _, _ in links]),
         com=np.array([centre for _, centre, _ in links]),
-        inertia=np.array([moment for _, _, moment in links]),
+        least=least,
+        spread=spread,
         rotor=np.array([float(model.dof_armature[model.jnt_dofadr[j]]) for j in joints]),
         tip=np.zeros(3),
         tip_turn=np.eye(3),

@@ -13,7 +13,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
-from palpate.robots.serial.chain import Chain
+from palpate.robots.serial.chain import Chain, spread_of
 from palpate.robots.serial.inertias import check_inertia
 from palpate.robots.serial.serial_arm import SerialArm
 
@@ -144,13 +144,15 @@ def _built(file: ArmFile) -> SerialArm:
 
 def _chain(file: ArmFile) -> Chain:
     joints = file.joint
+    least, spread = spread_of(np.array([symmetric(j.inertia) for j in joints]))
     return Chain(
         at=np.array([j.at for j in joints], float).reshape(-1, 3),
         turn=np.array([rotation(j.turn) for j in joints]).reshape(-1, 3, 3),
         slide=_column(float(j.kind == "prismatic") for j in joints),
         mass=_column(j.mass for j in joints),
         com=np.array([j.com for j in joints], float).reshape(-1, 3),
-        inertia=np.array([symmetric(j.inertia) for j in joints]).reshape(-1, 3, 3),
+        least=least,
+        spread=spread,
         rotor=_column(j.rotor for j in joints),
         tip=np.array(file.flange, float),
         tip_turn=rotation(file.flange_turn),

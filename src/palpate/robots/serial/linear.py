@@ -34,6 +34,17 @@ def forward(L, b):
 
 
 @law
+def forward_both(L, a, b):
+    """a becomes L^-1 a and b L^-1 b, each L's element read once."""
+    n = len(b)
+    for k in range(n):
+        p, q = a[k], b[k]
+        for i in range(k + 1, n):
+            a[i] -= L[i, k] * p
+            b[i] -= L[i, k] * q
+
+
+@law
 def product(L, a, b):
     """a^T D^-1 b: of A^-1, where both went `forward`."""
     total = 0.0

@@ -6,7 +6,7 @@ There twists, wrenches and inertias of all bodies simply add (Featherstone, 2008
 from typing import NamedTuple
 
 from palpate._jit import law, part
-from palpate._vector import Mat3, Vec3, cos, sin
+from palpate._vector import Mat3, Vec3
 
 UNIT3 = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 
@@ -18,17 +18,16 @@ def cross(a, b):
 
 
 @law
-def turned(R, S):
-    """R S R^T of a symmetric S, symmetric to the last bit."""
-    A = R @ S
-    xy, xz, yz = A.r1 @ R.r2, A.r1 @ R.r3, A.r2 @ R.r3
-    return Mat3(Vec3(A.r1 @ R.r1, xy, xz), Vec3(xy, A.r2 @ R.r2, yz), Vec3(xz, yz, A.r3 @ R.r3))
+def squares(k, a, b):
+    """k 1 + a a^T + b b^T, symmetric to the last bit."""
+    xy, xz, yz = a.x * a.y + b.x * b.y, a.x * a.z + b.x * b.z, a.y * a.z + b.y * b.z
+    xx, yy, zz = a.x * a.x + b.x * b.x, a.y * a.y + b.y * b.y, a.z * a.z + b.z * b.z
+    return Mat3(Vec3(k + xx, xy, xz), Vec3(xy, k + yy, yz), Vec3(xz, yz, k + zz))
 
 
 @law
-def turned_about_z(R, angle):
-    """R Rz(angle)."""
-    c, s = cos(angle), sin(angle)
+def turned_about_z(R, c, s):
+    """R Rz, of the angle's cosine and sine."""
     columns = R.T
     return Mat3(c * columns.r1 + s * columns.r2, c * columns.r2 - s * columns.r1, columns.r3).T
 
