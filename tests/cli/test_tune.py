@@ -12,6 +12,7 @@ from force.test_inner_loop import TRUE
 from force.test_inner_loop import log as loop_log
 from palpate.cli import main
 from palpate.force import Certificate, ForceLoop
+from palpate.force.gains import LAW
 
 CONTRACT = {
     "arm", "kind", "rate_hz", "theta_s", "gains", "approach_speed_m_s", "peak_N", "settling_s", "overshoot",
@@ -221,7 +222,7 @@ def test_a_bad_identification_is_one_line(capsys, elsewhere, text, says):
 def test_bad_words_to_certify(capsys, elsewhere, words, says):
     (elsewhere / "gains.toml").write_text(gains_of("fr3").to_toml())
     text = (elsewhere / "gains.toml").read_text()
-    (elsewhere / "bad.toml").write_text(text.replace("control 3", "control 0"))
+    (elsewhere / "bad.toml").write_text(text.replace(LAW, "another law"))
     assert says in refused(capsys, "certify", *words)
 
 
