@@ -7,9 +7,9 @@ from functools import partial
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3, diagonal
+from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.conditioning import Conditioning
 from palpate.bench.elastic_mode import RIGID, elastic_mode
@@ -123,7 +123,7 @@ def _schedule(e: Experiment) -> ForceSchedule:
     return steps._replace(wave=_wave(e), rate=float(e.run.rate))
 
 
-def _wave(e: Experiment) -> NDArray[np.float64]:
+def _wave(e: Experiment) -> Array:
     """Chirp and multisine, tick by tick: the one as long as it lasts, the other as long as a run may."""
     chirp, multisine, rate = e.force.chirp, e.force.multisine, e.run.rate
     if chirp is None and multisine is None:

@@ -7,9 +7,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import kernel, law
+from palpate.arrays import Array
 from palpate.bench.force_input import ForceInput, ForceInputState
 from palpate.bench.paths import Path, positions
 from palpate.environments import SurfaceState, join
@@ -109,15 +109,13 @@ class GivenMotion:
         noise = np.random.default_rng(seed).standard_normal(ticks + 2)
         rows = np.empty((ticks, 2))
         rests = self._march(x, noise, rows, compiled)
-        t: NDArray[np.float64] = np.arange(float(ticks)) * self.tick
+        t: Array = np.arange(float(ticks)) * self.tick
         at = x[1 : 1 + ticks * self.steps : self.steps].copy()
         read = quantise(at, self.resolution) if self.resolution > 0.0 else at.copy()
         columns = (t, at, read, rows[:, 0].copy(), rows[:, 1].copy())
         return Record(dict(zip(COLUMNS, columns, strict=True)), COLUMNS, {**self._told(rests), "seed": seed})
 
-    def _march(
-        self, x: NDArray[np.float64], noise: NDArray[np.float64], rows: NDArray[np.float64], compiled: bool
-    ) -> list[float]:
+    def _march(self, x: Array, noise: Array, rows: Array, compiled: bool) -> list[float]:
         """Fills the rows, surface by surface; the rest positions of those that were reached [m]."""
         march = compiled_march if compiled else march_path
         rest, rests = self.wall, []
@@ -137,9 +135,7 @@ class GivenMotion:
         starts = [round(since / self.tick) for since, _ in self.surfaces]
         return list(pairwise([*(start for start in starts if start < ticks), ticks]))
 
-    def _start(
-        self, x: NDArray[np.float64], noise: NDArray[np.float64]
-    ) -> tuple[SurfaceState, ForceInputState]:
+    def _start(self, x: Array, noise: Array) -> tuple[SurfaceState, ForceInputState]:
         surface = self.surfaces[0][1]
         now, rate, second = self._motion(x, self.wall)
         state, force = surface.start(), 0.0
@@ -148,9 +144,7 @@ class GivenMotion:
             force = max(surface.force(state, now, rate) + surface.mass * second, 0.0)
         return state, self.line.settled_at(force, noise[-1], noise[-2])
 
-    def _changed(
-        self, i: int, state: SurfaceState, x: NDArray[np.float64], rest: float
-    ) -> tuple[float, SurfaceState]:
+    def _changed(self, i: int, state: SurfaceState, x: Array, rest: float) -> tuple[float, SurfaceState]:
         """Rest position [m] and state of the i-th surface, relaxed, under the force that there is already."""
         old, new = self.surfaces[i - 1][1], self.surfaces[i][1]
         now, rate, second = self._motion(x, rest)
@@ -158,7 +152,7 @@ class GivenMotion:
         depth = rest_for(new, force - new.mass * second, rate)
         return rest + now - depth, SurfaceState(depth, rate, 0.0, 1.0)
 
-    def _motion(self, x: NDArray[np.float64], rest: float) -> tuple[float, float, float]:
+    def _motion(self, x: Array, rest: float) -> tuple[float, float, float]:
         """Penetration, rate and acceleration at the second of these positions."""
         physics = float(self.line.sensor.rate)
         before, now, after = (float(at) - rest for at in x[:3])

@@ -11,10 +11,10 @@ over rows and second differences obey the same rule exactly. The window is the o
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+from palpate.arrays import Array, Mask
+
+Rows = Mask
 
 _WINDOWS = np.geomspace(0.04, 2.0, 9)
 """Lengths that are tried [s]."""

@@ -7,12 +7,10 @@ and a spring that only hardens has one without a flat side.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.contact_frame.free_inertia import CHANCE
 from palpate.contact_frame.vectors import FEWEST
-
-Array = NDArray[np.float64]
 
 _ENOUGH = 4000
 """Rows that are looked at, of a longer log evenly: that is a matter of time, not of what is found."""
@@ -61,7 +59,7 @@ def _misfit(force: Array, regressor: Array) -> float:
     return float(f @ f - (x @ f) ** 2 / max(float(x @ x), 1e-300))
 
 
-def _is_flat(force: Array, position: Array, flat: NDArray[np.bool_]) -> bool:
+def _is_flat(force: Array, position: Array, flat: Mask) -> bool:
     """Whether the force does not follow the position on one side, measured by how it does on the other."""
     if min(flat.sum(), (~flat).sum()) < FEWEST or not (np.ptp(position[flat]) and np.ptp(position[~flat])):
         return False

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.contact_frame.free_level import free_level
 from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.errors import InputError
@@ -12,8 +12,7 @@ from palpate.identification.contacts import contacts_of
 from palpate.identification.sampling import channels_of
 from palpate.records import Record
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+Rows = Mask
 
 _GUARD = 2.0
 """Times the filters' settling: once before the touch is seen, once after it has left the filters."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.contact_frame.declared import ContactFrame, Vector
 from palpate.contact_frame.free_inertia import BLOCKS, free_inertia
 from palpate.contact_frame.payload import Payload
@@ -27,8 +28,6 @@ from palpate.contact_frame.weighing_checks import noise_of, notes_against
 from palpate.errors import InputError
 from palpate.records import Record
 from palpate.results import Result
-
-Array = NDArray[np.float64]
 
 _FEWEST = 3
 """Orientations of three axes each: weight, bias and drift are nine numbers."""
@@ -129,7 +128,7 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
     )
 
 
-def _fit(signals: Signals, there: NDArray[np.bool_], tolerance: float) -> PoseFit:
+def _fit(signals: Signals, there: Mask, tolerance: float) -> PoseFit:
     time = signals.time[there] - signals.time[there].mean()
     turns, force = signals.rotations[there], signals.force[there]
     poses = poses_of(time, turns, force, groups_of(turns))
@@ -222,9 +221,7 @@ def _lacking(poses: Poses, fitted: Fitted, tolerance: float) -> list[str]:
     return [text]
 
 
-def _centre(
-    signals: Signals, there: NDArray[np.bool_], time: Array, poses: Poses, fitted: Fitted
-) -> dict[str, Estimated]:
+def _centre(signals: Signals, there: Mask, time: Array, poses: Poses, fitted: Fitted) -> dict[str, Estimated]:
     """Centre of mass and bias of the torque, if there is one."""
     if (
         signals.torque is None

@@ -18,9 +18,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.units import GRAVITY
-
-Array = NDArray[np.float64]
 
 APART = np.radians(30.0)
 """Orientations nearer than this are one group: what errs alike in them is not counted as many readings [rad]."""

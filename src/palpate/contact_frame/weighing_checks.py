@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.free_inertia import CHANCE, wrong_sign
 from palpate.contact_frame.signals_in_base import Signals, signals_of
@@ -15,8 +16,7 @@ from palpate.contact_frame.weighing import Estimated, Fitted, PoseFit, Poses, gr
 from palpate.identification.saturation import at_limit
 from palpate.records import Record
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+Rows = Mask
 
 _REFINED = 4
 """Of the cube's 24 turns as many are equally near to a turn at worst, where corners of their cells meet."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.excitation.budget import used_up
 from palpate.excitation.prediction import Made, Prediction
 from palpate.excitation.question import Question
 from palpate.references.waves import Chirp
-
-Array = NDArray[np.float64]
 
 _ENDS = 6  # places for each end of the sweep
 _FINE = 64  # frequencies of a sweep that are looked at

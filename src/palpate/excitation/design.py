@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.excitation import chirp, multisine
 from palpate.excitation.prediction import Made, Prediction, Wave
 from palpate.excitation.question import Question
 from palpate.references.waves import Multisine
-
-Array = NDArray[np.float64]
 
 MAKERS = {"multisine": multisine.make, "chirp": chirp.make}
 """By the kind of excitation: from a question and a duration to the best one."""

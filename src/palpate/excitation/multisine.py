@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.excitation.budget import used_up
 from palpate.excitation.phases import low_peak, summed
@@ -16,7 +17,6 @@ from palpate.excitation.question import Question
 from palpate.excitation.spectra import optimal
 from palpate.references.waves import Multisine
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Harmonics = NDArray[np.intp]
 

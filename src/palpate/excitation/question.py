@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.excitation.budget import Budget
 from palpate.excitation.force_loops import ForceLoop, HybridLoop, contact_force
@@ -17,7 +18,6 @@ from palpate.excitation.sensors import Sensors
 from palpate.excitation.spectra import CRITERIA, covariance
 from palpate.excitation.surfaces import SurfaceRange
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 KINDS = ("multisine", "chirp")

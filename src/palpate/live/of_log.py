@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification import Identification, Parameter
 from palpate.live.replay import Replay, Signals
 from palpate.live.view import Happened, View
@@ -12,8 +12,6 @@ from palpate.records import Record
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED, formatted
 from palpate.text import shown
-
-Array = NDArray[np.float64]
 
 _MOST_MARKS = 200
 

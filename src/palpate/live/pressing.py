@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.ending import DIVERGED
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.environments.kelvin_voigt import KelvinVoigt
@@ -37,8 +37,6 @@ from palpate.press.pressing import JOINT_LIMIT
 from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.text import shown
-
-Array = NDArray[np.float64]
 
 FORCE, STIFFNESS, DAMPING = 20.0, 5000.0, 50.0
 """Where the sliders stand at first [N, N/m, N s/m]."""

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
 from palpate.bench.ending import StopCondition
@@ -34,8 +34,6 @@ from palpate.live.view import (
     planar_bones,
 )
 from palpate.text import shown
-
-Array = NDArray[np.float64]
 
 _FROM = {name: i for i, name in enumerate(ROW)}
 _TAKEN = {

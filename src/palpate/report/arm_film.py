@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.sequence import CONTACT
 from palpate.press.setting import Place
 from palpate.records import Record
 from palpate.report.look.tokens import DATA, PAIRS
 from palpate.robots.serial.serial_arm import SerialArm
-
-Array = NDArray[np.float64]
 
 FRAMES = 96
 _BEFORE = 0.4

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Record
 from palpate.report import style
@@ -15,7 +16,6 @@ from palpate.text import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 HEAD = ("column", "unit", "least", "mean", "largest", "missing")
 _TIMES = ("time", "t")
@@ -55,7 +55,7 @@ def rows(record: Record) -> list[tuple[str, ...]]:
     ]
 
 
-def _numbers(column: NDArray[np.float64]) -> tuple[str, ...]:
+def _numbers(column: Array) -> tuple[str, ...]:
     finite = column[np.isfinite(column)]
     figures = (finite.min(), finite.mean(), finite.max()) if len(finite) else ()
     told = [f"{float(number):.5g}" for number in figures] or ["-"] * 3
@@ -88,7 +88,7 @@ def draw(record: Record) -> Figure:
     return figure
 
 
-def _thinned(time: NDArray[np.float64], column: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+def _thinned(time: Array, column: Array) -> tuple[Array, ...]:
     """A line of as many points as can be told apart: of each stretch the least and the largest value."""
     size = 2 * len(column) // _POINTS
     if size < 2:

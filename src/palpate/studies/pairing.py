@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench.ending import DONE
 from palpate.bench.metrics import metric_of
 from palpate.studies.parameters import Label
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from polars import DataFrame
 
 LEVEL = 0.95
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class Entrant:
     name: str
     at: dict[str, Label]
     values: Array
-    failed: NDArray[np.bool_]
+    failed: Mask
 
 
 @dataclass(frozen=True)
@@ -184,7 +183,7 @@ def _comparison(
 
 def _values(
     rows: DataFrame, metric: str, conditions: Sequence[str], places: Sequence[tuple[Any, ...]]
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Array, Mask]:
     """A setting's metric on each surface, and where it has none."""
     import polars
 

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.limits import Budget
 from palpate.logs.tables.clock import seconds_of_text
-from palpate.logs.tables.columns import Array, Stated, finite_words, is_finite, place_of
+from palpate.logs.tables.columns import Stated, finite_words, is_finite, place_of
 from palpate.logs.tables.layout import Layout, find_layout
 from palpate.logs.tables.lines import COMMENTS, NO_READING, Parting, first_lines, lines_of
 from palpate.logs.tables.preamble import read_preamble

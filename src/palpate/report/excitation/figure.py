@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.excitation import Design
 from palpate.references.waves import Multisine
 from palpate.report import style
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLORS = {"K": style.K, "B": style.B, "M": style.M}
-Array = NDArray[np.float64]
 
 _SHOWN = 4.0  # s of the desired force; more would be a block of ink
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.excitation import Design, Remedy
 from palpate.files import write_text
 from palpate.report import style
@@ -22,8 +22,6 @@ from palpate.report.look.columns import packed, thinned
 from palpate.report.numbers import plain, quantity
 from palpate.report.page import embedded, render
 from palpate.report.svg import svg
-
-Array = NDArray[np.float64]
 
 _ROWS = 6000
 """Of the desired force that lie in the page, its peaks among them."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.report import style
 from palpate.report.identification.spectra import stretches
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from palpate.identification.result import Identification, Traces
 
-Array = NDArray[np.float64]
 
 _BINS = 1200
 """Of time: more than a page has columns for; each keeps its least and its largest value."""

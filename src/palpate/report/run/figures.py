@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
@@ -148,7 +148,7 @@ def _identification(record: Record) -> Figure:
     return figure
 
 
-def _limits(axis: Axes, record: Record, name: str, shown: NDArray[np.bool_]) -> None:
+def _limits(axis: Axes, record: Record, name: str, shown: Mask) -> None:
     """Shows where the estimates come to rest, and the truth, not where they come from."""
     half = np.nonzero(shown)[0][-max(1, int(0.75 * shown.sum())) :]
     seen = [record[f"{name}_{front}"][half] for front in (*FRONT_ENDS, "matched")]
@@ -175,7 +175,7 @@ def _torque(record: Record) -> Figure:
     return figure
 
 
-def _around_contact(record: Record, before: float = BEFORE) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _around_contact(record: Record, before: float = BEFORE) -> tuple[Array, Mask]:
     """Time since contact [s] where it is shown, and which rows those are."""
     t = record["t"]
     start = t[np.argmax(record["phase"] == CONTACT)]
@@ -192,7 +192,7 @@ def _shade(axis: Axes, record: Record) -> None:
         axis.fill_between(record["t"], 0, 1, color=colour, alpha=0.09, **ends)
 
 
-def _mark(axis: Axes, t: NDArray[np.float64], flags: NDArray[np.float64], label: str) -> None:
+def _mark(axis: Axes, t: Array, flags: Array, label: str) -> None:
     """Ticks at the lower edge where a flag is up."""
     up = flags > 0.0
     if up.any():

@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.identification.result import Identification
 from palpate.records import Record
@@ -30,7 +30,6 @@ from palpate.text import shown
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-Array = NDArray[np.float64]
 
 ROWS = 4000
 """Of the record that lie in the page, the peaks of the measured force among them."""
@@ -290,6 +289,6 @@ def _marks(t: Array, phase: Array) -> list[dict[str, Any]]:
     return found
 
 
-def _stretches(t: Array, inside: NDArray[np.bool_]) -> list[list[float]]:
+def _stretches(t: Array, inside: Mask) -> list[list[float]]:
     edges = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
     return [[float(t[a]), float(t[b - 1])] for a, b in zip(edges[::2], edges[1::2], strict=True)][:40]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Mask
 from palpate.bench.ending import DONE
 from palpate.bench.metrics import Metric, metric_of
 from palpate.report.study.axes import Scale
@@ -46,9 +47,7 @@ def map_of(table: Rows, asked: Map, number: int) -> Drawn:
     return Drawn(f"map{number}", caption, metric, made, heat_figure)
 
 
-def cells(
-    rows: DataFrame, asked: Map, metric: Metric, x: Scale, y: Scale
-) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+def cells(rows: DataFrame, asked: Map, metric: Metric, x: Scale, y: Scale) -> tuple[NDArray[Any], Mask]:
     """The value of each cell, and whether most of its runs did not come to their end."""
     grouped = rows.group_by([asked.x, asked.y]).agg(asked.metric, "result")
     by_place = {(one[asked.x], one[asked.y]): one for one in grouped.rows(named=True)}

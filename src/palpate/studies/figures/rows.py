@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.metrics import Metric
 from palpate.errors import unknown
 from palpate.report.study.axes import Scale
@@ -111,7 +111,7 @@ def logarithmic(axis: Axis) -> bool:
     return _unevenness(np.log(np.sort(scale.places))) < _unevenness(np.sort(scale.places))
 
 
-def _unevenness(values: NDArray[np.float64]) -> float:
+def _unevenness(values: Array) -> float:
     """How much the steps differ, as a share of their mean."""
     steps = np.diff(values)
     return float(np.std(steps) / np.mean(steps))

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed
 from palpate.thesis.claims import Claim, decided
 from palpate.thesis.conditions import RELAXING_FOAM, moved, rougher
 from palpate.thesis.explanations.e2_integrator import PI
 from palpate.thesis.force_control.divergence_panels import (
     DURATION,
-    Array,
     Course,
     Loss,
     causes_panel,

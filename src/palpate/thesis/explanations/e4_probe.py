@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.thesis.claims import Claim, decided, often, spread
-from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.neural_identifier import ablation as causes
 from palpate.thesis.neural_identifier import network, panels
 from palpate.thesis.neural_identifier.ablation import PARAMETERS, STRAIGHT, Data, Surface

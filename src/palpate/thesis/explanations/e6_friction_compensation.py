@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
@@ -60,8 +59,6 @@ PRINTED_BLEND = 0.002
 BLENDS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2)
 HALF, SHAKES = 0.5, 5.0
 """Largest share of the error that is left where compensation works; least ratio of shaking that is called a hammer."""
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

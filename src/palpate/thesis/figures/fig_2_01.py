@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Vec3
+from palpate.arrays import Array, Mask
 from palpate.bench import changed, load
 from palpate.bench.metrics.summary import losses
 from palpate.controllers import RaibertCraig
@@ -53,8 +53,6 @@ GROWS = 1.0
 """Growth that counts as unstable [1/s]."""
 XS, YS = np.linspace(0.10, 0.53, 65), np.linspace(-0.35, 0.35, 51)
 LAWS = ("without dynamics", "with dynamics")
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -254,7 +252,7 @@ def _changes() -> dict[str, Mapping[str, Any]]:
     }
 
 
-def _growth(gain: float, where: NDArray[np.bool_]) -> Array:
+def _growth(gain: float, where: Mask) -> Array:
     """Of the original's position loop, its stiffness times `gain`, over YS and XS [1/s]; NaN elsewhere."""
     arm: Any = Arm3()
     into = Vec3(1.0, 0.0, 0.0)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Vec3
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.summary import losses
 from palpate.bench.tick import Loop, LoopState
@@ -53,8 +53,6 @@ FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
 TOLERANCES = {"K": 0.10, "B": 0.25, "M": 0.25}
 TARGET = {"K": 2000.0, "B": 600.0, "M": 5.0}
 """In x; the same numbers as in PARAMETERS [N/m, N s/m, kg]."""
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.metrics.following import LIMIT, SHARE
 from palpate.bench.metrics.window import SETTLE, rms
 from palpate.bench.one_joint import JOINT_FRICTION, one_joint
@@ -77,8 +77,6 @@ FOLLOWS = (
     f"most {LIMIT:g} N outside the first {SETTLE:g} s after each step, mean error in the last second of each "
     f"interval at most {SHARE:.0%}"
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.following import LIMIT
 from palpate.environments import KelvinVoigt
@@ -62,7 +62,6 @@ FIXED = {"controller.learning_rate": 1e-12}
 BETTER = 0.9
 """Largest share of the untaught loop's error that counts as better."""
 
-Array = NDArray[np.float64]
 Case = tuple[Experiment, int]
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.summary import losses
 from palpate.records import Record
@@ -53,7 +53,6 @@ KFS, KIS = np.linspace(0.1, 2.0, 15), np.linspace(0.0, 0.006, 11)
 SURFACES = {"foam": (200.0, 5.2e3), "rubber": (480.0, 34.5e3)}
 """As chosen for the bench: damping [N s/m], stiffness [N/m]."""
 
-Array = NDArray[np.float64]
 Case = tuple[float, float]
 
 

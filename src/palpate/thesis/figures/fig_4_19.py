@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
@@ -58,7 +58,6 @@ HALF = 0.5
 """Largest share of what the coupled law lets through."""
 
 LAWS = ("(4.13), coupled", "(4.19) corrected", "(4.19) as printed")
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import changed
 from palpate.bench.metrics.following import LIMIT
 from palpate.bench.metrics.window import SETTLE, rms
@@ -56,7 +56,7 @@ OTHERS: Mapping[str, Mapping[str, Any]] = {
 class Course:
     """The error of each cycle outside the steps [N], up to the first loss of contact."""
 
-    error: NDArray[np.float64]  # (cycles,)
+    error: Array  # (cycles,)
     lost: float | None  # when [s]
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import changed, load
 from palpate.bench.metrics.following import SHARE
 from palpate.bench.sequence import CONTACT, LOST
@@ -22,7 +22,6 @@ from palpate.thesis.force_control.tracking import since_contact
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 LOSS = changed(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
 GONE, BACK, FOUND = 2.5, 0.005, 10.0

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics import Look
 from palpate.bench.metrics.following import LIMIT, SHARE, interval_error
@@ -25,7 +25,6 @@ FOLLOWING = (
     f"{100 * SHARE:.0f} % of the desired force"
 )
 FOLLOWS = f"in 9 of 10 runs: {FOLLOWING}"
-Array = NDArray[np.float64]
 SINE = {"force.amplitude": 4.0, "force.frequency": 0.5, "force.restart": 5.0}
 """4 sin(pi t), its clock started anew every 5 s as the listing does; that turns the sine's sign each time."""
 FOAM = changed(load("foam-neural"), SHORT)

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import sources_stamp
+from palpate.arrays import Array
 from palpate.studies.local import unordered
 from palpate.thesis.inference import archive, sampler
 from palpate.thesis.inference.archive import Archive, Head, Tried
@@ -27,7 +27,6 @@ from palpate.thesis.laboratory.unknowns import UNKNOWNS
 if TYPE_CHECKING:
     from palpate.studies.cluster import Cluster
 
-Array = NDArray[np.float64]
 Progress = Callable[[float, int, int], None]
 MOST_WRONG = 0.5
 """At most so probable is it that a sentence does not hold in the very laboratory it was written in: beyond, it would

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.records import Record
 from palpate.report import style
-from palpate.thesis.least_squares.press_runs import Array, between
+from palpate.thesis.least_squares.press_runs import between
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,12 +8,12 @@ from itertools import product
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.identifiers.neural_probe import NeuralProbe
 from palpate.identifiers.neural_settings import SETTINGS
 from palpate.records import Record
 from palpate.thesis.least_squares import press_runs
-from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.runs import Runs
 
 PRESS = 4.0
