@@ -10,13 +10,14 @@ import numpy as np
 
 from palpate._jit import kernel, law
 from palpate.arrays import Array
+from palpate.bench.experiments.tables import ForceSensor
 from palpate.bench.force_input import ForceInput, ForceInputState
+from palpate.bench.force_reading import force_input
 from palpate.bench.paths import Path, positions
 from palpate.environments import SurfaceState, join
 from palpate.environments.surface import members
 from palpate.environments.surface_state import follow
 from palpate.errors import InputError
-from palpate.instruments import Converter, analog_filter_190, force_sensor
 from palpate.records import Record
 from palpate.signals.quantise import quantise
 
@@ -27,6 +28,7 @@ COLUMNS = {
     "force": "N",  # true, at t; an impact's impulse has no value at an instant and is in the sampled force only
     "force_sampled": "N",
 }
+SENSOR = ForceSensor()
 RIGID = 1e12
 """Effective mass of a tip that nothing turns from its path [kg]."""
 SHALLOW = 1e-6
@@ -168,19 +170,12 @@ class GivenMotion:
         return {"truth": told[-1]["truth"], "surfaces": told, "instruments": instruments}
 
 
-# More than seven arguments: each is an instrument or a surface of its own, and has a default.
 def given_motion(
     surface: Any | list[tuple[float, Any]],
     *,
     wall: float = 0.0,
     resolution: float = 5e-6,
-    noise: float = 0.6,
-    phase: float = 0.0,
-    cutoff: float = 120.0,
-    sampling: int = 480,
-    bits: int = 12,
-    full_scale: float = 200.0,
-    analog_filter: bool = False,
+    sensor: ForceSensor = SENSOR,
     rate: int = 1000,
     steps: int = 20,
 ) -> GivenMotion:
@@ -192,13 +187,7 @@ def given_motion(
             pressed has the rest length that leaves the force as it is.
         wall: where the first surface is undeformed [m].
         resolution: of the encoder, in the tip's position [m]; 0: none.
-        noise: standard deviation of a force sample [N].
-        phase: when the force sensor's clock ticks first [s].
-        cutoff: of the force sensor's low-pass [Hz].
-        sampling: of the force sensor [Hz].
-        bits: of the force sensor's converter.
-        full_scale: of the force sensor [N].
-        analog_filter: whether the 190 Hz filter of fig. 3.6 stands between sensor and reading.
+        sensor: of the force, as an experiment's `[force_sensor]` has it; the thesis' own if not given.
         rate: rows a second.
         steps: of the physics between them.
 
@@ -208,11 +197,7 @@ def given_motion(
     for name, value, least in (("rate", rate, 1), ("steps", steps, 1), ("resolution", resolution, 0.0)):
         if not value >= least:
             raise InputError(f"{name} must be at least {least}, got {value}")
-    physics = rate * steps
-    sensor = force_sensor(cutoff, sampling, bits, full_scale, noise, physics, phase)
-    line = ForceInput(
-        sensor, analog_filter_190(float(physics)), 1.0 if analog_filter else 0.0, Converter(16, full_scale)
-    )
+    line = force_input(sensor, rate * steps, sensor.full_scale)
     return GivenMotion(_in_turn(surface), float(wall), line, float(resolution), int(steps))
 
 

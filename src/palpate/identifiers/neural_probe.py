@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from palpate._jit import kernel, law
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.identifiers.neural_settings import SETTINGS
+from palpate.identifiers.neural_settings import SETTINGS, Setting
 from palpate.networks import Network, layers_of, network, random_layers
 from palpate.networks.backpropagation import backward, descend, forward
 from palpate.signals.types import Estimate
@@ -47,8 +47,8 @@ class NeuralProbe:
     network's answer depends on the weights it starts from, and carries no interval.
 
     Args:
-        scale: of displacement, velocity and acceleration before the network sees them, shape (3,).
-        values: displacement [m], velocity [m/s] and acceleration [m/s^2] that it is asked at, shape (3,).
+        setting: scales of displacement, velocity and acceleration before the network sees them, and the values that
+            it is asked at [m, m/s, m/s^2]; the thesis' are in `SETTINGS`.
         amplitude: the largest force that it can say [N]. The thesis does not give it; it must exceed the force.
         learning_rate: eta, above 0.
         layers: neurons of each hidden layer.
@@ -60,11 +60,9 @@ class NeuralProbe:
         InputError: numbers out of range.
     """
 
-    # More than seven arguments: the settings of the thesis' network, most with a default.
     def __init__(
         self,
-        scale: ArrayLike,
-        values: ArrayLike,
+        setting: Setting,
         amplitude: float = 40.0,
         learning_rate: float = 1e-4,
         layers: Sequence[int] = (4,),
@@ -77,8 +75,8 @@ class NeuralProbe:
         for layer in start:
             layer[:, 0] *= self._thresholds
         self._net: Network = network(start, amplitude, learning_rate)
-        self.scale = _three(scale, "scale")
-        self.values = _probe_values(_three(values, "values"))
+        self.scale = _three(setting.scale, "scale")
+        self.values = _probe_values(_three(setting.values, "values"))
         self.samples = 0
         self._memory = self._net.start()
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -98,8 +96,7 @@ class NeuralProbe:
         """The 3-4-1 network with the scales and the probe of the thesis for "foam" or "rubber"."""
         if surface not in SETTINGS:
             raise unknown("surface", surface, SETTINGS)
-        s = SETTINGS[surface]
-        return cls(s.scale, s.values, amplitude, learning_rate, (4,), seed, weights, thresholds)
+        return cls(SETTINGS[surface], amplitude, learning_rate, (4,), seed, weights, thresholds)
 
     def update(self, regressor: ArrayLike, force: float) -> None:
         """Takes one sample in: displacement, velocity and acceleration, shape (3,), and the force [N].

@@ -108,15 +108,10 @@ class Choice:
 
     def probe(self, surface: str, start: int) -> NeuralProbe:
         """The 3-4-1 network before it has learned anything."""
-        scale, values = SETTINGS[surface]
+        setting = SETTINGS[surface] if self.scale is None else SETTINGS[surface]._replace(scale=self.scale)
+        weights, thresholds = self.weights, self.thresholds
         return NeuralProbe(
-            self.scale or scale,
-            values,
-            self.amplitude,
-            self.rate,
-            seed=start,
-            weights=self.weights,
-            thresholds=self.thresholds,
+            setting, self.amplitude, self.rate, seed=start, weights=weights, thresholds=thresholds
         )
 
 
