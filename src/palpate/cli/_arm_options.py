@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._flags import FLAG, SIGNED
 from palpate.cli._values import span, vector, with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.contact_frame import Arm, ContactFrame, Payload
-
-_SIGNED = Parameter(allow_leading_hyphen=True)
 
 
 @Parameter(name="*", group=Group("Wrench and pose, and the sign of the force", sort_key=2))
@@ -44,12 +43,12 @@ class FrameOptions:
     """
 
     wrench_frame: Literal["base", "tool", "sensor"] | None = None
-    sensor_rpy: Annotated[str | None, _SIGNED] = None
-    tcp: Annotated[str | None, _SIGNED] = None
-    wrench_at: Annotated[str | None, _SIGNED] = None
-    force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, _SIGNED] = None
-    normal: Annotated[str | None, _SIGNED] = None
-    gravity_compensated: Annotated[bool, Parameter(negative=())] = False
+    sensor_rpy: Annotated[str | None, SIGNED] = None
+    tcp: Annotated[str | None, SIGNED] = None
+    wrench_at: Annotated[str | None, SIGNED] = None
+    force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, SIGNED] = None
+    normal: Annotated[str | None, SIGNED] = None
+    gravity_compensated: Annotated[bool, FLAG] = False
     free: str | None = None
 
     @property

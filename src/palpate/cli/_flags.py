@@ -1,13 +1,8 @@
-"""Flags that several commands have: how they are read, and where their results may go."""
+"""Kinds of flags that several commands have, and numbers with their units."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from cyclopts import Parameter
-
-from palpate.errors import InputError
-from palpate.files import check_place
 
 FLAG = Parameter(negative=())
 """A switch without a `--no-` of its own."""
@@ -29,16 +24,3 @@ def in_si(option: str, text: str, kind: str) -> float:
 def in_si_if_given(option: str, text: str | None, kind: str) -> float | None:
     """The same of an option that may be left out."""
     return None if text is None else in_si(option, text, kind)
-
-
-def check_new(path: Path | None, option: str, *, replace: bool, ending: str = "") -> None:
-    """Refuse a place before any work is done; a file that stands there too, unless it is to be replaced.
-
-    Raises:
-        InputError: in one line.
-    """
-    if path is None:
-        return
-    check_place(path, option, ending=ending)
-    if path.exists() and not replace:
-        raise InputError(f"{path} exists; choose another place, or add --replace")

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._flags import FLAG, SIGNED, check_new, in_si, in_si_if_given
+from palpate.cli._flags import SIGNED, in_si, in_si_if_given
 from palpate.cli._log_options import LogOptions
+from palpate.cli._written import WRITTEN, FileOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -131,28 +132,18 @@ class ColumnOptions:
         return LogOptions(time=self.time, rate=self.rate, position=self.position, force=self.log_force)
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=6))
+@Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
+class OutputOptions(FileOptions):
     """Where results go.
 
     Parameters
     ----------
     out
         Where to write the gains (a TOML file) or the certificate (a JSON file).
-    replace
-        Replace what stands there.
-    json
-        Print one JSON object and nothing else.
     """
 
     out: Path | None = None
-    replace: Annotated[bool, FLAG] = False
-    json: Annotated[bool, FLAG] = False
-
-    def check(self, ending: str) -> None:
-        """Finds the place wrong before any work is done."""
-        check_new(self.out, "--out", replace=self.replace, ending=ending)
 
 
 def one_thread() -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._flags import SIGNED
 from palpate.cli._values import with_std
 from palpate.errors import InputError
 from palpate.units import unit
@@ -35,7 +36,7 @@ class IndenterOptions:
     """
 
     indenter: str | None = None
-    poisson: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None
+    poisson: Annotated[str | None, SIGNED] = None
 
     def check(self) -> None:
         """Refuse what is wrong before any work is done."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
+from palpate.cli._flags import SIGNED
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class LogOptions:
     wrench: str | None = None
     pose: str | None = None
     rotation: Rotation = "quaternion"
-    start: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None
+    start: Annotated[float | None, SIGNED] = None
     end: float | None = None
     missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = ()
     delimiter: str | None = None

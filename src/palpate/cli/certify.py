@@ -113,7 +113,7 @@ def certify(
         return _checked(check, gains, output.json)
     if gains is None:
         raise InputError("certify what? Give the gains that palpate tune wrote, or --check CERTIFICATE")
-    output.check(".json")
+    output.check_new(output.out, ending=".json")
     proof.check()
     return _made(gains, proof, columns or ColumnOptions(), output)
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG, SIGNED, check_new, in_si, in_si_if_given
+from palpate.cli._flags import FLAG, SIGNED, in_si, in_si_if_given
 from palpate.cli._terminal import console, place
+from palpate.cli._written import WRITTEN, FileOptions, PictureOptions
 from palpate.errors import InputError
-from palpate.files import check_place
 from palpate.text import shown
 
 if TYPE_CHECKING:
@@ -221,9 +221,9 @@ class LoopOptions:
         return KnownBandwidth(in_si("--loop-bandwidth", self.loop_bandwidth, "frequency"))
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=6))
+@Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
+class OutputOptions(PictureOptions, FileOptions):
     """Where results go.
 
     Parameters
@@ -236,21 +236,22 @@ class OutputOptions:
         Replace what stands at --out and --experiment.
     figure
         Where to write the figure, a PNG; excite.png in the current folder if not given.
-    no_figure
-        Write no figure.
-    report
-        Where to write a page that opens without a network, HTML.
-    json
-        Print one JSON object and nothing else; a figure is written only if --figure is given.
     """
 
     out: Path | None = None
     experiment: Path | None = None
     replace: Annotated[bool, FLAG] = False
     figure: Path | None = None
-    no_figure: Annotated[bool, FLAG] = False
-    report: Path | None = None
-    json: Annotated[bool, FLAG] = False
+
+    def check_all(self) -> None:
+        """Finds every place wrong before any work is done."""
+        from palpate.report.excitation.files import check_ending
+
+        if self.out is not None:
+            check_ending(self.out)
+        self.check_new(self.out)
+        self.check_new(self.experiment, "--experiment", ".toml")
+        self.page()
 
 
 def excite(
@@ -275,8 +276,8 @@ def excite(
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
     robot, output = robot or LoopOptions(), output or OutputOptions()
-    picture = _picture(output)
-    _check_places(output)
+    picture = output.picture("excite.png")
+    output.check_all()
     surfaces = surface.range()
     question = Question(
         surfaces,
@@ -291,26 +292,6 @@ def excite(
         in_si("--settle", goal.settle, "time"),
     )
     return _answer(question, sensor.rate, output, picture)
-
-
-def _picture(output: OutputOptions) -> Path | None:
-    """Where the figure goes; found wrong before any work is done."""
-    if output.no_figure or (output.figure is None and output.json):
-        return None
-    path = output.figure or Path("excite.png")
-    check_place(path, "--figure", ending=".png")
-    return path
-
-
-def _check_places(output: OutputOptions) -> None:
-    from palpate.report.excitation.files import check_ending
-
-    if output.out is not None:
-        check_ending(output.out)
-    check_new(output.out, "--out", replace=output.replace)
-    check_new(output.experiment, "--experiment", replace=output.replace, ending=".toml")
-    if output.report is not None:
-        check_place(output.report, "--report", ending=".html")
 
 
 def _answer(question: Question, rate: int, output: OutputOptions, picture: Path | None) -> int:

@@ -10,15 +10,15 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
 from palpate.cli._arm_options import ArmOptions, FrameOptions
-from palpate.cli._flags import FLAG, SIGNED
+from palpate.cli._flags import SIGNED
 from palpate.cli._indenter_options import IndenterOptions
 from palpate.cli._log_options import LogOptions
 from palpate.cli._one_log import OneLog, answered
 from palpate.cli._options_file import CellOptions
 from palpate.cli._terminal import console, place
 from palpate.cli._values import with_std
+from palpate.cli._written import WRITTEN, PictureOptions
 from palpate.errors import InputError
-from palpate.files import check_place
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
@@ -81,9 +81,9 @@ class ModelOptions:
         return known | {name: getattr(self, name) for name in names}
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=6))
+@Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
+class OutputOptions(PictureOptions):
     """Where results go.
 
     Parameters
@@ -93,37 +93,17 @@ class OutputOptions:
         (of many logs, pooled.identify.png).
     dpi
         Of a PNG; 110 if not given.
-    no_figure
-        Write no figure.
-    report
-        Where to write a page with everything, an HTML file.
-    json
-        Print one JSON object and nothing else; a figure is written only if --figure is given.
     """
 
     figure: Path | None = None
     dpi: int | None = None
-    no_figure: Annotated[bool, FLAG] = False
-    report: Path | None = None
-    json: Annotated[bool, FLAG] = False
 
     def png(self, name: str) -> Path | None:
         """Where the figure goes; found wrong before any work is done."""
-        if self.no_figure or (self.figure is None and self.json):
-            return None
         from palpate.report.style import FORMATS, check_dpi
 
         check_dpi(self.dpi)
-        path = self.figure or Path(f"{name}.identify.png")
-        ending = path.suffix.lower()
-        check_place(path, "--figure", ending=ending if ending in FORMATS else ".png")
-        return path
-
-    def page(self) -> Path | None:
-        """Where the page goes; likewise."""
-        if self.report is not None:
-            check_place(self.report, "--report", ending=".html")
-        return self.report
+        return self.picture(f"{name}.identify.png", FORMATS)
 
 
 def identify(

@@ -13,13 +13,10 @@ from cyclopts import Group, Parameter, validators
 from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG
 from palpate.cli._named import FolderOptions
+from palpate.cli._progress import counted
 from palpate.cli._terminal import console, place, say, show_table
-from palpate.cli.study import Lines
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from palpate.thesis.inference.kept import Progress as Told
     from palpate.thesis.inference.result import Result
     from palpate.thesis.inference.search import Runner
 
@@ -111,7 +108,7 @@ def laboratory(
     command, out, threads = search.command, output.out, who.cores or all_cores()
     settings = Settings(search.particles + search.particles % 2, moves=search.moves, seed=search.seed)
     try:
-        with _runner(who.scheduler, threads) as runner, _progress(console(stderr=True)) as told:
+        with _runner(who.scheduler, threads) as runner, counted(console(stderr=True)) as told:
             inference = Inference(out, settings, runner, command, threads, search.half, told)
             result = inference.run(force=output.force)
     except KeyboardInterrupt:
@@ -135,28 +132,6 @@ def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
         yield Workers(cluster)
     finally:
         cluster.close()
-
-
-@contextmanager
-def _progress(screen: Console) -> Iterator[Told]:
-    """A bar for each part of the work, with the time left in it; without a terminal a line now and then."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    watched = screen.is_terminal
-    with Progress(*columns, console=screen, transient=True, disable=not watched) as progress:
-        bar = progress.add_task("compiling", total=None)
-        parts: dict[str, Lines] = {}
-
-        def told(what: str, done: int, of: int) -> None:
-            if what not in parts:
-                parts[what] = Lines(screen, of, f"in {what}")
-                progress.reset(bar, total=of, description=what)
-            progress.update(bar, completed=done)
-            if not watched:
-                parts[what].show(done)
-
-        yield told
 
 
 def _tell(result: Result, folder: Path, found: Mapping[str, Any] | None) -> None:

@@ -14,6 +14,7 @@ from palpate.cli._arm_options import ArmOptions, FrameOptions
 from palpate.cli._flags import FLAG, SIGNED
 from palpate.cli._indenter_options import IndenterOptions
 from palpate.cli._log_options import LogOptions
+from palpate.cli._progress import COMPILING
 from palpate.cli._terminal import print_lines, say
 from palpate.cli.identify import ModelOptions
 from palpate.cli.run import whole_number
@@ -137,7 +138,6 @@ def live(
 
 def _simulation(name: str, seed: int, whole: bool) -> Source:
     from palpate.bench.experiments.tables import load
-    from palpate.cli._waiting import COMPILING
     from palpate.live.simulation import Simulation
 
     experiment = load(name)
@@ -148,7 +148,6 @@ def _simulation(name: str, seed: int, whole: bool) -> Source:
 
 
 def _pressing(name: str, seed: int) -> Source:
-    from palpate.cli._waiting import COMPILING
     from palpate.live.pressing import PressingArm
 
     return PressingArm(name, seed, waiting=lambda: say(COMPILING))

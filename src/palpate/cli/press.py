@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from palpate.cli import _progress
 from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
@@ -17,8 +17,6 @@ from palpate.files import fresh_folder, signed, write_json
 from palpate.text import shown
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from palpate.press.prepare import Pressing
     from palpate.records import Record
 
@@ -84,29 +82,14 @@ def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> in
     question, folder = simulated.question(asked), simulated.folder
     with noticed() as interrupted, fresh_folder(folder, force=simulated.replace) as fresh:
         pressing = prepared(question)
-        record = _record(console(stderr=json), pressing, interrupted)
+        start = "starting (the first time it compiles, which takes some seconds)"
+        with _progress.simulated(console(stderr=json), interrupted, start) as show:
+            record = pressing.run(show)
         summary = _written(record, pressing, fresh)
     _tell(pressing, summary, folder, json)
     if interrupted() or summary["end"] == INTERRUPTED:
         return 130
     return 0 if summary["end"] == DONE else 1
-
-
-def _record(screen: Console, pressing: Pressing, interrupted: Callable[[], bool]) -> Record:
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as progress:
-        bar = progress.add_task(
-            "starting (the first time it compiles, which takes some seconds)", total=None, time=""
-        )
-
-        def show(time: float, phase: str) -> None:
-            if interrupted():
-                raise KeyboardInterrupt  # here the press ends, and keeps what there is of it
-            progress.update(bar, description=f"{phase:12}", time=f"{time:6.1f} s simulated")
-
-        return pressing.run(show)
 
 
 def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:

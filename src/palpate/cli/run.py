@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,7 @@ from palpate.cli._figures import DRAWN, FigureOptions
 from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
 from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
+from palpate.cli._progress import COMPILING, simulated
 from palpate.cli._terminal import STYLE, console, head, place, show_table
 from palpate.errors import InputError
 from palpate.files import fresh_folder, signed, write_json, write_text
@@ -189,31 +191,16 @@ def _identified(record: Path) -> tuple[Identification | None, str]:
 def _record(
     screen: Console, name: str, experiment: Any, seed: int, interrupted: Callable[[], bool]
 ) -> Record:
-    from rich.progress import BarColumn, Progress, TextColumn
-
     from palpate.bench.any_experiment import build_any
     from palpate.bench.part_check import check_parts
-    from palpate.cli._waiting import COMPILING
 
     try:
         bench = build_any(experiment)
         check_parts(bench, lambda: screen.print(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
-    # Without a terminal there is nobody to watch it, and it would leave an empty line.
-    watched = screen.is_terminal
-    with Progress(*columns, console=screen, transient=True, disable=not watched) as progress:
-        bar = progress.add_task("starting", total=None, time="")
-
-        def waiting() -> None:
-            progress.console.print(COMPILING)
-
-        def show(time: float, phase: str) -> None:
-            if interrupted():
-                raise KeyboardInterrupt  # here the bench ends the run, and keeps what there is of it
-            progress.update(bar, description=f"{phase:9}", time=f"{time:6.1f} s simulated")
-
+    waiting = partial(screen.print, COMPILING)
+    with simulated(screen, interrupted) as show:
         return bench.run(
             experiment.run.duration, seed, press=experiment.run.press, progress=show, waiting=waiting
         )

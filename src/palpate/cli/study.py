@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from cyclopts import Group, Parameter
 from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG
 from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
+from palpate.cli._progress import COMPILING, counted
 from palpate.cli._terminal import STYLE, console, head, place, say, show_table
 from palpate.errors import InputError
 from palpate.text import shown
@@ -112,7 +112,6 @@ def study(
 
 def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
-    from palpate.cli._waiting import COMPILING
     from palpate.studies.part_check import check_parts_of
     from palpate.studies.plan import plan
     from palpate.studies.run_study import Work, begun
@@ -127,14 +126,15 @@ def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
     if not yes and (force or not begun(folder)):
         _ask(planned, screen, here=where.scheduler is None)
-    with _runner(where, screen) as runner, _progress(screen, len(planned)) as show:
-        frame = Work(planned, source, folder, runner, show).done(force=force)
+    with _runner(where, screen) as runner, counted(screen) as show:
+        frame = Work(planned, source, folder, runner, lambda done: show("runs", done, len(planned))).done(
+            force=force
+        )
     return present(frame, planned, folder, source, shown(f"palpate study {shlex.quote(name)}"))
 
 
 def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
     """Asks whether to begin what takes very long on the cores here; of a cluster only the number of runs is known."""
-    from palpate.cli._waiting import COMPILING
     from palpate.studies.cost import MANY, seconds_a_run, too_much
 
     if not here and len(plan) < MANY:
@@ -154,7 +154,6 @@ def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
 def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
     cluster = where.cluster()
     if cluster is None:
-        from palpate.cli._waiting import COMPILING
         from palpate.studies.local import Local
 
         yield Local(waiting=lambda: screen.print(COMPILING))
@@ -163,52 +162,6 @@ def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
         yield cluster
     finally:
         cluster.close()
-
-
-@contextmanager
-def _progress(screen: Console, total: int) -> Iterator[Callable[[int], None]]:
-    """A bar with the time left; without a terminal a line now and then."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("left")
-    watched = screen.is_terminal
-    with Progress(
-        *columns, console=screen, transient=True, disable=not watched, speed_estimate_period=600
-    ) as bar:
-        task = bar.add_task("", total=total)
-        lines = Lines(screen, total)
-
-        def show(finished: int) -> None:
-            bar.update(task, completed=finished)
-            if not watched:
-                lines.show(finished)
-
-        yield show
-
-
-class Lines:
-    """Progress where there is no terminal: a line each minute."""
-
-    EVERY = 60.0
-
-    def __init__(self, screen: Console, total: int, what: str = "runs"):
-        self._screen, self._total, self._what = screen, total, what
-        self._begun = self._told = time.monotonic()
-        self._first: int | None = None
-
-    def show(self, finished: int) -> None:
-        """How many runs are finished, and what is left by the pace so far."""
-        from palpate.studies.cost import in_words
-
-        self._first = finished if self._first is None else self._first
-        now = time.monotonic()
-        if now - self._told < self.EVERY or finished == self._first:
-            return
-        self._told = now
-        left = (now - self._begun) / (finished - self._first) * (self._total - finished)
-        self._screen.print(
-            f"{finished} of {self._total} {self._what}, some {in_words(left)} left", soft_wrap=True
-        )
 
 
 def _tell(found: Findings, folder: Path, as_json: bool) -> None:

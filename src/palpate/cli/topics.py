@@ -11,13 +11,13 @@ from cyclopts import Group, Parameter
 from palpate.cli._answer import print_answer
 from palpate.cli._log_options import GB, limits_of
 from palpate.cli._terminal import print_lines
+from palpate.cli._written import WRITTEN
 
 if TYPE_CHECKING:
     from palpate.logs.listing import Entry, Listing
 
 
 _HOW = Group("How it is read", sort_key=1)
-_WRITTEN = Group("What is written", sort_key=6)
 
 
 def topics(
@@ -27,7 +27,7 @@ def topics(
     delimiter: Annotated[str | None, Parameter(group=_HOW)] = None,
     max_size: Annotated[float, Parameter(group=_HOW)] = GB,
     max_seconds: Annotated[float, Parameter(group=_HOW)] = 600.0,
-    json: Annotated[bool, Parameter(negative=(), group=_WRITTEN)] = False,
+    json: Annotated[bool, Parameter(negative=(), group=WRITTEN)] = False,
 ) -> int:
     """List what a log holds, and propose how to identify it.
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
 from palpate.cli._force_options import (
@@ -21,26 +18,13 @@ from palpate.cli._found import read_found
 from palpate.cli._log_options import LogOptions
 from palpate.cli._program import command
 from palpate.cli._terminal import console, place
+from palpate.cli._written import ReportOption
 from palpate.errors import InputError
-from palpate.files import check_place, write_text
+from palpate.files import write_text
 
 if TYPE_CHECKING:
     from palpate.force import Known, Tuning
     from palpate.force.inner_loop import InnerLoop
-
-
-@Parameter(name="*", group=Group("What is written", sort_key=6))
-@dataclass(frozen=True, kw_only=True)
-class PageOptions:
-    """The page.
-
-    Parameters
-    ----------
-    report
-        Where to write a page with everything, an HTML file.
-    """
-
-    report: Path | None = None
 
 
 def tune(
@@ -52,7 +36,7 @@ def tune(
     surface: SurfaceOptions | None = None,
     columns: ColumnOptions | None = None,
     output: OutputOptions | None = None,
-    page: PageOptions | None = None,
+    page: ReportOption | None = None,
 ) -> int:
     """Tune a force loop for an arm, and prove where it is stable.
 
@@ -78,10 +62,9 @@ def tune(
     """
     one_thread()
     surface, columns = surface or SurfaceOptions(), columns or ColumnOptions()
-    output, page = output or OutputOptions(), page or PageOptions()
-    output.check(".toml")
-    if page.report is not None:
-        check_place(page.report, "--report", ending=".html")
+    output, page = output or OutputOptions(), page or ReportOption()
+    output.check_new(output.out, ending=".toml")
+    report = page.page()
     from palpate.force import tune as tuned
 
     one, inner = arm.named(columns)
@@ -94,7 +77,7 @@ def tune(
         surface_speed=surface.surface_speed,
         prove_adapting=one.kind == "position" and inner is None,
     )
-    written = _written(told, output.out, page.report)
+    written = _written(told, output.out, report)
     _print(told, inner, written, output.json)
     return 0 if told.proved else 1
 
