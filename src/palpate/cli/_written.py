@@ -1,7 +1,6 @@
 """Options of what a command writes, and how a place is found wrong before any work is done."""
 
-from __future__ import annotations
-
+# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
