@@ -15,6 +15,7 @@ from palpate.cli._program import command
 from palpate.cli._progress import bar
 from palpate.cli._terminal import console, place, say
 from palpate.errors import InputError, PalpateError
+from palpate.files import write_text
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
@@ -103,9 +104,9 @@ def _write(
 
         write_figure(rows, pooled, figure, dpi)
     if page is not None:
-        from palpate.report.many.page import write_page
+        from palpate.report.many.page import page as page_of
 
-        write_page(rows, pooled, page)
+        write_text(page, page_of(rows, pooled))
     return [path for path in (figure, page) if path is not None]
 
 

@@ -14,6 +14,7 @@ from palpate.cli._flags import FLAG, SIGNED, in_si, in_si_if_given
 from palpate.cli._terminal import console, place
 from palpate.cli._written import WRITTEN, FileOptions, PictureOptions
 from palpate.errors import InputError
+from palpate.files import write_text
 from palpate.text import shown
 
 if TYPE_CHECKING:
@@ -307,16 +308,15 @@ def _answer(question: Question, rate: int, output: OutputOptions, picture: Path 
         write_figure(found, picture)
     if output.report is not None:
         from palpate.cli._program import command
-        from palpate.report.excitation.page import write_page
+        from palpate.report.excitation.page import page
 
-        write_page(found, helps, output.report, shown(command()))
+        write_text(output.report, page(found, helps, shown(command())))
     written = [*([output.out, output.experiment] if found.feasible else []), output.report]
     _print(found, helps, written, picture, output.json)
     return 0 if found.feasible else 1
 
 
 def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
-    from palpate.files import write_text
     from palpate.report.excitation import files
 
     if out is not None:

@@ -19,6 +19,7 @@ from palpate.cli._terminal import console, place
 from palpate.cli._values import with_std
 from palpate.cli._written import WRITTEN, PictureOptions
 from palpate.errors import InputError
+from palpate.files import write_text
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
@@ -180,9 +181,9 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
 
         write_figure(found, figure, title=log.name, dpi=output.dpi)
     if page is not None:
-        from palpate.report.identification.page import write_page
+        from palpate.report.identification.page import page as page_of
 
-        write_page(found, page, origin)
+        write_text(page, page_of(found, origin))
     _print(found, origin, [path for path in (figure, page) if path is not None], output.json)
     return 0 if answered(found) else 1
 

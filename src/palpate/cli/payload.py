@@ -15,6 +15,7 @@ from palpate.cli._options_file import CellOptions
 from palpate.cli._terminal import STYLE, console, head, place, show_table
 from palpate.cli._written import WRITTEN, FileOptions, ReportOption
 from palpate.errors import InputError
+from palpate.files import write_text
 
 if TYPE_CHECKING:
     from palpate.contact_frame import Weighed
@@ -83,9 +84,9 @@ def payload(
         found.payload.save(output.out)
         written.append(output.out)
     if report is not None:
-        from palpate.report.payload import write_page
+        from palpate.report.payload import page
 
-        write_page(found, log.name, report)
+        write_text(report, page(found, log.name))
         written.append(report)
     _print(found, log, written, output.json)
     return 0 if found.payload is not None else 1

@@ -122,9 +122,9 @@ def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     if out is not None:
         write_text(out, told.gains.to_toml())
     if page is not None:
-        from palpate.report.force_page import write_page
+        from palpate.report.force_page import page as page_of
 
-        write_page(told, page, command())
+        write_text(page, page_of(told, command()))
     return [path for path in (out, page) if path is not None]
 
 

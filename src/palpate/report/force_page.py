@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import UTC, datetime
 from math import isfinite
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.files import write_text
 from palpate.force.steps import BAND, frequency_response
 from palpate.force.telling import UNCOVERED
 from palpate.force.tuning import RIGID, Tuning
@@ -26,12 +23,6 @@ if TYPE_CHECKING:
 
 _SHOWN = (1.0, 1e7)
 """Stiffnesses that the figure shows [N/m]."""
-
-
-def write_page(told: Tuning, path: Path, command: str = "palpate tune") -> Path:
-    """Writes the page, whole or not at all; it opens without a network."""
-    write_text(path, page(told, command))
-    return path
 
 
 def page(told: Tuning, command: str = "palpate tune") -> str:
@@ -56,7 +47,6 @@ def page(told: Tuning, command: str = "palpate tune") -> str:
         source_title="The gains",
         room="tune",
         command=shown(command),
-        made=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
 

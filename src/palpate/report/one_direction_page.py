@@ -13,7 +13,9 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.report.numbers import NONE, quantity
 from palpate.report.page import Table, page
-from palpate.report.run.words import alerts, sentence
+from palpate.report.run.figures import around_contact
+from palpate.report.run.table import notes
+from palpate.report.run.words import sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,14 +57,9 @@ def write_one_direction(
         figures=figures,
         command=summary["command"],
         source=source,
-        notes=one_direction_notes(summary),
+        notes=notes(summary),
     )
     write_text(folder / "report.html", text)
-
-
-def one_direction_notes(summary: dict[str, Any]) -> list[str]:
-    """What a reader must not miss."""
-    return [" ".join(part for part in (a["title"], a["text"], a["advice"]) if part) for a in alerts(summary)]
 
 
 def one_direction_tables(record: Record, summary: dict[str, Any]) -> list[Table]:
@@ -101,7 +98,7 @@ def _world(record: Record) -> tuple[tuple[str, str], ...]:
 
 def _force(record: Record) -> Figure:
     figure, (force, speed) = style.figure(2, height=2.3)
-    since, shown = _shown(record)
+    since, shown = around_contact(record, BEFORE)
     style.panel(force, "force on the surface [N]")
     measured, true = record["force_measured"][shown], record["force"][shown]
     force.plot(since, measured, color=style.MEASURED, linewidth=0.8, label="reading")
@@ -116,7 +113,7 @@ def _force(record: Record) -> Figure:
 
 def _bound(record: Record) -> Figure:
     figure, (axis,) = style.figure(1, height=2.4)
-    since, shown = _shown(record)
+    since, shown = around_contact(record, BEFORE)
     style.panel(axis, "stiffness [N/m]", "time since the touch [s]")
     axis.plot(since, record["bound"][shown], color=style.K, linewidth=1.6, label="K_u, the law's upper bound")
     axis.plot(
@@ -134,16 +131,6 @@ def _true_stiffness(record: Record) -> np.ndarray[Any, np.dtype[np.float64]]:
     later = surface["later"] or surface["stiffness"]
     own = np.where(since < surface["changes"], surface["stiffness"], later)
     return own / (1.0 + own / loop["series"]) if loop["kind"] == "position" else own
-
-
-def _shown(
-    record: Record,
-) -> tuple[np.ndarray[Any, np.dtype[np.float64]], np.ndarray[Any, np.dtype[np.bool_]]]:
-    """Time since the touch [s] where it is shown, and which rows those are."""
-    t = record["t"]
-    start = t[np.argmax(record["phase"] == CONTACT)]
-    shown = t >= start - BEFORE
-    return (t - start)[shown], shown
 
 
 DRAWN = (

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.contact_frame import Weighed
 from palpate.contact_frame.weighing import Estimated
-from palpate.files import write_text
 from palpate.report import style
 from palpate.report.page import Table, embedded, render
 from palpate.report.svg import svg
@@ -44,12 +42,6 @@ def sentence(found: Weighed) -> str:
         return "The poses do not tell the tool's mass: " + "; ".join(found.lacking) + "."
     mass = found.parameters["mass"]
     return f"The tool weighs {float(mass.value):.4g} +- {float(mass.half):.2g} kg (95 %, {found.poses} orientations)."
-
-
-def write_page(found: Weighed, title: str, path: Path) -> Path:
-    """Writes the page, whole or not at all; it opens without a network."""
-    write_text(path, page(found, title))
-    return path
 
 
 def page(found: Weighed, title: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +51,6 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
         source="",
         room="press",
         command=summary["command"],
-        made=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     write_text(folder / "report.html", page)
 

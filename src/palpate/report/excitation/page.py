@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
-from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.excitation import Design, Remedy
-from palpate.files import write_text
 from palpate.report import style
 from palpate.report.excitation.figure import curves, draw, lines_of
 from palpate.report.excitation.table import describe_remedy, describe_wave, percent, reached
 from palpate.report.identification.words import CALLED
-from palpate.report.look.assets import CHARTS, TABLES, data, scripts
+from palpate.report.look.assets import CHARTS, TABLES, data, scripts, text_of
 from palpate.report.look.columns import packed, thinned
 from palpate.report.numbers import plain, quantity
 from palpate.report.page import embedded, render
 from palpate.report.svg import svg
 
+_PACKAGE = "palpate.report.excitation"
 _ROWS = 6000
 """Of the desired force that lie in the page, its peaks among them."""
 _SHOWN = 4.0
@@ -30,30 +27,16 @@ _SHOWN = 4.0
 _UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
-def write_page(found: Design, helps: Sequence[Remedy], path: Path, command: str) -> Path:
-    """Writes the page of a design, whole or not at all; it opens without a network.
-
-    Args:
-        found: the design.
-        helps: what would make it enough, if it is not.
-        path: of the HTML file.
-        command: that made it.
-    """
-    write_text(path, page(found, helps, command))
-    return path
-
-
 def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
     """The page as HTML."""
     told = describe_wave(found)
-    codes = (*scripts(*CHARTS, *TABLES), _own("excitation.js"))
+    codes = (*scripts(*CHARTS, *TABLES), text_of("excitation.js", _PACKAGE))
     with style.inked():
         still = embedded(svg(draw(found)), "image/svg+xml")
     return render(
         "excitation.html",
-        "palpate.report.excitation",
+        _PACKAGE,
         room="excite",
-        made=datetime.now(UTC).isoformat(timespec="seconds"),
         title="A force to ask for",
         sentence=_sentence(found),
         about=f"{told[0].upper()}{told[1:]}.",
@@ -181,7 +164,3 @@ def _charts(found: Design) -> dict[str, Any]:
         "window": [0.0, min(float(time[-1]), found.settle + _SHOWN)],
         "seconds": found.seconds,
     }
-
-
-def _own(name: str) -> str:
-    return (resources.files("palpate.report.excitation") / name).read_text(encoding="utf-8")

@@ -6,10 +6,8 @@ import json
 import math
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.files import write_text
 from palpate.identification.result import Identification, Parameter, Traces, Verdict
 from palpate.report.identification import captions
 from palpate.report.identification import evidence_panels as evidence
@@ -49,19 +47,6 @@ _SHARE = 0.25
 """Of the value: the ends of the bar that shows how narrow an interval is, the same on all cards."""
 _MOST_CONTACTS = 20
 """That a page lists one by one."""
-
-
-def write_page(found: Identification, path: Path, source: Source) -> Path:
-    """Write the page of an identification, whole or not at all; it opens without a network and runs nothing.
-
-    Args:
-        found: what to show; figures need its traces.
-        path: of the HTML file.
-        source: where it is from.
-    """
-    text = page(found, source)
-    write_text(path, text)
-    return path
 
 
 def page(found: Identification, source: Source) -> str:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from palpate.files import write_text
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.source import Source
@@ -23,13 +21,6 @@ from palpate.text import shown
 
 _COLOURED = {POINT: "K", "K": "K", "B": "B", "M": "M"}
 _HALF, _NARROW = 560, 360
-
-
-def write_page(rows: Sequence[LogRow], pooled: Pooled, path: Path) -> Path:
-    """Write the page of many identifications, whole or not at all; it opens without a network."""
-    text = page(rows, pooled)
-    write_text(path, text)
-    return path
 
 
 def page(rows: Sequence[LogRow], pooled: Pooled) -> str:

@@ -106,7 +106,7 @@ def _approach(record: Record) -> Figure:
 
 def _force(record: Record) -> Figure:
     figure, (axis,) = style.figure(1, height=3.4)
-    since, shown = _around_contact(record)
+    since, shown = around_contact(record)
     style.panel(axis, "force on the surface [N]", SINCE)
     axis.plot(
         since,
@@ -128,7 +128,7 @@ def _force(record: Record) -> Figure:
 
 def _identification(record: Record) -> Figure:
     figure, axes = style.figure(3, height=2.0)
-    since, shown = _around_contact(record, 0.0)  # before it there is nothing to be known
+    since, shown = around_contact(record, 0.0)  # before it there is nothing to be known
     truth: dict[str, Any] = record.meta["truth"]
     units = (("K", "N/m"), ("B", "N s/m"), ("M", "kg"))
     for axis, (name, unit) in zip(axes, units, strict=True):
@@ -175,7 +175,7 @@ def _torque(record: Record) -> Figure:
     return figure
 
 
-def _around_contact(record: Record, before: float = BEFORE) -> tuple[Array, Mask]:
+def around_contact(record: Record, before: float = BEFORE) -> tuple[Array, Mask]:
     """Time since contact [s] where it is shown, and which rows those are."""
     t = record["t"]
     start = t[np.argmax(record["phase"] == CONTACT)]

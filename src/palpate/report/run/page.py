@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, formatted
-from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts
+from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts, text_of
 from palpate.report.look.columns import packed, thinned
 from palpate.report.numbers import plain, quantity
 from palpate.report.page import embedded, render
@@ -36,6 +35,7 @@ ROWS = 4000
 _FEWER = 1500
 """Of it in the pictures for a browser that runs no scripts."""
 _PARAMETERS = ("K", "B", "M")
+_PACKAGE = "palpate.report.run"
 _STILL = ("force", "identification")
 
 
@@ -66,10 +66,9 @@ def run_page(record: Record, content: Content) -> str:
     summary = content.summary
     contact = summary["force"] is not None
     worth = len(record) > 2
-    codes = "palpate.report.run"
     return render(
         "run.html",
-        codes,
+        _PACKAGE,
         room="run",
         title=shown(content.title),
         about=shown(content.about),
@@ -84,17 +83,12 @@ def run_page(record: Record, content: Content) -> str:
         source=content.source,
         charts=data(_charts(record, summary)) if worth else "",
         pictures=list(_pictures(record)) if worth else [],
-        scripts=(*scripts(*CHARTS, *ARM, *TABLES), _script()) if worth else scripts(*TABLES),
+        scripts=(*scripts(*CHARTS, *ARM, *TABLES), text_of("run.js", _PACKAGE))
+        if worth
+        else scripts(*TABLES),
         command=summary["command"],
         origin=[("seed", str(summary["seed"])), ("record.parquet", f"sha256 {content.sha256}")],
-        made=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-
-
-def _script() -> str:
-    from importlib import resources
-
-    return (resources.files("palpate.report.run") / "run.js").read_text(encoding="utf-8")
 
 
 def _cards(content: Content) -> list[dict[str, str]]:
