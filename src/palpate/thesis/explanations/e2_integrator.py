@@ -19,7 +19,6 @@ from palpate.thesis.force_control.tracking import (
     FOAM,
     RUBBER,
     SINE,
-    Slot,
     Tracking,
     since_contact,
     slot,
@@ -67,8 +66,8 @@ OUTSIDE = ("random\nweights", "rate of\nthe listing", "clock\nruns on")
 class Pair:
     """An experiment under both controllers."""
 
-    network: Slot
-    pi: Slot
+    network: Record
+    pi: Record
     network_found: list[Tracking]
     pi_found: list[Tracking]
     ratios: dict[str, list[float]]  # RMS of the network over that of the PI, by variation
@@ -162,10 +161,15 @@ def plot(data: Data) -> Figure:
 
 def _overlay(axis: Axes, name: str, pair: Pair) -> None:
     axis.plot(
-        pair.network.t, pair.network.true, color=style.SERIES[1], linewidth=3.2, alpha=0.5, label="network"
+        pair.network["t"],
+        pair.network["force"],
+        color=style.SERIES[1],
+        linewidth=3.2,
+        alpha=0.5,
+        label="network",
     )
-    axis.plot(pair.pi.t, pair.pi.true, color=style.SERIES[0], linewidth=1.0, label="PI")
-    axis.plot(pair.pi.t, pair.pi.desired, **style.KNOWN, label="desired")
+    axis.plot(pair.pi["t"], pair.pi["force"], color=style.SERIES[0], linewidth=1.0, label="PI")
+    axis.plot(pair.pi["t"], pair.pi["force_desired"], **style.KNOWN, label="desired")
     limits(axis, pair.network)
     axis.set_title(
         f"{name}: {_median(pair.network_found):.2f} and {_median(pair.pi_found):.2f} N",

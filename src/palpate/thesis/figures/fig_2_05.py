@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.following import LIMIT
 from palpate.environments import KelvinVoigt
@@ -28,11 +27,9 @@ from palpate.thesis.force_control.disturbances import Disturbance, other_surface
 from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
 from palpate.thesis.force_control.tracking import (
     FOLLOWS,
-    Slot,
     Tracking,
     described,
     following,
-    since_contact,
     slot,
     tracking,
 )
@@ -69,8 +66,7 @@ Case = tuple[Experiment, int]
 class Data:
     """What `check` and `plot` need."""
 
-    shown: Slot
-    gains: Array  # kf, ki, kd over their middle values, shape (n, 3)
+    shown: Record
     tuned: dict[str, list[Tracking]]
     fixed: dict[str, list[Tracking]]
     turned: list[Tracking]
@@ -84,13 +80,7 @@ def run(runs: Runs) -> Data:
     tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
     fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
     turned = runs.map(lambda seed: measure(_turned(seed)), list(runs.seeds))
-    record = _turned(runs.seeds[0])
-    t = since_contact(record)
-    inside = (t >= SHOWN[0]) & (t < SHOWN[1])
-    c = PARAMETERS.controller
-    middle = np.array([c.kf, c.ki, c.kd])
-    gains = np.column_stack([record[f"adapted{i}"] for i in (1, 2, 3)])[inside] / middle
-    return Data(slot(record, *SHOWN), gains, tuned, fixed, turned)
+    return Data(slot(_turned(runs.seeds[0]), *SHOWN), tuned, fixed, turned)
 
 
 def check(data: Data) -> Sequence[Claim]:
@@ -166,10 +156,12 @@ def plot(data: Data) -> Figure:
     """The turn, the gains, and the runs."""
     drawing, ((force,), (gains,), (dots,)) = panels([2.8, 1.8, 2.2])
     force_panel(force, data.shown)
-    for i, (name, color) in enumerate(
-        (("K_fp", style.SERIES[0]), ("K_fi", style.SERIES[1]), ("K_fd", style.OK))
-    ):
-        gains.plot(data.shown.t, data.gains[:, i], color=color, linewidth=1.2, label=name)
+    c = PARAMETERS.controller
+    names, colors = ("K_fp", "K_fi", "K_fd"), (*style.SERIES[:2], style.OK)
+    for i, (name, middle, color) in enumerate(zip(names, (c.kf, c.ki, c.kd), colors, strict=True), start=1):
+        gains.plot(
+            data.shown["t"], data.shown[f"adapted{i}"] / middle, color=color, linewidth=1.2, label=name
+        )
     gains.set(xlabel="time since contact [s]", ylabel="gain over middle", xlim=SHOWN, ylim=(0.0, 2.0))
     style.legend(gains)
     for axis in (force, gains):

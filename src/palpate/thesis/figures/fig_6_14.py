@@ -22,7 +22,6 @@ from palpate.thesis.force_control.panels import force_panel, panels
 from palpate.thesis.force_control.tracking import (
     FOAM,
     FOLLOWS,
-    Slot,
     Tracking,
     described,
     following,
@@ -64,7 +63,7 @@ class Course:
 class Data:
     """What `check` and `plot` need."""
 
-    shown: Slot
+    shown: Record
     nominal: list[Tracking]
     courses: dict[str, list[Course]]
 
