@@ -18,7 +18,7 @@ from palpate.files import write_text
 from palpate.text import shown
 
 if TYPE_CHECKING:
-    from palpate.excitation import Budget, Design, ForceLoop, Question, Remedy, Sensors, SurfaceRange
+    from palpate.excitation import Budget, Design, ForceLoop, Problem, Remedy, Sensors, SurfaceRange
 
 
 @Parameter(name="*", group=Group("The surfaces", sort_key=1))
@@ -272,7 +272,7 @@ def excite(
 
     Exit code 1 says that the precision cannot be had within the limits; what would help is printed.
     """
-    from palpate.excitation import Question
+    from palpate.excitation import Problem
     from palpate.excitation.quantities import shares
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
@@ -280,7 +280,7 @@ def excite(
     picture = output.picture("excite.png")
     output.check_all()
     surfaces = surface.range()
-    question = Question(
+    problem = Problem(
         surfaces,
         limits.budget(),
         shares("--precision", goal.precision, surfaces.names),
@@ -292,13 +292,13 @@ def excite(
         in_si("--longest", goal.longest, "time"),
         in_si("--settle", goal.settle, "time"),
     )
-    return _answer(question, sensor.rate, output, picture)
+    return _answer(problem, sensor.rate, output, picture)
 
 
-def _answer(question: Question, rate: int, output: OutputOptions, picture: Path | None) -> int:
+def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | None) -> int:
     from palpate.excitation import design, remedies
 
-    found = design(question)
+    found = design(problem)
     helps = [] if found.feasible else remedies(found)
     if found.feasible:
         _write(found, rate, output.out, output.experiment)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The model", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class ModelOptions:
-    """What is fitted, and what is known beforehand.
+    """What is fitted, and the prior of it.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class ModelOptions:
     force_filter
         What the force went through before it was sampled, as butterworth3:120 (order and Hz), joined by +; or none.
     mass
-        What is known of the mass beforehand, in kg, VALUE or VALUE:STD.
+        Prior of the mass, in kg, VALUE or VALUE:STD.
     tolerance
         Largest half-width of an identified parameter's 95 % interval, as a share of its value.
     calibration

@@ -97,7 +97,7 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
 
     from palpate.logs import write_record
     from palpate.press.summary import summarise
-    from palpate.report.press_page import write_report
+    from palpate.report.press.page import write_report
 
     record = changed(record, meta={**record.meta, "command": shown(command())})
     summary = signed({"command": shown(command()), **summarise(record, pressing.asked)})
@@ -109,7 +109,7 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
 
 
 def _tell(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    from palpate.report.press_page import notes, tables
+    from palpate.report.press.page import notes, tables
 
     if as_json:
         print_answer(summary)

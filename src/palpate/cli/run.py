@@ -155,7 +155,7 @@ def _draw(
     """Figures, page and film of a run."""
     about = record.meta["experiment"]
     if "loop" in record.meta:
-        from palpate.report.one_direction_page import write_one_direction
+        from palpate.report.run.one_direction import write_one_direction
 
         write_one_direction(record, folder, summary, source, drawn.endings, drawn.dpi)
         return
@@ -216,7 +216,7 @@ def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
     screen = console()
     head(screen, ran.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
     if "loop" in ran.record.meta:
-        from palpate.report.one_direction_page import one_direction_tables
+        from palpate.report.run.one_direction import one_direction_tables
 
         shown_tables = one_direction_tables(ran.record, summary)
     else:

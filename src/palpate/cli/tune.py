@@ -122,7 +122,7 @@ def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     if out is not None:
         write_text(out, told.gains.to_toml())
     if page is not None:
-        from palpate.report.force_page import page as page_of
+        from palpate.report.tuning.page import page as page_of
 
         write_text(page, page_of(told, command()))
     return [path for path in (out, page) if path is not None]
@@ -132,7 +132,7 @@ def _print(told: Tuning, inner: InnerLoop | None, written: list[Path], json: boo
     if json:
         print_answer(told.to_json() | {"inner_loop": None if inner is None else inner.to_json()})
         return
-    from palpate.report.force_table import show
+    from palpate.report.tuning.table import show
 
     screen = console()
     show(told, screen)

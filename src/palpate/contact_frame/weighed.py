@@ -42,7 +42,7 @@ arm turns its tool faster."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Weighed(Result, shown_by="palpate.report.weighed"):
+class Weighed(Result, shown_by="palpate.report.payload.in_python"):
     """What a log tells of a tool.
 
     Args:

@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.page import Table, embedded, render
-from palpate.report.shown import as_html, as_text
+from palpate.report.result_text import as_html, as_text
 from palpate.text import shown
 
 if TYPE_CHECKING:

@@ -53,7 +53,7 @@ def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
 
 
 def _sentence(found: Design) -> str:
-    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.question.precision.items())
+    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     lasts = quantity(found.seconds, "s", digits=3)
     if found.feasible:
         return (
@@ -68,7 +68,7 @@ def _cards(found: Design) -> list[dict[str, str]]:
     worst = found.made.worst(found.seconds)
     cards = []
     for name in found.predictions[0].names:
-        asked = found.question.precision.get(name)
+        asked = found.problem.precision.get(name)
         enough = asked is None or worst[name] <= asked
         cards.append(
             {
@@ -117,7 +117,7 @@ def _rows(found: Design) -> list[list[dict[str, Any]]]:
         values = dict(zip(("K", "B", "M"), one.surface.values, strict=True))
         row = [{"text": plain(values[name], 4), "value": values[name]} for name in one.names]
         for name in one.names:
-            asked = found.question.precision.get(name)
+            asked = found.problem.precision.get(name)
             bad = asked is not None and widths[name] > asked
             row.append({"text": f"± {percent(widths[name])}", "value": widths[name], "bad": bad})
         low, high = one.force
@@ -133,7 +133,7 @@ def _charts(found: Design) -> dict[str, Any]:
     """What the charts are drawn from, in plain values."""
     time, force = found.force()
     rows = thinned(force, _ROWS)
-    budget = found.question.budget
+    budget = found.problem.budget
     n = len(rows)
     over = {
         "t": time[rows],
@@ -148,7 +148,7 @@ def _charts(found: Design) -> dict[str, Any]:
     precision: dict[str, Array] = {"t": seconds}
     for name, share in widths.items():
         precision |= {f"{name}_low": 100 * share.min(axis=0), f"{name}_high": 100 * share.max(axis=0)}
-        asked = found.question.precision.get(name)
+        asked = found.problem.precision.get(name)
         if asked is not None:
             precision[f"{name}_asked"] = np.full(len(seconds), 100 * asked)
     return {

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from palpate.excitation import Design, Remedy
 from palpate.excitation.prediction import Prediction
-from palpate.excitation.question import LONGEST
+from palpate.excitation.problem import LONGEST
 from palpate.references.waves import Multisine
 
 
@@ -34,7 +34,7 @@ def describe_remedy(remedy: Remedy, found: Design) -> str:
 
 def describe_wave(found: Design) -> str:
     """What is asked for, in a line."""
-    budget, wave = found.question.budget, found.wave
+    budget, wave = found.problem.budget, found.wave
     if isinstance(wave, Multisine):
         low, high = wave.frequencies[0], wave.frequencies[-1]
         kind = f"multisine of {len(wave.frequencies)} sines, {low:g} to {high:.4g} Hz"
@@ -68,7 +68,7 @@ def _row(prediction: Prediction, found: Design) -> list[str | Text]:
     low, high = prediction.force
     return [
         *(f"{values[name]:.4g}" for name in prediction.names),
-        *(_width(widths[name], found.question.precision.get(name)) for name in prediction.names),
+        *(_width(widths[name], found.problem.precision.get(name)) for name in prediction.names),
         f"{low:.1f}-{high:.1f}",
         f"{1e6 * prediction.travel:.0f} um",
     ]
@@ -86,7 +86,7 @@ def percent(share: float) -> str:
 
 def _verdict(found: Design) -> str:
     worst = found.made.worst(found.seconds)
-    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.question.precision.items())
+    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     if found.feasible:
         return f"every surface to within {asked} (95 %): yes, predicted {reached(worst, found)}"
     return f"every surface to within {asked} (95 %): no; the best is {reached(worst, found)}. What would change that:"
@@ -94,4 +94,4 @@ def _verdict(found: Design) -> str:
 
 def reached(widths: dict[str, float], found: Design) -> str:
     """The half-widths of what was asked for."""
-    return ", ".join(f"{name} {percent(widths[name])}" for name in found.question.precision)
+    return ", ".join(f"{name} {percent(widths[name])}" for name in found.problem.precision)

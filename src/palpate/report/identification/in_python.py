@@ -11,7 +11,7 @@ from palpate.report.identification import page as pages
 from palpate.report.identification.source import Source
 from palpate.report.identification.table import show
 from palpate.report.identification.words import formatted, sentence
-from palpate.report.shown import as_html, printed
+from palpate.report.result_text import as_html, printed
 from palpate.text import shown
 
 if TYPE_CHECKING:

@@ -12,10 +12,10 @@ from palpate.files import write_text
 from palpate.press.summary import Asked
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.arm_film import film
 from palpate.report.figure_panels.panels import panels_of, shown_in
 from palpate.report.numbers import NONE, plain, with_half
 from palpate.report.page import Table, embedded, render
+from palpate.report.press.film import film
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -26,7 +26,7 @@ LONGEST = 3600.0
 
 
 @dataclass(frozen=True)
-class Question:
+class Problem:
     """An excitation for a range of surfaces, by a robot with its sensors, within a budget, to a precision.
 
     Args:

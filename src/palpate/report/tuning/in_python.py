@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from palpate.force.tuning import Tuning
-from palpate.report import force_page as pages
-from palpate.report.force_table import rows, show
-from palpate.report.shown import as_html, printed
+from palpate.report.result_text import as_html, printed
+from palpate.report.tuning import page as pages
+from palpate.report.tuning.table import rows, show
 from palpate.text import shown
 
 if TYPE_CHECKING:

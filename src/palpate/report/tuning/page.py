@@ -13,8 +13,8 @@ from palpate.force.telling import UNCOVERED
 from palpate.force.tuning import RIGID, Tuning
 from palpate.report import style
 from palpate.report.figure_panels.panels import panels_of, shown_in
-from palpate.report.force_table import rows
 from palpate.report.page import Table, render
+from palpate.report.tuning.table import rows
 from palpate.text import shown
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from palpate.report.many import page as pages
 from palpate.report.many.rows import LogRow, drawn, quantities
 from palpate.report.many.table import show
 from palpate.report.many.words import failures, sentence
-from palpate.report.shown import as_html, printed
+from palpate.report.result_text import as_html, printed
 from palpate.text import shown
 
 if TYPE_CHECKING:
