@@ -93,12 +93,6 @@ def headline(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: 
     return f"{done} of {len(frame)} runs came to their end."
 
 
-def _origin(plan: Plan) -> list[tuple[str, str]]:
-    """What the page's foot says of the runs."""
-    own = [(one.name, f"sources {one.stamp}") for one in plan.plugins]
-    return [("runs", str(len(plan))), ("seeds", _seeds(plan)), *own]
-
-
 def _seeds(plan: Plan) -> str:
     seeds = plan.parts[0].seeds
     return (

@@ -61,7 +61,7 @@ class Text:
         preamble = read_preamble(self.layout.above, self.names)
         rows = {name: Stated(symbol, "the row of units") for name, symbol in self.layout.units.items()}
         self.stated: dict[str, Stated] = rows | preamble.columns
-        self.rate, self.rate_said = preamble.rate, preamble.said
+        self.rate = preamble.rate
         self.clocks: set[str] = set()
         self.left_out: dict[str, str] = {}
         self.notes: list[dict[str, Any]] = []
