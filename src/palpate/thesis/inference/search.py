@@ -179,7 +179,7 @@ def borrowed(path: Path, head: Head, of: Sequence[Sentence], wanted: Sequence[Se
     """What another search's archive tells of the sentences wanted, where it was not given up; nothing if it is none."""
     if not path.exists():
         return {}
-    there, known, _ = archive.read(path)
+    there, known = archive.read(path)
     if there != head:
         return {}
     at = [of.index(sentence) for sentence in wanted]
