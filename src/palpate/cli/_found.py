@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import InputError
+from palpate.files import read_bytes
 
 _LARGEST = 1 << 26
 """Bytes that are read: what identify prints of a thousand contacts is a hundredth of it."""
@@ -20,14 +21,8 @@ def read_found(path: Path) -> dict[str, Any]:
     """
     from json import JSONDecodeError, loads
 
-    with path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise InputError(
-            f"{path}: more than {_LARGEST} bytes are not what palpate identify prints; check the path"
-        )
     try:
-        value = loads(data)
+        value = loads(read_bytes(path, _LARGEST, "not what palpate identify prints"))
     except (JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"{path}: not JSON: {error}; give what palpate identify --json printed") from None
     if not isinstance(value, dict):

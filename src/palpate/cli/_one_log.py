@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from palpate.report.identification.source import Source
 
 
+_LOG, _FRAME, _ARM, _INDENTER = LogOptions(), FrameOptions(), ArmOptions(), IndenterOptions()
+
+
 class Fitted(Protocol):
     """What is asked of the identification itself."""
 
@@ -43,11 +46,11 @@ def answered(found: Identification) -> bool:
 class OneLog:
     """What is asked, the same of each log."""
 
-    source: LogOptions
-    frame: FrameOptions
-    arm: ArmOptions
     fitted: Fitted
-    pressed_by: IndenterOptions
+    source: LogOptions = _LOG
+    frame: FrameOptions = _FRAME
+    arm: ArmOptions = _ARM
+    pressed_by: IndenterOptions = _INDENTER
 
     def identified(self, log: Path) -> tuple[Identification, Source]:
         """Read a log and find what it touched, and say where that is from.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Group, Parameter
 
 from palpate.errors import InputError, unknown
-from palpate.files import check_place, write_text
+from palpate.files import check_place, read_bytes, write_text
 from palpate.files.ownership import MADE
 
 if TYPE_CHECKING:
@@ -144,10 +144,7 @@ def _preset(name: str, known: set[str]) -> dict[str, Any]:
 
 
 def _file(path: Path, known: set[str]) -> dict[str, Any]:
-    with path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise InputError(f"{path}: more than {_LARGEST} bytes are no options; check the path")
+    data = read_bytes(path, _LARGEST, "no options")
     try:
         table = tomllib.loads(data.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:

@@ -88,6 +88,17 @@ def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> No
     console.print()
 
 
+def show_answer(title: str, rest: str, tables: Iterable[Table], notes: Iterable[str]) -> Console:
+    """A title with what belongs to it, tables, and what a reader must not miss; the console, for what follows."""
+    screen = console()
+    head(screen, title, rest)
+    for table in tables:
+        show_table(screen, table)
+    for note in notes:
+        screen.print(note, style=STYLE, soft_wrap=True)
+    return screen
+
+
 def place(console: Console, what: str, where: object) -> None:
     """Where something was written, unbroken, so that it can be copied."""
     console.print(f"{what} {where}", soft_wrap=True)

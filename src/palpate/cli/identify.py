@@ -145,21 +145,13 @@ def identify(
     """
     from palpate.logs.gathered import gathered, is_folder_of_logs
 
-    pressed_by, output, cell = (
-        pressed_by or IndenterOptions(),
-        output or OutputOptions(),
-        cell or CellOptions(),
-    )
+    output, cell = output or OutputOptions(), cell or CellOptions()
+    source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
+    fitted, pressed_by = fitted or ModelOptions(), pressed_by or IndenterOptions()
     pressed_by.check()
     cell.check()
-    asked = OneLog(
-        source or LogOptions(),
-        frame or FrameOptions(),
-        arm or ArmOptions(),
-        fitted or ModelOptions(),
-        pressed_by,
-    )
-    cell.save((asked.source, asked.frame, asked.arm, fitted or ModelOptions(), asked.pressed_by))
+    asked = OneLog(fitted, source, frame, arm, pressed_by)
+    cell.save((source, frame, arm, fitted, pressed_by))
     if not logs:
         raise InputError(
             "identify what? Name a log, several, or a folder of them (see: palpate identify --help)"

@@ -12,7 +12,6 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._arm_options import ArmOptions, FrameOptions
 from palpate.cli._flags import FLAG, SIGNED
-from palpate.cli._indenter_options import IndenterOptions
 from palpate.cli._log_options import LogOptions
 from palpate.cli._progress import COMPILING
 from palpate.cli._terminal import print_lines, say
@@ -125,11 +124,7 @@ def live(
     from palpate.cli._one_log import OneLog
 
     asked = OneLog(
-        source or LogOptions(),
-        frame or FrameOptions(),
-        arm or ArmOptions(),
-        fitted or ModelOptions(),
-        IndenterOptions(),
+        fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
     )
     if shown.record is not None and not asked.source.plain:
         raise InputError("a record names its own columns; give --log FILE with --time, --position, --force")

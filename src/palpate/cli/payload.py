@@ -12,7 +12,7 @@ from palpate.cli._answer import print_answer
 from palpate.cli._arm_options import FrameOptions
 from palpate.cli._log_options import LogOptions, read
 from palpate.cli._options_file import CellOptions
-from palpate.cli._terminal import STYLE, console, head, place, show_table
+from palpate.cli._terminal import place, show_answer
 from palpate.cli._written import WRITTEN, FileOptions, ReportOption
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -98,10 +98,7 @@ def _print(found: Weighed, log: Path, written: list[Path], json: bool) -> None:
         return
     from palpate.report.payload.page import sentence, table
 
-    screen = console()
-    head(screen, log.name, f": {sentence(found)}")
-    show_table(screen, table(found))
-    for note in found.notes:
-        screen.print(f"{note['code']}: {note['text']}", style=STYLE, soft_wrap=True)
+    notes = [f"{note['code']}: {note['text']}" for note in found.notes]
+    screen = show_answer(log.name, f": {sentence(found)}", [table(found)], notes)
     for path in written:
         place(screen, "written:", path)

@@ -12,7 +12,7 @@ from palpate.cli._interrupts import noticed
 from palpate.cli._options_file import CellOptions
 from palpate.cli._press_options import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
 from palpate.cli._program import command
-from palpate.cli._terminal import STYLE, console, head, place, print_lines, show_table
+from palpate.cli._terminal import console, place, print_lines, show_answer
 from palpate.files import fresh_folder, signed, write_json
 from palpate.text import shown
 
@@ -114,12 +114,6 @@ def _tell(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bo
     if as_json:
         print_answer(summary)
         return
-    screen = console()
-    head(
-        screen, pressing.asked.arm.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
-    )
-    for content in tables(summary):
-        show_table(screen, content)
-    for note in notes(summary):
-        screen.print(note, style=STYLE)
+    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    screen = show_answer(pressing.asked.arm.title, rest, tables(summary), notes(summary))
     place(screen, "report:", folder / "report.html")

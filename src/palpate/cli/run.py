@@ -17,7 +17,7 @@ from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
 from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli._progress import COMPILING, simulated
-from palpate.cli._terminal import STYLE, console, head, place, show_table
+from palpate.cli._terminal import console, place, show_answer
 from palpate.errors import InputError
 from palpate.files import fresh_folder, signed, write_json, write_text
 from palpate.text import shown
@@ -175,15 +175,11 @@ def _draw(
 
 def _identified(record: Path) -> tuple[Identification | None, str]:
     """What `palpate identify` says of the record, or why it says nothing."""
-    from palpate.cli._arm_options import ArmOptions, FrameOptions
-    from palpate.cli._indenter_options import IndenterOptions
-    from palpate.cli._log_options import LogOptions
     from palpate.cli._one_log import OneLog
     from palpate.cli.identify import ModelOptions
 
-    asked = OneLog(LogOptions(), FrameOptions(), ArmOptions(), ModelOptions(), IndenterOptions())
     try:
-        return asked.identified(record)[0], ""
+        return OneLog(ModelOptions()).identified(record)[0], ""
     except InputError as error:
         return None, shown(str(error).replace(str(record), record.name))
 
@@ -213,18 +209,14 @@ def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
     if as_json:
         print_answer(summary)
         return
-    screen = console()
-    head(screen, ran.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
     if "loop" in ran.record.meta:
         from palpate.report.run.one_direction import one_direction_tables
 
         shown_tables = one_direction_tables(ran.record, summary)
     else:
         shown_tables = tables(summary, ran.found)
-    for content in shown_tables:
-        show_table(screen, content)
-    for note in notes(summary):
-        screen.print(note, style=STYLE)
+    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    screen = show_answer(ran.title, rest, shown_tables, notes(summary))
     report = folder / "report.html"
     if report.exists():
         place(screen, "report:", report)

@@ -16,7 +16,7 @@ from palpate.cli._answer import print_answer
 from palpate.cli._flags import FLAG
 from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli._progress import COMPILING, counted
-from palpate.cli._terminal import STYLE, console, head, place, say, show_table
+from palpate.cli._terminal import console, place, say, show_answer
 from palpate.errors import InputError
 from palpate.text import shown
 
@@ -168,10 +168,5 @@ def _tell(found: Findings, folder: Path, as_json: bool) -> None:
     if as_json:
         print_answer(found.summary)
         return
-    screen = console()
-    head(screen, found.summary["study"], f", {found.summary['runs']} runs")
-    for content in found.tables:
-        show_table(screen, content)
-    for note in found.notes:
-        screen.print(note, style=STYLE)
+    screen = show_answer(found.summary["study"], f", {found.summary['runs']} runs", found.tables, found.notes)
     place(screen, "report:", folder / "report.html")

@@ -12,6 +12,7 @@ from palpate.excitation import Design, Remedy
 from palpate.excitation.prediction import Prediction
 from palpate.excitation.problem import LONGEST
 from palpate.references.waves import Multisine
+from palpate.report.terminal import bare_table
 
 
 def show(found: Design, remedies: list[Remedy], console: Console) -> None:
@@ -47,16 +48,10 @@ def describe_wave(found: Design) -> str:
 
 
 def _table(found: Design) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     names = found.predictions[0].names
     units = {"K": "N/m", "B": "N s/m", "M": "kg"}
-    for title in (
-        *(f"{name} [{units[name]}]" for name in names),
-        *(f"± {name}" for name in names),
-        "force [N]",
-        "travel",
-    ):
-        table.add_column(title, justify="right", no_wrap=True)
+    known, widths = [f"{name} [{units[name]}]" for name in names], [f"± {name}" for name in names]
+    table = bare_table(*known, *widths, "force [N]", "travel")
     for prediction in found.predictions:
         table.add_row(*_row(prediction, found))
     return table

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -232,19 +232,23 @@ def _figure(
     size: tuple[int, int],
 ) -> dict[str, str]:
     """A picture at the two widths at which it is looked at, so that its letters keep their size."""
-    assert found.traces is not None
-    words = caption(found, found.traces)
-    wide, narrow = (
-        embedded(svg(drawn(found, found.traces, *own)), "image/svg+xml")
-        for own in (size, (_NARROW, min(size[1], 330)))
-    )
+    traces = found.traces
+    assert traces is not None
+    narrow = (_NARROW, min(size[1], 330))
+    drawn_at = [drawn(found, traces, *own) for own in (size, narrow)]
+    return picture(title, caption(found, traces), drawn_at, full=size[0] > _HALF)
+
+
+def picture(title: str, caption: str, drawn: Sequence[Figure], *, full: bool = False) -> dict[str, str]:
+    """A figure on a page, drawn wide and narrow, with its caption."""
+    wide, narrow = (embedded(svg(one), "image/svg+xml") for one in drawn)
     return {
         "title": title,
         "wide": wide,
         "narrow": narrow,
-        "alt": f"{title}. {words}",
-        "caption": words,
-        "full": "full" if size[0] > _HALF else "",
+        "alt": f"{title}. {caption}",
+        "caption": caption,
+        "full": "full" if full else "",
     }
 
 

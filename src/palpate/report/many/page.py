@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from palpate.identification.pooling import Pooled, PooledParameter
-from palpate.report.identification.page import TONES, split
+from palpate.report.identification.page import TONES, picture, split
 from palpate.report.identification.source import Source
 from palpate.report.identification.words import CALLED, facts_of, formatted, interval
 from palpate.report.look.assets import TABLES, scripts
@@ -15,8 +15,7 @@ from palpate.report.many import forest
 from palpate.report.many.rows import POINT, LogRow, drawn, json_of, quantities
 from palpate.report.many.words import failures, place, sentence
 from palpate.report.numbers import quantity
-from palpate.report.page import embedded, render
-from palpate.report.svg import svg
+from palpate.report.page import render
 from palpate.text import shown
 
 _COLOURED = {POINT: "K", "K": "K", "B": "B", "M": "M"}
@@ -86,19 +85,9 @@ def _row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
 
 def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]:
     title = "Stiffness at the working point" if name == POINT else f"{name}, {CALLED.get(name, name)}"
-    wide, narrow = (
-        embedded(svg(forest.one(rows, pooled, name, width)), "image/svg+xml") for width in (_HALF, _NARROW)
-    )
     own = quantities(pooled)[name].parameter
     words = (
         f"Pooled: {formatted(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
         " own, the brackets hold where the next press falls. Pale: not pooled."
     )
-    return {
-        "title": title,
-        "wide": wide,
-        "narrow": narrow,
-        "alt": f"{title}. {words}",
-        "caption": words,
-        "full": "",
-    }
+    return picture(title, words, [forest.one(rows, pooled, name, width) for width in (_HALF, _NARROW)])
