@@ -137,7 +137,7 @@ def _simulation(name: str, seed: int, whole: bool) -> Source:
 
     experiment = load(name)
     try:
-        return Simulation(name, experiment, seed, whole=whole, waiting=lambda: say(COMPILING))
+        return Simulation(experiment, seed, whole=whole, waiting=lambda: say(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 
