@@ -115,7 +115,9 @@ class GivenMotion:
         at = x[1 : 1 + ticks * self.steps : self.steps].copy()
         read = quantise(at, self.resolution) if self.resolution > 0.0 else at.copy()
         columns = (t, at, read, rows[:, 0].copy(), rows[:, 1].copy())
-        return Record(dict(zip(COLUMNS, columns, strict=True)), COLUMNS, {**self._told(rests), "seed": seed})
+        return Record(
+            dict(zip(COLUMNS, columns, strict=True)), COLUMNS, {**self._description(rests), "seed": seed}
+        )
 
     def _march(self, x: Array, noise: Array, rows: Array, compiled: bool) -> list[float]:
         """Fills the rows, surface by surface; the rest positions of those that were reached [m]."""
@@ -160,7 +162,7 @@ class GivenMotion:
         before, now, after = (float(at) - rest for at in x[:3])
         return now, (after - before) * 0.5 * physics, (after - 2.0 * now + before) * physics * physics
 
-    def _told(self, rests: list[float]) -> dict[str, Any]:
+    def _description(self, rests: list[float]) -> dict[str, Any]:
         """What a record says of its making, in plain values."""
         told = [
             {"from_s": since, "rest_m": rest, "truth": _truth(surface)}

@@ -122,7 +122,7 @@ def export(
     )
     exported = prepare(contact, request, out)
     checked = _written(exported, out, output.check)
-    told = _told(exported, out, checked)
+    told = _as_json(exported, out, checked)
     write_json(beside, signed(told))
     _print(exported, told, checked, (out, beside), json=output.json)
     verdicts = [one.passed for one in checked if one.passed is not None]
@@ -148,7 +148,7 @@ def _written(exported: Exported, out: Path, wanted: bool) -> list[Checked]:
         return check(exported, draft) if wanted else []
 
 
-def _told(exported: Exported, out: Path, checked: list[Checked]) -> dict[str, Any]:
+def _as_json(exported: Exported, out: Path, checked: list[Checked]) -> dict[str, Any]:
     from palpate import __version__
 
     return {

@@ -114,7 +114,7 @@ def laboratory(
     except KeyboardInterrupt:
         say(f"interrupted; what is tried is saved in {out}, and the same command goes on from there")
         return 130
-    _tell(result, out, {"seed": search.seed, **numbers(result, command)} if output.json else None)
+    _show(result, out, {"seed": search.seed, **numbers(result, command)} if output.json else None)
     return 0
 
 
@@ -134,7 +134,7 @@ def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
         cluster.close()
 
 
-def _tell(result: Result, folder: Path, found: Mapping[str, Any] | None) -> None:
+def _show(result: Result, folder: Path, found: Mapping[str, Any] | None) -> None:
     from palpate.report.page import Table
     from palpate.thesis.inference.findings import PAGE
     from palpate.thesis.inference.result import halves, laboratories

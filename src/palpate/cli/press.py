@@ -86,7 +86,7 @@ def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> in
         with _progress.simulated(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)
         summary = _written(record, pressing, fresh)
-    _tell(pressing, summary, folder, json)
+    _show(pressing, summary, folder, json)
     if interrupted() or summary["end"] == INTERRUPTED:
         return 130
     return 0 if summary["end"] == DONE else 1
@@ -108,7 +108,7 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
     return summary
 
 
-def _tell(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
+def _show(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
     from palpate.report.press.page import notes, tables
 
     if as_json:

@@ -89,7 +89,7 @@ def run(
     with noticed() as interrupted:
         ran = _run(name, source, seed, folder, output, drawn, interrupted)
     # All is in its place, so that a reader of the output who has gone loses nothing.
-    _tell(ran, folder, output.json)
+    _show(ran, folder, output.json)
     if ran.undrawn:
         raise InputError(f"{ran.undrawn}; the record is in {folder}")
     if interrupted() or ran.summary["end"] == INTERRUPTED:
@@ -202,7 +202,7 @@ def _record(
         )
 
 
-def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
+def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
     from palpate.report.run.table import notes, tables
 
     summary = ran.summary

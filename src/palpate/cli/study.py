@@ -106,7 +106,7 @@ def study(
         kept = f"what is done is saved in {folder}, and the same command goes on from there"
         say(f"interrupted; {kept}")
         return 130
-    _tell(found, folder, output.json)
+    _show(found, folder, output.json)
     return 0 if found.summary["results"].get("done") else 1
 
 
@@ -164,7 +164,7 @@ def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
         cluster.close()
 
 
-def _tell(found: Findings, folder: Path, as_json: bool) -> None:
+def _show(found: Findings, folder: Path, as_json: bool) -> None:
     if as_json:
         print_answer(found.summary)
         return

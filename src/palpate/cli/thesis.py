@@ -126,10 +126,10 @@ def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, written: Written
 
         runs = replace(runs, waiting=partial(screen.print, COMPILING))
         done = measure(chosen, runs, folder, written=written, force=force, started=started, resumed=resumed)
-    _tell(screen, done, folder)
+    _show(screen, done, folder)
 
 
-def _tell(screen: Console, done: Sequence[Done], folder: Path) -> None:
+def _show(screen: Console, done: Sequence[Done], folder: Path) -> None:
     from palpate.report.page import Table
     from palpate.thesis.claims import count_in_words, rows_of
 

@@ -177,10 +177,12 @@ def _fitted(poses: Poses, tolerance: float) -> Fitted:
     if len(poses.count) < _FEWEST:
         return fit_force(poses, drift=False)
     with_drift, without = fit_force(poses, drift=True), fit_force(poses, drift=False)
-    return with_drift if _tells(with_drift, tolerance) or not _tells(without, tolerance) else without
+    return (
+        with_drift if _determines(with_drift, tolerance) or not _determines(without, tolerance) else without
+    )
 
 
-def _tells(fitted: Fitted, tolerance: float) -> bool:
+def _determines(fitted: Fitted, tolerance: float) -> bool:
     mass = fitted.mass
     return bool(np.isfinite(mass.half) and float(mass.half) <= max(tolerance * float(mass.value), 1e-3))
 
@@ -193,7 +195,7 @@ def _modelled(time: Array, turns: Array, fitted: Fitted) -> Array:
 
 def _lacking(poses: Poses, fitted: Fitted, tolerance: float) -> list[str]:
     """Which direction the poses do not tell, and how to move."""
-    if _tells(fitted, tolerance) and poses.effective > 2.0:
+    if _determines(fitted, tolerance) and poses.effective > 2.0:
         return []
     angles = np.degrees(np.sqrt(np.minimum(fitted.information, 1.0)))
     listed = f"{len(poses.count)} orientations (worth {poses.effective:.2g} of one length)"

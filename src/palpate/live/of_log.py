@@ -55,10 +55,10 @@ def identified(found: Identification) -> tuple[dict[str, str], ...]:
     """What `palpate identify` says, parameter by parameter: as it prints it."""
     parameters = dict(found.parameters)
     point = found.working_point
-    rows = [_told("working point", point.stiffness)] if point else []
+    rows = [_fact("working point", point.stiffness)] if point else []
     return (
         *rows,
-        *(_told(f"{name}, {CALLED[name]}" if name in CALLED else name, p) for name, p in parameters.items()),
+        *(_fact(f"{name}, {CALLED[name]}" if name in CALLED else name, p) for name, p in parameters.items()),
     )
 
 
@@ -74,7 +74,7 @@ def restarted(columns: dict[str, Array]) -> tuple[dict[str, Array], tuple[str, .
     return {name: values[grows] for name, values in columns.items()}, (note,)
 
 
-def _told(name: str, p: Parameter) -> dict[str, str]:
+def _fact(name: str, p: Parameter) -> dict[str, str]:
     text = formatted(p) if p.value is not None else "no number"
     return {"name": shown(name), "text": text, "verdict": str(p.verdict), "tone": TONES[p.verdict]}
 

@@ -63,7 +63,7 @@ class Searching:
         state = optuna.trial.TrialState.PRUNED if objective is None else optuna.trial.TrialState.COMPLETE
         self._kept.add_trial(
             optuna.trial.create_trial(
-                params={a.name: _told(a, values[a.name]) for a in self._axes},
+                params={a.name: _suggested_value(a, values[a.name]) for a in self._axes},
                 distributions=self._space,
                 value=objective,
                 state=state,
@@ -153,7 +153,7 @@ def _heard(axis: Axis, told: Any) -> Any:
     return axis.settings[[str(one) for one in axis.labels()].index(told)]
 
 
-def _told(axis: Axis, value: Any) -> Any:
+def _suggested_value(axis: Axis, value: Any) -> Any:
     """Optuna's value, from one as it is set."""
     return value if axis.drawn else str(axis.labels()[axis.settings.index(value)])
 

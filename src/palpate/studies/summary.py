@@ -56,7 +56,9 @@ def present(frame: DataFrame, plan: Plan, folder: Path, source: str, command: st
     told = signed({"command": command, **summary(frame, plan, ranked, compared)})
     found = Findings(told, tables(frame, plan, ranked, compared), notes(frame, plan, ranked, compared))
     drawn = list(figures(frame, plan))
-    described = Table("What is measured", ("metric", "is"), [(m, _told(m)) for m in plan.study.metrics])
+    described = Table(
+        "What is measured", ("metric", "is"), [(m, _description(m)) for m in plan.study.metrics]
+    )
     page = StudyPage(
         title=plan.study.title,
         about=plan.study.about,
@@ -288,7 +290,7 @@ def _results(frame: DataFrame) -> Table:
     return Table("What the runs came to", ("result", "runs"), [(result, f"{n}") for result, n in counted])
 
 
-def _told(name: str) -> str:
+def _description(name: str) -> str:
     metric = metric_of(name)
     return metric.text if metric.unit == "1" else f"{metric.text} [{metric.unit}]"
 

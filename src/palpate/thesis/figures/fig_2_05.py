@@ -95,7 +95,7 @@ def _environment(data: Data) -> Claim:
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the environment's dynamics.",
         thesis="robust, by their simulations and experiments",
-        measured=f"foam turned into rubber: {described(data.turned)}; {_told(found)}",
+        measured=f"foam turned into rubber: {described(data.turned)}; {_how_many_follow(found)}",
         tolerance=f"on foam, on rubber and after foam turned into rubber, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(following(f) for f in found.values())),
         note=(
@@ -116,7 +116,7 @@ def _configuration(data: Data) -> Claim:
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the arm's configuration.",
         thesis="robust, by their simulations and experiments",
-        measured=_told(found),
+        measured=_how_many_follow(found),
         tolerance=f"with the wall at 0.40, 0.465 and 0.49 m on foam, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(following(f) for f in found.values())),
         note=(
@@ -220,7 +220,7 @@ def _name(name: str) -> str:
     return name.replace("\n", " ")
 
 
-def _told(found: Mapping[str, Sequence[Tracking]]) -> str:
+def _how_many_follow(found: Mapping[str, Sequence[Tracking]]) -> str:
     return "; ".join(f"{_name(n)} {sum(f.follows for f in v)} of {len(v)} follow" for n, v in found.items())
 
 

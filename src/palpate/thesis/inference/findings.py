@@ -29,7 +29,7 @@ def present(result: Result, folder: Path, command: str) -> None:
     """Writes page, document, figure and JSON into the folder."""
     style.save(drawn_figure(result.posterior), folder / FIGURE)
     write_json(folder / FOUND, signed(as_json(result, command)))
-    notes, found = [_told(result), _worth(result.posterior)], tables.found(result)
+    notes, found = [_cross_validated(result), _worth(result.posterior)], tables.found(result)
     whole = page(
         title="The thesis' laboratory, inferred",
         about=(
@@ -60,7 +60,7 @@ def _rows(table: Table) -> str:
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
 
 
-def _told(result: Result) -> str:
+def _cross_validated(result: Result) -> str:
     there, here = result.cross_validation
     follows = "It could take its place." if result.better else "The bench stays the default."
     return (

@@ -156,16 +156,16 @@ class _Asked:
             if other is not None and other.shares == job.shares and job.number not in self.book.known:
                 self.book.add(other)
         missing = [job for job in jobs if job.number not in self.book.known]
-        self._tell(len(jobs) - len(missing))
+        self._progress(len(jobs) - len(missing))
         self._try(missing)
         return np.array([-MISS * self._misses(job) for job in jobs])
 
     def _try(self, jobs: Sequence[Job]) -> None:
         for tried in self.search.runner.tried(jobs, tuple(s.id for s in self.search.sentences)):
             self.book.add(tried)
-            self._tell(1)
+            self._progress(1)
 
-    def _tell(self, more: int) -> None:
+    def _progress(self, more: int) -> None:
         self.done += more
         self.search.progress(self.power, self.done, self.of)
 
