@@ -123,14 +123,11 @@ def _identified_table(found: dict[str, Any], truth: dict[str, Any]) -> Table:
 
 def _arm(record: Record, asked: Asked) -> tuple[Figure, str]:
     """The arm from two sides at the end."""
-    from matplotlib.figure import Figure
-
     joints = [record[f"q{i}"] for i in range(1, asked.arm.joints + 1)]
     bones = asked.arm.joint_places([column[-1] for column in joints])
-    drawing = Figure(figsize=(9.0, 4.2), dpi=style.DPI, layout="constrained")
+    drawing, axes = style.grid((9.0, 4.2), 1, 2)
     centre = asked.place.pose[:3, 3]
-    for axis, (i, j), names in zip(drawing.subplots(1, 2), ((0, 2), (1, 2)), ("xz", "yz"), strict=True):
-        style.plain(axis)
+    for axis, (i, j), names in zip(axes, ((0, 2), (1, 2)), ("xz", "yz"), strict=True):
         along = np.array([-0.15, 0.15])
         flat = asked.place.axes[1:][:, [i, j]]
         for direction in flat:

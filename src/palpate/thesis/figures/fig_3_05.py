@@ -178,11 +178,7 @@ def _peak(data: Data, line: str) -> tuple[float, float]:
 
 def plot(data: Data) -> Figure:
     """Both spectra, and the tones."""
-    drawing, _ = style.figure(1, height=3.6)
-    drawing.clear()
-    left, right = drawing.subplots(1, 2, width_ratios=(1.6, 1.0))
-    for axis in (left, right):
-        style.plain(axis)
+    drawing, (left, right) = style.grid((9.0, 4.1), 1, 2, width_ratios=(1.6, 1.0))
     _spectra(left, data)
     _folded(right, data)
     return drawing

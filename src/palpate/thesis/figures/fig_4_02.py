@@ -166,11 +166,7 @@ def _threshold(data: Data) -> Claim:
 
 def plot(data: Data) -> Figure:
     """The force around the switch; below, the thresholds."""
-    drawing, _ = style.figure(1, height=5.4)
-    drawing.clear()
-    upper, lower = drawing.subplots(2, 1, height_ratios=(1.5, 1.0))
-    for axis in (upper, lower):
-        style.plain(axis)
+    drawing, (upper, lower) = style.grid((9.0, 5.9), 2, height_ratios=(1.5, 1.0))
     _force(upper, data)
     _thresholds(lower, data)
     return drawing

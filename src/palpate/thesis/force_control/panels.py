@@ -24,14 +24,9 @@ FAILED: dict[str, Any] = {"color": style.FAIL, "s": 20, "marker": "x", "linewidt
 
 def panels(heights: Sequence[float], columns: int = 1, width: float = 9.0) -> tuple[Figure, list[list[Axes]]]:
     """Rows of panels of these heights [inches], each with an x axis of its own."""
-    from matplotlib.figure import Figure
-
     size = (width, sum(heights) + 0.45 * len(heights))
-    drawing = Figure(figsize=size, dpi=style.DPI, layout="constrained")
-    grid = drawing.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
-    for axis in grid.flat:
-        style.plain(axis)
-    return drawing, [list(row) for row in grid]
+    drawing, axes = style.grid(size, len(heights), columns, height_ratios=heights)
+    return drawing, [axes[i : i + columns] for i in range(0, len(axes), columns)]
 
 
 def across(row: Sequence[Axes]) -> Axes:

@@ -91,16 +91,12 @@ def _worth(sample: Sample) -> str:
 
 def drawn_figure(sample: Sample) -> Figure:
     """A small panel for each unknown: where its posterior lies in shares of its prior."""
-    from matplotlib.figure import Figure
-
     columns, bins = 6, 10
     rows = -(-len(UNKNOWNS) // columns)
-    drawing = Figure(figsize=(11.0, 1.3 * rows), dpi=style.DPI, layout="constrained")
-    axes = drawing.subplots(rows, columns).ravel()
+    drawing, axes = style.grid((11.0, 1.3 * rows), rows, columns)
     for axis in axes[len(UNKNOWNS) :]:
         axis.remove()
     for i, (axis, unknown) in enumerate(zip(axes, UNKNOWNS, strict=False)):
-        style.plain(axis)
         count = len(unknown.choices) or bins
         axis.hist(
             sample.visited[:, i], bins=count, range=(0.0, 1.0), density=True, color=style.SERIES[0], alpha=0.8
