@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from palpate.cli._arm_options import ArmOptions, FrameOptions
-from palpate.cli._indenter_options import IndenterOptions
-from palpate.cli._log_options import LogOptions, read
 from palpate.cli._program import command
+from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.options.indenter import IndenterOptions
+from palpate.cli.options.log import LogOptions, read
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

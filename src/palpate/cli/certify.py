@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG, SIGNED
-from palpate.cli._force_options import ColumnOptions, OutputOptions, inner_loop, one_thread
 from palpate.cli._terminal import console, print_lines
+from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.force import ColumnOptions, OutputOptions, inner_loop, one_thread
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

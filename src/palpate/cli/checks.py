@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import console, show_table
-from palpate.cli._written import JsonOption
+from palpate.cli.options.written import JsonOption
 from palpate.errors import InputError
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG, SIGNED, in_si, in_si_if_given
 from palpate.cli._terminal import console, place
-from palpate.cli._written import WRITTEN, FileOptions, PictureOptions
+from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
+from palpate.cli.options.written import WRITTEN, FileOptions, PictureOptions
 from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.text import shown

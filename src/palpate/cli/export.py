@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG, SIGNED
-from palpate.cli._found import read_found
+from palpate.cli._identified import read_found
 from palpate.cli._program import command
 from palpate.cli._terminal import STYLE, console, head, place, show_table
-from palpate.cli._written import WRITTEN, FileOptions
+from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.written import WRITTEN, FileOptions
 from palpate.errors import InputError
 from palpate.files import MADE, signed, whole, write_json
 

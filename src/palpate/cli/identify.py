@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._arm_options import ArmOptions, FrameOptions
-from palpate.cli._flags import SIGNED
-from palpate.cli._indenter_options import IndenterOptions
-from palpate.cli._log_options import LogOptions
 from palpate.cli._one_log import OneLog, answered
-from palpate.cli._options_file import CellOptions
 from palpate.cli._terminal import console, place
-from palpate.cli._values import with_std
-from palpate.cli._written import WRITTEN, PictureOptions
+from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.options.flags import SIGNED
+from palpate.cli.options.indenter import IndenterOptions
+from palpate.cli.options.kept import CellOptions
+from palpate.cli.options.log import LogOptions
+from palpate.cli.options.values import with_std
+from palpate.cli.options.written import WRITTEN, PictureOptions
 from palpate.errors import InputError
 from palpate.files import write_text
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter, validators
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG
-from palpate.cli._named import FolderOptions
 from palpate.cli._progress import counted
 from palpate.cli._terminal import console, place, say, show_table
+from palpate.cli.options.flags import FLAG
+from palpate.cli.options.known import FolderOptions
 
 if TYPE_CHECKING:
     from palpate.thesis.inference.result import Result

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._arm_options import ArmOptions, FrameOptions
-from palpate.cli._flags import FLAG, SIGNED
-from palpate.cli._log_options import LogOptions
 from palpate.cli._progress import COMPILING
 from palpate.cli._terminal import print_lines, say
 from palpate.cli.identify import ModelOptions
-from palpate.cli.run import whole_number
+from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.options.flags import FLAG, SIGNED, WHOLE
+from palpate.cli.options.log import LogOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ class ShownOptions:
     arm_: Annotated[str | None, Parameter(name="--arm")] = None
     log: Path | None = None
     record: Path | None = None
-    seed: Annotated[int, Parameter(converter=whole_number)] = 0
+    seed: Annotated[int, WHOLE] = 0
     whole_approach: Annotated[bool, FLAG] = False
 
     def file(self) -> Path | None:

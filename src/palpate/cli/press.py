@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.cli import _progress
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
-from palpate.cli._options_file import CellOptions
-from palpate.cli._press_options import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
 from palpate.cli._program import command
 from palpate.cli._terminal import console, place, print_lines, show_answer
+from palpate.cli.options.flags import FLAG
+from palpate.cli.options.kept import CellOptions
+from palpate.cli.options.press import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
 from palpate.files import fresh_folder, signed, write_json
 from palpate.text import shown
 

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter, Token
+from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._figures import DRAWN, FigureOptions
-from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
-from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli._progress import COMPILING, simulated
 from palpate.cli._terminal import console, place, show_answer
+from palpate.cli.options.figures import DRAWN, FigureOptions
+from palpate.cli.options.flags import FLAG, WHOLE
+from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
 from palpate.files import fresh_folder, signed, write_json, write_text
 from palpate.text import shown
@@ -27,14 +27,6 @@ if TYPE_CHECKING:
 
     from palpate.identification import Identification
     from palpate.records import Record
-
-
-def whole_number(_: Any, tokens: Sequence[Token]) -> int:
-    """A seed; the conversion of cyclopts would round 1.5 without a word."""
-    (token,) = tokens
-    if not token.value.isdecimal():
-        raise InputError(f"it must be a whole number, 0 or above, got {token.value!r}")
-    return int(token.value)
 
 
 @Parameter(name="*", group=DRAWN)
@@ -55,7 +47,7 @@ def run(
     name: str | None = None,
     /,
     *,
-    seed: Annotated[int, Parameter(converter=whole_number)] = 0,
+    seed: Annotated[int, WHOLE] = 0,
     known: KnownOptions | None = None,
     output: FolderOptions | None = None,
     drawn: DrawnOptions | None = None,

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from palpate.cli._answer import print_answer
 from palpate.cli._progress import COMPILING
 from palpate.cli._terminal import print_lines, say
-from palpate.cli._written import WRITTEN
+from palpate.cli.options.written import WRITTEN
 
 
 def speed(*, json: Annotated[bool, Parameter(negative="", group=WRITTEN)] = False) -> int:

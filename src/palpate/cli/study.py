@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG
-from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli._progress import COMPILING, counted
 from palpate.cli._terminal import console, place, say, show_answer
+from palpate.cli.options.flags import FLAG
+from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
 from palpate.text import shown
 

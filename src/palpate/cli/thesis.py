@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter, validators
 
-from palpate.cli._figures import FigureOptions
 from palpate.cli._progress import COMPILING, bar
 from palpate.cli._terminal import console, place, print_lines, say, show_table
-from palpate.cli._written import WRITTEN
+from palpate.cli.options.figures import FigureOptions
+from palpate.cli.options.written import WRITTEN
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._log_options import GB, limits_of
 from palpate.cli._terminal import print_lines
-from palpate.cli._written import WRITTEN
+from palpate.cli.options.log import GB, limits_of
+from palpate.cli.options.written import WRITTEN
 
 if TYPE_CHECKING:
     from palpate.logs.listing import Entry, Listing

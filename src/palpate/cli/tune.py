@@ -6,7 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli._answer import print_answer
-from palpate.cli._force_options import (
+from palpate.cli._identified import read_found
+from palpate.cli._program import command
+from palpate.cli._terminal import console, place
+from palpate.cli.options.force import (
     ArmOptions,
     ColumnOptions,
     OutputOptions,
@@ -14,11 +17,8 @@ from palpate.cli._force_options import (
     SurfaceOptions,
     one_thread,
 )
-from palpate.cli._found import read_found
-from palpate.cli._log_options import LogOptions
-from palpate.cli._program import command
-from palpate.cli._terminal import console, place
-from palpate.cli._written import ReportOption
+from palpate.cli.options.log import LogOptions
+from palpate.cli.options.written import ReportOption
 from palpate.errors import InputError
 from palpate.files import write_text
 
@@ -103,8 +103,8 @@ def _known(
 
 
 def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str, Any]:
-    from palpate.cli._arm_options import ArmOptions as PayloadOptions
-    from palpate.cli._log_options import read
+    from palpate.cli.options.arm import ArmOptions as PayloadOptions
+    from palpate.cli.options.log import read
     from palpate.contact_frame import identify_contact
     from palpate.logs.own_runs import is_run, measured_by
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._flags import SIGNED, in_si, in_si_if_given
-from palpate.cli._log_options import LogOptions
-from palpate.cli._written import WRITTEN, FileOptions
+from palpate.cli.options.flags import SIGNED, in_si, in_si_if_given
+from palpate.cli.options.log import LogOptions
+from palpate.cli.options.written import WRITTEN, FileOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._flags import FLAG
 from palpate.cli._terminal import print_lines
+from palpate.cli.options.flags import FLAG
 from palpate.errors import InputError
 from palpate.text import shown
 

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
-from cyclopts import Parameter
+from collections.abc import Sequence
+from typing import Any
+
+from cyclopts import Parameter, Token
+
+from palpate.errors import InputError
 
 FLAG = Parameter(negative=())
 """A switch without a `--no-` of its own."""
 SIGNED = Parameter(allow_leading_hyphen=True)
 """A value that may begin with a minus: it is a number below zero, not another option."""
+
+
+def _whole_number(_: Any, tokens: Sequence[Token]) -> int:
+    (token,) = tokens
+    if not token.value.isdecimal():
+        raise InputError(f"it must be a whole number, 0 or above, got {token.value!r}")
+    return int(token.value)
+
+
+WHOLE = Parameter(converter=_whole_number)
+"""A seed; the conversion of cyclopts would round 1.5 without a word."""
 
 
 def in_si(option: str, text: str, kind: str) -> float:

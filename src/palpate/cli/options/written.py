@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._flags import FLAG
+from palpate.cli.options.flags import FLAG
 from palpate.errors import InputError
 from palpate.files import check_place
 

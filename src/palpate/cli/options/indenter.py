@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._flags import SIGNED
-from palpate.cli._values import with_std
+from palpate.cli.options.flags import SIGNED
+from palpate.cli.options.values import with_std
 from palpate.errors import InputError
 from palpate.units import unit
 

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._flags import FLAG, SIGNED, in_si
-from palpate.cli._options_file import options_given
-from palpate.cli._values import vector
-from palpate.cli.run import whole_number
+from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
+from palpate.cli.options.kept import options_given
+from palpate.cli.options.values import vector
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -106,7 +105,7 @@ class SimulatedOptions:
     physics: str = "own"
     controller: str = "cautious"
     at: Annotated[str | None, SIGNED] = None
-    seed: Annotated[int, Parameter(converter=whole_number)] = 0
+    seed: Annotated[int, WHOLE] = 0
     out: Path | None = None
     replace: Annotated[bool, FLAG] = False
 

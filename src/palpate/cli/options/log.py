@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._flags import SIGNED
+from palpate.cli.options.flags import SIGNED
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
