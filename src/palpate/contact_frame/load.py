@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_inertia import BLOCKS
+from palpate.contact_frame.free_motion.inertia import BLOCKS
 
 if TYPE_CHECKING:
     from palpate.contact_frame.payload import Payload

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.free_motion import contact_rows, rows_between
+from palpate.contact_frame.free_motion.rows import contact_rows, rows_between
 from palpate.contact_frame.load import Load, known_load, load_of, no_load, robust_load, turns
 from palpate.contact_frame.saturation import saturated_rows
 from palpate.contact_frame.signals_in_base import Signals

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_inertia import BLOCKS
+from palpate.contact_frame.free_motion.inertia import BLOCKS
 
 Rows = Mask
 

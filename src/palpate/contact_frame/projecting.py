@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.free_inertia import CHANCE, free_inertia, wrong_sign, wrong_sign_of
+from palpate.contact_frame.free_motion.inertia import CHANCE, free_inertia, wrong_sign, wrong_sign_of
 from palpate.contact_frame.lever import line_misses_tcp
 from palpate.contact_frame.load import load_of, turns
 from palpate.contact_frame.load_removal import Unloaded, in_range

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_inertia import CHANCE
+from palpate.contact_frame.free_motion.inertia import CHANCE
 from palpate.contact_frame.vectors import FEWEST
 
 _ENOUGH = 4000

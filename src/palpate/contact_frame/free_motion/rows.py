@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_level import free_level
+from palpate.contact_frame.free_motion.level import free_level
 from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.errors import InputError
 from palpate.identification.contacts import contacts_of
