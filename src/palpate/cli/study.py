@@ -23,10 +23,10 @@ from palpate.text import shown
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from palpate.studies.cluster import Cluster
-    from palpate.studies.plan import Plan
-    from palpate.studies.run_study import Runner
-    from palpate.studies.summary import Findings
+    from palpate.studies.definition.plan import Plan
+    from palpate.studies.findings.summary import Findings
+    from palpate.studies.running.cluster import Cluster
+    from palpate.studies.running.run_study import Runner
 
 
 @Parameter(name="*", group=Group("A cluster", sort_key=1))
@@ -54,7 +54,7 @@ class ClusterOptions:
 
     def cluster(self) -> Cluster | None:
         """The cluster; None if none is named."""
-        from palpate.studies.cluster import Certificates, Cluster
+        from palpate.studies.running.cluster import Certificates, Cluster
 
         files = (self.tls_ca, self.tls_cert, self.tls_key)
         given = [path for path in files if path is not None]
@@ -91,7 +91,7 @@ def study(
         Begin a study that takes very long without asking.
     """
     known, output = known or KnownOptions(), output or FolderOptions()
-    from palpate.studies import study as studies
+    from palpate.studies.definition import study as studies
 
     if known.list_:
         listed(studies.FILES, lambda one: studies.load(one).title)
@@ -112,11 +112,11 @@ def study(
 
 def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
-    from palpate.studies.part_check import check_parts_of
-    from palpate.studies.plan import plan
-    from palpate.studies.run_study import Work, begun
-    from palpate.studies.study import parse
-    from palpate.studies.summary import present
+    from palpate.studies.definition.part_check import check_parts_of
+    from palpate.studies.definition.plan import plan
+    from palpate.studies.definition.study import parse
+    from palpate.studies.findings.summary import present
+    from palpate.studies.running.run_study import Work, begun
 
     screen = console(stderr=True)
     try:
@@ -135,7 +135,7 @@ def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool
 
 def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
     """Asks whether to begin what takes very long on the cores here; of a cluster only the number of runs is known."""
-    from palpate.studies.cost import MANY, seconds_a_run, too_much
+    from palpate.studies.running.cost import MANY, seconds_a_run, too_much
 
     if not here and len(plan) < MANY:
         return
@@ -154,7 +154,7 @@ def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
 def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
     cluster = where.cluster()
     if cluster is None:
-        from palpate.studies.local import Local
+        from palpate.studies.running.local import Local
 
         yield Local(waiting=lambda: screen.print(COMPILING))
         return

@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate._jit import sources_stamp
 from palpate.arrays import Array
-from palpate.studies.local import unordered
+from palpate.studies.running.local import unordered
 from palpate.thesis.inference import archive, sampler
 from palpate.thesis.inference.archive import Archive, Head, Tried
 from palpate.thesis.inference.sampler import Sample, Settings
@@ -25,7 +25,7 @@ from palpate.thesis.laboratory.laboratory import drawn
 from palpate.thesis.laboratory.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
-    from palpate.studies.cluster import Cluster
+    from palpate.studies.running.cluster import Cluster
 
 Progress = Callable[[float, int, int], None]
 MOST_WRONG = 0.5

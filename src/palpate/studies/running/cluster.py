@@ -16,8 +16,8 @@ from urllib.parse import urlsplit
 
 from palpate.errors import InputError
 from palpate.plugins import Plugin
-from palpate.studies.run_one import FAILED, Done, Job, Row, run_one
-from palpate.studies.sources import sources
+from palpate.studies.running.run_one import FAILED, Done, Job, Row, run_one
+from palpate.studies.running.sources import sources
 
 A = TypeVar("A")
 B = TypeVar("B")

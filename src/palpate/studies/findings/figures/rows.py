@@ -12,10 +12,10 @@ from palpate.arrays import Array
 from palpate.bench.metrics import Metric
 from palpate.errors import unknown
 from palpate.report.study.axes import Scale
-from palpate.studies.parameters import Axis, label
-from palpate.studies.plan import MAIN, Plan
-from palpate.studies.study import flat
-from palpate.studies.tables import Curves, Map
+from palpate.studies.definition.parameters import Axis, label
+from palpate.studies.definition.plan import MAIN, Plan
+from palpate.studies.definition.study import flat
+from palpate.studies.definition.tables import Curves, Map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from palpate.bench.metrics import metric_of
 from palpate.report import style
 from palpate.report.study.axes import Scale
-from palpate.studies.figures.curves import curves_of
-from palpate.studies.figures.maps import map_of
-from palpate.studies.figures.rows import FEW, Drawn, Rows
-from palpate.studies.figures.scatter import clouds_of
-from palpate.studies.plan import Plan
-from palpate.studies.tables import Curves, Map
+from palpate.studies.definition.plan import Plan
+from palpate.studies.definition.tables import Curves, Map
+from palpate.studies.findings.figures.curves import curves_of
+from palpate.studies.findings.figures.maps import map_of
+from palpate.studies.findings.figures.rows import FEW, Drawn, Rows
+from palpate.studies.findings.figures.scatter import clouds_of
 
 if TYPE_CHECKING:
     from polars import DataFrame

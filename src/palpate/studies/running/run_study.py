@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Protocol
 
 from palpate.files import MADE, kept_folder, write_text
 from palpate.logs import write_record
-from palpate.studies import journal, results, search
-from palpate.studies.journal import Head, Journal
-from palpate.studies.local import Local
-from palpate.studies.part_check import check_parts_of
-from palpate.studies.plan import Plan, Setting, plan, resolved
-from palpate.studies.run_one import Done, Job
-from palpate.studies.sources import sources
-from palpate.studies.study import parse
+from palpate.studies.definition.part_check import check_parts_of
+from palpate.studies.definition.plan import Plan, Setting, plan, resolved
+from palpate.studies.definition.study import parse
+from palpate.studies.running import journal, results, search
+from palpate.studies.running.journal import Head, Journal
+from palpate.studies.running.local import Local
+from palpate.studies.running.run_one import Done, Job
+from palpate.studies.running.sources import sources
 
 SOURCE, RECORDS = "study.toml", "records"
 
@@ -116,7 +116,7 @@ def run(text: str, out: str | Path, *, where: str = "study", runner: Runner | No
         text: the study's file.
         out: folder for the journal and the table.
         where: the file's path, for errors, and for experiments that lie beside it.
-        runner: `Local`, on all cores, when left out; or a `palpate.studies.cluster.Cluster`.
+        runner: `Local`, on all cores, when left out; or a `palpate.studies.running.cluster.Cluster`.
 
     Raises:
         InputError: what `palpate study` would refuse.

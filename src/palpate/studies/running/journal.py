@@ -12,7 +12,7 @@ import msgspec
 
 from palpate.errors import InputError
 from palpate.files import check_place, journal
-from palpate.studies.run_one import Row
+from palpate.studies.running.run_one import Row
 
 NAME = "runs.jsonl"
 

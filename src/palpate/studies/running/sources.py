@@ -22,7 +22,7 @@ OF_A_RUN = (
     "references",
     "robots",
     "signals",
-    "studies/run_one.py",
+    "studies/running/run_one.py",
 )
 """Files and folders of the package that a row depends on; what reads studies and draws pages may change."""
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.studies.applying import Tables, combined, put, value_at
-from palpate.studies.study import flat
-from palpate.studies.tables import Parameter
+from palpate.studies.definition.applying import Tables, combined, put, value_at
+from palpate.studies.definition.study import flat
+from palpate.studies.definition.tables import Parameter
 
 Label = float | int | bool | str
 """A value as it stands in a table of results."""

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, check_place
-from palpate.studies.parameters import Axis
-from palpate.studies.plan import Plan
+from palpate.studies.definition.parameters import Axis
+from palpate.studies.definition.plan import Plan
 
 if TYPE_CHECKING:
     from optuna import Study as OptunaStudy

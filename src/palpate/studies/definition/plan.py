@@ -16,11 +16,11 @@ from palpate.bench.any_experiment import AnyExperiment, build_any, load_any
 from palpate.bench.experiments.own_parts import ROLES
 from palpate.errors import InputError, PluginError, unknown
 from palpate.plugins import Plugin, is_plugin, plugin
-from palpate.studies.applying import Tables, experiment_of, put, tables_of
-from palpate.studies.parameters import Axis, Label, axis, label
-from palpate.studies.sobol import Sobol
-from palpate.studies.study import flat
-from palpate.studies.tables import Against, Parameter, Study
+from palpate.studies.definition.applying import Tables, experiment_of, put, tables_of
+from palpate.studies.definition.parameters import Axis, Label, axis, label
+from palpate.studies.definition.sobol import Sobol
+from palpate.studies.definition.study import flat
+from palpate.studies.definition.tables import Against, Parameter, Study
 
 TRIED = 2000
 """How many combinations of values are tried before a study is refused whose every value is refused."""

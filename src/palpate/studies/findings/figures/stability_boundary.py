@@ -16,9 +16,9 @@ from palpate.controllers import NeuralController
 from palpate.errors import InputError
 from palpate.report.study.axes import Scale
 from palpate.report.study.maps import Bound
-from palpate.studies.plan import Part
-from palpate.studies.study import flat
-from palpate.studies.tables import Map
+from palpate.studies.definition.plan import Part
+from palpate.studies.definition.study import flat
+from palpate.studies.definition.tables import Map
 
 LOOKED_AT = 8
 """Places along a row that are looked at first; what changes twice between two of them is not seen."""

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from palpate.bench.any_experiment import AnyExperiment, build_any
 from palpate.bench.speed import cores
 from palpate.errors import InputError
-from palpate.studies.plan import Plan
-from palpate.studies.run_one import Stopped
+from palpate.studies.definition.plan import Plan
+from palpate.studies.running.run_one import Stopped
 
 LOOKED_AT = 0.5
 """Seconds of this machine's time that the piece may take [s]."""

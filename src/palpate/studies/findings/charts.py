@@ -10,9 +10,9 @@ import numpy as np
 
 from palpate.bench.metrics import metric_of
 from palpate.report.study.plain import MOST, numbers, plain_panels
-from palpate.studies.figures.rows import Drawn, sentence, with_unit
-from palpate.studies.pairing import Comparison
-from palpate.studies.plan import Plan
+from palpate.studies.definition.plan import Plan
+from palpate.studies.findings.figures.rows import Drawn, sentence, with_unit
+from palpate.studies.findings.pairing import Comparison
 
 ENTRANTS = 12
 """Settings that are drawn against each other at most, the best ones."""

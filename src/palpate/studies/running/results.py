@@ -12,8 +12,8 @@ import msgspec
 from palpate.bench.metrics import metric_of
 from palpate.errors import InputError
 from palpate.logs.store import write_parquet
-from palpate.studies.plan import Plan
-from palpate.studies.run_one import Row
+from palpate.studies.definition.plan import Plan
+from palpate.studies.running.run_one import Row
 
 if TYPE_CHECKING:
     from polars import DataFrame

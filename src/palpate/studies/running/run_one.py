@@ -13,8 +13,8 @@ from palpate.bench.metrics import Look, metric_of
 from palpate.errors import InputError
 from palpate.plugins import Plugin
 from palpate.records import Record
-from palpate.studies.parameters import Label
-from palpate.studies.plan import Setting
+from palpate.studies.definition.parameters import Label
+from palpate.studies.definition.plan import Setting
 
 REFUSED, FAILED = "refused", "failed"
 """Results beside those that a run ends with: values that are no experiment; an error."""

@@ -15,8 +15,8 @@ from palpate.bench.ending import DONE
 from palpate.bench.metrics import Metric, metric_of
 from palpate.report.study.axes import Scale
 from palpate.report.study.maps import Heat, heat_figure
-from palpate.studies.figures.rows import Drawn, Rows, restricted_to, sentence
-from palpate.studies.tables import Map
+from palpate.studies.definition.tables import Map
+from palpate.studies.findings.figures.rows import Drawn, Rows, restricted_to, sentence
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -27,7 +27,7 @@ def map_of(table: Rows, asked: Map, number: int) -> Drawn:
     metric, x, y = metric_of(asked.metric), table.scale(asked.x), table.scale(asked.y)
 
     def made() -> list[Heat]:
-        from palpate.studies.figures.stability_boundary import bounds
+        from palpate.studies.findings.figures.stability_boundary import bounds
 
         panels = []
         for title, value, rows in table.panels(asked):

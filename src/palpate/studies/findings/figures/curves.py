@@ -11,8 +11,8 @@ from palpate.bench.ending import DONE
 from palpate.bench.metrics import metric_of
 from palpate.report.study.axes import Scale, decades
 from palpate.report.study.lines import Curve, Line, curves_figure
-from palpate.studies.figures.rows import FEW, Drawn, Rows, restricted_to, sentence, short
-from palpate.studies.tables import Curves
+from palpate.studies.definition.tables import Curves
+from palpate.studies.findings.figures.rows import FEW, Drawn, Rows, restricted_to, sentence, short
 
 if TYPE_CHECKING:
     from polars import DataFrame

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from palpate.bench.metrics import Metric
 from palpate.report.study.axes import Scale
 from palpate.report.study.clouds import Cloud, Points, clouds_figure
-from palpate.studies.figures.rows import FEW, Drawn, Rows, logarithmic, sentence
-from palpate.studies.parameters import Axis
+from palpate.studies.definition.parameters import Axis
+from palpate.studies.findings.figures.rows import FEW, Drawn, Rows, logarithmic, sentence
 
 CLOUDS = 9
 """Parameters that are drawn as clouds at most."""

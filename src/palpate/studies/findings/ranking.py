@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench.ending import DONE
-from palpate.studies.parameters import Label
-from palpate.studies.plan import MAIN, Plan
+from palpate.studies.definition.parameters import Label
+from palpate.studies.definition.plan import MAIN, Plan
 
 if TYPE_CHECKING:
     from polars import DataFrame

@@ -19,8 +19,8 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.bench.ending import DONE
 from palpate.bench.metrics import metric_of
-from palpate.studies.parameters import Label
-from palpate.studies.plan import MAIN, Part, Plan
+from palpate.studies.definition.parameters import Label
+from palpate.studies.definition.plan import MAIN, Part, Plan
 
 if TYPE_CHECKING:
     from polars import DataFrame

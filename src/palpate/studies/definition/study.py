@@ -13,7 +13,7 @@ from palpate.bench.experiments.toml_files import TomlFiles, decoded
 from palpate.bench.metrics import metric_of
 from palpate.errors import InputError, unknown
 from palpate.plugins import look_in
-from palpate.studies.tables import Against, Curves, Map, Parameter, Study
+from palpate.studies.definition.tables import Against, Curves, Map, Parameter, Study
 
 T = TypeVar("T")
 VALUES = frozenset(Parameter.__struct_fields__)

@@ -11,8 +11,8 @@ import numpy as np
 
 from palpate.bench.metrics import metric_of
 from palpate.report.page import Table
-from palpate.studies.figures.rows import short, with_unit
-from palpate.studies.pairing import Comparison, Entrant, Pair
+from palpate.studies.findings.figures.rows import short, with_unit
+from palpate.studies.findings.pairing import Comparison, Entrant, Pair
 
 NONE = "–"
 SHOWN = 12

@@ -11,7 +11,7 @@ from palpate.bench.metrics.own import tried
 from palpate.bench.part_check import check_parts
 from palpate.errors import InputError, PluginError
 from palpate.plugins import is_plugin
-from palpate.studies.plan import TRIED, Plan, samples
+from palpate.studies.definition.plan import TRIED, Plan, samples
 
 PRESS = 0.1
 """Contact after which a run is long enough to ask a metric of it [s]."""

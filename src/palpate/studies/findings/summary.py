@@ -15,13 +15,13 @@ from palpate.bench.metrics import metric_of
 from palpate.files import signed, write_json, write_text
 from palpate.report.page import Table
 from palpate.report.study.page import StudyPage, study_page
-from palpate.studies import comparison_table
-from palpate.studies.charts import charts
-from palpate.studies.figures.draw import draw, figures
-from palpate.studies.figures.rows import short, with_unit
-from palpate.studies.pairing import Comparison, comparisons
-from palpate.studies.plan import MAIN, Plan
-from palpate.studies.ranking import Mean, Ranked, Ranking, rankings
+from palpate.studies.definition.plan import MAIN, Plan
+from palpate.studies.findings import comparison_table
+from palpate.studies.findings.charts import charts
+from palpate.studies.findings.figures.draw import draw, figures
+from palpate.studies.findings.figures.rows import short, with_unit
+from palpate.studies.findings.pairing import Comparison, comparisons
+from palpate.studies.findings.ranking import Mean, Ranked, Ranking, rankings
 
 if TYPE_CHECKING:
     from polars import DataFrame

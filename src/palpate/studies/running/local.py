@@ -8,7 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TypeVar
 
 from palpate.bench.speed import cores
-from palpate.studies.run_one import Done, Job, run_one
+from palpate.studies.running.run_one import Done, Job, run_one
 
 A = TypeVar("A")
 B = TypeVar("B")
