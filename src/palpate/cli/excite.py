@@ -15,7 +15,7 @@ from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
 from palpate.cli.options.written import WRITTEN, FileOptions, PictureOptions
 from palpate.errors import InputError
 from palpate.files import write_text
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from palpate.excitation import Budget, Design, ForceLoop, Problem, Remedy, Sensors, SurfaceRange
@@ -310,7 +310,7 @@ def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | 
         from palpate.cli._program import command
         from palpate.report.excitation.page import page
 
-        write_text(output.report, page(found, helps, shown(command())))
+        write_text(output.report, page(found, helps, printable(command())))
     written = [*([output.out, output.experiment] if found.feasible else []), output.report]
     _print(found, helps, written, picture, output.json)
     return 0 if found.feasible else 1

@@ -14,7 +14,7 @@ from palpate.cli.options.flags import FLAG
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.press import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
 from palpate.files import fresh_folder, signed, write_json
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from palpate.press.prepare import Pressing
@@ -99,8 +99,8 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
     from palpate.press.summary import summarise
     from palpate.report.press.page import write_report
 
-    record = changed(record, meta={**record.meta, "command": shown(command())})
-    summary = signed({"command": shown(command()), **summarise(record, pressing.asked)})
+    record = changed(record, meta={**record.meta, "command": printable(command())})
+    summary = signed({"command": printable(command()), **summarise(record, pressing.asked)})
     write_record(record, folder / "record.parquet")
     write_json(folder / "summary.json", summary)
     if len(record):

@@ -20,7 +20,7 @@ from palpate.cli.options.flags import FLAG, WHOLE
 from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
 from palpate.files import fresh_folder, signed, write_json, write_text
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -117,14 +117,14 @@ def _run(
 
     with fresh_folder(folder, force=output.force) as fresh:
         experiment = parse_any(source, name)
-        command = shown(f"palpate run {shlex.quote(name)} --seed {seed}")
+        command = printable(f"palpate run {shlex.quote(name)} --seed {seed}")
         record = _record(console(stderr=output.json), name, experiment, seed, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / "record.parquet")
         alone = isinstance(experiment, OneDirection)  # nothing excites it, and no estimator watches
         found, why = (None, "") if alone else _identified(fresh / "record.parquet")
         said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
-        about = {"experiment": shown(Path(name).stem), "command": command}
+        about = {"experiment": printable(Path(name).stem), "command": command}
         summary = signed({**about, **summarise(record), **said})
         write_json(fresh / "summary.json", summary)
         undrawn = ""
@@ -132,7 +132,9 @@ def _run(
             if len(record):
                 _draw(record, fresh, summary, found, source, drawn)
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
-            undrawn = f"there was not enough room to draw it ({shown(str(error)) or type(error).__name__})"
+            undrawn = (
+                f"there was not enough room to draw it ({printable(str(error)) or type(error).__name__})"
+            )
     return _Ran(experiment.title, summary, found, undrawn, record)
 
 
@@ -173,7 +175,7 @@ def _identified(record: Path) -> tuple[Identification | None, str]:
     try:
         return OneLog(ModelOptions()).identified(record)[0], ""
     except InputError as error:
-        return None, shown(str(error).replace(str(record), record.name))
+        return None, printable(str(error).replace(str(record), record.name))
 
 
 def _record(

@@ -18,7 +18,7 @@ from palpate.cli._terminal import console, place, say, show_answer
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -130,7 +130,7 @@ def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool
         frame = Work(planned, source, folder, runner, lambda done: show("runs", done, len(planned))).done(
             force=force
         )
-    return present(frame, planned, folder, source, shown(f"palpate study {shlex.quote(name)}"))
+    return present(frame, planned, folder, source, printable(f"palpate study {shlex.quote(name)}"))
 
 
 def _ask(plan: Plan, screen: Console, *, here: bool) -> None:

@@ -11,7 +11,7 @@ from palpate.live.view import Happened, View
 from palpate.records import Record
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED, formatted
-from palpate.text import shown
+from palpate.text import printable
 
 _MOST_MARKS = 200
 
@@ -38,7 +38,7 @@ def of_log(title: str, found: Identification, along: Record) -> Replay:
         columns |= _constant(columns["t"], found, name)
     kept, notes = restarted(columns)
     view = View(
-        title=shown(title),
+        title=printable(title),
         about=f"{len(along)} rows; the estimate is that of the whole log",
         kind="replay",
         rate=0.0,
@@ -76,7 +76,7 @@ def restarted(columns: dict[str, Array]) -> tuple[dict[str, Array], tuple[str, .
 
 def _fact(name: str, p: Parameter) -> dict[str, str]:
     text = formatted(p) if p.value is not None else "no number"
-    return {"name": shown(name), "text": text, "verdict": str(p.verdict), "tone": TONES[p.verdict]}
+    return {"name": printable(name), "text": text, "verdict": str(p.verdict), "tone": TONES[p.verdict]}
 
 
 def _constant(t: Array, found: Identification, name: str) -> dict[str, Array]:

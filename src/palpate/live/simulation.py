@@ -31,7 +31,7 @@ from palpate.live.view import (
     check_ahead,
     planar_bones,
 )
-from palpate.text import shown
+from palpate.text import printable
 
 _FROM = {name: i for i, name in enumerate(ROW)}
 _TAKEN = {
@@ -83,8 +83,8 @@ class Simulation:
         self.state.values = {slider.key: slider.value for slider in sliders}
         q, length = bench.q, bench.loop.plant.arm.length
         self.view = View(
-            title=shown(experiment.title),
-            about=shown(experiment.about),
+            title=printable(experiment.title),
+            about=printable(experiment.about),
             kind="simulation",
             rate=float(self._rate),
             sliders=sliders,

@@ -13,7 +13,7 @@ from palpate.report import style
 from palpate.report.look.columns import with_peaks
 from palpate.report.page import Table, embedded, render
 from palpate.report.result_text import as_html, as_text
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +35,7 @@ def line(record: Record) -> str:
     source = record.meta.get("source")
     named = f", from {source}" if isinstance(source, str) else ""
     span = f", {record[clock][0]:.4g} to {record[clock][-1]:.4g} s" if clock is not None and count > 1 else ""
-    return shown(f"{columns}{span}{named}")
+    return printable(f"{columns}{span}{named}")
 
 
 def text(record: Record) -> str:
@@ -51,7 +51,7 @@ def html(record: Record) -> str:
 def rows(record: Record) -> list[tuple[str, ...]]:
     """Name, unit, extremes and mean of each column, and how many of its values are missing."""
     return [
-        (shown(name), shown(record.units[name]), *_numbers(np.asarray(column)))
+        (printable(name), printable(record.units[name]), *_numbers(np.asarray(column)))
         for name, column in record.columns.items()
     ]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palpate.files import check_place, write_text
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,7 +25,7 @@ def printed(show: Callable[[Console], None]) -> str:
 
     file = StringIO()
     show(Console(file=file, width=_WIDTH, no_color=True, markup=False, emoji=False, highlight=False))
-    return shown("\n".join(line.rstrip() for line in file.getvalue().rstrip().splitlines()))
+    return printable("\n".join(line.rstrip() for line in file.getvalue().rstrip().splitlines()))
 
 
 def as_text(head: str, rows: Sequence[Sequence[str]]) -> str:
@@ -34,7 +34,7 @@ def as_text(head: str, rows: Sequence[Sequence[str]]) -> str:
     lines = [
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]
-    return shown("\n".join([head, *(f"  {line}" for line in lines)]))
+    return printable("\n".join([head, *(f"  {line}" for line in lines)]))
 
 
 def as_html(head: str, rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> str:
@@ -62,4 +62,4 @@ def _row(cells: Sequence[str], tag: str) -> str:
 
 
 def _safe(text: str) -> str:
-    return escape(shown(text), quote=True)
+    return escape(printable(text), quote=True)

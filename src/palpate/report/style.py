@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
 from palpate.report.look import tokens
 from palpate.report.look.tokens import DATA, PAIRS
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -150,7 +150,7 @@ def legend_above(axis: Axes) -> None:
 
 def literal(text: str) -> str:
     """A text from outside as it is to be drawn: dollars are dollars, not formulas."""
-    return shown(text).replace("$", r"\$")
+    return printable(text).replace("$", r"\$")
 
 
 def save(drawing: Figure, path: Path, dpi: int | None = None) -> Path:

@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter
 from palpate.cli._terminal import print_lines
 from palpate.cli.options.flags import FLAG
 from palpate.errors import InputError
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from palpate.bench.experiments.toml_files import TomlFiles
@@ -76,5 +76,5 @@ def source_of(files: TomlFiles, name: str | None, verb: str, printed: bool) -> s
     source = files.source(name)
     if not printed:
         return source
-    sys.stdout.write(shown(source))
+    sys.stdout.write(printable(source))
     return None

@@ -12,7 +12,7 @@ from palpate.report.identification.source import Source
 from palpate.report.identification.table import show
 from palpate.report.identification.words import formatted, sentence
 from palpate.report.result_text import as_html, printed
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,7 +24,7 @@ HEAD = ("parameter", "value", "verdict", "why")
 def line(found: Identification) -> str:
     """The model, and each parameter with its verdict."""
     values = [f"{name} {_value(own)} {own.verdict}" for name, own in found.parameters.items()]
-    return shown(f"{found.model}; {', '.join(values)}")
+    return printable(f"{found.model}; {', '.join(values)}")
 
 
 def text(found: Identification) -> str:

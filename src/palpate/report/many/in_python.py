@@ -14,7 +14,7 @@ from palpate.report.many.rows import LogRow, drawn, quantities
 from palpate.report.many.table import show
 from palpate.report.many.words import failures, sentence
 from palpate.report.result_text import as_html, printed
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +25,7 @@ HEAD = ("pooled", "mean ± 95 %", "next press", "logs", "verdict", "why")
 def line(pooled: Pooled) -> str:
     """Each quantity with its verdict."""
     values = [f"{name} {_value(own)} {own.parameter.verdict}" for name, own in quantities(pooled).items()]
-    return shown(f"{pooled.count} logs; {', '.join(values) or 'nothing in common'}")
+    return printable(f"{pooled.count} logs; {', '.join(values) or 'nothing in common'}")
 
 
 def text(pooled: Pooled) -> str:

@@ -16,7 +16,7 @@ from palpate.report.many.rows import POINT, LogRow, drawn, json_of, quantities
 from palpate.report.many.words import failures, place, sentence
 from palpate.report.numbers import quantity
 from palpate.report.page import render
-from palpate.text import shown
+from palpate.text import printable
 
 _COLOURED = {POINT: "K", "K": "K", "B": "B", "M": "M"}
 _HALF, _NARROW = 560, 360
@@ -44,8 +44,8 @@ def page(rows: Sequence[LogRow], pooled: Pooled) -> str:
         json=json.dumps(json_of(rows, pooled), indent=1),
         source=Source("", source.options, None, source.command, source.made),
         file="",
-        options=", ".join(f"{shown(str(k))} {shown(str(v))}" for k, v in source.options.items()),
-        command=shown(source.command),
+        options=", ".join(f"{printable(str(k))} {printable(str(v))}" for k, v in source.options.items()),
+        command=printable(source.command),
     )
 
 
@@ -62,7 +62,7 @@ def _card(name: str, own: PooledParameter, pooled: Pooled) -> dict[str, Any]:
         "next": interval(own.prediction95, p.unit),
         "between": "" if own.between is None else quantity(own.between, p.unit, digits=2),
         "count": f"{len(own.logs)} of {pooled.count}",
-        "reason": shown(p.reason),
+        "reason": printable(p.reason),
     }
 
 
@@ -73,7 +73,7 @@ def _row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
     return {
         "name": row.source.title,
         "sha256": row.source.sha256,
-        "error": shown(row.error),
+        "error": printable(row.error),
         "cells": [formatted(p) if p is not None and p.value is not None else "–" for p in values],
         "place": ", ".join(facts_of(found, point)) if found and point else "–",
         "model": found.model if found else "–",

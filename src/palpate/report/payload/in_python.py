@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from palpate.contact_frame import Weighed
 from palpate.report.payload import page as pages
 from palpate.report.result_text import as_html, as_text
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def line(found: Weighed) -> str:
     """The sentence."""
-    return shown(pages.sentence(found))
+    return printable(pages.sentence(found))
 
 
 def text(found: Weighed) -> str:

@@ -24,7 +24,7 @@ from palpate.report.run.table import force_rows, thesis_table
 from palpate.report.run.words import alerts, motors, sentence
 from palpate.report.svg import svg
 from palpate.robots.arm3 import Arm3
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,8 +70,8 @@ def run_page(record: Record, content: Content) -> str:
         "run.html",
         _PACKAGE,
         room="run",
-        title=shown(content.title),
-        about=shown(content.about),
+        title=printable(content.title),
+        about=printable(content.about),
         sentence=sentence(summary),
         alerts=alerts(summary),
         cards=_cards(content),
@@ -97,7 +97,7 @@ def _cards(content: Content) -> list[dict[str, str]]:
         return []
     lost, end = summary["contacts_lost"], summary["end"]
     kept = not lost and end not in {"lost contact", "diverged"}
-    why = f"from {summary['contact_at_s']:.2f} s on" if kept else shown(summary["why"])
+    why = f"from {summary['contact_at_s']:.2f} s on" if kept else printable(summary["why"])
     cards = [_card("Contact", "kept" if kept else "lost", why=why, tone="ok" if kept else "fail", verdict="")]
     never = "of a changing force there is none" if f["overshoot_N"] is None else "not within the run"
     settled = None if f["settling_s"] is None else plain(f["settling_s"], 3)
@@ -138,7 +138,7 @@ def _stiffness(content: Content) -> dict[str, str]:
         number["text"] if known else "",
         number["unit"],
         half=number["half"],
-        why=shown(own.reason),
+        why=printable(own.reason),
         colour="K wide",
         tone=TONES[own.verdict],
         verdict=str(own.verdict),
@@ -147,7 +147,7 @@ def _stiffness(content: Content) -> dict[str, str]:
 
 def _identified_by(content: Content) -> str:
     if content.found is None:
-        return f"palpate identify says nothing of this record: {shown(content.why)}."
+        return f"palpate identify says nothing of this record: {printable(content.why)}."
     return (
         f"By palpate identify of record.parquet, as the model {content.found.model}; on the bench the truth is known. "
         "The charts are of an estimator on line, which assumes a spring, a damper and a mass."
@@ -167,7 +167,7 @@ def _surface(content: Content) -> list[dict[str, str]]:
             off = "inside the interval" if p.ci95[0] <= known <= p.ci95[1] else "outside the interval"
         rows.append(
             {
-                "name": shown(name),
+                "name": printable(name),
                 "called": CALLED.get(name, ""),
                 "colour": name if name in _PARAMETERS else "other",
                 "tone": TONES[p.verdict],

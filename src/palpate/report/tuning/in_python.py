@@ -8,7 +8,7 @@ from palpate.force.tuning import Tuning
 from palpate.report.result_text import as_html, printed
 from palpate.report.tuning import page as pages
 from palpate.report.tuning.table import rows, show
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def line(told: Tuning) -> str:
     """The arm, the force, and whether anything is proved."""
     proved = "proved" if told.proved else "nothing proved"
-    return shown(f"{told.gains.arm.title}, {told.gains.force:g} N, {proved}")
+    return printable(f"{told.gains.arm.title}, {told.gains.force:g} N, {proved}")
 
 
 def text(told: Tuning) -> str:

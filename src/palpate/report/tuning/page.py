@@ -15,7 +15,7 @@ from palpate.report import style
 from palpate.report.figure_panels.panels import panels_of, shown_in
 from palpate.report.page import Table, render
 from palpate.report.tuning.table import rows
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def page(told: Tuning, command: str = "palpate tune") -> str:
         source=told.gains.to_toml(),
         source_title="The gains",
         room="tune",
-        command=shown(command),
+        command=printable(command),
     )
 
 
