@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from palpate.bench import build, load
 from palpate.bench.experiments.tables import changed, parse
-from palpate.excitation import Budget, Design, HybridLoop, Question, SurfaceRange, design
+from palpate.excitation import Budget, Design, HybridLoop, Problem, SurfaceRange, design
 from palpate.identification import identify
 from palpate.records import Record
 from palpate.report.excitation.files import experiment
@@ -36,7 +36,7 @@ def designed(name: str, kind: str) -> Design:
     surfaces = SurfaceRange(*((value, value) for value in (s.stiffness, s.damping, s.mass)))
     loop = HybridLoop(gain=gains.kf, integral=1000 * gains.ki)
     asked = dict.fromkeys(NAMES, 0.1)
-    return design(Question(surfaces, Budget(15.0, 20.0), asked, loop=loop, kind=kind, duration=20.0))
+    return design(Problem(surfaces, Budget(15.0, 20.0), asked, loop=loop, kind=kind, duration=20.0))
 
 
 def errors(design_: Design, seed: int) -> dict[str, NDArray[np.float64]]:
@@ -47,7 +47,7 @@ def errors(design_: Design, seed: int) -> dict[str, NDArray[np.float64]]:
     run = build(asked).run(asked.run.duration, seed=seed, press=asked.run.press)
     rows = np.flatnonzero(run["phase"] == 1.0)
     rows = rows[rows >= rows[0] + round(1000 * design_.settle)]
-    step = design_.question.sensors.position_step
+    step = design_.problem.sensors.position_step
     positions = {"tip": np.round(run["x"][rows] / step) * step, "arm": run["x_measured"][rows]}
     truth = np.array(design_.predictions[0].surface.values)
     return {at: identified(run, rows, position) / truth - 1 for at, position in positions.items()}

@@ -14,7 +14,7 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.excitation import Budget, Design, KnownBandwidth, Question, Sensors, SurfaceRange, design
+from palpate.excitation import Budget, Design, KnownBandwidth, Problem, Sensors, SurfaceRange, design
 from palpate.excitation.fisher_information import ForceChain
 from palpate.identifiers import ContactIdentifier
 from palpate.references.waves import Multisine
@@ -33,21 +33,21 @@ def designed(surface: tuple[float, float, float], step: float) -> Design:
     ranges = SurfaceRange(*((value, value) for value in surface))
     sensors = Sensors(CHAIN, position_step=step)
     asked, loop = dict.fromkeys(NAMES, 0.1), KnownBandwidth(60.0)
-    return design(Question(ranges, Budget(15.0, 20.0), asked, sensors, loop, duration=SECONDS))
+    return design(Problem(ranges, Budget(15.0, 20.0), asked, sensors, loop, duration=SECONDS))
 
 
 def signals(made: Design, begin: float) -> tuple[Array, Array]:
     """Position [m] and force through the sensor's low-pass [N], from an instant of the wave on."""
-    wave, question = made.wave, made.question
+    wave, problem = made.wave, made.problem
     if not isinstance(wave, Multisine):
         raise TypeError("the wave must be a multisine")
     omega = 2 * np.pi * np.array(wave.frequencies)
-    force = question.forces(omega, np.array(wave.amplitudes))[0] * np.exp(1j * np.array(wave.phases))
+    force = problem.forces(omega, np.array(wave.amplitudes))[0] * np.exp(1j * np.array(wave.phases))
     surface, t = made.predictions[0].surface, begin + np.arange(round(SECONDS * RATE)) / RATE
     turned = np.exp(1j * np.outer(t, omega))
     position = np.imag(turned @ (force / surface.impedance(omega)))
     felt = np.imag(turned @ (force * CHAIN.low_pass.at(omega)))
-    return position + question.budget.mean / surface.stiffness, felt + question.budget.mean
+    return position + problem.budget.mean / surface.stiffness, felt + problem.budget.mean
 
 
 def errors(made: Design, step: float, seed: int) -> Array:

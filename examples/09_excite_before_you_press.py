@@ -8,7 +8,7 @@ account, tells something of its own about K.
 import palpate
 from palpate.bench import build
 from palpate.bench.experiments.tables import parse
-from palpate.excitation import Budget, Question, SurfaceRange, design
+from palpate.excitation import Budget, Problem, SurfaceRange, design
 from palpate.records import Record
 from palpate.report.excitation.files import experiment
 from palpate.signals.low_pass import LowPass
@@ -16,7 +16,7 @@ from palpate.signals.low_pass import LowPass
 truth = {"K": 5200.0, "B": 200.0, "M": 0.3}
 surfaces = SurfaceRange(*((value, value) for value in truth.values()))
 precision = {"K": 0.05, "B": 0.05, "M": 0.2}
-found = design(Question(surfaces, Budget(mean=15.0, peak=20.0), precision))
+found = design(Problem(surfaces, Budget(mean=15.0, peak=20.0), precision))
 print(f"{len(found.wave.frequencies)} sines for {found.seconds:g} s")
 
 press = parse(experiment(found), "the design")  # the same text that `palpate excite --experiment` writes

@@ -8,9 +8,9 @@ from student import Damped
 
 from palpate.checks import controller_checks, outcomes
 from palpate.studies import run
-from palpate.studies.pairing import comparisons
-from palpate.studies.plan import plan
-from palpate.studies.study import parse
+from palpate.studies.definition.plan import plan
+from palpate.studies.definition.study import parse
+from palpate.studies.findings.pairing import comparisons
 
 STUDY = """
 title = "Damped push or PI, on random foam"

@@ -78,8 +78,8 @@ def study(path: Path) -> None:
 
 def journal(path: Path) -> None:
     """Finished runs of a study."""
-    from palpate.studies import journal as journals
-    from palpate.studies.run_one import Row
+    from palpate.studies.running import journal as journals
+    from palpate.studies.running.run_one import Row
 
     with journals.opened(path, HEAD()) as book:
         for run in range(10):
@@ -110,7 +110,7 @@ def _wrote(path: Path, *words: str) -> None:
 
 def HEAD() -> object:
     """Of the journal."""
-    from palpate.studies.journal import Head
+    from palpate.studies.running.journal import Head
 
     return Head("T", "study", "0.1.0", "sources", 10)
 

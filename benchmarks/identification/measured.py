@@ -20,9 +20,10 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.files import write_text
 from palpate.identification import Identification, Parameter, identify
 from palpate.logs import read_log
-from palpate.report.identification.page import write_page
+from palpate.report.identification.page import page
 from palpate.report.identification.source import Source, sha256_of
 
 
@@ -187,7 +188,8 @@ def main() -> None:
             skin.append(found)
         if asked.pages:
             asked.pages.mkdir(exist_ok=True)
-            write_page(found, asked.pages / f"{path.stem}.html", Source(str(path), sha256=sha256_of(path)))
+            source = Source(str(path), sha256=sha256_of(path))
+            write_text(asked.pages / f"{path.stem}.html", page(found, source))
     print("\nrepeats, each piece of a log by itself:")
     for own in REPEATS:
         if (asked.folder / own.log.path).is_file():

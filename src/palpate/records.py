@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.results import Result
 
@@ -26,7 +24,7 @@ class Record(Result, shown_by="palpate.report.record"):
         InputError: columns of different lengths, or a column without a unit.
     """
 
-    columns: Mapping[str, NDArray[np.float64]]
+    columns: Mapping[str, Array]
     units: Mapping[str, str]
     meta: Mapping[str, Any] = field(default_factory=dict)
 
@@ -41,7 +39,7 @@ class Record(Result, shown_by="palpate.report.record"):
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
+    def __getitem__(self, name: str) -> Array:
         if name not in self.columns:
             raise unknown("column", name, self.columns)
         return self.columns[name]

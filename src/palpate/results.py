@@ -48,7 +48,7 @@ class Compared:
 class Result(Compared):
     """A result that can be read, drawn and written.
 
-    A class says where its looks are: `class Identification(Result, shown_by="palpate.report.identification.shown")`, a
+    A class says where its looks are, `class Record(Result, shown_by="palpate.report.record")`: a
     module with `line`, `text`, `html`, `draw` and `page`, each of one result. It is imported when it is first asked.
     """
 
@@ -94,4 +94,6 @@ class Result(Compared):
         Raises:
             InputError: palpate may not write there, or the name has another ending.
         """
-        return Path(import_module("palpate.report.shown").write_page(self._looks().page(self), Path(path)))
+        return Path(
+            import_module("palpate.report.result_text").write_page(self._looks().page(self), Path(path))
+        )

@@ -14,7 +14,7 @@ _UNSAFE = {
 _KEPT = "\n\t\u200c\u200d"  # the last two join letters of several scripts
 
 
-def shown(text: str) -> str:
+def printable(text: str) -> str:
     """The text with every control character, escape sequence and undecodable byte as a visible escape.
 
     Lines and tabs are kept. The result holds nothing that a terminal obeys, and can be encoded as UTF-8.

@@ -1,11 +1,12 @@
 """The bench of one joint: its physics against closed forms, and a network that alone learns to press."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
-from palpate.bench.one_joint import COLUMNS, JOINT_FRICTION, Joint, one_joint
+from palpate.bench.one_joint import COLUMNS, JOINT_FRICTION, Joint, Link, one_joint
 from palpate.controllers.direct_neural import DirectIntegral, direct_neural
 from palpate.environments import KelvinVoigt, join
 from palpate.errors import InputError
@@ -116,15 +117,17 @@ def test_a_run_leaves_the_next_one_as_it_was():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"inertia": 0.0}, {"lever": -1.0}, {"limit": 0.0}, {"rate": 0}, {"steps": 0}]
+    ("make", "wrong"),
+    [(Link, {"inertia": 0.0}), (Link, {"lever": -1.0}), (Link, {"limit": 0.0})]
+    + [(partial(one_joint, FOAM, direct_neural(), STEPS), wrong) for wrong in ({"rate": 0}, {"steps": 0})],
 )
-def test_a_joint_that_cannot_be_is_refused(wrong):
+def test_a_joint_that_cannot_be_is_refused(make, wrong):
     with pytest.raises(InputError, match=f"{next(iter(wrong))} must be above 0"):
-        one_joint(FOAM, direct_neural(), STEPS, **wrong)
+        make(**wrong)
 
 
 def test_a_run_of_no_time_and_impossible_friction_are_refused():
     with pytest.raises(InputError, match="at least one tick"):
         one_joint(FOAM, direct_neural(), STEPS).run(0.0)
     with pytest.raises(InputError, match="coulomb"):
-        one_joint(FOAM, direct_neural(), STEPS, friction=JOINT_FRICTION._replace(coulomb=0.0))
+        one_joint(FOAM, direct_neural(), STEPS, link=Link(JOINT_FRICTION._replace(coulomb=0.0)))

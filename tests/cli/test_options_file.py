@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from contact_frame.synthetic_arm import any_world, log_of
 from palpate.cli import main
-from palpate.cli._options_file import presets
+from palpate.cli.options.kept import presets
 
 
 @pytest.fixture(autouse=True)

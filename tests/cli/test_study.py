@@ -13,7 +13,7 @@ import polars
 import pytest
 
 from palpate.cli import main
-from palpate.studies.study import names
+from palpate.studies.definition.study import names
 from studies.small import NEAR, SMALL, text
 
 MANY = SMALL.replace("points = 3", "points = 60")

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from palpate.cli import _terminal, main
 from palpate.report import style
 from palpate.report.page import Table
-from palpate.text import shown
+from palpate.text import printable
 
 EVIL = "\x1b]0;owned\x07\x1b[2J[bold]$x^{$\u202egnp.\udcff"
 COLUMNS = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
@@ -22,18 +22,18 @@ COLUMNS = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force
 
 @given(st.text(st.characters(categories=["L", "N", "P", "S", "Zs", "Cc", "Cf", "Cs"])))
 def test_what_is_shown_holds_nothing_that_is_obeyed(text):
-    safe = shown(text)
+    safe = printable(text)
     safe.encode("utf-8")
     assert all(letter in "\n\t" or ord(letter) >= 32 for letter in safe)
     assert not set("\x7f\x9b\u202e\u2028") & set(safe)
-    assert shown(safe) == safe
+    assert printable(safe) == safe
     if text.isascii() and text.isprintable():
         assert safe == text
 
 
 def test_letters_of_any_script_stay():
     for text in ("Kraft [N] ± 3 µm", "力", "نیم‌فاصله", "é"):
-        assert shown(text) == text
+        assert printable(text) == text
 
 
 def test_a_console_obeys_neither_markup_nor_escapes(capsys):

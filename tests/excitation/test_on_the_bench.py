@@ -8,7 +8,7 @@ import pytest
 import palpate
 from palpate.bench import build
 from palpate.bench.experiments.tables import changed, parse
-from palpate.excitation import Budget, Question, SurfaceRange, design
+from palpate.excitation import Budget, Problem, SurfaceRange, design
 from palpate.records import Record
 from palpate.report.excitation.files import experiment
 from palpate.signals.low_pass import LowPass
@@ -21,9 +21,7 @@ RUNS = 8
 @pytest.mark.parametrize("kind", ["multisine", "chirp"])
 def test_the_spread_over_seeds_is_the_predicted_one(kind):
     surfaces = SurfaceRange(*((value, value) for value in FOAM.values()))
-    found = design(
-        Question(surfaces, Budget(15.0, 20.0), dict.fromkeys("KBM", 0.1), kind=kind, duration=10.0)
-    )
+    found = design(Problem(surfaces, Budget(15.0, 20.0), dict.fromkeys("KBM", 0.1), kind=kind, duration=10.0))
     asked = parse(experiment(found), "the design")
     sensor = LowPass.parse("butterworth3:120")
     rng = np.random.default_rng(5)

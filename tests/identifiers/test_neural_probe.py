@@ -5,9 +5,12 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.identifiers import NeuralProbe, watch
+from palpate.identifiers.neural_settings import SETTINGS
 from palpate.records import Record
 
 K, B, M = 5000.0, 300.0, 3.0
+
+FOAM = SETTINGS["foam"]
 
 
 def pressing(n, seed=0):
@@ -88,7 +91,7 @@ def test_the_answer_depends_on_the_weights_at_the_start():
 
 
 def test_more_layers_by_configuration():
-    probe = NeuralProbe((1e3, 1e2, 1.0), (2e-3, 1e-2, 1.0), layers=(5, 4))
+    probe = NeuralProbe(FOAM, layers=(5, 4))
     assert [w.shape for w in probe.layers] == [(5, 4), (4, 6), (1, 5)]
     probe.update_many(*pressing(100))
 
@@ -126,18 +129,17 @@ def test_a_bad_sample_is_named_and_the_rest_kept():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"values": (0.0, 0.01, 1.0)},
-        {"values": (0.002, 0.01)},
-        {"scale": (1.0, np.inf, 1.0)},
+        {"setting": FOAM._replace(values=(0.0, 0.01, 1.0))},
+        {"setting": FOAM._replace(values=(0.002, 0.01))},
+        {"setting": FOAM._replace(scale=(1.0, np.inf, 1.0))},
         {"amplitude": -1.0},
         {"learning_rate": 0.0},
         {"layers": (0,)},
     ],
 )
 def test_numbers_out_of_range_are_refused(wrong):
-    good = {"scale": (1e3, 1e2, 1.0), "values": (2e-3, 1e-2, 1.0)}
     with pytest.raises(InputError):
-        NeuralProbe(**{**good, **wrong})
+        NeuralProbe(**{"setting": FOAM, **wrong})
 
 
 def test_an_unknown_surface_is_refused_by_name():

@@ -74,7 +74,7 @@ def near(name="foam-hybrid", **more):
 
 @pytest.fixture
 def simulation():
-    return Simulation("foam-hybrid", near(), seed=1)
+    return Simulation(near(), seed=1)
 
 
 @contextmanager

@@ -49,7 +49,7 @@ def opened(browser, address, **context):
 
 @pytest.fixture(scope="module")
 def served_simulation():
-    with playing(Simulation("foam-hybrid", near(), seed=1)) as (player, address, _):
+    with playing(Simulation(near(), seed=1)) as (player, address, _):
         yield player, address
 
 
@@ -109,7 +109,7 @@ def test_two_pages_at_once_see_the_same(browser, served_simulation):
 
 
 def test_gone_and_back(browser):
-    source = Simulation("foam-hybrid", near(), seed=1)
+    source = Simulation(near(), seed=1)
     with playing(source) as (_, address, _client):
         with opened(browser, address) as page:
             until(page, "palpate.live.rows > 10")

@@ -52,13 +52,13 @@ def test_it_begins_shortly_before_the_touch_and_the_same_again(simulation):
 
 
 def test_the_whole_approach_is_there_if_asked_for():
-    whole = Simulation("foam-hybrid", near(), seed=1, whole=True)
+    whole = Simulation(near(), seed=1, whole=True)
     assert pressed(whole, 0.1)[0, 0] == pytest.approx(0.004)
 
 
 @pytest.mark.parametrize("surface", ["foam-hybrid", "foam-viscoelastic"])
 def test_a_surface_that_changes_bears_the_force_of_that_moment(surface):
-    simulation = Simulation(surface, near(surface), seed=1)
+    simulation = Simulation(near(surface), seed=1)
     before = pressed(simulation, 4.0)
     simulation.set("surface.stiffness", 4.0 * simulation.state.values["surface.stiffness"])
     after = pressed(simulation, 0.05)
@@ -113,7 +113,7 @@ def test_sliders_take_nothing_else(simulation, key, value):
 
 
 def test_controllers_without_a_force_gain_say_so():
-    simulation = Simulation("foam-impedance", near("foam-impedance"), seed=0)
+    simulation = Simulation(near("foam-impedance"), seed=0)
     assert "controller.kf" not in simulation.state.values
     assert any("no force gain" in note for note in simulation.view.notes)
 
@@ -126,7 +126,7 @@ def test_the_first_change_of_a_surface_waits_for_no_import():
         "from live.conftest import near\n"
         "from palpate.live.player import made_ready\n"
         "from palpate.live.simulation import Simulation\n"
-        "shown = Simulation('foam-hybrid', near(), seed=1)\n"
+        "shown = Simulation(near(), seed=1)\n"
         "made_ready()\n"
         "for _ in range(300): shown.advance(0.01)\n"
         "before = set(sys.modules)\n"

@@ -1,7 +1,9 @@
 """Each room knows only the rooms under it."""
 
+import re
 import subprocess
 import sys
+import tomllib
 
 
 def test_the_direction_of_imports(root):
@@ -9,3 +11,16 @@ def test_the_direction_of_imports(root):
     ran = subprocess.run([sys.executable, "-c", check], cwd=root, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout
     assert " 0 broken" in ran.stdout
+
+
+def test_the_house_is_drawn_as_it_stands(root):
+    """CONTRIBUTING's drawing, the contract of the imports and the folders name the same rooms, in the same order."""
+    config = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    contract = config["tool"]["importlinter"]["contracts"][0]["layers"]
+    layers = [set(re.findall(r"\w+", layer)) for layer in contract]
+    text = (root / "CONTRIBUTING.md").read_text(encoding="utf-8").split("## The house")[1]
+    drawn = re.findall(r"(?m)^    ([\w|  ]*?\w)(?=  +|$)", text.split("Where does a file go?")[0])
+    assert [set(re.findall(r"\w+", line)) for line in drawn] == layers
+    package = root / "src" / "palpate"
+    there = {p.stem for p in package.iterdir() if p.suffix == ".py" or (p / "__init__.py").exists()}
+    assert set.union(*layers) == there - {"__init__", "__main__"}

@@ -7,8 +7,8 @@ import pytest
 
 from palpate.files import check_place
 from palpate.report.identification.figure import draw, write_figure
-from palpate.report.identification.fit_panels import thinned
 from palpate.report.identification.words import formatted, sentence
+from palpate.report.look.columns import with_peaks
 from report.outcomes import OUTCOMES
 
 
@@ -112,7 +112,7 @@ def test_a_long_log_is_thinned_without_losing_a_peak():
     values = np.zeros(len(time))
     values[54_321] = 7.0
     values[77_777] = -3.0
-    at, kept = thinned(time, values)
+    at, kept = with_peaks(time, values, 2400)
     assert len(kept) < 5000
     assert (np.diff(at) >= 0).all()
     assert (kept.max(), kept.min()) == (7.0, -3.0)

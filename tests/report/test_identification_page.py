@@ -12,10 +12,10 @@ from xml.etree import ElementTree
 import pytest
 
 from palpate.errors import InputError
-from palpate.files import check_place
-from palpate.identification.warning_codes import Code, Warn
+from palpate.files import check_place, write_text
+from palpate.identification.warning_codes import Code
 from palpate.report import style
-from palpate.report.identification.page import page, write_page
+from palpate.report.identification.page import page
 from palpate.report.identification.source import Source, as_json
 from palpate.report.identification.words import ADVICE, interval, sentence
 from report.outcomes import OUTCOMES
@@ -246,30 +246,18 @@ def test_an_identification_without_traces_has_a_page_without_pictures():
     assert not Reader(page(bare, SOURCE)).of("img")
 
 
-def test_how_the_log_was_read_is_told(tmp_path):
+def test_how_the_log_was_read_is_told():
     source = Source("log", notes=("normal: <x>", "tool: 1 kg"))
-    path = write_page(OUTCOMES["no_contact"](), tmp_path / "a.html", source)
-    text = Reader(path.read_text(encoding="utf-8")).text
+    text = Reader(page(OUTCOMES["no_contact"](), source)).text
     assert "normal: <x> tool: 1 kg" in text
 
 
 def test_a_page_may_replace_an_older_one_and_nothing_else(tmp_path):
-    path = write_page(OUTCOMES["no_contact"](), tmp_path / "a.html", SOURCE)
+    path = tmp_path / "a.html"
+    write_text(path, page(OUTCOMES["no_contact"](), SOURCE))
     check_place(path, "--report")
     other = tmp_path / "b.html"
     other.write_text("<!doctype html><title>palpate identify, a diary</title>", encoding="utf-8")
     for taken in (other, tmp_path):
         with pytest.raises(InputError, match="--report"):
             check_place(taken, "--report")
-
-
-def test_a_page_that_fails_leaves_the_old_one(tmp_path):
-    found = OUTCOMES["no_contact"]()
-    path = write_page(found, tmp_path / "press.html", SOURCE)
-    before = path.read_bytes()
-    assert before.decode() == page(found, SOURCE)
-    broken = replace(found, warnings=(Warn("no code", "no text"),))
-    with pytest.raises(AttributeError):
-        write_page(broken, path, SOURCE)
-    assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from palpate.files import check_place
+from palpate.files import check_place, write_text
 from palpate.identification.pooling import pool
 from palpate.identification.result import Identification, Parameter, Traces, Verdict, WorkingPoint
 from palpate.report.identification.source import Source
 from palpate.report.many.forest import draw, write_figure
-from palpate.report.many.page import page, write_page
+from palpate.report.many.page import page
 from palpate.report.many.rows import LogRow, json_of
 from palpate.report.many.table import show
 from palpate.report.many.words import failures, sentence
@@ -107,7 +107,8 @@ def test_the_forest_has_a_row_a_log_and_the_pooled_one(rows, pooled):
 
 def test_both_files_are_whole_and_ours(rows, pooled, tmp_path):
     check_place(write_figure(rows, pooled, tmp_path / "a.png"), "--figure")
-    check_place(write_page(rows, pooled, tmp_path / "a.html"), "--report")
+    write_text(tmp_path / "a.html", page(rows, pooled))
+    check_place(tmp_path / "a.html", "--report")
 
 
 @pytest.mark.parametrize("width", [80, 160])

@@ -9,8 +9,8 @@ import pytest
 from palpate.cli import main
 from palpate.report import style
 from palpate.report.figure_panels.panels import panels_of
-from palpate.studies.run_study import Work
-from palpate.studies.summary import present
+from palpate.studies.findings.summary import present
+from palpate.studies.running.run_study import Work
 from palpate.thesis.claims import Done
 from palpate.thesis.page import index_page
 from studies.small import Formula, planned, text

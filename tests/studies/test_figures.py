@@ -9,18 +9,18 @@ from palpate.bench import load
 from palpate.bench.metrics import METRICS
 from palpate.errors import InputError
 from palpate.report.study.axes import Scale
-from palpate.studies.figures import draw
-from palpate.studies.figures.curves import lines, references
-from palpate.studies.figures.maps import cells
-from palpate.studies.figures.rows import Rows
-from palpate.studies.figures.scatter import points
-from palpate.studies.figures.stability_boundary import bounds, equivalent
-from palpate.studies.plan import MAIN
-from palpate.studies.ranking import Mean, rankings
-from palpate.studies.results import table
-from palpate.studies.run_one import Row
-from palpate.studies.summary import interval, present, tables
-from palpate.studies.tables import Map
+from palpate.studies.definition.plan import MAIN
+from palpate.studies.definition.tables import Map
+from palpate.studies.findings.figures import draw
+from palpate.studies.findings.figures.curves import lines, references
+from palpate.studies.findings.figures.maps import cells
+from palpate.studies.findings.figures.rows import Rows
+from palpate.studies.findings.figures.scatter import points
+from palpate.studies.findings.figures.stability_boundary import bounds, equivalent
+from palpate.studies.findings.ranking import Mean, rankings
+from palpate.studies.findings.summary import interval, present, tables
+from palpate.studies.running.results import table
+from palpate.studies.running.run_one import Row
 from studies.small import planned, text
 
 GRID = text(

@@ -6,8 +6,8 @@ import os
 import pytest
 
 from palpate.errors import InputError
-from palpate.studies.journal import Finished, Head, opened, rows
-from palpate.studies.run_one import Row
+from palpate.studies.running.journal import Finished, Head, opened, rows
+from palpate.studies.running.run_one import Row
 
 YESTERDAY = (
     b'60054b54 {"title":"T","study":"study","palpate":"0.1.0","sources":"sources","runs":10,"format":1}\n'

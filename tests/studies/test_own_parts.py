@@ -8,12 +8,12 @@ from own_parts import controller
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.studies import run
-from palpate.studies.cluster import run_batch
-from palpate.studies.part_check import check_parts_of
-from palpate.studies.plan import plan, resolved
-from palpate.studies.run_one import Job, run_one
-from palpate.studies.sources import sources
-from palpate.studies.study import parse
+from palpate.studies.definition.part_check import check_parts_of
+from palpate.studies.definition.plan import plan, resolved
+from palpate.studies.definition.study import parse
+from palpate.studies.running.cluster import run_batch
+from palpate.studies.running.run_one import Job, run_one
+from palpate.studies.running.sources import sources
 from studies.small import NEAR, text
 
 METRIC = '["force_rms", "own_parts:mean_force"]'

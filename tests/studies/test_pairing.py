@@ -7,11 +7,11 @@ import pytest
 from scipy import stats
 
 from palpate.errors import InputError
-from palpate.studies.comparison_table import comparison_table, sentence
-from palpate.studies.pairing import Entrant, compared, comparisons, median_interval
-from palpate.studies.results import table
-from palpate.studies.run_one import Row
-from palpate.studies.summary import present
+from palpate.studies.findings.comparison_table import comparison_table, sentence
+from palpate.studies.findings.pairing import Entrant, compared, comparisons, median_interval
+from palpate.studies.findings.summary import present
+from palpate.studies.running.results import table
+from palpate.studies.running.run_one import Row
 from studies.small import planned, text
 
 N = 64

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate.bench import load
-from palpate.studies.plan import resolved
-from palpate.studies.sobol import Sobol
+from palpate.studies.definition.plan import resolved
+from palpate.studies.definition.sobol import Sobol
 from studies.small import SMALL, planned, text
 
 

@@ -11,10 +11,10 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.logs import read_record
-from palpate.studies import run_one as one_run
-from palpate.studies.local import Local, unordered
-from palpate.studies.run_one import Job
-from palpate.studies.run_study import Work
+from palpate.studies.running import run_one as one_run
+from palpate.studies.running.local import Local, unordered
+from palpate.studies.running.run_one import Job
+from palpate.studies.running.run_study import Work
 from studies.small import NEAR, SMALL, Formula, planned, text
 
 GRID = text(

@@ -128,7 +128,7 @@ def test_without_friction_the_arm_is_the_target_spring_and_damper():
 def test_the_target_impedance_itself_settles_at_what_two_springs_agree_on():
     ideal = fig_2_02._ideal()
     for i, depth in enumerate(fig_2_02.DEPTHS):
-        end = ideal.force[1000 * (i + 1) - 1]
+        end = ideal["force"][1000 * (i + 1) - 1]
         assert end == pytest.approx(depth * 2000.0 * 5200.0 / 7200.0, rel=0.01)
 
 

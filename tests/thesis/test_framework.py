@@ -338,7 +338,7 @@ def test_figures_come_in_the_thesis_order():
 @pytest.mark.parametrize("claim", CLAIMS)
 def test_no_claim_of_the_thesis_is_left_out(claim):
     folder = Path(palpate.thesis.__file__).parent
-    literal = re.compile(rf'"{re.escape(claim)}(\.[\w-]+)?"')
+    literal = re.compile(rf'"{re.escape(claim)}(\.[\w{{}}-]+)?"')
     assert any(literal.search(path.read_text("utf-8")) for path in folder.rglob("*.py"))
 
 

@@ -14,7 +14,7 @@ from palpate.bench import Experiment, build, changed, load
 from palpate.bench.sequence import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.studies.cluster import Cluster
+from palpate.studies.running.cluster import Cluster
 from palpate.thesis.claims import Claim, count_in_words, counted, with_wholes
 from palpate.thesis.conditions import rougher
 from palpate.thesis.figure import studies, study

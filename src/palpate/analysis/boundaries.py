@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from palpate.analysis.constant_modes import heeded
 from palpate.analysis.linear_model import linearise
 from palpate.analysis.stability_cells import stable_pieces
+from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.experiments.tables import Experiment, changed
 from palpate.environments.surface import alone
 from palpate.errors import InputError, unknown
-
-Array = NDArray[np.float64]
 
 LOW, HIGH = 100.0, 3e6
 """Stiffnesses that are looked at [N/m]."""

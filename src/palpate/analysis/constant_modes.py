@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array
+
 Complex = NDArray[np.complex128]
 CONSTANT = 1e-5
 """Change in a period, in steps of `Motion`, under which a combination of the state is taken for one that never changes.

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from palpate.arrays import Array
 
 
 def leaves(tree: Any, path: str = "") -> Iterator[tuple[str, float]]:
@@ -29,7 +30,7 @@ def rebuilt(tree: Any, numbers: Iterator[float]) -> Any:
     return tree._make(parts) if hasattr(tree, "_make") else tuple(parts)
 
 
-def vector(tree: Any) -> NDArray[np.float64]:
+def vector(tree: Any) -> Array:
     """The numbers of a tree in the order of `leaves`, shape (n,)."""
     numbers: list[float] = []
     _gather(tree, numbers)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from palpate.analysis.constant_modes import CONSTANT, moving
 from palpate.analysis.motion import SHOWN, Motion
+from palpate.arrays import Array
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 

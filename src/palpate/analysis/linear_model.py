@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.analysis.constant_modes import change
 from palpate.analysis.equilibrium import at_equilibrium, pressing
 from palpate.analysis.linear_loop import LinearLoop
 from palpate.analysis.motion import Motion
+from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
 from palpate.bench.experiments.tables import Experiment
@@ -18,7 +18,6 @@ from palpate.bench.row import COLUMNS
 from palpate.bench.tick import Loop
 from palpate.errors import InputError
 
-Array = NDArray[np.float64]
 REST = 10.0
 """Steps of `Motion` by which a tick may still move a state of rest: 1e-8 rad, 1e-5 rad/s, 1e-3 N."""
 TRIES = 12

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.analysis.flatten import leaves, rebuilt, vector
+from palpate.arrays import Array
 from palpate.bench.row import COLUMNS
 from palpate.bench.tick import Loop, LoopState, compiled_march
 from palpate.controllers.any_controller import AnyController
 
-Array = NDArray[np.float64]
 FLAGS = ("plant.surface.contact",)
 """Leaves that are yes or no: they stand still."""
 PLACE, RATE, ACCELERATION, FORCE = 1e-9, 1e-6, 1e-3, 1e-4

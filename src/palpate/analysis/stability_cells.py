@@ -13,12 +13,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.analysis.constant_modes import change
+from palpate.arrays import Array
 from palpate.force.lyapunov import single
 
-Array = NDArray[np.float64]
 Period = Callable[[float], Array]
 
 EXACT = 1e-4

@@ -10,7 +10,7 @@ from palpate._jit import law, part
 from palpate._vector import Vec3
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.experiments.tables import Experiment, changed, load, names, source
+from palpate.bench.experiments.tables import Experiment, ForceSensor, changed, load, names, source
 from palpate.bench.given_motion import GivenMotion, given_motion
 from palpate.bench.metrics.summary import summarise
 from palpate.bench.tick import Loop, march, start_at
@@ -18,6 +18,7 @@ from palpate.bench.tick import Loop, march, start_at
 __all__ = [
     "Bench",
     "Experiment",
+    "ForceSensor",
     "GivenMotion",
     "Loop",
     "Vec3",

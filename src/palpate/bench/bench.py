@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._vector import Vec3
+from palpate.arrays import Array
 from palpate.bench.ending import DONE, INTERRUPTED, NO_CONTACT, Ending, StopCondition
 from palpate.bench.identifier_watch import Identifier, watched
 from palpate.bench.row import COLUMNS
@@ -141,9 +142,9 @@ class Bench:
 
     def _rows(
         self, simulation: Simulation, total: int, press: int | None, progress: Progress | None
-    ) -> tuple[list[NDArray[np.float64]], Ending]:
+    ) -> tuple[list[Array], Ending]:
         """The rows of a run, chunk after chunk, and why it ended."""
-        chunks: list[NDArray[np.float64]] = []
+        chunks: list[Array] = []
         condition = StopCondition(self.losses)
         done, stop = 0, total
         end: Ending | None = None
@@ -166,6 +167,6 @@ class Bench:
         return chunks, end or Ending(DONE, "as asked for")
 
 
-def _column(rows: list[NDArray[np.float64]], i: int) -> NDArray[np.float64]:
+def _column(rows: list[Array], i: int) -> Array:
     """One column of all chunks, without another copy of them all."""
     return np.concatenate([chunk[:, i] for chunk in rows]) if rows else np.empty(0)

@@ -7,16 +7,16 @@ from functools import partial
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3, diagonal
+from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.conditioning import Conditioning
 from palpate.bench.elastic_mode import RIGID, elastic_mode
 from palpate.bench.estimators import Estimators
 from palpate.bench.experiments.consistency import check, matched_delay
 from palpate.bench.experiments.tables import Experiment
-from palpate.bench.force_input import ForceInput
+from palpate.bench.force_reading import force_input
 from palpate.bench.matched_channels import Centring, Matched
 from palpate.bench.plant import Plant
 from palpate.bench.sequence import Sequence
@@ -26,7 +26,7 @@ from palpate.environments import StickSlip, surface_of
 from palpate.errors import InputError
 from palpate.friction import Coulomb, LuGre
 from palpate.identifiers.kernels.least_squares import LeastSquares
-from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
+from palpate.instruments import Converter, Encoder
 from palpate.references import Approach, Chirp, ForceSchedule, Multisine
 from palpate.references.force_schedule import NO_WAVE
 from palpate.robots.arm3 import MOTOR_TORQUE, Arm3
@@ -45,7 +45,7 @@ def build(experiment: Experiment) -> Bench:
     arm = Arm3(limits=triple(e.robot.torque_limits), rotor=triple(e.robot.rotor_inertia))
     q = _start(arm, e)
     rate, tick = float(e.run.rate), 1.0 / e.run.rate
-    force = _force_input(e)
+    force = force_input(e.force_sensor, e.run.rate * e.run.steps)
     loop = Loop(
         start=triple(e.robot.start),
         plant=_plant(arm, e),
@@ -102,14 +102,6 @@ def _plant(arm: Arm3, e: Experiment) -> Plant:
     return Plant(arm.with_rotors(), friction, surface_of(e.surface), side, float(e.wall.x), mode, beyond)
 
 
-def _force_input(e: Experiment) -> ForceInput:
-    s, physics = e.force_sensor, e.run.rate * e.run.steps
-    sensor = force_sensor(s.cutoff, s.sampling, s.bits, s.full_scale, s.noise, physics, s.phase)
-    analog = analog_filter_190(float(physics))
-    filtered = 1.0 if s.analog_filter else 0.0
-    return ForceInput(sensor, analog, filtered, Converter(16, 200.0), float(s.roughness))
-
-
 def _sequence(e: Experiment, tick: float) -> Sequence:
     a = e.approach
     reference = Approach(float(e.robot.start[0]), a.hold, a.first, a.step, a.period)
@@ -123,7 +115,7 @@ def _schedule(e: Experiment) -> ForceSchedule:
     return steps._replace(wave=_wave(e), rate=float(e.run.rate))
 
 
-def _wave(e: Experiment) -> NDArray[np.float64]:
+def _wave(e: Experiment) -> Array:
     """Chirp and multisine, tick by tick: the one as long as it lasts, the other as long as a run may."""
     chirp, multisine, rate = e.force.chirp, e.force.multisine, e.run.rate
     if chirp is None and multisine is None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT, LOST
 
@@ -44,7 +44,7 @@ class StopCondition:
         self._lost = 0
         self._phase = 0.0
 
-    def judge(self, out: NDArray[np.float64], trouble: str) -> tuple[int, Ending | None]:
+    def judge(self, out: Array, trouble: str) -> tuple[int, Ending | None]:
         """How many of these rows to keep, and the ending if there is one.
 
         Args:
@@ -70,7 +70,7 @@ class StopCondition:
         return len(out), None
 
 
-def _time(out: NDArray[np.float64], row: int) -> str:
+def _time(out: Array, row: int) -> str:
     return f"{out[max(row, 0), 0]:.3f} s"
 
 

@@ -7,16 +7,17 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import kernel, law
+from palpate.arrays import Array
+from palpate.bench.experiments.tables import ForceSensor
 from palpate.bench.force_input import ForceInput, ForceInputState
+from palpate.bench.force_reading import force_input
 from palpate.bench.paths import Path, positions
 from palpate.environments import SurfaceState, join
 from palpate.environments.surface import members
 from palpate.environments.surface_state import follow
 from palpate.errors import InputError
-from palpate.instruments import Converter, analog_filter_190, force_sensor
 from palpate.records import Record
 from palpate.signals.quantise import quantise
 
@@ -27,6 +28,7 @@ COLUMNS = {
     "force": "N",  # true, at t; an impact's impulse has no value at an instant and is in the sampled force only
     "force_sampled": "N",
 }
+SENSOR = ForceSensor()
 RIGID = 1e12
 """Effective mass of a tip that nothing turns from its path [kg]."""
 SHALLOW = 1e-6
@@ -109,15 +111,15 @@ class GivenMotion:
         noise = np.random.default_rng(seed).standard_normal(ticks + 2)
         rows = np.empty((ticks, 2))
         rests = self._march(x, noise, rows, compiled)
-        t: NDArray[np.float64] = np.arange(float(ticks)) * self.tick
+        t: Array = np.arange(float(ticks)) * self.tick
         at = x[1 : 1 + ticks * self.steps : self.steps].copy()
         read = quantise(at, self.resolution) if self.resolution > 0.0 else at.copy()
         columns = (t, at, read, rows[:, 0].copy(), rows[:, 1].copy())
-        return Record(dict(zip(COLUMNS, columns, strict=True)), COLUMNS, {**self._told(rests), "seed": seed})
+        return Record(
+            dict(zip(COLUMNS, columns, strict=True)), COLUMNS, {**self._description(rests), "seed": seed}
+        )
 
-    def _march(
-        self, x: NDArray[np.float64], noise: NDArray[np.float64], rows: NDArray[np.float64], compiled: bool
-    ) -> list[float]:
+    def _march(self, x: Array, noise: Array, rows: Array, compiled: bool) -> list[float]:
         """Fills the rows, surface by surface; the rest positions of those that were reached [m]."""
         march = compiled_march if compiled else march_path
         rest, rests = self.wall, []
@@ -137,9 +139,7 @@ class GivenMotion:
         starts = [round(since / self.tick) for since, _ in self.surfaces]
         return list(pairwise([*(start for start in starts if start < ticks), ticks]))
 
-    def _start(
-        self, x: NDArray[np.float64], noise: NDArray[np.float64]
-    ) -> tuple[SurfaceState, ForceInputState]:
+    def _start(self, x: Array, noise: Array) -> tuple[SurfaceState, ForceInputState]:
         surface = self.surfaces[0][1]
         now, rate, second = self._motion(x, self.wall)
         state, force = surface.start(), 0.0
@@ -148,9 +148,7 @@ class GivenMotion:
             force = max(surface.force(state, now, rate) + surface.mass * second, 0.0)
         return state, self.line.settled_at(force, noise[-1], noise[-2])
 
-    def _changed(
-        self, i: int, state: SurfaceState, x: NDArray[np.float64], rest: float
-    ) -> tuple[float, SurfaceState]:
+    def _changed(self, i: int, state: SurfaceState, x: Array, rest: float) -> tuple[float, SurfaceState]:
         """Rest position [m] and state of the i-th surface, relaxed, under the force that there is already."""
         old, new = self.surfaces[i - 1][1], self.surfaces[i][1]
         now, rate, second = self._motion(x, rest)
@@ -158,13 +156,13 @@ class GivenMotion:
         depth = rest_for(new, force - new.mass * second, rate)
         return rest + now - depth, SurfaceState(depth, rate, 0.0, 1.0)
 
-    def _motion(self, x: NDArray[np.float64], rest: float) -> tuple[float, float, float]:
+    def _motion(self, x: Array, rest: float) -> tuple[float, float, float]:
         """Penetration, rate and acceleration at the second of these positions."""
         physics = float(self.line.sensor.rate)
         before, now, after = (float(at) - rest for at in x[:3])
         return now, (after - before) * 0.5 * physics, (after - 2.0 * now + before) * physics * physics
 
-    def _told(self, rests: list[float]) -> dict[str, Any]:
+    def _description(self, rests: list[float]) -> dict[str, Any]:
         """What a record says of its making, in plain values."""
         told = [
             {"from_s": since, "rest_m": rest, "truth": _truth(surface)}
@@ -174,19 +172,12 @@ class GivenMotion:
         return {"truth": told[-1]["truth"], "surfaces": told, "instruments": instruments}
 
 
-# More than seven arguments: each is an instrument or a surface of its own, and has a default.
 def given_motion(
     surface: Any | list[tuple[float, Any]],
     *,
     wall: float = 0.0,
     resolution: float = 5e-6,
-    noise: float = 0.6,
-    phase: float = 0.0,
-    cutoff: float = 120.0,
-    sampling: int = 480,
-    bits: int = 12,
-    full_scale: float = 200.0,
-    analog_filter: bool = False,
+    sensor: ForceSensor = SENSOR,
     rate: int = 1000,
     steps: int = 20,
 ) -> GivenMotion:
@@ -198,13 +189,7 @@ def given_motion(
             pressed has the rest length that leaves the force as it is.
         wall: where the first surface is undeformed [m].
         resolution: of the encoder, in the tip's position [m]; 0: none.
-        noise: standard deviation of a force sample [N].
-        phase: when the force sensor's clock ticks first [s].
-        cutoff: of the force sensor's low-pass [Hz].
-        sampling: of the force sensor [Hz].
-        bits: of the force sensor's converter.
-        full_scale: of the force sensor [N].
-        analog_filter: whether the 190 Hz filter of fig. 3.6 stands between sensor and reading.
+        sensor: of the force, as an experiment's `[force_sensor]` has it; the thesis' own if not given.
         rate: rows a second.
         steps: of the physics between them.
 
@@ -214,11 +199,7 @@ def given_motion(
     for name, value, least in (("rate", rate, 1), ("steps", steps, 1), ("resolution", resolution, 0.0)):
         if not value >= least:
             raise InputError(f"{name} must be at least {least}, got {value}")
-    physics = rate * steps
-    sensor = force_sensor(cutoff, sampling, bits, full_scale, noise, physics, phase)
-    line = ForceInput(
-        sensor, analog_filter_190(float(physics)), 1.0 if analog_filter else 0.0, Converter(16, full_scale)
-    )
+    line = force_input(sensor, rate * steps, sensor.full_scale)
     return GivenMotion(_in_turn(surface), float(wall), line, float(resolution), int(steps))
 
 

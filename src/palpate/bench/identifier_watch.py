@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law
+from palpate.arrays import Array
 from palpate.bench.estimators import Estimators, listened
 from palpate.bench.sequence import CONTACT
 from palpate.errors import PartError
 from palpate.plugins import reason
 from palpate.records import Record
 from palpate.signals.types import Estimate
-
-Array = NDArray[np.float64]
 
 COLUMNS = {
     "M_identifier": "kg",

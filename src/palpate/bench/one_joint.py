@@ -9,13 +9,14 @@ import numpy as np
 
 from palpate._jit import kernel, law, part
 from palpate._vector import clip
+from palpate.bench.experiments.tables import ForceSensor
 from palpate.bench.force_input import ForceInput, ForceInputState
+from palpate.bench.force_reading import force_input
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
 from palpate.environments.surface import Surface
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
 from palpate.errors import InputError
 from palpate.friction import LuGre
-from palpate.instruments import Converter, analog_filter_190, force_sensor
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.signals.filters import Biquad, BiquadState, butterworth2
@@ -202,48 +203,62 @@ class OneJoint:
 JOINT_FRICTION = LuGre(1250.0, 11.0, 0.0, 0.25, 0.3, 0.01)  # type: ignore[arg-type]
 
 
-# More than seven arguments: each is a number of the experiment, and most have a default.
+def require_positive(**numbers: float) -> None:
+    """Refuses numbers that are not above 0, by their names."""
+    for name, value in numbers.items():
+        if not value > 0:
+            raise InputError(f"{name} must be above 0, got {value}")
+
+
+@dataclass(frozen=True)
+class Link:
+    """A joint and its motor; by default joint 2 of the thesis' arm, the one that presses where its experiments start.
+
+    Args:
+        friction: of the joint, in numbers.
+        inertia: of link and rotor about the joint [kg m^2].
+        lever: [m].
+        limit: torque of the motor [N m].
+
+    Raises:
+        InputError: a number that is not above 0.
+    """
+
+    friction: LuGre = JOINT_FRICTION
+    inertia: float = 0.126
+    lever: float = 0.113
+    limit: float = 2.5
+
+    def __post_init__(self) -> None:
+        require_positive(inertia=self.inertia, lever=self.lever, limit=self.limit)
+
+
+JOINT_2 = Link()
+
+
 def one_joint(
     surface: KelvinVoigt | StandardLinearSolid | HuntCrossley,
     controller: Any,
     schedule: ForceSchedule,
     *,
-    friction: LuGre = JOINT_FRICTION,
+    link: Link = JOINT_2,
     noise: float = 0.6,
-    inertia: float = 0.126,
-    lever: float = 0.113,
-    limit: float = 2.5,
     rate: int = 1000,
     steps: int = 20,
 ) -> OneJoint:
-    """A bench of one joint, by default joint 2 of the thesis' arm: the one that presses where its experiments start.
+    """A bench of one joint.
 
     Args:
         surface: that it presses.
         controller: `DirectNeural`, `DirectIntegral` or one of the user's own.
         schedule: desired force.
-        friction: of the joint, in numbers.
+        link: the joint and its motor.
         noise: standard deviation of a force sample [N].
-        inertia: of link and rotor about the joint [kg m^2].
-        lever: [m].
-        limit: torque [N m].
         rate: ticks a second.
         steps: of the plant between ticks.
     """
-    for name, value in (
-        ("inertia", inertia),
-        ("lever", lever),
-        ("limit", limit),
-        ("rate", rate),
-        ("steps", steps),
-    ):
-        if not value > 0:
-            raise InputError(f"{name} must be above 0, got {value}")
-    physics = rate * steps
-    sensor = force_sensor(noise=noise, rate=physics)
-    force = ForceInput(sensor, analog_filter_190(float(physics)), 0.0, Converter(16, 200.0))
-    joint = Joint(float(inertia), float(lever), friction.checked(), join(surface))
-    smooth = butterworth2(120.0, float(rate))
-    return OneJoint(
-        JointLoop(joint, force, smooth, schedule, controller, float(limit), 1.0 / rate, int(steps))
-    )
+    require_positive(rate=rate, steps=steps)
+    force = force_input(ForceSensor(noise=noise), rate * steps)
+    joint = Joint(float(link.inertia), float(link.lever), link.friction.checked(), join(surface))
+    smooth, limit = butterworth2(120.0, float(rate)), float(link.limit)
+    return OneJoint(JointLoop(joint, force, smooth, schedule, controller, limit, 1.0 / rate, int(steps)))

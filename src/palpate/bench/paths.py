@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 
-Path = Callable[[NDArray[np.float64]], NDArray[np.float64]] | ArrayLike
+Path = Callable[[Array], Array] | ArrayLike
 """A function of times [s], or positions [m] at ticks, shape (n,), or at steps of the physics, shape (n, steps)."""
 LEAST = 4
 """Ticks that a path must have: a cubic spline needs so many."""
 
 
-def positions(path: Path, duration: float | None, tick: float, steps: int) -> NDArray[np.float64]:
+def positions(path: Path, duration: float | None, tick: float, steps: int) -> Array:
     """Positions [m] at each step of n ticks, and at one step before and after: shape (n steps + 2,).
 
     Raises:
@@ -35,23 +36,23 @@ def positions(path: Path, duration: float | None, tick: float, steps: int) -> ND
 
 
 def _called(
-    path: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    path: Callable[[Array], Array],
     duration: float | None,
     tick: float,
     steps: int,
-) -> NDArray[np.float64]:
+) -> Array:
     if duration is None or not duration >= LEAST * tick:
         raise InputError(
             f"duration must be at least {LEAST * tick:g} s for a path that is a function, got {duration}"
         )
-    times: NDArray[np.float64] = np.arange(-1.0, round(duration / tick) * steps + 1) * (tick / steps)
+    times: Array = np.arange(-1.0, round(duration / tick) * steps + 1) * (tick / steps)
     x = np.asarray(path(times), dtype=np.float64)
     if x.shape != times.shape:
         raise InputError(f"path must give one position for each time, {times.shape}, got {x.shape}")
     return x
 
 
-def _extended(path: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
+def _extended(path: Array, steps: int) -> Array:
     if path.ndim not in {1, 2} or len(path) < LEAST or (path.ndim == 2 and path.shape[1] != steps):
         raise InputError(
             f"path must be of shape (n,), one position a tick, or (n, {steps}), one a step of the physics, with n at "
@@ -65,7 +66,7 @@ def _extended(path: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
     return np.concatenate([[before], flat, [after]])
 
 
-def _interpolated(at_ticks: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
+def _interpolated(at_ticks: Array, steps: int) -> Array:
     """By a cubic spline: acceleration has no jumps, which a mass would feel."""
     from scipy.interpolate import CubicSpline
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import NotCompiled
+from palpate.arrays import Array
 from palpate.bench.diagnosis import diagnosed
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT
@@ -49,7 +49,7 @@ class Simulation:
         """Time since the first contact [s]; 0 before it."""
         return 0.0 if self.contact is None else (self.ticks - self.contact) * self.loop.tick
 
-    def advance(self, ticks: int) -> NDArray[np.float64]:
+    def advance(self, ticks: int) -> Array:
         """Runs so many ticks; their rows in the order of `COLUMNS`, shape (ticks, columns).
 
         Raises:
@@ -63,7 +63,7 @@ class Simulation:
         self.ticks += ticks
         return out
 
-    def _march(self, noise: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    def _march(self, noise: Array, out: Array) -> None:
         if not self.compiled:
             self.state = _march_plain(self.loop, self.state, self.ticks, noise, out)
             return
@@ -84,9 +84,7 @@ def _compiling() -> None:
         sys.stderr.write("palpate: compiling the loop: some ten seconds, once after installation\n")
 
 
-def _march_plain(
-    loop: Loop, state: LoopState, k: int, noise: NDArray[np.float64], out: NDArray[np.float64]
-) -> LoopState:
+def _march_plain(loop: Loop, state: LoopState, k: int, noise: Array, out: Array) -> LoopState:
     """As compiled also where numbers are none: plain Python raises there, after the row that has them."""
     out[:] = np.nan
     try:

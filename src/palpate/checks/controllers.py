@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import ZERO3, Vec3
+from palpate.arrays import Array
 from palpate.bench import build, changed, load
 from palpate.bench.bench import Bench
 from palpate.bench.part_check import check_parts
@@ -45,7 +45,7 @@ def a_moment() -> tuple[Sense, Task, Any]:
     return sense, task, arm.model(q, qd)
 
 
-def ticks(controller: Any, count: int = 5) -> tuple[NDArray[np.float64], Any]:
+def ticks(controller: Any, count: int = 5) -> tuple[Array, Any]:
     """Torques [N m] of so many equal ticks, shape (count, 3), and the state after them."""
     sense, task, model = a_moment()
     state, torques = controller.start(), []

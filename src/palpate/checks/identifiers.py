@@ -8,11 +8,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.checks.check import Check, require
-
-Array = NDArray[np.float64]
 
 TRUTH = np.array([0.1, 200.0, 5200.0])
 """M [kg], B [N s/m], K [N/m] of the foam that is pressed."""

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import kernel
 from palpate._jit import part as registered
+from palpate.arrays import Array
 from palpate.checks.check import Check, require
 from palpate.environments import SurfaceState, contact_force, impact, part_from, touch
-
-Array = NDArray[np.float64]
 
 DT = 50e-6
 """A step of the physics [s]."""

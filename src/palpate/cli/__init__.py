@@ -23,8 +23,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     import sys
 
     from palpate.cli._edge import guarded
-    from palpate.cli._options_file import expanded
     from palpate.cli._program import EXPANDED, TYPED, program
+    from palpate.cli.options.kept import expanded
 
     TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
 

@@ -14,7 +14,7 @@ from cyclopts import CycloptsError
 
 from palpate.cli import _streams
 from palpate.errors import PalpateError
-from palpate.text import shown
+from palpate.text import printable
 
 DONE = 0
 WRONG_INPUT = 2
@@ -85,7 +85,7 @@ def _code_of(error: BaseException) -> int:
 
 
 def _say(text: str, code: int) -> int:
-    line = shown(" ".join(text.split()))
+    line = printable(" ".join(text.split()))
     with suppress(OSError):  # standard error is full or closed: the code still tells
         print(f"palpate: {line}", file=sys.stderr)  # noqa: T201
     return code

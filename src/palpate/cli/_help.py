@@ -102,7 +102,7 @@ class PhraseFormatter(DefaultFormatter):
         """Render one panel."""
         from attrs import evolve
 
-        entries = [evolve(entry, **_told(entry)) for entry in panel.entries]
+        entries = [evolve(entry, **_described(entry)) for entry in panel.entries]
         super().__call__(console, options, panel.copy(entries=entries))
 
     def render_description(self, console: Console, options: ConsoleOptions, description: Any) -> None:
@@ -113,7 +113,7 @@ class PhraseFormatter(DefaultFormatter):
             console.print()
 
 
-def _told(entry: Any) -> dict[str, Any]:
+def _described(entry: Any) -> dict[str, Any]:
     """An entry's text with what else is known of it, as one."""
     choices = [f"[choices: {', '.join(entry.choices)}]"] if entry.choices else []
     empty: Sequence[object] = (None, "False", "()", "('',)")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,12 +12,12 @@ from palpate.cli._answer import print_answer
 from palpate.cli._edge import INTERRUPTED
 from palpate.cli._one_log import OneLog, answered
 from palpate.cli._program import command
+from palpate.cli._progress import bar
 from palpate.cli._terminal import console, place, say
 from palpate.errors import InputError, PalpateError
+from palpate.files import write_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from palpate.identification import Identification
     from palpate.identification.pooling import Pooled
     from palpate.report.many.rows import LogRow
@@ -43,14 +42,16 @@ def many(
     Raises:
         InputError: no log could be read; nothing is printed or written then.
     """
+    from rich.progress import MofNCompleteColumn
+
     from palpate.identification.pooling import pool
 
     rows: list[LogRow] = []
     interrupted = False
     try:
-        with _progress(len(logs)) as step:
-            for log in logs:
-                step(log.name)
+        with bar(console(stderr=True), MofNCompleteColumn()) as progress:
+            for log in progress.track(logs, description=""):
+                progress.update(progress.task_ids[0], description=log.name)
                 rows.append(_row(log, asked))
     except KeyboardInterrupt:
         interrupted = True
@@ -103,9 +104,9 @@ def _write(
 
         write_figure(rows, pooled, figure, dpi)
     if page is not None:
-        from palpate.report.many.page import write_page
+        from palpate.report.many.page import page as page_of
 
-        write_page(rows, pooled, page)
+        write_text(page, page_of(rows, pooled))
     return [path for path in (figure, page) if path is not None]
 
 
@@ -126,22 +127,3 @@ def _print(rows: Sequence[LogRow], pooled: Pooled, written: Sequence[Path], *, j
     show(rows, pooled, screen)
     for path in written:
         place(screen, "report:" if path.suffix.lower() == ".html" else "figure:", path)
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[str], None]]:
-    """A bar on a terminal's standard error; nothing elsewhere."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn()
-    screen = console(stderr=True)
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        task = bar.add_task("", total=total)
-        begun = 0
-
-        def step(name: str) -> None:
-            nonlocal begun
-            bar.update(task, completed=begun, description=name)
-            begun += 1
-
-        yield step

@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from palpate.cli._arm_options import ArmOptions, FrameOptions
-from palpate.cli._indenter_options import IndenterOptions
-from palpate.cli._log_options import LogOptions, read
 from palpate.cli._program import command
+from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.options.indenter import IndenterOptions
+from palpate.cli.options.log import LogOptions, read
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from palpate.identification import Identification
     from palpate.records import Record
     from palpate.report.identification.source import Source
+
+
+_LOG, _FRAME, _ARM, _INDENTER = LogOptions(), FrameOptions(), ArmOptions(), IndenterOptions()
 
 
 class Fitted(Protocol):
@@ -43,11 +46,11 @@ def answered(found: Identification) -> bool:
 class OneLog:
     """What is asked, the same of each log."""
 
-    source: LogOptions
-    frame: FrameOptions
-    arm: ArmOptions
     fitted: Fitted
-    pressed_by: IndenterOptions
+    source: LogOptions = _LOG
+    frame: FrameOptions = _FRAME
+    arm: ArmOptions = _ARM
+    pressed_by: IndenterOptions = _INDENTER
 
     def identified(self, log: Path) -> tuple[Identification, Source]:
         """Read a log and find what it touched, and say where that is from.

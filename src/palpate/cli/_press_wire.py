@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.cli import _interrupts
 from palpate.cli._answer import print_answer
-from palpate.cli._press_options import AskOptions, LimitOptions, WireOptions, task_of
 from palpate.cli._program import command
 from palpate.cli._terminal import print_lines, say
+from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, task_of
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

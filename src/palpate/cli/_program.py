@@ -23,7 +23,7 @@ COMMANDS = {
     "identify": "Find what a robot touched, from a log: stiffness, damping, mass.",
     "payload": "Weigh a tool by a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List what a log holds: topics, variables, columns.",
-    "excite": "Design a force that shows what a surface is, and say how well beforehand.",
+    "excite": "Design a force that shows what a surface is, and predict how well.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write what was identified as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",

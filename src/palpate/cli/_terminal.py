@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli._streams import flush
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,7 +23,7 @@ STYLE = "yellow"
 
 def print_lines(*lines: str) -> None:
     """Print lines as they are, however long, for a reader or for another program; at once, on a pipe too."""
-    sys.stdout.write("".join(f"{shown(line)}\n" for line in lines))
+    sys.stdout.write("".join(f"{printable(line)}\n" for line in lines))
     flush(sys.stdout)
 
 
@@ -39,7 +39,7 @@ def print_json(value: Any) -> None:
 
 def say(text: str) -> None:
     """Print a line about the program itself on standard error."""
-    print(f"palpate: {shown(' '.join(text.split()))}", file=sys.stderr)  # noqa: T201
+    print(f"palpate: {printable(' '.join(text.split()))}", file=sys.stderr)  # noqa: T201
 
 
 def console(*, stderr: bool = False) -> Console:
@@ -50,7 +50,7 @@ def console(*, stderr: bool = False) -> Console:
     class Plain(Console):
         def render(self, renderable: Any, options: Any = None) -> Iterable[Segment]:
             for segment in super().render(renderable, options):
-                yield segment if segment.control else segment._replace(text=shown(segment.text))
+                yield segment if segment.control else segment._replace(text=printable(segment.text))
 
     return Plain(stderr=stderr, markup=False, emoji=False, highlight=False)
 
@@ -86,6 +86,17 @@ def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> No
         drawn.add_row(*row[:-1], last)
     console.print(drawn)
     console.print()
+
+
+def show_answer(title: str, rest: str, tables: Iterable[Table], notes: Iterable[str]) -> Console:
+    """A title with what belongs to it, tables, and what a reader must not miss; the console, for what follows."""
+    screen = console()
+    head(screen, title, rest)
+    for table in tables:
+        show_table(screen, table)
+    for note in notes:
+        screen.print(note, style=STYLE, soft_wrap=True)
+    return screen
 
 
 def place(console: Console, what: str, where: object) -> None:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG, SIGNED
-from palpate.cli._force_options import ColumnOptions, OutputOptions, inner_loop, one_thread
 from palpate.cli._terminal import console, print_lines
+from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.force import ColumnOptions, OutputOptions, inner_loop, one_thread
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def certify(
         return _checked(check, gains, output.json)
     if gains is None:
         raise InputError("certify what? Give the gains that palpate tune wrote, or --check CERTIFICATE")
-    output.check(".json")
+    output.check_new(output.out, ending=".json")
     proof.check()
     return _made(gains, proof, columns or ColumnOptions(), output)
 

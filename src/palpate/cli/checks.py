@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from cyclopts import Parameter
-
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import console, show_table
+from palpate.cli.options.written import JsonOption
 from palpate.errors import InputError
 
 
-def checks(name: str | None = None, /, *, json: Annotated[bool, Parameter(negative="")] = False) -> int:
+def checks(name: str | None = None, /, *, output: JsonOption | None = None) -> int:
     """Run the conformance suite of palpate's own parts on a controller, surface or identifier of yours.
 
     palpate checks student:Damped
@@ -21,8 +18,6 @@ def checks(name: str | None = None, /, *, json: Annotated[bool, Parameter(negati
     name
         Your part, module:Class, or an experiment's TOML file that names some. The module is looked for among the
         installed ones, beside the file and in the current folder; naming it imports it.
-    json
-        Print the outcomes as JSON and nothing else.
     """
     if name is None:
         raise InputError("check what? Give module:Class, as in student:Damped, or an experiment's TOML file")
@@ -31,7 +26,7 @@ def checks(name: str | None = None, /, *, json: Annotated[bool, Parameter(negati
 
     found = {subject: list(outcomes(some)) for subject, some in checks_of(name).items()}
     failed = sum(bool(one.failed) for some in found.values() for one in some)
-    if json:
+    if output is not None and output.json:
         parts = {
             subject: [{"check": one.sentence, "failed": one.failed or None} for one in some]
             for subject, some in found.items()

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG, SIGNED, check_new, in_si, in_si_if_given
 from palpate.cli._terminal import console, place
+from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
+from palpate.cli.options.written import WRITTEN, FileOptions, PictureOptions
 from palpate.errors import InputError
-from palpate.files import check_place
-from palpate.text import shown
+from palpate.files import write_text
+from palpate.text import printable
 
 if TYPE_CHECKING:
-    from palpate.excitation import Budget, Design, ForceLoop, Question, Remedy, Sensors, SurfaceRange
+    from palpate.excitation import Budget, Design, ForceLoop, Problem, Remedy, Sensors, SurfaceRange
 
 
 @Parameter(name="*", group=Group("The surfaces", sort_key=1))
@@ -221,9 +222,9 @@ class LoopOptions:
         return KnownBandwidth(in_si("--loop-bandwidth", self.loop_bandwidth, "frequency"))
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=6))
+@Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
+class OutputOptions(PictureOptions, FileOptions):
     """Where results go.
 
     Parameters
@@ -236,21 +237,22 @@ class OutputOptions:
         Replace what stands at --out and --experiment.
     figure
         Where to write the figure, a PNG; excite.png in the current folder if not given.
-    no_figure
-        Write no figure.
-    report
-        Where to write a page that opens without a network, HTML.
-    json
-        Print one JSON object and nothing else; a figure is written only if --figure is given.
     """
 
     out: Path | None = None
     experiment: Path | None = None
     replace: Annotated[bool, FLAG] = False
     figure: Path | None = None
-    no_figure: Annotated[bool, FLAG] = False
-    report: Path | None = None
-    json: Annotated[bool, FLAG] = False
+
+    def check_all(self) -> None:
+        """Finds every place wrong before any work is done."""
+        from palpate.report.excitation.files import check_ending
+
+        if self.out is not None:
+            check_ending(self.out)
+        self.check_new(self.out)
+        self.check_new(self.experiment, "--experiment", ".toml")
+        self.page()
 
 
 def excite(
@@ -270,15 +272,15 @@ def excite(
 
     Exit code 1 says that the precision cannot be had within the limits; what would help is printed.
     """
-    from palpate.excitation import Question
+    from palpate.excitation import Problem
     from palpate.excitation.quantities import shares
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
     robot, output = robot or LoopOptions(), output or OutputOptions()
-    picture = _picture(output)
-    _check_places(output)
+    picture = output.picture("excite.png")
+    output.check_all()
     surfaces = surface.range()
-    question = Question(
+    problem = Problem(
         surfaces,
         limits.budget(),
         shares("--precision", goal.precision, surfaces.names),
@@ -290,33 +292,13 @@ def excite(
         in_si("--longest", goal.longest, "time"),
         in_si("--settle", goal.settle, "time"),
     )
-    return _answer(question, sensor.rate, output, picture)
+    return _answer(problem, sensor.rate, output, picture)
 
 
-def _picture(output: OutputOptions) -> Path | None:
-    """Where the figure goes; found wrong before any work is done."""
-    if output.no_figure or (output.figure is None and output.json):
-        return None
-    path = output.figure or Path("excite.png")
-    check_place(path, "--figure", ending=".png")
-    return path
-
-
-def _check_places(output: OutputOptions) -> None:
-    from palpate.report.excitation.files import check_ending
-
-    if output.out is not None:
-        check_ending(output.out)
-    check_new(output.out, "--out", replace=output.replace)
-    check_new(output.experiment, "--experiment", replace=output.replace, ending=".toml")
-    if output.report is not None:
-        check_place(output.report, "--report", ending=".html")
-
-
-def _answer(question: Question, rate: int, output: OutputOptions, picture: Path | None) -> int:
+def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | None) -> int:
     from palpate.excitation import design, remedies
 
-    found = design(question)
+    found = design(problem)
     helps = [] if found.feasible else remedies(found)
     if found.feasible:
         _write(found, rate, output.out, output.experiment)
@@ -326,16 +308,15 @@ def _answer(question: Question, rate: int, output: OutputOptions, picture: Path 
         write_figure(found, picture)
     if output.report is not None:
         from palpate.cli._program import command
-        from palpate.report.excitation.page import write_page
+        from palpate.report.excitation.page import page
 
-        write_page(found, helps, output.report, shown(command()))
+        write_text(output.report, page(found, helps, printable(command())))
     written = [*([output.out, output.experiment] if found.feasible else []), output.report]
     _print(found, helps, written, picture, output.json)
     return 0 if found.feasible else 1
 
 
 def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
-    from palpate.files import write_text
     from palpate.report.excitation import files
 
     if out is not None:

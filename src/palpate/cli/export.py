@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._found import read_found
+from palpate.cli._identified import read_found
 from palpate.cli._program import command
 from palpate.cli._terminal import STYLE, console, head, place, show_table
+from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.written import WRITTEN, FileOptions
 from palpate.errors import InputError
-from palpate.files import MADE, check_place, signed, whole, write_json
+from palpate.files import MADE, signed, whole, write_json
 
 if TYPE_CHECKING:
     from palpate.export import Checked, Exported
-
-_FLAG = Parameter(negative=())
-_NUMBER = Parameter(allow_leading_hyphen=True)
 
 
 @Parameter(name="*", group=Group("The scene", sort_key=1))
@@ -60,14 +59,14 @@ class GivenOptions:
         Take the stiffness at the working point in place of the model's K: of a surface that no linear model explains.
     """
 
-    damping: Annotated[float | None, _NUMBER] = None
-    mass: Annotated[float | None, _NUMBER] = None
-    working_point: Annotated[bool, _FLAG] = False
+    damping: Annotated[float | None, SIGNED] = None
+    mass: Annotated[float | None, SIGNED] = None
+    working_point: Annotated[bool, FLAG] = False
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=6))
+@Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
+class OutputOptions(FileOptions):
     """Where results go.
 
     Parameters
@@ -79,14 +78,11 @@ class OutputOptions:
         Replace what an earlier export wrote there.
     check
         Press the contact in the simulator, and state the error in K and B; exit code 1 if one is above 0.1 %.
-    json
-        Print one JSON object and nothing else.
     """
 
     out: Path | None = None
-    replace: Annotated[bool, _FLAG] = False
-    check: Annotated[bool, _FLAG] = False
-    json: Annotated[bool, _FLAG] = False
+    replace: Annotated[bool, FLAG] = False
+    check: Annotated[bool, FLAG] = False
 
 
 def export(
@@ -116,7 +112,7 @@ def export(
     request = Request(scene.to, scene.model, scene.geom, scene.probe)
     out = output.out or request.default_place()
     beside = out.with_name(f"{out.name}.json")
-    _check_places((out, beside), output.replace, scene.model)
+    _check_places((out, beside), output, scene.model)
     contact = contact_from(
         read_found(found),
         found.name,
@@ -126,20 +122,18 @@ def export(
     )
     exported = prepare(contact, request, out)
     checked = _written(exported, out, output.check)
-    told = _told(exported, out, checked)
+    told = _as_json(exported, out, checked)
     write_json(beside, signed(told))
     _print(exported, told, checked, (out, beside), json=output.json)
     verdicts = [one.passed for one in checked if one.passed is not None]
     return 1 if output.check and not (verdicts and all(verdicts)) else 0
 
 
-def _check_places(places: tuple[Path, ...], replace: bool, model: Path | None) -> None:
+def _check_places(places: tuple[Path, ...], output: OutputOptions, model: Path | None) -> None:
     for path in places:
         if model is not None and path.absolute() == model.absolute():
             raise InputError(f"--out {path} is the scene itself; name another file")
-        check_place(path, "--out")
-        if path.exists() and not replace:
-            raise InputError(f"{path} exists; name another with --out, or add --replace")
+        output.check_new(path)
 
 
 def _written(exported: Exported, out: Path, wanted: bool) -> list[Checked]:
@@ -154,7 +148,7 @@ def _written(exported: Exported, out: Path, wanted: bool) -> list[Checked]:
         return check(exported, draft) if wanted else []
 
 
-def _told(exported: Exported, out: Path, checked: list[Checked]) -> dict[str, Any]:
+def _as_json(exported: Exported, out: Path, checked: list[Checked]) -> dict[str, Any]:
     from palpate import __version__
 
     return {

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._arm_options import ArmOptions, FrameOptions
-from palpate.cli._flags import FLAG, SIGNED
-from palpate.cli._indenter_options import IndenterOptions
-from palpate.cli._log_options import LogOptions
 from palpate.cli._one_log import OneLog, answered
-from palpate.cli._options_file import CellOptions
 from palpate.cli._terminal import console, place
-from palpate.cli._values import with_std
+from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.options.flags import SIGNED
+from palpate.cli.options.indenter import IndenterOptions
+from palpate.cli.options.kept import CellOptions
+from palpate.cli.options.log import LogOptions
+from palpate.cli.options.values import with_std
+from palpate.cli.options.written import WRITTEN, PictureOptions
 from palpate.errors import InputError
-from palpate.files import check_place
+from palpate.files import write_text
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The model", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class ModelOptions:
-    """What is fitted, and what is known beforehand.
+    """What is fitted, and the prior of it.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ class ModelOptions:
     force_filter
         What the force went through before it was sampled, as butterworth3:120 (order and Hz), joined by +; or none.
     mass
-        What is known of the mass beforehand, in kg, VALUE or VALUE:STD.
+        Prior of the mass, in kg, VALUE or VALUE:STD.
     tolerance
         Largest half-width of an identified parameter's 95 % interval, as a share of its value.
     calibration
@@ -81,9 +82,9 @@ class ModelOptions:
         return known | {name: getattr(self, name) for name in names}
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=6))
+@Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
+class OutputOptions(PictureOptions):
     """Where results go.
 
     Parameters
@@ -93,37 +94,17 @@ class OutputOptions:
         (of many logs, pooled.identify.png).
     dpi
         Of a PNG; 110 if not given.
-    no_figure
-        Write no figure.
-    report
-        Where to write a page with everything, an HTML file.
-    json
-        Print one JSON object and nothing else; a figure is written only if --figure is given.
     """
 
     figure: Path | None = None
     dpi: int | None = None
-    no_figure: Annotated[bool, FLAG] = False
-    report: Path | None = None
-    json: Annotated[bool, FLAG] = False
 
     def png(self, name: str) -> Path | None:
         """Where the figure goes; found wrong before any work is done."""
-        if self.no_figure or (self.figure is None and self.json):
-            return None
         from palpate.report.style import FORMATS, check_dpi
 
         check_dpi(self.dpi)
-        path = self.figure or Path(f"{name}.identify.png")
-        ending = path.suffix.lower()
-        check_place(path, "--figure", ending=ending if ending in FORMATS else ".png")
-        return path
-
-    def page(self) -> Path | None:
-        """Where the page goes; likewise."""
-        if self.report is not None:
-            check_place(self.report, "--report", ending=".html")
-        return self.report
+        return self.picture(f"{name}.identify.png", FORMATS)
 
 
 def identify(
@@ -164,21 +145,13 @@ def identify(
     """
     from palpate.logs.gathered import gathered, is_folder_of_logs
 
-    pressed_by, output, cell = (
-        pressed_by or IndenterOptions(),
-        output or OutputOptions(),
-        cell or CellOptions(),
-    )
+    output, cell = output or OutputOptions(), cell or CellOptions()
+    source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
+    fitted, pressed_by = fitted or ModelOptions(), pressed_by or IndenterOptions()
     pressed_by.check()
     cell.check()
-    asked = OneLog(
-        source or LogOptions(),
-        frame or FrameOptions(),
-        arm or ArmOptions(),
-        fitted or ModelOptions(),
-        pressed_by,
-    )
-    cell.save((asked.source, asked.frame, asked.arm, fitted or ModelOptions(), asked.pressed_by))
+    asked = OneLog(fitted, source, frame, arm, pressed_by)
+    cell.save((source, frame, arm, fitted, pressed_by))
     if not logs:
         raise InputError(
             "identify what? Name a log, several, or a folder of them (see: palpate identify --help)"
@@ -200,9 +173,9 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
 
         write_figure(found, figure, title=log.name, dpi=output.dpi)
     if page is not None:
-        from palpate.report.identification.page import write_page
+        from palpate.report.identification.page import page as page_of
 
-        write_page(found, page, origin)
+        write_text(page, page_of(found, origin))
     _print(found, origin, [path for path in (figure, page) if path is not None], output.json)
     return 0 if answered(found) else 1
 

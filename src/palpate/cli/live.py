@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._arm_options import ArmOptions, FrameOptions
-from palpate.cli._flags import FLAG, SIGNED
-from palpate.cli._indenter_options import IndenterOptions
-from palpate.cli._log_options import LogOptions
+from palpate.cli._progress import COMPILING
 from palpate.cli._terminal import print_lines, say
 from palpate.cli.identify import ModelOptions
-from palpate.cli.run import whole_number
+from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.options.flags import FLAG, SIGNED, WHOLE
+from palpate.cli.options.log import LogOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,7 +51,7 @@ class ShownOptions:
     arm_: Annotated[str | None, Parameter(name="--arm")] = None
     log: Path | None = None
     record: Path | None = None
-    seed: Annotated[int, Parameter(converter=whole_number)] = 0
+    seed: Annotated[int, WHOLE] = 0
     whole_approach: Annotated[bool, FLAG] = False
 
     def file(self) -> Path | None:
@@ -124,11 +123,7 @@ def live(
     from palpate.cli._one_log import OneLog
 
     asked = OneLog(
-        source or LogOptions(),
-        frame or FrameOptions(),
-        arm or ArmOptions(),
-        fitted or ModelOptions(),
-        IndenterOptions(),
+        fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
     )
     if shown.record is not None and not asked.source.plain:
         raise InputError("a record names its own columns; give --log FILE with --time, --position, --force")
@@ -137,18 +132,16 @@ def live(
 
 def _simulation(name: str, seed: int, whole: bool) -> Source:
     from palpate.bench.experiments.tables import load
-    from palpate.cli._waiting import COMPILING
     from palpate.live.simulation import Simulation
 
     experiment = load(name)
     try:
-        return Simulation(name, experiment, seed, whole=whole, waiting=lambda: say(COMPILING))
+        return Simulation(experiment, seed, whole=whole, waiting=lambda: say(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 
 
 def _pressing(name: str, seed: int) -> Source:
-    from palpate.cli._waiting import COMPILING
     from palpate.live.pressing import PressingArm
 
     return PressingArm(name, seed, waiting=lambda: say(COMPILING))

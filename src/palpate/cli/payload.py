@@ -4,50 +4,35 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._arm_options import FrameOptions
-from palpate.cli._flags import FLAG, check_new
-from palpate.cli._log_options import LogOptions, read
-from palpate.cli._options_file import CellOptions
-from palpate.cli._terminal import STYLE, console, head, place, show_table
+from palpate.cli._terminal import place, show_answer
+from palpate.cli.options.arm import FrameOptions
+from palpate.cli.options.kept import CellOptions
+from palpate.cli.options.log import LogOptions, read
+from palpate.cli.options.written import WRITTEN, FileOptions, ReportOption
 from palpate.errors import InputError
-from palpate.files import check_place
+from palpate.files import write_text
 
 if TYPE_CHECKING:
     from palpate.contact_frame import Weighed
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=6))
+@Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions:
+class OutputOptions(ReportOption, FileOptions):
     """Where results go.
 
     Parameters
     ----------
     out
         Where to write the payload, a TOML file for --payload.
-    replace
-        Replace what stands at --out.
-    report
-        Where to write a page with everything, an HTML file.
-    json
-        Print one JSON object and nothing else.
     """
 
     out: Path | None = None
-    replace: Annotated[bool, FLAG] = False
-    report: Path | None = None
-    json: Annotated[bool, FLAG] = False
-
-    def check(self) -> None:
-        """Refuse a place before any work is done."""
-        check_new(self.out, "--out", replace=self.replace, ending=".toml")
-        if self.report is not None:
-            check_place(self.report, "--report", ending=".html")
 
 
 def payload(
@@ -81,7 +66,8 @@ def payload(
     """
     cell, output = cell or CellOptions(), output or OutputOptions()
     cell.check()
-    output.check()
+    output.check_new(output.out, ending=".toml")
+    report = output.page()
     if not 0.0 < tolerance <= 1.0:
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
     from palpate.contact_frame import ContactFrame, weigh
@@ -97,11 +83,11 @@ def payload(
     if output.out is not None and found.payload is not None:
         found.payload.save(output.out)
         written.append(output.out)
-    if output.report is not None:
-        from palpate.report.payload import write_page
+    if report is not None:
+        from palpate.report.payload.page import page
 
-        write_page(found, log.name, output.report)
-        written.append(output.report)
+        write_text(report, page(found, log.name))
+        written.append(report)
     _print(found, log, written, output.json)
     return 0 if found.payload is not None else 1
 
@@ -110,12 +96,9 @@ def _print(found: Weighed, log: Path, written: list[Path], json: bool) -> None:
     if json:
         print_answer(found.to_json())
         return
-    from palpate.report.payload import sentence, table
+    from palpate.report.payload.page import sentence, table
 
-    screen = console()
-    head(screen, log.name, f": {sentence(found)}")
-    show_table(screen, table(found))
-    for note in found.notes:
-        screen.print(f"{note['code']}: {note['text']}", style=STYLE, soft_wrap=True)
+    notes = [f"{note['code']}: {note['text']}" for note in found.notes]
+    screen = show_answer(log.name, f": {sentence(found)}", [table(found)], notes)
     for path in written:
         place(screen, "written:", path)

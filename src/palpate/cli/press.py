@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from palpate.cli import _progress
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
-from palpate.cli._options_file import CellOptions
-from palpate.cli._press_options import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
 from palpate.cli._program import command
-from palpate.cli._terminal import STYLE, console, head, place, print_lines, show_table
+from palpate.cli._terminal import console, place, print_lines, show_answer
+from palpate.cli.options.flags import FLAG
+from palpate.cli.options.kept import CellOptions
+from palpate.cli.options.press import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
 from palpate.files import fresh_folder, signed, write_json
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from palpate.press.prepare import Pressing
     from palpate.records import Record
 
@@ -84,29 +82,14 @@ def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> in
     question, folder = simulated.question(asked), simulated.folder
     with noticed() as interrupted, fresh_folder(folder, force=simulated.replace) as fresh:
         pressing = prepared(question)
-        record = _record(console(stderr=json), pressing, interrupted)
+        start = "starting (the first time it compiles, which takes some seconds)"
+        with _progress.simulated(console(stderr=json), interrupted, start) as show:
+            record = pressing.run(show)
         summary = _written(record, pressing, fresh)
-    _tell(pressing, summary, folder, json)
+    _show(pressing, summary, folder, json)
     if interrupted() or summary["end"] == INTERRUPTED:
         return 130
     return 0 if summary["end"] == DONE else 1
-
-
-def _record(screen: Console, pressing: Pressing, interrupted: Callable[[], bool]) -> Record:
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as progress:
-        bar = progress.add_task(
-            "starting (the first time it compiles, which takes some seconds)", total=None, time=""
-        )
-
-        def show(time: float, phase: str) -> None:
-            if interrupted():
-                raise KeyboardInterrupt  # here the press ends, and keeps what there is of it
-            progress.update(bar, description=f"{phase:12}", time=f"{time:6.1f} s simulated")
-
-        return pressing.run(show)
 
 
 def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
@@ -114,10 +97,10 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
 
     from palpate.logs import write_record
     from palpate.press.summary import summarise
-    from palpate.report.press_page import write_report
+    from palpate.report.press.page import write_report
 
-    record = changed(record, meta={**record.meta, "command": shown(command())})
-    summary = signed({"command": shown(command()), **summarise(record, pressing.asked)})
+    record = changed(record, meta={**record.meta, "command": printable(command())})
+    summary = signed({"command": printable(command()), **summarise(record, pressing.asked)})
     write_record(record, folder / "record.parquet")
     write_json(folder / "summary.json", summary)
     if len(record):
@@ -125,18 +108,12 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
     return summary
 
 
-def _tell(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    from palpate.report.press_page import notes, tables
+def _show(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
+    from palpate.report.press.page import notes, tables
 
     if as_json:
         print_answer(summary)
         return
-    screen = console()
-    head(
-        screen, pressing.asked.arm.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
-    )
-    for content in tables(summary):
-        show_table(screen, content)
-    for note in notes(summary):
-        screen.print(note, style=STYLE)
+    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    screen = show_answer(pressing.asked.arm.title, rest, tables(summary), notes(summary))
     place(screen, "report:", folder / "report.html")

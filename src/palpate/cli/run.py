@@ -3,36 +3,30 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter, Token
+from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._figures import DRAWN, FigureOptions
-from palpate.cli._flags import FLAG
 from palpate.cli._interrupts import noticed
-from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
-from palpate.cli._terminal import STYLE, console, head, place, show_table
+from palpate.cli._progress import COMPILING, simulated
+from palpate.cli._terminal import console, place, show_answer
+from palpate.cli.options.figures import DRAWN, FigureOptions
+from palpate.cli.options.flags import FLAG, WHOLE
+from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
 from palpate.files import fresh_folder, signed, write_json, write_text
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from palpate.identification import Identification
     from palpate.records import Record
-
-
-def whole_number(_: Any, tokens: Sequence[Token]) -> int:
-    """A seed; the conversion of cyclopts would round 1.5 without a word."""
-    (token,) = tokens
-    if not token.value.isdecimal():
-        raise InputError(f"it must be a whole number, 0 or above, got {token.value!r}")
-    return int(token.value)
 
 
 @Parameter(name="*", group=DRAWN)
@@ -53,7 +47,7 @@ def run(
     name: str | None = None,
     /,
     *,
-    seed: Annotated[int, Parameter(converter=whole_number)] = 0,
+    seed: Annotated[int, WHOLE] = 0,
     known: KnownOptions | None = None,
     output: FolderOptions | None = None,
     drawn: DrawnOptions | None = None,
@@ -87,7 +81,7 @@ def run(
     with noticed() as interrupted:
         ran = _run(name, source, seed, folder, output, drawn, interrupted)
     # All is in its place, so that a reader of the output who has gone loses nothing.
-    _tell(ran, folder, output.json)
+    _show(ran, folder, output.json)
     if ran.undrawn:
         raise InputError(f"{ran.undrawn}; the record is in {folder}")
     if interrupted() or ran.summary["end"] == INTERRUPTED:
@@ -123,14 +117,14 @@ def _run(
 
     with fresh_folder(folder, force=output.force) as fresh:
         experiment = parse_any(source, name)
-        command = shown(f"palpate run {shlex.quote(name)} --seed {seed}")
+        command = printable(f"palpate run {shlex.quote(name)} --seed {seed}")
         record = _record(console(stderr=output.json), name, experiment, seed, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / "record.parquet")
         alone = isinstance(experiment, OneDirection)  # nothing excites it, and no estimator watches
         found, why = (None, "") if alone else _identified(fresh / "record.parquet")
         said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
-        about = {"experiment": shown(Path(name).stem), "command": command}
+        about = {"experiment": printable(Path(name).stem), "command": command}
         summary = signed({**about, **summarise(record), **said})
         write_json(fresh / "summary.json", summary)
         undrawn = ""
@@ -138,7 +132,9 @@ def _run(
             if len(record):
                 _draw(record, fresh, summary, found, source, drawn)
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
-            undrawn = f"there was not enough room to draw it ({shown(str(error)) or type(error).__name__})"
+            undrawn = (
+                f"there was not enough room to draw it ({printable(str(error)) or type(error).__name__})"
+            )
     return _Ran(experiment.title, summary, found, undrawn, record)
 
 
@@ -153,7 +149,7 @@ def _draw(
     """Figures, page and film of a run."""
     about = record.meta["experiment"]
     if "loop" in record.meta:
-        from palpate.report.one_direction_page import write_one_direction
+        from palpate.report.run.one_direction import write_one_direction
 
         write_one_direction(record, folder, summary, source, drawn.endings, drawn.dpi)
         return
@@ -173,71 +169,48 @@ def _draw(
 
 def _identified(record: Path) -> tuple[Identification | None, str]:
     """What `palpate identify` says of the record, or why it says nothing."""
-    from palpate.cli._arm_options import ArmOptions, FrameOptions
-    from palpate.cli._indenter_options import IndenterOptions
-    from palpate.cli._log_options import LogOptions
     from palpate.cli._one_log import OneLog
     from palpate.cli.identify import ModelOptions
 
-    asked = OneLog(LogOptions(), FrameOptions(), ArmOptions(), ModelOptions(), IndenterOptions())
     try:
-        return asked.identified(record)[0], ""
+        return OneLog(ModelOptions()).identified(record)[0], ""
     except InputError as error:
-        return None, shown(str(error).replace(str(record), record.name))
+        return None, printable(str(error).replace(str(record), record.name))
 
 
 def _record(
     screen: Console, name: str, experiment: Any, seed: int, interrupted: Callable[[], bool]
 ) -> Record:
-    from rich.progress import BarColumn, Progress, TextColumn
-
     from palpate.bench.any_experiment import build_any
     from palpate.bench.part_check import check_parts
-    from palpate.cli._waiting import COMPILING
 
     try:
         bench = build_any(experiment)
         check_parts(bench, lambda: screen.print(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
-    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[time]}")
-    # Without a terminal there is nobody to watch it, and it would leave an empty line.
-    watched = screen.is_terminal
-    with Progress(*columns, console=screen, transient=True, disable=not watched) as progress:
-        bar = progress.add_task("starting", total=None, time="")
-
-        def waiting() -> None:
-            progress.console.print(COMPILING)
-
-        def show(time: float, phase: str) -> None:
-            if interrupted():
-                raise KeyboardInterrupt  # here the bench ends the run, and keeps what there is of it
-            progress.update(bar, description=f"{phase:9}", time=f"{time:6.1f} s simulated")
-
+    waiting = partial(screen.print, COMPILING)
+    with simulated(screen, interrupted) as show:
         return bench.run(
             experiment.run.duration, seed, press=experiment.run.press, progress=show, waiting=waiting
         )
 
 
-def _tell(ran: _Ran, folder: Path, as_json: bool) -> None:
+def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
     from palpate.report.run.table import notes, tables
 
     summary = ran.summary
     if as_json:
         print_answer(summary)
         return
-    screen = console()
-    head(screen, ran.title, f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated")
     if "loop" in ran.record.meta:
-        from palpate.report.one_direction_page import one_direction_tables
+        from palpate.report.run.one_direction import one_direction_tables
 
         shown_tables = one_direction_tables(ran.record, summary)
     else:
         shown_tables = tables(summary, ran.found)
-    for content in shown_tables:
-        show_table(screen, content)
-    for note in notes(summary):
-        screen.print(note, style=STYLE)
+    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    screen = show_answer(ran.title, rest, shown_tables, notes(summary))
     report = folder / "report.html"
     if report.exists():
         place(screen, "report:", report)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
+from palpate.cli._progress import COMPILING
 from palpate.cli._terminal import print_lines, say
+from palpate.cli.options.written import WRITTEN
 
 
-def speed(
-    *, json: Annotated[bool, Parameter(negative="", group=Group("What is written", sort_key=6))] = False
-) -> int:
+def speed(*, json: Annotated[bool, Parameter(negative="", group=WRITTEN)] = False) -> int:
     """Measure what one tick of the closed loop costs here: sense, think, act, and the physics in between.
 
     palpate speed --json
@@ -23,7 +23,6 @@ def speed(
         Print ns_per_tick, ticks_per_s, cores and times_real_time as JSON and nothing else.
     """
     from palpate.bench.speed import EXPERIMENT, STEPS, measure
-    from palpate.cli._waiting import COMPILING
 
     figures = measure(waiting=lambda: say(COMPILING))
     if json:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,19 +13,20 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._flags import FLAG
-from palpate.cli._named import FolderOptions, KnownOptions, listed, source_of
-from palpate.cli._terminal import STYLE, console, head, place, say, show_table
+from palpate.cli._progress import COMPILING, counted
+from palpate.cli._terminal import console, place, say, show_answer
+from palpate.cli.options.flags import FLAG
+from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from palpate.studies.cluster import Cluster
-    from palpate.studies.plan import Plan
-    from palpate.studies.run_study import Runner
-    from palpate.studies.summary import Findings
+    from palpate.studies.definition.plan import Plan
+    from palpate.studies.findings.summary import Findings
+    from palpate.studies.running.cluster import Cluster
+    from palpate.studies.running.run_study import Runner
 
 
 @Parameter(name="*", group=Group("A cluster", sort_key=1))
@@ -54,7 +54,7 @@ class ClusterOptions:
 
     def cluster(self) -> Cluster | None:
         """The cluster; None if none is named."""
-        from palpate.studies.cluster import Certificates, Cluster
+        from palpate.studies.running.cluster import Certificates, Cluster
 
         files = (self.tls_ca, self.tls_cert, self.tls_key)
         given = [path for path in files if path is not None]
@@ -91,7 +91,7 @@ def study(
         Begin a study that takes very long without asking.
     """
     known, output = known or KnownOptions(), output or FolderOptions()
-    from palpate.studies import study as studies
+    from palpate.studies.definition import study as studies
 
     if known.list_:
         listed(studies.FILES, lambda one: studies.load(one).title)
@@ -106,18 +106,17 @@ def study(
         kept = f"what is done is saved in {folder}, and the same command goes on from there"
         say(f"interrupted; {kept}")
         return 130
-    _tell(found, folder, output.json)
+    _show(found, folder, output.json)
     return 0 if found.summary["results"].get("done") else 1
 
 
 def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
     """Runs what is not done, and writes table, page and summary."""
-    from palpate.cli._waiting import COMPILING
-    from palpate.studies.part_check import check_parts_of
-    from palpate.studies.plan import plan
-    from palpate.studies.run_study import Work, begun
-    from palpate.studies.study import parse
-    from palpate.studies.summary import present
+    from palpate.studies.definition.part_check import check_parts_of
+    from palpate.studies.definition.plan import plan
+    from palpate.studies.definition.study import parse
+    from palpate.studies.findings.summary import present
+    from palpate.studies.running.run_study import Work, begun
 
     screen = console(stderr=True)
     try:
@@ -127,15 +126,16 @@ def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
     if not yes and (force or not begun(folder)):
         _ask(planned, screen, here=where.scheduler is None)
-    with _runner(where, screen) as runner, _progress(screen, len(planned)) as show:
-        frame = Work(planned, source, folder, runner, show).done(force=force)
-    return present(frame, planned, folder, source, shown(f"palpate study {shlex.quote(name)}"))
+    with _runner(where, screen) as runner, counted(screen) as show:
+        frame = Work(planned, source, folder, runner, lambda done: show("runs", done, len(planned))).done(
+            force=force
+        )
+    return present(frame, planned, folder, source, printable(f"palpate study {shlex.quote(name)}"))
 
 
 def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
     """Asks whether to begin what takes very long on the cores here; of a cluster only the number of runs is known."""
-    from palpate.cli._waiting import COMPILING
-    from palpate.studies.cost import MANY, seconds_a_run, too_much
+    from palpate.studies.running.cost import MANY, seconds_a_run, too_much
 
     if not here and len(plan) < MANY:
         return
@@ -154,8 +154,7 @@ def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
 def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
     cluster = where.cluster()
     if cluster is None:
-        from palpate.cli._waiting import COMPILING
-        from palpate.studies.local import Local
+        from palpate.studies.running.local import Local
 
         yield Local(waiting=lambda: screen.print(COMPILING))
         return
@@ -165,60 +164,9 @@ def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
         cluster.close()
 
 
-@contextmanager
-def _progress(screen: Console, total: int) -> Iterator[Callable[[int], None]]:
-    """A bar with the time left; without a terminal a line now and then."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("left")
-    watched = screen.is_terminal
-    with Progress(
-        *columns, console=screen, transient=True, disable=not watched, speed_estimate_period=600
-    ) as bar:
-        task = bar.add_task("", total=total)
-        lines = Lines(screen, total)
-
-        def show(finished: int) -> None:
-            bar.update(task, completed=finished)
-            if not watched:
-                lines.show(finished)
-
-        yield show
-
-
-class Lines:
-    """Progress where there is no terminal: a line each minute."""
-
-    EVERY = 60.0
-
-    def __init__(self, screen: Console, total: int, what: str = "runs"):
-        self._screen, self._total, self._what = screen, total, what
-        self._begun = self._told = time.monotonic()
-        self._first: int | None = None
-
-    def show(self, finished: int) -> None:
-        """How many runs are finished, and what is left by the pace so far."""
-        from palpate.studies.cost import in_words
-
-        self._first = finished if self._first is None else self._first
-        now = time.monotonic()
-        if now - self._told < self.EVERY or finished == self._first:
-            return
-        self._told = now
-        left = (now - self._begun) / (finished - self._first) * (self._total - finished)
-        self._screen.print(
-            f"{finished} of {self._total} {self._what}, some {in_words(left)} left", soft_wrap=True
-        )
-
-
-def _tell(found: Findings, folder: Path, as_json: bool) -> None:
+def _show(found: Findings, folder: Path, as_json: bool) -> None:
     if as_json:
         print_answer(found.summary)
         return
-    screen = console()
-    head(screen, found.summary["study"], f", {found.summary['runs']} runs")
-    for content in found.tables:
-        show_table(screen, content)
-    for note in found.notes:
-        screen.print(note, style=STYLE)
+    screen = show_answer(found.summary["study"], f", {found.summary['runs']} runs", found.tables, found.notes)
     place(screen, "report:", folder / "report.html")

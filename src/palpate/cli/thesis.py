@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter, validators
 
-from palpate.cli._figures import FigureOptions
+from palpate.cli._progress import COMPILING, bar
 from palpate.cli._terminal import console, place, print_lines, say, show_table
+from palpate.cli.options.figures import FigureOptions
+from palpate.cli.options.written import WRITTEN
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,7 +29,6 @@ COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_b
 
 
 _MEASURED = Group("What is measured", sort_key=1)
-_WRITTEN = Group("What is written", sort_key=6)
 
 
 def thesis(
@@ -36,8 +38,8 @@ def thesis(
     laboratory: Annotated[str, Parameter(group=_MEASURED)] = "bench",
     seeds: Annotated[int, Parameter(group=_MEASURED, validator=validators.Number(gte=10, lte=1000))] = 10,
     list_: Annotated[bool, Parameter(group=_MEASURED, name="--list", negative="")] = False,
-    out: Annotated[Path | None, Parameter(group=_WRITTEN)] = None,
-    force: Annotated[bool, Parameter(group=_WRITTEN, negative=())] = False,
+    out: Annotated[Path | None, Parameter(group=WRITTEN)] = None,
+    force: Annotated[bool, Parameter(group=WRITTEN, negative=())] = False,
     drawn: FigureOptions | None = None,
 ) -> int:
     """Measure the thesis again: each figure, each claim, with spread over the seeds and a verdict.
@@ -108,31 +110,26 @@ def _chosen(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[St
 
 
 def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, written: Written, force: bool) -> None:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
-    from palpate.cli._waiting import COMPILING
     from palpate.thesis.measure import measure
 
     screen = console()
-    columns = BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
-    with Progress(*columns, console=screen, transient=True) as progress:
-        bar = progress.add_task("", total=len(chosen))
-
-        def waiting() -> None:
-            progress.console.print(COMPILING)
+    with bar(screen, MofNCompleteColumn(), TimeElapsedColumn()) as progress:
+        task = progress.add_task("", total=len(chosen))
 
         def started(one: Study) -> None:
-            progress.update(bar, completed=chosen.index(one), description=f"{one.NUMBER}  {one.TITLE}")
+            progress.update(task, completed=chosen.index(one), description=f"{one.NUMBER}  {one.TITLE}")
 
         def resumed(done: int) -> None:
-            progress.console.print(f"going on in {folder}: {done} of {len(chosen)} are measured already")
+            screen.print(f"going on in {folder}: {done} of {len(chosen)} are measured already")
 
-        runs = replace(runs, waiting=waiting)
+        runs = replace(runs, waiting=partial(screen.print, COMPILING))
         done = measure(chosen, runs, folder, written=written, force=force, started=started, resumed=resumed)
-    _tell(screen, done, folder)
+    _show(screen, done, folder)
 
 
-def _tell(screen: Console, done: Sequence[Done], folder: Path) -> None:
+def _show(screen: Console, done: Sequence[Done], folder: Path) -> None:
     from palpate.report.page import Table
     from palpate.thesis.claims import count_in_words, rows_of
 

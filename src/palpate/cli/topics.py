@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._log_options import GB, limits_of
 from palpate.cli._terminal import print_lines
+from palpate.cli.options.log import GB, limits_of
+from palpate.cli.options.written import WRITTEN
 
 if TYPE_CHECKING:
     from palpate.logs.listing import Entry, Listing
 
 
 _HOW = Group("How it is read", sort_key=1)
-_WRITTEN = Group("What is written", sort_key=6)
 
 
 def topics(
@@ -27,7 +27,7 @@ def topics(
     delimiter: Annotated[str | None, Parameter(group=_HOW)] = None,
     max_size: Annotated[float, Parameter(group=_HOW)] = GB,
     max_seconds: Annotated[float, Parameter(group=_HOW)] = 600.0,
-    json: Annotated[bool, Parameter(negative=(), group=_WRITTEN)] = False,
+    json: Annotated[bool, Parameter(negative=(), group=WRITTEN)] = False,
 ) -> int:
     """List what a log holds, and propose how to identify it.
 
@@ -57,7 +57,7 @@ def topics(
         files = [{"file": str(log), "sha256": None}]
         print_answer({"files": files, "entries": entries, "troubles": found.troubles, "identify": proposal})
         return 0
-    print_lines(*_table(log, found), *_told(found, command))
+    print_lines(*_table(log, found), *_proposed(found, command))
     return 0
 
 
@@ -82,7 +82,7 @@ def _table(log: Path, found: Listing) -> list[str]:
     return [*lines, *found.facts, *found.troubles]
 
 
-def _told(found: Listing, command: str | None) -> list[str]:
+def _proposed(found: Listing, command: str | None) -> list[str]:
     """The command that the log asks for, and what of it is guessed."""
     guesses = [f"  {guess}" for guess in found.proposal.guesses]
     if command is None:

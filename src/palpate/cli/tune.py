@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cyclopts import Group, Parameter
-
 from palpate.cli._answer import print_answer
-from palpate.cli._force_options import (
+from palpate.cli._identified import read_found
+from palpate.cli._program import command
+from palpate.cli._terminal import console, place
+from palpate.cli.options.force import (
     ArmOptions,
     ColumnOptions,
     OutputOptions,
@@ -17,30 +17,14 @@ from palpate.cli._force_options import (
     SurfaceOptions,
     one_thread,
 )
-from palpate.cli._found import read_found
-from palpate.cli._log_options import LogOptions
-from palpate.cli._program import command
-from palpate.cli._terminal import console, place
+from palpate.cli.options.log import LogOptions
+from palpate.cli.options.written import ReportOption
 from palpate.errors import InputError
-from palpate.files import check_place, write_text
+from palpate.files import write_text
 
 if TYPE_CHECKING:
     from palpate.force import Known, Tuning
     from palpate.force.inner_loop import InnerLoop
-
-
-@Parameter(name="*", group=Group("What is written", sort_key=6))
-@dataclass(frozen=True, kw_only=True)
-class PageOptions:
-    """The page.
-
-    Parameters
-    ----------
-    report
-        Where to write a page with everything, an HTML file.
-    """
-
-    report: Path | None = None
 
 
 def tune(
@@ -52,7 +36,7 @@ def tune(
     surface: SurfaceOptions | None = None,
     columns: ColumnOptions | None = None,
     output: OutputOptions | None = None,
-    page: PageOptions | None = None,
+    page: ReportOption | None = None,
 ) -> int:
     """Tune a force loop for an arm, and prove where it is stable.
 
@@ -78,10 +62,9 @@ def tune(
     """
     one_thread()
     surface, columns = surface or SurfaceOptions(), columns or ColumnOptions()
-    output, page = output or OutputOptions(), page or PageOptions()
-    output.check(".toml")
-    if page.report is not None:
-        check_place(page.report, "--report", ending=".html")
+    output, page = output or OutputOptions(), page or ReportOption()
+    output.check_new(output.out, ending=".toml")
+    report = page.page()
     from palpate.force import tune as tuned
 
     one, inner = arm.named(columns)
@@ -94,7 +77,7 @@ def tune(
         surface_speed=surface.surface_speed,
         prove_adapting=one.kind == "position" and inner is None,
     )
-    written = _written(told, output.out, page.report)
+    written = _written(told, output.out, report)
     _print(told, inner, written, output.json)
     return 0 if told.proved else 1
 
@@ -120,8 +103,8 @@ def _known(
 
 
 def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str, Any]:
-    from palpate.cli._arm_options import ArmOptions as PayloadOptions
-    from palpate.cli._log_options import read
+    from palpate.cli.options.arm import ArmOptions as PayloadOptions
+    from palpate.cli.options.log import read
     from palpate.contact_frame import identify_contact
     from palpate.logs.own_runs import is_run, measured_by
 
@@ -139,9 +122,9 @@ def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     if out is not None:
         write_text(out, told.gains.to_toml())
     if page is not None:
-        from palpate.report.force_page import write_page
+        from palpate.report.tuning.page import page as page_of
 
-        write_page(told, page, command())
+        write_text(page, page_of(told, command()))
     return [path for path in (out, page) if path is not None]
 
 
@@ -149,7 +132,7 @@ def _print(told: Tuning, inner: InnerLoop | None, written: list[Path], json: boo
     if json:
         print_answer(told.to_json() | {"inner_loop": None if inner is None else inner.to_json()})
         return
-    from palpate.report.force_table import show
+    from palpate.report.tuning.table import show
 
     screen = console()
     show(told, screen)

@@ -13,7 +13,7 @@ from palpate.contact_frame.description import described
 from palpate.contact_frame.identify import identify_contact
 from palpate.contact_frame.payload import Payload, load_payload
 from palpate.contact_frame.projecting import project
-from palpate.contact_frame.weighed import Weighed, weigh
+from palpate.contact_frame.weighing.weighed import Weighed, weigh
 
 __all__ = [
     "Arm",

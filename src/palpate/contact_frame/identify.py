@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.contact_frame.arm import with_arm
 from palpate.contact_frame.declared import Arm, ContactFrame
-from palpate.contact_frame.free_inertia import wrong_sign, wrong_sign_of
+from palpate.contact_frame.free_motion.inertia import wrong_sign, wrong_sign_of
 from palpate.contact_frame.projecting import project
 from palpate.contact_frame.signals_in_base import FORCE
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Mask
 from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.signals_in_base import Signals
 from palpate.contact_frame.vectors import FEWEST, read_rows
 
-Rows = NDArray[np.bool_]
+Rows = Mask
 
 _LEAST = 0.3
 """Of the largest force: the line of a weaker one is three times as uncertain, for the same noise of the torque."""

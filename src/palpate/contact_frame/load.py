@@ -15,15 +15,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.contact_frame.free_inertia import BLOCKS
+from palpate.arrays import Array, Mask
+from palpate.contact_frame.free_motion.inertia import BLOCKS
 
 if TYPE_CHECKING:
     from palpate.contact_frame.payload import Payload
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+Rows = Mask
 
 _TOLD = np.radians(3.0) ** 2
 """Least eigenvalue for which a weight is told from a bias: by a smaller turn, a pose that errs by 0.3 deg makes a tenth

@@ -6,17 +6,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.free_motion import contact_rows, rows_between
+from palpate.contact_frame.free_motion.rows import contact_rows, rows_between
 from palpate.contact_frame.load import Load, known_load, load_of, no_load, robust_load, turns
 from palpate.contact_frame.saturation import saturated_rows
 from palpate.contact_frame.signals_in_base import Signals
 from palpate.contact_frame.vectors import read_rows
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+Rows = Mask
 
 _ROUNDS = 4
 """At most: the weight tells the free rows and they the weight, until neither changes."""

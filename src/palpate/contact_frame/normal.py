@@ -14,12 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.contact_frame.free_inertia import BLOCKS
+from palpate.arrays import Array, Mask
+from palpate.contact_frame.free_motion.inertia import BLOCKS
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+Rows = Mask
 
 MATTERS = 0.02
 """Relative standard deviation that the normal may add to K, B and M unsaid: 4 % at 95 %, which in quadrature takes a

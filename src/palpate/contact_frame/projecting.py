@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.free_inertia import CHANCE, free_inertia, wrong_sign, wrong_sign_of
+from palpate.contact_frame.free_motion.inertia import CHANCE, free_inertia, wrong_sign, wrong_sign_of
 from palpate.contact_frame.lever import line_misses_tcp
 from palpate.contact_frame.load import load_of, turns
 from palpate.contact_frame.load_removal import Unloaded, in_range
@@ -17,8 +17,6 @@ from palpate.contact_frame.signals_in_base import Signals, signals_of
 from palpate.contact_frame.vectors import read_rows
 from palpate.errors import InputError
 from palpate.records import Record
-
-Array = NDArray[np.float64]
 
 _FOLLOWS = 0.65
 """Correlation that noise shows once in a thousand logs of twenty independent rows (Student's t with 18 degrees)."""

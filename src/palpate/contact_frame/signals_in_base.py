@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.vectors import matrices
 from palpate.errors import InputError
 from palpate.records import Record
-
-Array = NDArray[np.float64]
 
 FORCE = ("force_x", "force_y", "force_z")
 TORQUE = ("torque_x", "torque_y", "torque_z")

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.signals.quaternions import continuous
-
-Array = NDArray[np.float64]
 
 FEWEST = 20
 """Rows for a mean that is said of a log: its standard deviation is then a fifth of a reading's, or less."""
@@ -16,7 +14,7 @@ _UNIT = 0.1
 """By which a quaternion's length is off at most where its four numbers are rounded to one digit."""
 
 
-def read_rows(vectors: Array) -> NDArray[np.bool_]:
+def read_rows(vectors: Array) -> Mask:
     """Rows of vectors, shape (n, k), that hold a reading in each component."""
     return np.isfinite(vectors.sum(axis=1))
 

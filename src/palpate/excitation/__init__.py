@@ -3,7 +3,7 @@
 from palpate.excitation.budget import Budget
 from palpate.excitation.design import Design, design
 from palpate.excitation.force_loops import ForceLoop, HybridLoop, KnownBandwidth
-from palpate.excitation.question import Question
+from palpate.excitation.problem import Problem
 from palpate.excitation.remedies import Remedy, remedies
 from palpate.excitation.sensors import Sensors
 from palpate.excitation.surfaces import Surface, SurfaceRange
@@ -14,7 +14,7 @@ __all__ = [
     "ForceLoop",
     "HybridLoop",
     "KnownBandwidth",
-    "Question",
+    "Problem",
     "Remedy",
     "Sensors",
     "Surface",

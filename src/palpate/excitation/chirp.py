@@ -5,30 +5,28 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.excitation.budget import used_up
 from palpate.excitation.prediction import Made, Prediction
-from palpate.excitation.question import Question
+from palpate.excitation.problem import Problem
 from palpate.references.waves import Chirp
-
-Array = NDArray[np.float64]
 
 _ENDS = 6  # places for each end of the sweep
 _FINE = 64  # frequencies of a sweep that are looked at
 
 
-def make(question: Question, seconds: float) -> Made:
+def make(problem: Problem, seconds: float) -> Made:
     """The best sweep of so many seconds: from where to where, and whether evenly or logarithmically."""
-    budget = question.budget
+    budget = problem.budget
     grid = np.geomspace(budget.lowest, budget.highest, _ENDS)
     sweeps = [
         Chirp(float(low), float(high), seconds, 1.0, logarithmic)
         for low, high, logarithmic in product(grid, grid, (False, True))
         if low < high and low * seconds >= 1
     ] or [Chirp(budget.lowest, budget.highest, seconds, 1.0, False)]
-    made = (_predicted(question, _within_budget(question, sweep)) for sweep in sweeps)
-    return min(made, key=lambda found: found.excess(seconds, question.precision))
+    made = (_predicted(problem, _within_budget(problem, sweep)) for sweep in sweeps)
+    return min(made, key=lambda found: found.excess(seconds, problem.precision))
 
 
 def _frequencies(sweep: Chirp) -> Array:
@@ -39,32 +37,32 @@ def _frequencies(sweep: Chirp) -> Array:
     return 2 * np.pi * (sweep.low + share * (sweep.high - sweep.low))
 
 
-def _within_budget(question: Question, sweep: Chirp) -> Chirp:
+def _within_budget(problem: Problem, sweep: Chirp) -> Chirp:
     omega = _frequencies(sweep)
 
     def share(amplitude: float) -> float:
-        felt = float(np.abs(question.forces(omega, np.full(_FINE, amplitude))).max())
-        return min(_share(question, sweep._replace(amplitude=amplitude)), question.budget.swing / felt)
+        felt = float(np.abs(problem.forces(omega, np.full(_FINE, amplitude))).max())
+        return min(_share(problem, sweep._replace(amplitude=amplitude)), problem.budget.swing / felt)
 
-    return sweep._replace(amplitude=used_up(share, question.budget.desired_swing))
-
-
-def _share(question: Question, sweep: Chirp) -> float:
-    return question.budget.share(sweep.amplitude, 2 * np.pi * sweep.high * sweep.amplitude)
+    return sweep._replace(amplitude=used_up(share, problem.budget.desired_swing))
 
 
-def _predicted(question: Question, sweep: Chirp) -> Made:
+def _share(problem: Problem, sweep: Chirp) -> float:
+    return problem.budget.share(sweep.amplitude, 2 * np.pi * sweep.high * sweep.amplitude)
+
+
+def _predicted(problem: Problem, sweep: Chirp) -> Made:
     omega = _frequencies(sweep)
-    forces = question.forces(omega, np.full(_FINE, sweep.amplitude))
-    information = question.information(omega, forces).mean(axis=1)
-    pulls = question.pull(omega, forces, together=False)
+    forces = problem.forces(omega, np.full(_FINE, sweep.amplitude))
+    information = problem.information(omega, forces).mean(axis=1)
+    pulls = problem.pull(omega, forces, together=False)
     predictions = []
-    each = zip(question.surfaces.surfaces(), forces, information, pulls, strict=True)
+    each = zip(problem.surfaces.surfaces(), forces, information, pulls, strict=True)
     for surface, force, told, pull in each:
         felt = float(np.abs(force).max())
         travel = 2 * float(np.abs(force / surface.impedance(omega)).max())
-        between = (question.budget.mean - felt, question.budget.mean + felt)
+        between = (problem.budget.mean - felt, problem.budget.mean + felt)
         predictions.append(
-            Prediction(surface, question.surfaces.names, told, question.prior, pull, between, travel)
+            Prediction(surface, problem.surfaces.names, told, problem.prior, pull, between, travel)
         )
     return Made(sweep, tuple(predictions), gap=0.0)

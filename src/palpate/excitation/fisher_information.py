@@ -18,11 +18,10 @@ from math import gcd, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.signals import Estimate
 from palpate.signals.low_pass import LowPass
-
-Array = NDArray[np.float64]
 
 NAMES = ("K", "B", "M", "offset", "lag")
 """What a bound is given for, in this order."""

@@ -9,11 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.excitation.surfaces import Surface
 from palpate.signals.low_pass import LowPass
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 BENCH_FILTERS = LowPass(((3, 120.0), (2, 120.0)))

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.excitation.budget import used_up
 from palpate.excitation.phases import low_peak, summed
 from palpate.excitation.prediction import Made, Prediction
-from palpate.excitation.question import Question
+from palpate.excitation.problem import Problem
 from palpate.excitation.spectra import optimal
 from palpate.references.waves import Multisine
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Harmonics = NDArray[np.intp]
 
@@ -34,7 +34,7 @@ _POINTS = 32  # a cycle of the highest line
 _WIDTHS = (0.01, 0.05, 0.1, 0.2, 0.4, 0.8)  # of a line, in the frequency's logarithm
 
 
-def make(question: Question, seconds: float) -> Made:
+def make(problem: Problem, seconds: float) -> Made:
     """The best multisine of so many seconds, a whole number of its periods.
 
     Where the budget limits the rate of change, power at high frequencies is made dearer until it pays no more.
@@ -42,33 +42,33 @@ def make(question: Question, seconds: float) -> Made:
     Raises:
         InputError: the band has room for fewer than two frequencies.
     """
-    mixes = _MIXES if np.isfinite(question.budget.rate) else _MIXES[:1]
+    mixes = _MIXES if np.isfinite(problem.budget.rate) else _MIXES[:1]
     return min(
-        (_make(question, seconds, mix) for mix in mixes),
-        key=lambda made: made.excess(seconds, question.precision),
+        (_make(problem, seconds, mix) for mix in mixes),
+        key=lambda made: made.excess(seconds, problem.precision),
     )
 
 
-def _make(question: Question, seconds: float, mix: float) -> Made:
-    harmonics, base = _harmonics(question, seconds), 2 * np.pi / _period(question, seconds)
+def _make(problem: Problem, seconds: float, mix: float) -> Made:
+    harmonics, base = _harmonics(problem, seconds), 2 * np.pi / _period(problem, seconds)
     places = np.unique(np.round(np.geomspace(1, len(harmonics), _LINES)).astype(np.intp)) - 1
     omega = base * harmonics[places].astype(np.float64)
     costs = (1 - mix) + mix * omega**2 / np.mean(omega**2)
     powers, gap = np.full(len(omega), 1 / costs.sum()), np.inf
-    strength = question.budget.desired_swing / _USUAL_CREST
+    strength = problem.budget.desired_swing / _USUAL_CREST
     for _ in range(_ROUNDS):  # friction makes the answer depend on the power, so the two are found in turns
-        forces = question.forces(omega, strength * np.sqrt(2 * powers))
-        unit = seconds * question.information(omega, forces) / powers[:, None, None]
-        found = optimal(unit, question.prior, question.wanted, question.criterion, costs, powers)
+        forces = problem.forces(omega, strength * np.sqrt(2 * powers))
+        unit = seconds * problem.information(omega, forces) / powers[:, None, None]
+        found = optimal(unit, problem.prior, problem.wanted, problem.criterion, costs, powers)
         powers, gap = found.powers, found.gap
 
     def spread(width: float, rounds: int) -> Made:
         amplitudes = _spread(omega, powers, base * harmonics.astype(np.float64), width)
         used = amplitudes > 0
         phases = low_peak(amplitudes[used], harmonics[used], rounds)
-        return _within_budget(question, harmonics[used], base, amplitudes[used], phases, gap)
+        return _within_budget(problem, harmonics[used], base, amplitudes[used], phases, gap)
 
-    tried = {width: spread(width, _QUICK).excess(seconds, question.precision) for width in _WIDTHS}
+    tried = {width: spread(width, _QUICK).excess(seconds, problem.precision) for width in _WIDTHS}
     return spread(min(tried, key=tried.__getitem__), _THOROUGH)
 
 
@@ -85,7 +85,7 @@ def _spread(omega: Array, powers: Array, dense: Array, width: float) -> Array:
 
 
 def _within_budget(
-    question: Question, harmonics: Harmonics, base: float, amplitudes: Array, phases: Array, gap: float
+    problem: Problem, harmonics: Harmonics, base: float, amplitudes: Array, phases: Array, gap: float
 ) -> Made:
     """As strong as the budget allows, for the desired force and for the force on every surface."""
     omega, start = base * harmonics.astype(np.float64), np.exp(1j * phases)
@@ -93,21 +93,21 @@ def _within_budget(
     def share(strength: float) -> float:
         asked = strength * amplitudes * start
         peak, slope = np.abs(summed(np.stack([asked, 1j * omega * asked]), harmonics, _POINTS)).max(axis=1)
-        phasors = question.forces(omega, strength * amplitudes) * start
+        phasors = problem.forces(omega, strength * amplitudes) * start
         felt = np.abs(summed(phasors, harmonics, _POINTS)).max()
-        return min(question.budget.share(float(peak), float(slope)), question.budget.swing / float(felt))
+        return min(problem.budget.share(float(peak), float(slope)), problem.budget.swing / float(felt))
 
-    amplitudes = amplitudes * used_up(share, question.budget.desired_swing)
-    forces = question.forces(omega, amplitudes)
-    told = question.information(omega, forces).sum(axis=1)
+    amplitudes = amplitudes * used_up(share, problem.budget.desired_swing)
+    forces = problem.forces(omega, amplitudes)
+    told = problem.information(omega, forces).sum(axis=1)
     predictions = []
-    pulls = question.pull(omega, forces, together=True)
-    each = zip(question.surfaces.surfaces(), forces, told, pulls, strict=True)
+    pulls = problem.pull(omega, forces, together=True)
+    each = zip(problem.surfaces.surfaces(), forces, told, pulls, strict=True)
     for surface, force, information, pull in each:
-        felt_there = question.budget.mean + summed(force * start, harmonics, _POINTS)
+        felt_there = problem.budget.mean + summed(force * start, harmonics, _POINTS)
         moved = summed(force / surface.impedance(omega) * start, harmonics, _POINTS)
         between = float(felt_there.min()), float(felt_there.max())
-        names, prior = question.surfaces.names, question.prior
+        names, prior = problem.surfaces.names, problem.prior
         predictions.append(
             Prediction(surface, names, information, prior, pull, between, float(np.ptp(moved)))
         )
@@ -116,15 +116,15 @@ def _within_budget(
     return Made(wave, tuple(predictions), gap)
 
 
-def _period(question: Question, seconds: float) -> float:
+def _period(problem: Problem, seconds: float) -> float:
     """The usual period, or the one next to it of which `seconds` are a whole number [s]."""
-    usual = max(PERIOD, 1 / question.budget.lowest)
+    usual = max(PERIOD, 1 / problem.budget.lowest)
     return seconds / max(1, floor(seconds / usual + 1e-9))
 
 
-def _harmonics(question: Question, seconds: float) -> Harmonics:
+def _harmonics(problem: Problem, seconds: float) -> Harmonics:
     """Those of the period that lie in the band; of many, every second, third or so."""
-    budget, period = question.budget, _period(question, seconds)
+    budget, period = problem.budget, _period(problem, seconds)
     first, last = max(ceil(budget.lowest * period - 1e-9), 1), floor(budget.highest * period + 1e-9)
     if last <= first:
         raise InputError(

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array
+
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 _POINTS = 8  # of the period a cycle of the highest harmonic

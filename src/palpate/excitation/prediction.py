@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.excitation.spectra import covariance
 from palpate.excitation.surfaces import Surface
 from palpate.references.waves import Chirp, Multisine
 
-Array = NDArray[np.float64]
 Wave = Multisine | Chirp
 
 ALL = ("K", "B", "M")

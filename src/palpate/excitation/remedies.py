@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from palpate.excitation.design import FOREVER, MAKERS, Design, needed
-from palpate.excitation.question import LONGEST, Question
+from palpate.excitation.problem import LONGEST, Problem
 
 _MUCH = 10.0  # times the force
 _HELPS, _SOONER = 0.95, 0.5  # of the excess, or of the time needed; what helps less is no remedy
@@ -40,10 +40,10 @@ def remedies(found: Design) -> list[Remedy]:
     if found.needed <= LONGEST:
         told = f"{ceil(found.needed)} s instead of {found.seconds:g} s"
         helpful.append(Remedy(told, found.made.worst(found.needed), True, found.needed, 1.0))
-    together, limit = found.question, found.made.excess(FOREVER, found.question.precision)
+    together, limit = found.problem, found.made.excess(FOREVER, found.problem.precision)
     for change in (_stronger, _steeper, _wider, _synchronous, _finer):
-        words, other = change(found.question, found.excess)
-        if other == found.question:
+        words, other = change(found.problem, found.excess)
+        if other == found.problem:
             continue
         tried = _tried(words, other, found.seconds)
         sooner = tried.needed < _SOONER * found.needed
@@ -55,19 +55,19 @@ def remedies(found: Design) -> list[Remedy]:
     return helpful
 
 
-def _tried(words: str, question: Question, seconds: float) -> Remedy:
-    made = MAKERS[question.kind](question, seconds)
-    enough = made.excess(seconds, question.precision) <= 1
-    limit = made.excess(FOREVER, question.precision)
-    return Remedy(words, made.worst(seconds), enough, needed(made, question), limit)
+def _tried(words: str, problem: Problem, seconds: float) -> Remedy:
+    made = MAKERS[problem.kind](problem, seconds)
+    enough = made.excess(seconds, problem.precision) <= 1
+    limit = made.excess(FOREVER, problem.precision)
+    return Remedy(words, made.worst(seconds), enough, needed(made, problem), limit)
 
 
 def _excess(tried: Remedy, found: Design) -> float:
-    return max(tried.reached[name] / asked for name, asked in found.question.precision.items())
+    return max(tried.reached[name] / asked for name, asked in found.problem.precision.items())
 
 
-def _stronger(question: Question, excess: float) -> tuple[str, Question]:
-    budget, more = question.budget, min(1.1 * excess, _MUCH)
+def _stronger(problem: Problem, excess: float) -> tuple[str, Problem]:
+    budget, more = problem.budget, min(1.1 * excess, _MUCH)
     swing = more * budget.swing
     mean = max(budget.mean, budget.least + swing)
     drive = None if budget.drive is None else more * budget.drive
@@ -75,32 +75,32 @@ def _stronger(question: Question, excess: float) -> tuple[str, Question]:
         f"a force of {mean:.3g} N with {swing:.3g} N to each side instead of {budget.mean:g} N "
         f"with {budget.swing:g} N"
     )
-    return words, replace(question, budget=replace(budget, mean=mean, peak=mean + swing, drive=drive))
+    return words, replace(problem, budget=replace(budget, mean=mean, peak=mean + swing, drive=drive))
 
 
-def _steeper(question: Question, excess: float) -> tuple[str, Question]:
-    rate = question.budget.rate
+def _steeper(problem: Problem, excess: float) -> tuple[str, Problem]:
+    rate = problem.budget.rate
     faster = min(1.1 * excess, _MUCH) * rate
     words = f"a force that changes by {faster:.3g} N/s instead of {rate:g} N/s"
-    return words, replace(question, budget=replace(question.budget, rate=faster))
+    return words, replace(problem, budget=replace(problem.budget, rate=faster))
 
 
-def _wider(question: Question, _excess: float) -> tuple[str, Question]:
-    budget = question.budget
-    highest = max(budget.highest, min(2 * budget.highest, 0.45 * question.sensors.force.sampling))
+def _wider(problem: Problem, _excess: float) -> tuple[str, Problem]:
+    budget = problem.budget
+    highest = max(budget.highest, min(2 * budget.highest, 0.45 * problem.sensors.force.sampling))
     words = f"frequencies up to {highest:g} Hz instead of {budget.highest:g} Hz"
-    return words, replace(question, budget=replace(budget, highest=highest))
+    return words, replace(problem, budget=replace(budget, highest=highest))
 
 
-def _synchronous(question: Question, _excess: float) -> tuple[str, Question]:
-    sensors = question.sensors
+def _synchronous(problem: Problem, _excess: float) -> tuple[str, Problem]:
+    sensors = problem.sensors
     exact = replace(sensors, lag_std=0.0, force=replace(sensors.force, phase_std=0.0))
     words = f"a lag between force and position known exactly, not to {1e6 * sensors.lag_error:.0f} us"
-    return words, replace(question, sensors=exact)
+    return words, replace(problem, sensors=exact)
 
 
-def _finer(question: Question, _excess: float) -> tuple[str, Question]:
-    sensors = question.sensors
+def _finer(problem: Problem, _excess: float) -> tuple[str, Problem]:
+    sensors = problem.sensors
     step = sensors.position_step / _MUCH
     words = f"a position in steps of {1e6 * step:.3g} um instead of {1e6 * sensors.position_step:.3g} um"
-    return words, replace(question, sensors=replace(sensors, position_step=step))
+    return words, replace(problem, sensors=replace(sensors, position_step=step))

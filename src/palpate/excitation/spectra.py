@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import unknown
-
-Array = NDArray[np.float64]
 
 _SHARPNESS = 8.0  # of the norm that stands for a maximum: of 27 equal ones it makes 1.5 times as much
 _ROUNDS = 1500

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 
-Array = NDArray[np.float64]
 Range = tuple[float, float]
 
 

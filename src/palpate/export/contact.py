@@ -99,15 +99,15 @@ def contact_from(
     model = str(own.get("model") or "kelvin-voigt" if "logs" in found else own.get("model"))
     point = own.get("working_point")
     K = _stiffness(parameters, point, model, source, working_point)
-    B = _told("damping", damping, "N s/m") or _identified(parameters, "B", "N s/m", source, _GIVE_DAMPING)
-    M = _told("mass", mass, "kg") or _if_identified(parameters.get("M"), "kg")
+    B = _given("damping", damping, "N s/m") or _identified(parameters, "B", "N s/m", source, _GIVE_DAMPING)
+    M = _given("mass", mass, "kg") or _if_identified(parameters.get("M"), "kg")
     return Contact(K, B, M, _force(point), model, source, _assumed(parameters, point, model, working_point))
 
 
 _GIVE_DAMPING = "say one with --damping (0 for a pure spring), or excite more (palpate excite)"
 
 
-def _told(name: str, value: float | None, unit: str) -> Quantity | None:
+def _given(name: str, value: float | None, unit: str) -> Quantity | None:
     if value is None:
         return None
     if not (isfinite(value) and value >= 0.0 and (value > 0.0 or name == "damping")):

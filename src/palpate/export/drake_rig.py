@@ -7,13 +7,11 @@ from tempfile import NamedTemporaryFile
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.export.drake_scene import properties
 from palpate.export.rig import across
-
-Array = NDArray[np.float64]
 
 TIME_STEP = 1e-3
 """Of the plant in a check [s]."""

@@ -15,6 +15,7 @@ from xml.sax.saxutils import quoteattr
 
 from palpate.errors import InputError, unknown
 from palpate.export.contact import Contact
+from palpate.files import read_bytes
 
 RIGID = 1e12
 """Point stiffness of what presses [N/m]: K / RIGID is lost of K."""
@@ -98,10 +99,7 @@ def load_scene(path: Path) -> Scene:
         InputError: no SDF or URDF.
         OSError: no such file.
     """
-    with path.open("rb") as file:
-        text = file.read(_LARGEST + 1)
-    if len(text) > _LARGEST:
-        raise InputError(f"{path}: more than {_LARGEST} bytes are no SDF or URDF file; check the path")
+    text = read_bytes(path, _LARGEST, "no SDF or URDF file")
     try:
         text.decode()
     except UnicodeDecodeError as error:

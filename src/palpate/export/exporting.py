@@ -11,7 +11,7 @@ from typing import Any
 from palpate.errors import InputError, unknown
 from palpate.export.contact import Contact
 from palpate.export.rig import Pressed, press, touch
-from palpate.text import shown
+from palpate.text import printable
 
 TARGETS = ("mujoco", "drake", "newton", "mjcf-spring")
 TOLERANCE = 1e-3
@@ -131,7 +131,7 @@ class Exported:
         Args:
             mark: the comment's first line.
         """
-        lines = [mark, *(shown(line).replace("\n", " ") for line in self.lines())]
+        lines = [mark, *(printable(line).replace("\n", " ") for line in self.lines())]
         if self.target == "newton":
             head, rest = self.text.split("\n", 1)
             return "\n".join([head, "", *(f"# {line}" for line in lines), rest])

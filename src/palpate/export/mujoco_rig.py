@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.export.rig import across
 from palpate.robots.serial._extra import mujoco
-
-Array = NDArray[np.float64]
 
 _DIRECTED = 1e-6
 """Gap from which on its direction is taken [m]."""

@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
-
-Array = NDArray[np.float64]
 
 _RADIUS = 0.02
 _MASS = 1.0

@@ -7,9 +7,8 @@ from math import pi, sqrt
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array
 
 _TOUCHING = 1e-7
 """Gap that counts as the touch [m]; single-precision places of a few centimetres are as fine."""

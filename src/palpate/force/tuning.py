@@ -49,7 +49,7 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tuning(Result, shown_by="palpate.report.tuning"):
+class Tuning(Result, shown_by="palpate.report.tuning.in_python"):
     """A tuned loop: what `palpate tune` says.
 
     Args:

@@ -158,7 +158,7 @@ class PooledPoint:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pooled(Result, shown_by="palpate.report.many.shown"):
+class Pooled(Result, shown_by="palpate.report.many.in_python"):
     """What many logs say together.
 
     Args:

@@ -253,7 +253,7 @@ class LagFound:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Result, shown_by="palpate.report.identification.shown"):
+class Identification(Result, shown_by="palpate.report.identification.in_python"):
     """What was touched: the model, its parameters with verdicts, and what to know about them.
 
     Args:

@@ -19,6 +19,7 @@ from palpate.identifiers.forgetting import Directional, Exponential, SIFt
 from palpate.identifiers.identifier_table import IdentifierTable
 from palpate.identifiers.kalman_filter import KalmanFilter, KalmanIdentifier
 from palpate.identifiers.neural_probe import NeuralProbe, Probed
+from palpate.identifiers.neural_settings import Setting
 from palpate.identifiers.recursive_least_squares import LeastSquaresIdentifier, RecursiveLeastSquares
 from palpate.identifiers.replay import watch
 from palpate.identifiers.restarting import RestartingIdentifier, RestartingLeastSquares
@@ -39,5 +40,6 @@ __all__ = [
     "RestartingIdentifier",
     "RestartingLeastSquares",
     "SIFt",
+    "Setting",
     "watch",
 ]

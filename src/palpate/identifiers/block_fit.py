@@ -14,11 +14,9 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identifiers.kernels import block_sums as sums
-
-Array = NDArray[np.float64]
 
 FALSE_ALARM = 1e-3
 """Probability at which a test rejects a model that holds, each time one looks."""

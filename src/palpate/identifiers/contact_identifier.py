@@ -10,9 +10,10 @@ from math import ceil
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import kernel
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identifiers.block_fit import block_fit
 from palpate.identifiers.estimator import entry
@@ -21,8 +22,6 @@ from palpate.identifiers.kernels.contact_stream import ticked
 from palpate.signals.low_pass import LowPass
 from palpate.signals.taps import FRACTIONS, taps
 from palpate.signals.types import Estimate
-
-Array = NDArray[np.float64]
 
 NAMES = ("M", "B", "K", "offset")
 _FORGOTTEN = 10.0

@@ -6,9 +6,10 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import Kernel
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identifiers.kernels.dimension import size_of
 from palpate.signals.types import Estimate
@@ -32,7 +33,7 @@ class Streaming(ABC):
 
     names: tuple[str, ...]
 
-    def __init__(self, state: NDArray[np.float64], n: int, policy: Any, names: tuple[str, ...] | None):
+    def __init__(self, state: Array, n: int, policy: Any, names: tuple[str, ...] | None):
         self.names = names if names is not None else tuple(f"theta{i}" for i in range(n))
         if len(self.names) != n:
             raise InputError(f"names must be as many as parameters: got {len(self.names)} names for {n}")
@@ -50,11 +51,11 @@ class Streaming(ABC):
 
     @property
     @abstractmethod
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Array:
         """P, shape (n, n)."""
 
     @property
-    def theta(self) -> NDArray[np.float64]:
+    def theta(self) -> Array:
         """The estimate, shape (n,)."""
         return self._state[: self._n].copy()
 
@@ -129,7 +130,7 @@ def entry(kernel: Kernel, *example: Any) -> Any:
     return kernel.compiled.overloads[tuple(map(numba.typeof, example))].entry_point
 
 
-def checked(theta: ArrayLike, covariance: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def checked(theta: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
     """Copies of theta, shape (n,), and of its covariance, shape (n, n), symmetric to the last bit.
 
     Raises:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import Kernel, kernel, law, part
 from palpate._vector import sqrt
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identifiers.estimator import HUGE, Streaming, checked
 from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
@@ -91,7 +92,7 @@ class KalmanFilter(Streaming):
         return _one, _many
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Array:
         """P, shape (n, n): the covariance of theta, were the noise white and as it is said or estimated."""
         return covariance_in(self._state, self._n)
 
@@ -110,9 +111,7 @@ class KalmanFilter(Streaming):
         return Estimate(self.names, self.theta, 0.5 * (C + C.T), seen)
 
 
-def _first(
-    theta: NDArray[np.float64], P: NDArray[np.float64], steps: NDArray[np.float64], noise: float
-) -> NDArray[np.float64]:
+def _first(theta: Array, P: Array, steps: Array, noise: float) -> Array:
     """The state of `flat`; then the covariance that the walk has left, that of one step, and each step's deviation.
 
     The noise is believed to be as given, or 1 N, as if `_GUESS` samples had said so.

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.identifiers.neural_settings import SETTINGS
+from palpate.identifiers.neural_settings import SETTINGS, Setting
 from palpate.networks import Network, layers_of, network, random_layers
 from palpate.networks.backpropagation import backward, descend, forward
 from palpate.signals.types import Estimate
@@ -46,8 +47,8 @@ class NeuralProbe:
     network's answer depends on the weights it starts from, and carries no interval.
 
     Args:
-        scale: of displacement, velocity and acceleration before the network sees them, shape (3,).
-        values: displacement [m], velocity [m/s] and acceleration [m/s^2] that it is asked at, shape (3,).
+        setting: scales of displacement, velocity and acceleration before the network sees them, and the values that
+            it is asked at [m, m/s, m/s^2]; the thesis' are in `SETTINGS`.
         amplitude: the largest force that it can say [N]. The thesis does not give it; it must exceed the force.
         learning_rate: eta, above 0.
         layers: neurons of each hidden layer.
@@ -59,11 +60,9 @@ class NeuralProbe:
         InputError: numbers out of range.
     """
 
-    # More than seven arguments: the settings of the thesis' network, most with a default.
     def __init__(
         self,
-        scale: ArrayLike,
-        values: ArrayLike,
+        setting: Setting,
         amplitude: float = 40.0,
         learning_rate: float = 1e-4,
         layers: Sequence[int] = (4,),
@@ -76,8 +75,8 @@ class NeuralProbe:
         for layer in start:
             layer[:, 0] *= self._thresholds
         self._net: Network = network(start, amplitude, learning_rate)
-        self.scale = _three(scale, "scale")
-        self.values = _probe_values(_three(values, "values"))
+        self.scale = _three(setting.scale, "scale")
+        self.values = _probe_values(_three(setting.values, "values"))
         self.samples = 0
         self._memory = self._net.start()
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -97,8 +96,7 @@ class NeuralProbe:
         """The 3-4-1 network with the scales and the probe of the thesis for "foam" or "rubber"."""
         if surface not in SETTINGS:
             raise unknown("surface", surface, SETTINGS)
-        s = SETTINGS[surface]
-        return cls(s.scale, s.values, amplitude, learning_rate, (4,), seed, weights, thresholds)
+        return cls(SETTINGS[surface], amplitude, learning_rate, (4,), seed, weights, thresholds)
 
     def update(self, regressor: ArrayLike, force: float) -> None:
         """Takes one sample in: displacement, velocity and acceleration, shape (3,), and the force [N].
@@ -118,7 +116,7 @@ class NeuralProbe:
         """Takes k samples in, as k calls of `update` would: regressors of shape (k, 3), forces of shape (k,)."""
         self._update(regressors, forces, trajectory=False)
 
-    def trajectory(self, regressors: ArrayLike, forces: ArrayLike) -> NDArray[np.float64]:
+    def trajectory(self, regressors: ArrayLike, forces: ArrayLike) -> Array:
         """As `update_many`; returns K, B, M after each sample and the error of the force before it, shape (k, 4)."""
         return self._update(regressors, forces, trajectory=True)
 
@@ -158,16 +156,16 @@ class NeuralProbe:
         return Estimate(("K", "B", "M"), theta, np.full((3, 3), np.nan), float(self.samples))
 
     @property
-    def layers(self) -> tuple[NDArray[np.float64], ...]:
+    def layers(self) -> tuple[Array, ...]:
         """The weights of each layer, shape (n, n_before + 1), thresholds in column 0; copies."""
         return layers_of(self._net.sizes, self._memory.weights.copy())
 
     @property
-    def learned(self) -> NDArray[np.float64]:
+    def learned(self) -> Array:
         """Smallest and largest displacement, velocity and acceleration seen, shape (2, 3)."""
         return np.stack([self._low, self._high])
 
-    def _warnings(self, values: NDArray[np.float64]) -> tuple[tuple[str, str], ...]:
+    def _warnings(self, values: Array) -> tuple[tuple[str, str], ...]:
         if not np.isfinite(self._low).all():
             return ((OUTSIDE, "nothing has been learned yet: update the network first"),)
         return tuple(
@@ -179,7 +177,7 @@ class NeuralProbe:
             if not low <= v <= high
         )
 
-    def _update(self, regressors: ArrayLike, forces: ArrayLike, *, trajectory: bool) -> NDArray[np.float64]:
+    def _update(self, regressors: ArrayLike, forces: ArrayLike, *, trajectory: bool) -> Array:
         phi = np.ascontiguousarray(regressors, dtype=np.float64)
         y = np.ascontiguousarray(forces, dtype=np.float64)
         if phi.ndim != 2 or phi.shape[1] != 3 or y.shape != phi.shape[:1]:
@@ -196,7 +194,7 @@ class NeuralProbe:
             )
         return out
 
-    def _take(self, phi: NDArray[np.float64], y: NDArray[np.float64], out: NDArray[np.float64]) -> int:
+    def _take(self, phi: Array, y: Array, out: Array) -> int:
         net, memory = self._net, self._memory
         return int(
             self._follow(
@@ -218,7 +216,7 @@ class NeuralProbe:
         )
 
 
-def _three(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def _three(values: ArrayLike, name: str) -> Array:
     array = np.array(values, dtype=np.float64)
     if array.shape != (3,):
         raise InputError(f"{name} must have shape (3,): {', '.join(CHANNELS)}; got {array.shape}")
@@ -227,7 +225,7 @@ def _three(values: ArrayLike, name: str) -> NDArray[np.float64]:
     return array
 
 
-def _probe_values(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _probe_values(values: Array) -> Array:
     if (values == 0.0).any():
         raise InputError(f"a probe divides by its values: none may be 0, got {values}")
     return values

@@ -7,9 +7,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import Kernel, kernel, law
+from palpate.arrays import Array
 from palpate.identifiers.estimator import HUGE, Streaming, checked
 from palpate.identifiers.forgetting import Directional, Exponential, Forgetting, SIFt, policy_of
 from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
@@ -30,7 +31,7 @@ class LeastSquaresEstimator(Streaming):
     """What is known of theta by least squares, however it came about: the front of the state as `flat` has it."""
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Array:
         """P, shape (n, n): the covariance of theta if the force had noise of variance 1."""
         return covariance_in(self._state, self._n)
 

@@ -6,11 +6,9 @@ import threading
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.live.view import COLUMNS, STRIDE
-
-Array = NDArray[np.float64]
 
 SECONDS = 12.0
 """That are kept [s]."""

@@ -8,9 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.live.player import Player
 from palpate.live.server import HOST
@@ -111,7 +109,7 @@ class _Sender(threading.Thread):
             if self._arm is not None and len(rows):
                 self._draw(rows[-1])
 
-    def _draw(self, row: NDArray[np.float64]) -> None:
+    def _draw(self, row: Array) -> None:
         from foxglove.messages import (
             Color,
             LinePrimitive,

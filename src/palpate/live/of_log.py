@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification import Identification, Parameter
 from palpate.live.replay import Replay, Signals
 from palpate.live.view import Happened, View
 from palpate.records import Record
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED, formatted
-from palpate.text import shown
-
-Array = NDArray[np.float64]
+from palpate.text import printable
 
 _MOST_MARKS = 200
 
@@ -40,7 +38,7 @@ def of_log(title: str, found: Identification, along: Record) -> Replay:
         columns |= _constant(columns["t"], found, name)
     kept, notes = restarted(columns)
     view = View(
-        title=shown(title),
+        title=printable(title),
         about=f"{len(along)} rows; the estimate is that of the whole log",
         kind="replay",
         rate=0.0,
@@ -57,10 +55,10 @@ def identified(found: Identification) -> tuple[dict[str, str], ...]:
     """What `palpate identify` says, parameter by parameter: as it prints it."""
     parameters = dict(found.parameters)
     point = found.working_point
-    rows = [_told("working point", point.stiffness)] if point else []
+    rows = [_fact("working point", point.stiffness)] if point else []
     return (
         *rows,
-        *(_told(f"{name}, {CALLED[name]}" if name in CALLED else name, p) for name, p in parameters.items()),
+        *(_fact(f"{name}, {CALLED[name]}" if name in CALLED else name, p) for name, p in parameters.items()),
     )
 
 
@@ -76,9 +74,9 @@ def restarted(columns: dict[str, Array]) -> tuple[dict[str, Array], tuple[str, .
     return {name: values[grows] for name, values in columns.items()}, (note,)
 
 
-def _told(name: str, p: Parameter) -> dict[str, str]:
+def _fact(name: str, p: Parameter) -> dict[str, str]:
     text = formatted(p) if p.value is not None else "no number"
-    return {"name": shown(name), "text": text, "verdict": str(p.verdict), "tone": TONES[p.verdict]}
+    return {"name": printable(name), "text": text, "verdict": str(p.verdict), "tone": TONES[p.verdict]}
 
 
 def _constant(t: Array, found: Identification, name: str) -> dict[str, Array]:

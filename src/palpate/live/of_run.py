@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.row import COLUMNS as ROW
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.errors import InputError
@@ -19,8 +19,6 @@ from palpate.live.replay import Replay, Signals
 from palpate.live.view import LEAD, Happened, View
 from palpate.logs.read import read_log
 from palpate.robots.arm3 import Arm3
-
-Array = NDArray[np.float64]
 
 _PLAIN = {
     "t": "t",

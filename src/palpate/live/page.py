@@ -8,7 +8,7 @@ from importlib import resources
 from palpate.live.view import View
 from palpate.report.look.assets import ARM, ARM_IN_SPACE, CHARTS, data, policy, scripts
 from palpate.report.page import render
-from palpate.text import shown
+from palpate.text import printable
 
 PAGE_HEADERS = {
     "Content-Type": "text/html; charset=utf-8",
@@ -27,10 +27,10 @@ def page(view: View) -> str:
     codes = (*scripts(*CHARTS, *drawing), _own("strip.js"), _own("live.js"))
     shown_view = replace(
         view,
-        title=shown(view.title),
-        about=shown(view.about),
-        notes=tuple(map(shown, view.notes)),
-        units={name: shown(unit) for name, unit in view.units.items()},
+        title=printable(view.title),
+        about=printable(view.about),
+        notes=tuple(map(printable, view.notes)),
+        units={name: printable(unit) for name, unit in view.units.items()},
     )
     return render(
         "live.html",

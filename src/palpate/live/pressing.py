@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.ending import DIVERGED
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.environments.kelvin_voigt import KelvinVoigt
@@ -36,9 +36,7 @@ from palpate.press.prepare import Question, prepared
 from palpate.press.pressing import JOINT_LIMIT
 from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.text import shown
-
-Array = NDArray[np.float64]
+from palpate.text import printable
 
 FORCE, STIFFNESS, DAMPING = 20.0, 5000.0, 50.0
 """Where the sliders stand at first [N, N/m, N s/m]."""
@@ -78,15 +76,15 @@ class PressingArm:
         sliders = _sliders(asked.gains)
         self.state = State(values={slider.key: slider.value for slider in sliders}, seed=seed)
         self.view = View(
-            title=shown(asked.arm.title),
-            about=shown(f"{asked.gains.arm.title}; the cautious law of palpate tune, own physics"),
+            title=printable(asked.arm.title),
+            about=printable(f"{asked.gains.arm.title}; the cautious law of palpate tune, own physics"),
             kind="simulation",
             rate=float(asked.gains.arm.rate),
             stride=self._stride * asked.gains.arm.tick,
             sliders=sliders,
             rest=tuple(float(v) for v in asked.place.q),
             scene=_scene(asked),
-            notes=tuple(shown(note) for note in asked.notes),
+            notes=tuple(printable(note) for note in asked.notes),
         )
         self.reset()
 
@@ -226,7 +224,9 @@ class PressingArm:
     def _warning(self, saturated: Array) -> str:
         if saturated.any():
             joints = " and ".join(self._arm.names[i] for i in np.flatnonzero(saturated))
-            return f"{shown(joints)} gives all the torque it may, and the force asked for is out of reach."
+            return (
+                f"{printable(joints)} gives all the torque it may, and the force asked for is out of reach."
+            )
         return self._pilot.loop.trouble
 
     def _note(self, phase: float) -> None:
@@ -246,7 +246,7 @@ class PressingArm:
         beyond = np.flatnonzero((q < self._arm.lower) | (q > self._arm.upper))
         if len(beyond):
             self.state.ended = (
-                f"{JOINT_LIMIT}: {shown(self._arm.names[beyond[0]])} reached the end of its range"
+                f"{JOINT_LIMIT}: {printable(self._arm.names[beyond[0]])} reached the end of its range"
             )
         elif now >= LONGEST:
             self.state.ended = OVER

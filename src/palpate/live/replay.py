@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.live.view import AT, COLUMNS, STRIDE, Happened, State, View, planar_bones
-
-Array = NDArray[np.float64]
 
 FEWEST = 3
 """Rows that are worth playing."""

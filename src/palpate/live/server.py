@@ -188,7 +188,7 @@ class _Server:
         news = asyncio.Event()
         self._readers.add(news)
         self._player.watch()
-        telling = asyncio.create_task(self._tell(connection, news))
+        telling = asyncio.create_task(self._send_news(connection, news))
         try:
             async for message in connection:
                 await self._hear(connection, message)
@@ -206,7 +206,7 @@ class _Server:
         if not self._player.ask(request):
             await connection.send(_text("refused", why="too much is asked for at once"))
 
-    async def _tell(self, connection: ServerConnection, news: asyncio.Event) -> None:
+    async def _send_news(self, connection: ServerConnection, news: asyncio.Event) -> None:
         """Sends what is new; a reader that takes it slowly finds older rows gone, for nothing waits in memory."""
         feed, epoch, count, version = self._player.feed, -1, 0, -1
         while True:

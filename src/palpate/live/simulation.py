@@ -6,9 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.bench.bench import Bench
+from palpate.arrays import Array
 from palpate.bench.build import build
 from palpate.bench.ending import StopCondition
 from palpate.bench.experiments.tables import Experiment, changed
@@ -16,7 +15,6 @@ from palpate.bench.given_motion import rest_for
 from palpate.bench.part_check import check_parts
 from palpate.bench.row import COLUMNS as ROW
 from palpate.bench.sequence import CONTACT, LOST
-from palpate.bench.tick import LoopState, compiled_march, start_at
 from palpate.environments import SurfaceState
 from palpate.live.stability import OfBench
 from palpate.live.view import (
@@ -33,9 +31,7 @@ from palpate.live.view import (
     check_ahead,
     planar_bones,
 )
-from palpate.text import shown
-
-Array = NDArray[np.float64]
+from palpate.text import printable
 
 _FROM = {name: i for i, name in enumerate(ROW)}
 _TAKEN = {
@@ -60,7 +56,6 @@ class Simulation:
     """An experiment that is run as long as somebody watches.
 
     Args:
-        name: of the experiment.
         experiment: its numbers.
         seed: of the noise.
         whole: begin at the very start of the search for the surface, not shortly before the touch.
@@ -72,7 +67,6 @@ class Simulation:
 
     def __init__(
         self,
-        name: str,
         experiment: Experiment,
         seed: int = 0,
         *,
@@ -87,17 +81,16 @@ class Simulation:
         self._stride = max(1, round(STRIDE * self._rate))
         sliders = sliders_of(experiment)
         self.state.values = {slider.key: slider.value for slider in sliders}
-        self._loop: Any = bench.loop
         q, length = bench.q, bench.loop.plant.arm.length
         self.view = View(
-            title=shown(experiment.title),
-            about=shown(experiment.about),
+            title=printable(experiment.title),
+            about=printable(experiment.about),
             kind="simulation",
             rate=float(self._rate),
             sliders=sliders,
             links=(length.x, length.y, length.z),
             rest=(q.x, q.y, q.z),
-            notes=_notes(experiment, name),
+            notes=_notes(experiment),
         )
         self.reset()
 
@@ -106,23 +99,23 @@ class Simulation:
         self.state.begin(seed)
         first = 0 if self._whole else self._before_touch()
         self._begin()
-        while self._k < first:
-            self._march(min(500 * self._stride, first - self._k))
+        while self._run.ticks < first:
+            self._run.advance(min(500 * self._stride, first - self._run.ticks))
 
     def advance(self, seconds: float) -> Array:
         """The rows of the time to come: one for each `STRIDE`."""
         strides = round(seconds / STRIDE)
         if self.state.ended or not strides:
             return np.empty((0, len(COLUMNS)))
-        out = self._march(strides * self._stride)
-        keep, ending = self._watchman.judge(out, self._loop.controller.trouble(self._now.controller))
+        out = self._run.advance(strides * self._stride)
+        keep, ending = self._ending.judge(out, self._run.loop.controller.trouble(self._run.state.controller))
         out = out[:keep]
         self._note(out)
         self.state.warning = _at_limit(out)
         if ending is not None:
             self.state.ended = f"{ending.end}: {ending.why}"
             self.state.note(Happened(float(out[-1, 0]) if len(out) else 0.0, ending.end, "fail"))
-        elif self._k >= LONGEST * self._rate:
+        elif self._run.ticks >= LONGEST * self._rate:
             self.state.ended = OVER
         return self._shown(out)
 
@@ -139,7 +132,8 @@ class Simulation:
         new = build(experiment).loop
         if key.startswith("surface."):
             self._resurface(new.plant.surface)
-        self._loop = self._loop._replace(schedule=new.schedule, controller=new.controller)
+        run: Any = self._run
+        run.loop = run.loop._replace(schedule=new.schedule, controller=new.controller)
         self._experiment = experiment
         self.state.values[key] = value
         self._truth = _truth(experiment)
@@ -150,10 +144,10 @@ class Simulation:
         Raises:
             InputError: it lies behind, or beyond a run's longest.
         """
-        here = self._k / self._rate
+        here = self._run.ticks / self._rate
         check_ahead(here, time)
-        while self._k < round(time * self._rate) and not self.state.ended:
-            self.advance(min(2.5, STRIDE * round((time - self._k / self._rate) / STRIDE) or STRIDE))
+        while self._run.ticks < round(time * self._rate) and not self.state.ended:
+            self.advance(min(2.5, STRIDE * round((time - self._run.ticks / self._rate) / STRIDE) or STRIDE))
 
     @property
     def experiment(self) -> Experiment:
@@ -170,38 +164,28 @@ class Simulation:
         return planar_bones(self.view.links, row)
 
     def _begin(self) -> None:
-        bench: Bench = build(self._experiment)
-        self._loop = bench.loop
-        self._now: LoopState = start_at(self._loop, bench.q)  # type: ignore[no-untyped-call]
-        self._generator = np.random.default_rng(self.state.seed)
-        self._k = 0
-        self._watchman = StopCondition(self._experiment.run.losses)
+        self._run = build(self._experiment).simulation(self.state.seed or 0, waiting=self._waiting)
+        self._ending = StopCondition(self._experiment.run.losses)
         self._phase, self._contacts = 0.0, 0
         self._high = True
         self._truth = _truth(self._experiment)
-
-    def _march(self, ticks: int) -> Array:
-        out = np.empty((ticks, len(ROW)))
-        noise = self._generator.standard_normal(ticks)
-        self._now = compiled_march.run(self._waiting, self._loop, self._now, self._k, noise, out)
-        self._k += ticks
-        return out
 
     def _before_touch(self) -> int:
         """The tick, on a stride, from which it is shown: the same seed touches at the same tick again."""
         self._begin()
         most = round(min(self._experiment.run.duration, 120.0) * self._rate)
-        while self._k < most:
-            out = self._march(min(2000, most - self._k))
+        while self._run.ticks < most:
+            out = self._run.advance(min(2000, most - self._run.ticks))
             touching = out[:, _FROM["touching"]] > 0.0
             if touching.any():
-                touch = self._k - len(out) + int(np.argmax(touching))
+                touch = self._run.ticks - len(out) + int(np.argmax(touching))
                 return max(0, touch - round(LEAD * self._rate)) // self._stride * self._stride
         return 0
 
     def _resurface(self, new: Any) -> None:
         """Puts another surface before the tip, and lets the estimate begin again."""
-        plant, state = self._loop.plant, self._now
+        run: Any = self._run
+        plant, state = run.loop.plant, run.state
         s: SurfaceState = state.plant.surface
         if s.contact == 1.0:
             old: Any = plant.surface
@@ -213,12 +197,12 @@ class Simulation:
             depth = rest_for(new, force - branch, s.rate)
             plant = plant._replace(wall=plant.wall + s.deflection - depth)
             state = state._replace(plant=state.plant._replace(surface=s._replace(deflection=depth)))
-        estimators: Any = self._loop.estimators
+        estimators = run.loop.estimators
         anew = state.estimators._replace(
             matched=estimators.matched.start(), centring=estimators.centring.start()
         )
-        self._loop = self._loop._replace(plant=plant._replace(surface=new))
-        self._now = state._replace(estimators=anew)
+        run.loop = run.loop._replace(plant=plant._replace(surface=new))
+        run.state = state._replace(estimators=anew)
 
     def _note(self, out: Array) -> None:
         """Touches and losses, to be marked."""
@@ -275,7 +259,7 @@ def _truth(experiment: Experiment) -> tuple[float, float]:
     return float(surface.stiffness), float(surface.damping)
 
 
-def _notes(experiment: Experiment, name: str) -> tuple[str, ...]:
+def _notes(experiment: Experiment) -> tuple[str, ...]:
     notes = []
     if type(experiment.surface).__name__ != "KelvinVoigtSurface":
         notes.append(

@@ -6,11 +6,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
-
-Array = NDArray[np.float64]
 
 COLUMNS = (
     "t",

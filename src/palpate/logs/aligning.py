@@ -7,13 +7,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.logs.stamps import Timed
 from palpate.signals.held import fresh_rows
-
-Array = NDArray[np.float64]
 
 _FEWEST = 20
 """Readings of a stream: with fewer, a spline's ends are most of it, and identification refuses the log as well."""
@@ -129,12 +127,12 @@ def _moved(stream: Timed, time: Array, all_rows: bool) -> Array:
     return np.where(_near(stream.time, time, all_rows)[:, None], values, np.nan)
 
 
-def _near(readings: Array, time: Array, all_rows: bool) -> NDArray[np.bool_]:
+def _near(readings: Array, time: Array, all_rows: bool) -> Mask:
     """Rows that a value is given to: those nearest to a reading, or all that are not in a gap between readings."""
     if all_rows:
         after = np.clip(np.searchsorted(readings, time), 1, len(readings) - 1)
         step = np.diff(readings)
-        near: NDArray[np.bool_] = step[after - 1] <= _GAP * np.median(step)
+        near: Mask = step[after - 1] <= _GAP * np.median(step)
         return near
     after = np.clip(np.searchsorted(time, readings), 1, len(time) - 1)
     nearest = np.where(readings - time[after - 1] < time[after] - readings, after - 1, after)

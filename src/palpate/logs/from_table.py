@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.missing import find_sentinel
 from palpate.logs.plausibility import epoch_unit
@@ -54,9 +54,7 @@ def from_table(
     return loaded
 
 
-def _from_first(
-    table: Columns, places: Mapping[str, int], arrays: Mapping[str, NDArray[np.float64]]
-) -> float:
+def _from_first(table: Columns, places: Mapping[str, int], arrays: Mapping[str, Array]) -> float:
     """Take the first row's time off before it is scaled, in whole numbers where floats would lose some.
 
     Returns:
@@ -71,7 +69,7 @@ def _from_first(
     return origin
 
 
-def _epoch(time: NDArray[np.float64], origin: float) -> str | None:
+def _epoch(time: Array, origin: float) -> str | None:
     """The unit in which a time counts from 1970; None if it does not."""
     steps = np.diff(time[:1000])
     return epoch_unit(origin + float(time[0]), float(np.median(steps)) if len(steps) else 0.0)
@@ -132,7 +130,7 @@ def _other_unit(role: str, name: str) -> str | None:
     return next((symbol for other in sorted(others) if (symbol := unit_in_name(name, other))), None)
 
 
-def _missing(role: str, values: NDArray[np.float64], name: str, given: bool) -> list[dict[str, Any]]:
+def _missing(role: str, values: Array, name: str, given: bool) -> list[dict[str, Any]]:
     """Turn what means "no reading" into NaN, and say so."""
     notes = []
     sentinel = None if given or role not in {"position", "force"} else find_sentinel(values)
@@ -151,9 +149,7 @@ def _missing(role: str, values: NDArray[np.float64], name: str, given: bool) -> 
     return notes
 
 
-def _time(
-    table: Columns, arrays: dict[str, NDArray[np.float64]], rate: float | None, loaded: Loaded
-) -> float:
+def _time(table: Columns, arrays: dict[str, Array], rate: float | None, loaded: Loaded) -> float:
     """Make time start at 0, so that unix time keeps its digits; make it from the rate where there is no column."""
     if "time" not in arrays:
         arrays["time"] = np.arange(len(next(iter(arrays.values())))) / _rate(table, rate, loaded)

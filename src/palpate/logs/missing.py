@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from palpate.arrays import Array, Mask
 
 _USUAL = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 99999.0)
 _LEAST_SHARE = 0.002
@@ -13,7 +14,7 @@ _APART = 0.5
 numbers, which these values are."""
 
 
-def find_sentinel(values: NDArray[np.float64]) -> float | None:
+def find_sentinel(values: Array) -> float | None:
     """The value in a column, shape (n,), that plainly means "no reading"; None where there is none.
 
     It must be one of those that drivers use, occur again and again, lie on one side of all other
@@ -30,7 +31,7 @@ def find_sentinel(values: NDArray[np.float64]) -> float | None:
     return None
 
 
-def _outside(value: float, others: NDArray[np.float64]) -> bool:
+def _outside(value: float, others: Array) -> bool:
     """Whether the value lies where no reading does; a small negative one needs readings that are never negative."""
     low, high = float(others.min()), float(others.max())
     if value < 0:
@@ -38,7 +39,7 @@ def _outside(value: float, others: NDArray[np.float64]) -> bool:
     return value > high + (high - low)
 
 
-def _jumps(values: NDArray[np.float64], here: NDArray[np.bool_], value: float) -> bool:
+def _jumps(values: Array, here: Mask, value: float) -> bool:
     """Whether the typical reading beside this value is far from it, measured by how far readings step otherwise."""
     beside = values[1:][here[:-1] & ~here[1:]]
     if not len(beside):

@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
-
-Array = NDArray[np.float64]
 
 LARGEST, SMALLEST = 1e30, 1e-30
 """In SI units. Their fourth powers fit in a float with room for sums, and those are the highest that are formed."""

@@ -10,8 +10,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag, Topic
 from palpate.logs.plausibility import epoch_unit, usual_unit
@@ -67,7 +67,7 @@ class Seen:
 
     place: int
     name: str
-    values: NDArray[np.float64]
+    values: Array
     unit: str | None
     clock: bool
 

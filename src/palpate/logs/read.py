@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.bags import Bag
 from palpate.logs.from_bag import from_bag
@@ -106,9 +106,7 @@ def columns_of(path: str | Path, delimiter: str | None = None, limits: Limits | 
     return list(open_table(Path(path), kind, delimiter, limits).names)
 
 
-def _cut(
-    arrays: dict[str, NDArray[np.float64]], start: float | None, end: float | None, path: Path
-) -> dict[str, NDArray[np.float64]]:
+def _cut(arrays: dict[str, Array], start: float | None, end: float | None, path: Path) -> dict[str, Array]:
     if start is None and end is None:
         return arrays
     time = arrays["time"]

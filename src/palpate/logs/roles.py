@@ -7,9 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.units import unit
 
@@ -71,7 +69,7 @@ class Loaded:
         joints: the position is that of a joint.
     """
 
-    columns: dict[str, NDArray[np.float64]]
+    columns: dict[str, Array]
     units: dict[str, str]
     start: float
     notes: list[dict[str, Any]] = field(default_factory=list)

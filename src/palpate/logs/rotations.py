@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-
-Array = NDArray[np.float64]
 
 PLACE = ("position_x", "position_y", "position_z")
 QUATERNION = ("quaternion_x", "quaternion_y", "quaternion_z", "quaternion_w")

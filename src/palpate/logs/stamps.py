@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.bags import Stream
-
-Array = NDArray[np.float64]
 
 _BLOCKS = 20
 """Parts of a log in each of which the quickest message is looked for: a drift of the clocks shows between them."""

@@ -11,15 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from palpate._jit import part
 from palpate._vector import sqrt
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.networks.backpropagation import backward, descend, forward, squared_gradient
 
 
 @part
 class NetworkState(NamedTuple):
-    weights: NDArray[np.float64]  # (n_weights,), see `backpropagation`
-    signals: NDArray[np.float64]  # (n_neurons,)
-    deltas: NDArray[np.float64]  # (n_neurons,)
+    weights: Array  # (n_weights,), see `backpropagation`
+    signals: Array  # (n_neurons,)
+    deltas: Array  # (n_neurons,)
 
 
 @part
@@ -34,8 +35,8 @@ class Network(NamedTuple):
     """
 
     sizes: NDArray[np.int64]
-    weights: NDArray[np.float64]
-    amplitude: NDArray[np.float64]
+    weights: Array
+    amplitude: Array
     learning_rate: float
 
     def start(self):
@@ -82,7 +83,7 @@ class Network(NamedTuple):
         return sqrt(total)
 
 
-def layers_of(sizes: NDArray[np.int64], weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+def layers_of(sizes: NDArray[np.int64], weights: Array) -> tuple[Array, ...]:
     """The weights of each layer, shape (n, n_before + 1), thresholds in column 0: views of the flat array."""
     views, first = [], 0
     for n, m in pairwise(sizes):
@@ -119,7 +120,7 @@ def network(layers: Sequence[ArrayLike], amplitude: ArrayLike, learning_rate: fl
     return Network(sizes, weights, np.full(n_out, 1.0) * scale, float(learning_rate))
 
 
-def _check_layers(matrices: list[NDArray[np.float64]]) -> None:
+def _check_layers(matrices: list[Array]) -> None:
     for i, m in enumerate(matrices):
         if m.ndim != 2 or m.shape[0] < 1 or m.shape[1] < 2:
             raise InputError(f"weights of layer {i + 1} must have shape (n, n_before + 1), got {m.shape}")
@@ -132,9 +133,7 @@ def _check_layers(matrices: list[NDArray[np.float64]]) -> None:
             )
 
 
-def random_layers(
-    sizes: tuple[int, ...], seed: int | np.random.Generator, scale: float
-) -> list[NDArray[np.float64]]:
+def random_layers(sizes: tuple[int, ...], seed: int | np.random.Generator, scale: float) -> list[Array]:
     """Weights and thresholds drawn evenly from -scale ... scale.
 
     Args:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import kernel
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.networks.backpropagation import backward, descend, forward
 from palpate.networks.network import layers_of, network, random_layers
@@ -67,26 +68,26 @@ class Perceptron:
         self._heard = False  # both compiled, nothing learned
 
     @property
-    def layers(self) -> tuple[NDArray[np.float64], ...]:
+    def layers(self) -> tuple[Array, ...]:
         """The weights of each layer, shape (n, n_before + 1): views, so that writing in them changes the network."""
         return layers_of(self._sizes, self._weights)
 
     @property
-    def hidden(self) -> NDArray[np.float64]:
+    def hidden(self) -> Array:
         """The weights of the first layer after the inputs, a view."""
         return self.layers[0]
 
     @property
-    def output(self) -> NDArray[np.float64]:
+    def output(self) -> Array:
         """The weights of the last layer, a view."""
         return self.layers[-1]
 
     @property
-    def amplitude(self) -> NDArray[np.float64]:
+    def amplitude(self) -> Array:
         """The largest size of each output, shape (n_out,)."""
         return self._amplitude.copy()
 
-    def forward(self, inputs: ArrayLike) -> NDArray[np.float64]:
+    def forward(self, inputs: ArrayLike) -> Array:
         """The outputs, shape (n_out,), for inputs of shape (n_in,).
 
         Raises:
@@ -109,11 +110,11 @@ class Perceptron:
             raise InputError("learn needs the signals of a forward before it: call forward(inputs) first")
         self._descend(e, self.learning_rate)
 
-    def _descend(self, error: NDArray[np.float64], rate: float) -> None:
+    def _descend(self, error: Array, rate: float) -> None:
         self._learn(self._sizes, self._weights, self._amplitude, self._signals, self._deltas, error, rate)
 
     @staticmethod
-    def _checked(values: ArrayLike, n: int, name: str) -> NDArray[np.float64]:
+    def _checked(values: ArrayLike, n: int, name: str) -> Array:
         array = np.ascontiguousarray(values, dtype=np.float64)
         if array.shape != (n,):
             raise InputError(f"{name} must have shape ({n},), got {array.shape}")
@@ -126,7 +127,7 @@ THESIS_AMPLITUDE = (20.0, 10.0, 1.0)
 """Of the outputs of the thesis' controller [N, N, N m]."""
 
 
-def thesis_layers() -> list[NDArray[np.float64]]:
+def thesis_layers() -> list[Array]:
     """The weights that the thesis' controller starts from (App. E): shapes (12, 10) and (3, 13)."""
     from palpate.networks.thesis_weights import HIDDEN, OUTPUT
 

@@ -6,7 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from palpate.arrays import Array
 
 
 class Chirp(NamedTuple):
@@ -26,12 +27,12 @@ class Chirp(NamedTuple):
     amplitude: float
     logarithmic: bool = False
 
-    def at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, time: Array) -> Array:
         """The signal at times [s], shape (n,)."""
         inside = (time >= 0.0) & (time <= self.seconds)
         return np.where(inside, self.amplitude * np.sin(2.0 * math.pi * self._turns(time)), 0.0)
 
-    def _turns(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _turns(self, time: Array) -> Array:
         """Periods since the start."""
         if not self.logarithmic or self.low == self.high:
             return (self.low + 0.5 * (self.high - self.low) * time / self.seconds) * time
@@ -52,7 +53,7 @@ class Multisine(NamedTuple):
     amplitudes: tuple[float, ...]
     phases: tuple[float, ...]
 
-    def at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, time: Array) -> Array:
         """The signal at times [s], shape (n,)."""
         total = np.zeros(len(time))
         for f, a, phase in zip(self.frequencies, self.amplitudes, self.phases, strict=True):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +64,8 @@ def render(template: str, *packages: str, **values: Any) -> str:
         template: its file's name.
         packages: where it and those that it extends lie, besides this one.
         values: what it shows; `base.html` itself wants a `title` and the `command` that made the page, and takes the
-            `seconds` it took, what the page is of (`room`), the date it was `made`, further lines of its foot
-            (`origin`, pairs of name and text), and `scripts`, which alone may run.
+            `seconds` it took, what the page is of (`room`), the date it was `made` (now, if none is given), further
+            lines of its foot (`origin`, pairs of name and text), and `scripts`, which alone may run.
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader
 
@@ -72,7 +73,8 @@ def render(template: str, *packages: str, **values: Any) -> str:
     from palpate.report.look.assets import TABLES, policy, scripts, styles
 
     codes = tuple(values.pop("scripts", scripts(*TABLES)))
-    values = {"styles": styles(), "scripts": codes, "policy": policy(codes), **values}
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    values = {"styles": styles(), "scripts": codes, "policy": policy(codes), "made": now, **values}
     folders = dict.fromkeys((*packages, "palpate.report"))
     loader = ChoiceLoader([PackageLoader(folder, "") for folder in folders])
     environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)

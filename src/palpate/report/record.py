@@ -6,23 +6,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Record
 from palpate.report import style
+from palpate.report.look.columns import with_peaks
 from palpate.report.page import Table, embedded, render
-from palpate.report.shown import as_html, as_text
-from palpate.text import shown
+from palpate.report.result_text import as_html, as_text
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 HEAD = ("column", "unit", "least", "mean", "largest", "missing")
 _TIMES = ("time", "t")
 _DRAWN = 12
 """Columns of a figure; more are not legible."""
 _POINTS = 4000
-"""Points of a line at most: what is more is drawn by its extremes."""
+"""Points of a line, about: what is more is drawn by its extremes."""
 
 
 def line(record: Record) -> str:
@@ -34,7 +35,7 @@ def line(record: Record) -> str:
     source = record.meta.get("source")
     named = f", from {source}" if isinstance(source, str) else ""
     span = f", {record[clock][0]:.4g} to {record[clock][-1]:.4g} s" if clock is not None and count > 1 else ""
-    return shown(f"{columns}{span}{named}")
+    return printable(f"{columns}{span}{named}")
 
 
 def text(record: Record) -> str:
@@ -50,12 +51,12 @@ def html(record: Record) -> str:
 def rows(record: Record) -> list[tuple[str, ...]]:
     """Name, unit, extremes and mean of each column, and how many of its values are missing."""
     return [
-        (shown(name), shown(record.units[name]), *_numbers(np.asarray(column)))
+        (printable(name), printable(record.units[name]), *_numbers(np.asarray(column)))
         for name, column in record.columns.items()
     ]
 
 
-def _numbers(column: NDArray[np.float64]) -> tuple[str, ...]:
+def _numbers(column: Array) -> tuple[str, ...]:
     finite = column[np.isfinite(column)]
     figures = (finite.min(), finite.mean(), finite.max()) if len(finite) else ()
     told = [f"{float(number):.5g}" for number in figures] or ["-"] * 3
@@ -82,25 +83,10 @@ def draw(record: Record) -> Figure:
     with style.inked():
         figure, axes = style.figure(rows=len(names), height=1.6)
         for axis, name in zip(axes, names, strict=True):
-            axis.plot(*_thinned(time, record[name]), color=style.SERIES[0], linewidth=0.9)
+            axis.plot(*with_peaks(time, record[name], _POINTS), color=style.SERIES[0], linewidth=0.9)
             axis.set_ylabel(style.literal(f"{name} [{record.units[name]}]"))
         axes[-1].set_xlabel("time [s]" if clock else "row")
     return figure
-
-
-def _thinned(time: NDArray[np.float64], column: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-    """A line of as many points as can be told apart: of each stretch the least and the largest value."""
-    size = 2 * len(column) // _POINTS
-    if size < 2:
-        return time, column
-    whole = len(column) // size * size
-    blocks = column[:whole].reshape(-1, size)
-    ends = np.stack(
-        [np.where(np.isfinite(blocks), blocks, np.inf), np.where(np.isfinite(blocks), blocks, -np.inf)]
-    )
-    picked = np.stack([ends[0].argmin(axis=1), ends[1].argmax(axis=1)], axis=1)
-    at = np.sort(picked + np.arange(0, whole, size)[:, None], axis=1).ravel()
-    return time[at], column[at]
 
 
 def page(record: Record) -> str:

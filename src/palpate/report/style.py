@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
 from palpate.report.look import tokens
 from palpate.report.look.tokens import DATA, PAIRS
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,13 +60,20 @@ def figure(
     rows: int = 1, *, height: float = 2.6, width: float = 9.0, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels above each other that share their x axis; each `height` inches high."""
+    return grid((width, height * rows + 0.5), rows, sharex=True, **subplots)
+
+
+def grid(
+    size: tuple[float, float], rows: int = 1, columns: int = 1, **subplots: Any
+) -> tuple[Figure, list[Axes]]:
+    """A figure of this width and height [inches], and its panels row by row."""
     from matplotlib.figure import Figure
 
-    drawing = Figure(figsize=(width, height * rows + 0.5), dpi=DPI, layout="constrained")
-    axes = drawing.subplots(rows, 1, sharex=True, squeeze=False, **subplots)[:, 0]
+    drawing = Figure(figsize=size, dpi=DPI, layout="constrained")
+    axes = list(drawing.subplots(rows, columns, squeeze=False, **subplots).flat)
     for axis in axes:
         plain(axis)
-    return drawing, list(axes)
+    return drawing, axes
 
 
 def plain(axis: Axes) -> None:
@@ -143,7 +150,7 @@ def legend_above(axis: Axes) -> None:
 
 def literal(text: str) -> str:
     """A text from outside as it is to be drawn: dollars are dollars, not formulas."""
-    return shown(text).replace("$", r"\$")
+    return printable(text).replace("$", r"\$")
 
 
 def save(drawing: Figure, path: Path, dpi: int | None = None) -> Path:

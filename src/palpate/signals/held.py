@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
+
 _LONG_JUMP = 4.0
 """Times the sensor's own resolution from which a step is a jump."""
 _HELD_SHARE = 0.3
 """Pairs of jumps between which a reading may move all the same."""
 
 
-def fresh_rows(values: NDArray[np.float64]) -> NDArray[np.bool_] | None:
+def fresh_rows(values: Array) -> Mask | None:
     """Rows in which a channel, shape (n,), was refreshed; None if every row is.
 
     A value that repeats is no proof: a coarse or resting sensor repeats too. Held samples show in jumps that are many
@@ -34,7 +36,7 @@ def fresh_rows(values: NDArray[np.float64]) -> NDArray[np.bool_] | None:
     return _refill(fresh, round(usual))
 
 
-def _quiet_between(moved: NDArray[np.bool_], jumps: NDArray[np.intp], usual: float) -> bool:
+def _quiet_between(moved: Mask, jumps: NDArray[np.intp], usual: float) -> bool:
     """Whether nothing at all moves between neighbouring jumps."""
     total = np.r_[0, np.cumsum(moved)]
     near = np.flatnonzero(np.diff(jumps) <= 2 * usual)
@@ -45,7 +47,7 @@ def _quiet_between(moved: NDArray[np.bool_], jumps: NDArray[np.intp], usual: flo
     return bool(still.mean() > 1 - _HELD_SHARE)
 
 
-def _refill(fresh: NDArray[np.bool_], every: int) -> NDArray[np.bool_]:
+def _refill(fresh: Mask, every: int) -> Mask:
     """Count a long stretch without change as fresh once per period: the channel may simply rest."""
     fresh = fresh.copy()
     marks = np.flatnonzero(fresh)

@@ -9,6 +9,7 @@ from math import pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 
 _HIGHEST_ORDER = 10
@@ -73,7 +74,7 @@ class LowPass:
         """The lowest cut-off [Hz]; infinite where there is no low-pass."""
         return min((cutoff for _, cutoff in self.sections), default=float("inf"))
 
-    def at(self, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def at(self, omega: Array) -> NDArray[np.complex128]:
         """The complex gain at angular frequencies [rad/s], of their shape."""
         gain = np.ones(np.shape(omega), complex)
         for order, cutoff in self.sections:

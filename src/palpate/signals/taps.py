@@ -14,9 +14,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.signals.low_pass import LowPass
-
-Array = NDArray[np.float64]
 
 FRACTIONS = 1024
 """Places between two samples for which weights are kept: an instant is rounded by at most half of 1/1024."""

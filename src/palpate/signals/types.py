@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import part
 from palpate._vector import Vec3
+from palpate.arrays import Array
 from palpate.results import Compared
 
 
@@ -49,13 +49,13 @@ class Estimate(Compared):
     """
 
     names: tuple[str, ...]
-    theta: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    theta: Array
+    covariance: Array
     samples: float
     rejected: str = ""
 
     @property
-    def std(self) -> NDArray[np.float64]:
+    def std(self) -> Array:
         """Standard deviation of each parameter, shape (n,)."""
         return np.sqrt(np.diag(self.covariance))
 

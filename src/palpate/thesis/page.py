@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
-from importlib import resources
 from typing import Any
 
 from palpate.report.figure_panels.panels import panel_scripts
-from palpate.report.look.assets import data
+from palpate.report.look.assets import data, text_of
 from palpate.report.page import render
 from palpate.thesis.claims import Done, count_in_words, counted
 
@@ -39,7 +37,6 @@ def index_page(
         "index.html",
         "palpate.thesis",
         room="thesis",
-        made=datetime.now(UTC).isoformat(timespec="seconds"),
         title="The thesis, measured again",
         chapters=_chapters(done),
         count=verdicts.total(),
@@ -50,7 +47,7 @@ def index_page(
         missing=missing,
         command=command,
         seconds=sum(one.seconds for one in done),
-        scripts=(*panel_scripts(), _script()),
+        scripts=(*panel_scripts(), text_of("index.js", "palpate.thesis")),
     )
 
 
@@ -71,7 +68,3 @@ def chapter_of(number: str) -> str:
     if head != "6" or not tail.isdigit():
         return _OTHERS
     return next((title for last, title in _PARTS if int(tail) <= last), _OTHERS)
-
-
-def _script() -> str:
-    return (resources.files("palpate.thesis") / "index.js").read_text(encoding="utf-8")

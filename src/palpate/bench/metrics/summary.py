@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 
@@ -67,11 +67,11 @@ def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _share(flags: NDArray[np.float64]) -> float:
+def _share(flags: Array) -> float:
     return float(np.mean(flags)) if len(flags) else 0.0
 
 
-def force_figures(record: Record, pressing: NDArray[np.bool_], last: NDArray[np.bool_]) -> dict[str, Any]:
+def force_figures(record: Record, pressing: Mask, last: Mask) -> dict[str, Any]:
     """Of the true force, which only a simulation knows; the noise of the measured one beside it.
 
     Args:
@@ -101,12 +101,12 @@ def force_figures(record: Record, pressing: NDArray[np.bool_], last: NDArray[np.
     }
 
 
-def _first_change(values: NDArray[np.float64]) -> int:
+def _first_change(values: Array) -> int:
     changed = np.nonzero(values != values[0])[0]
     return int(changed[0]) if len(changed) else len(values)
 
 
-def _identified(record: Record, last: NDArray[np.bool_]) -> dict[str, Any]:
+def _identified(record: Record, last: Mask) -> dict[str, Any]:
     """The estimates at the end, the quotient f/x, and the standard deviations that the matched one states.
 
     They take the surface for a spring, a damper and a mass; whether it is one, `palpate.identify` says of the record.

@@ -10,14 +10,13 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench.ending import DIVERGED, LOST_CONTACT
 from palpate.bench.metrics.summary import summarise
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 
-Array = NDArray[np.float64]
 Value = float | None
 HALF_TICK = 5e-7
 """Times are multiples of a tick but for rounding: windows and intervals are opened this much early [s]."""
@@ -67,7 +66,7 @@ class Look:
         return self.record[name][self.inside]
 
     @cached_property
-    def pressing(self) -> NDArray[np.bool_]:
+    def pressing(self) -> Mask:
         """Where the contact controller runs, shape (n,)."""
         return self.record["phase"] == CONTACT
 
@@ -83,7 +82,7 @@ class Look:
         return t - t[np.argmax(self.pressing)] if len(t) else t
 
     @cached_property
-    def inside(self) -> NDArray[np.bool_]:
+    def inside(self) -> Mask:
         """Rows in contact and within the window; none where the run ended before the window did."""
         if not self.touched:
             return self.pressing

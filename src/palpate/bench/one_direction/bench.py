@@ -9,9 +9,9 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import kernel, law
+from palpate.arrays import Array
 from palpate.bench.ending import DONE, NO_CONTACT
 from palpate.bench.one_direction.tables import OneDirection, TouchedSurface
 from palpate.bench.sequence import APPROACH, CONTACT, LOST
@@ -22,8 +22,6 @@ from palpate.force.touching import Surface
 from palpate.force.worlds import pressed, surface, world_of
 from palpate.records import Record
 from palpate.references import ForceSchedule
-
-Array = NDArray[np.float64]
 
 COLUMNS = {
     "t": "s",

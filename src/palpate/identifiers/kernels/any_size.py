@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import law, part
+from palpate.arrays import Array
 
 
 @law
@@ -43,7 +43,7 @@ def eliminated(A, b):
 class Vector(NamedTuple):
     """n components; `+` and `/` work element by element, `@` is the dot product."""
 
-    of: NDArray[np.float64]
+    of: Array
 
     def __add__(a, b):
         out = np.empty(len(a.of))
@@ -90,7 +90,7 @@ class Vector(NamedTuple):
 class Matrix(NamedTuple):
     """n rows of n; `+ -` work element by element, `@` takes a `Vector` or a `Matrix`."""
 
-    of: NDArray[np.float64]
+    of: Array
 
     def __add__(A, B):
         out = np.empty(A.of.shape)

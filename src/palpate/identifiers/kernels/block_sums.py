@@ -7,9 +7,9 @@ that is correlated over less than a block, a share of all the samples, is covere
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import law
+from palpate.arrays import Array
 
 BLOCKS = 64
 FIRST = 16
@@ -32,7 +32,7 @@ HEADER = 12
 LENGTH = HEADER + BLOCKS * WIDTH + COLUMNS
 
 
-def no_sums() -> NDArray[np.float64]:
+def no_sums() -> Array:
     """Before the first sample."""
     sums = np.zeros(LENGTH)
     sums[SIZE] = FIRST

@@ -3,10 +3,8 @@
 from math import isnan
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from palpate._jit import law, part
+from palpate.arrays import Array
 
 NAN = float("nan")
 ROW, RESOLVED, GOOD, RUN, LAST_SIXTH, POWER, PRODUCT, COUNT, OPEN = range(9)
@@ -27,8 +25,8 @@ class Positions(NamedTuple):
         gap: ticks that may be missing in a row: more leave motion within the low-pass untold (Nyquist).
     """
 
-    ring: NDArray[np.float64]
-    numbers: NDArray[np.float64]
+    ring: Array
+    numbers: Array
     room: int
     gap: int
 

@@ -5,9 +5,9 @@ is the inverse of each initial variance, even that of their sum, n times.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import law
+from palpate.arrays import Array
 from palpate.identifiers.kernels.error_covariance import NOTHING, ErrorCovariance
 from palpate.identifiers.kernels.square_root import held
 
@@ -15,7 +15,7 @@ _STATISTICS = 6
 """Numbers that stand behind theta in the state: what is known of the residuals."""
 
 
-def known_first(theta: NDArray[np.float64], P: NDArray[np.float64]) -> NDArray[np.float64]:
+def known_first(theta: Array, P: Array) -> Array:
     """The state before the first sample: the initial estimate and its covariance, shapes (n,) and (n, n)."""
     n = len(theta)
     root, identity = np.linalg.cholesky(P).ravel(), np.eye(n).ravel()
@@ -57,7 +57,7 @@ def error_covariance_in(state, size):
     )
 
 
-def covariance_in(state: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+def covariance_in(state: Array, n: int) -> Array:
     """S S^T, shape (n, n)."""
     root = state[n : n + n * n].reshape(n, n)
     return np.asarray(root @ root.T)

@@ -9,8 +9,8 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 
 _SHOWN = 64
@@ -32,9 +32,9 @@ class Stream:
     """
 
     topic: str
-    received: NDArray[np.float64]
-    stamped: NDArray[np.float64]
-    values: NDArray[np.float64]
+    received: Array
+    stamped: Array
+    values: Array
     frame: str = ""
 
 

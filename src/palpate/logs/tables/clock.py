@@ -6,8 +6,7 @@ import math
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+from palpate.arrays import Array
 
 if TYPE_CHECKING:
     import polars
@@ -29,7 +28,7 @@ def seconds_of_text(text: str | None) -> float | None:
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
-def seconds_of_cells(cells: polars.Series) -> NDArray[np.float64]:
+def seconds_of_cells(cells: polars.Series) -> Array:
     """A column of dates, times or durations in seconds, NaN where there is none."""
     import polars
 
@@ -37,5 +36,5 @@ def seconds_of_cells(cells: polars.Series) -> NDArray[np.float64]:
         cells = cells.cast(polars.Datetime("ns"))
     if cells.dtype != polars.Time:  # which counts nanoseconds as it stands
         cells = cells.dt.cast_time_unit("ns")
-    seconds: NDArray[np.float64] = cells.to_physical().cast(polars.Float64).to_numpy() / 1e9
+    seconds: Array = cells.to_physical().cast(polars.Float64).to_numpy() / 1e9
     return seconds

@@ -39,7 +39,6 @@ class Layout:
         first_row: the line of the file, from 1, that holds the first row of numbers.
         header: the text of the header's line; empty without one.
         above: the lines before the header.
-        surplus: names in the header for which there is no column.
         quoted: cells may stand in quotes.
     """
 
@@ -49,7 +48,6 @@ class Layout:
     first_row: int
     header: str
     above: tuple[str, ...]
-    surplus: tuple[str, ...]
     quoted: bool
 
     @property
@@ -158,7 +156,6 @@ def _layout(path: Path, lines: Sequence[Line], block: _Block) -> Layout:
             " or part the cells by something that no number holds"
         )
     names = found[: max(block.filled, min(len(found), block.width))]
-    surplus = [name for name in found[len(names) :] if name]
     names = [name or str(i) for i, name in enumerate(names)] or [str(i) for i in range(block.filled)]
     units = {name: symbol.strip("[]() ") for name, symbol in zip(names, symbols, strict=False)}
     return Layout(
@@ -168,7 +165,6 @@ def _layout(path: Path, lines: Sequence[Line], block: _Block) -> Layout:
         block.first,
         header,
         tuple(line.text for line in above),
-        tuple(surplus),
         block.quoted,
     )
 

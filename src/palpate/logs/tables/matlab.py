@@ -13,9 +13,10 @@ from zlib import decompressobj
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.limits import Budget
-from palpate.logs.tables.columns import Array, Stated, as_counts, finite_words, place_of
+from palpate.logs.tables.columns import Stated, as_counts, finite_words, place_of
 from palpate.logs.tables.confined import read_confined
 
 _HEADER, _COMPRESSED, _PIECE = 128, 15, 1 << 20

@@ -11,11 +11,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import SIGNATURE
 from palpate.logs.limits import Budget, Limits
 from palpate.logs.tables.clock import seconds_of_cells
-from palpate.logs.tables.columns import Array, Stated, as_counts, finite_words, place_of
+from palpate.logs.tables.columns import Stated, as_counts, finite_words, place_of
 from palpate.logs.tables.confined import read_confined
 from palpate.logs.tables.lines import NO_READING
 

@@ -24,12 +24,10 @@ class Preamble:
     Args:
         rate: rows per second [1/s]; None if they do not say.
         columns: by name.
-        said: the line that states the rate.
     """
 
     rate: float | None = None
     columns: dict[str, Stated] = field(default_factory=dict)
-    said: str = ""
 
 
 def read_preamble(lines: Sequence[str], names: Sequence[str]) -> Preamble:
@@ -42,16 +40,16 @@ def read_preamble(lines: Sequence[str], names: Sequence[str]) -> Preamble:
         lines: above the header.
         names: of the columns.
     """
-    rate, said = next((found for found in map(_rate, lines) if found), (None, ""))
+    rate = next((found for found in map(_rate, lines) if found), None)
     rows = {cells[0].lower(): cells[1:] for cells in (line.split("\t") for line in lines) if len(cells) > 1}
     columns = (
         _labview(rows, names) if _LAST_HEADER.lower() in {line.strip().lower() for line in lines} else {}
     )
-    return Preamble(rate, columns or _scaled(rows, lines, names), said)
+    return Preamble(rate, columns or _scaled(rows, lines, names))
 
 
-def _rate(line: str) -> tuple[float, str] | None:
-    """Rows per second by one line, and the line."""
+def _rate(line: str) -> float | None:
+    """Rows per second by one line."""
     for pattern, inverse in ((_RATE, False), (_STEP, True)):
         found = pattern.search(line)
         if found is None or not found.start() < 40:
@@ -65,7 +63,7 @@ def _rate(line: str) -> tuple[float, str] | None:
             r"[\[(]\s*" + _UNIT.format("a"), line[found.end() : found.end() + number.start()], re.I
         )
         value *= _FACTORS[unit["a"].lower()] if unit else 1.0
-        return (1 / value if inverse else value), " ".join(line.split())
+        return 1 / value if inverse else value
     return None
 
 

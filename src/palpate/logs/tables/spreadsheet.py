@@ -11,9 +11,10 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.limits import Budget
-from palpate.logs.tables.columns import Array, Stated, place_of
+from palpate.logs.tables.columns import Stated, place_of
 from palpate.logs.tables.confined import read_confined
 from palpate.logs.tables.text import Text
 

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.limits import Budget
 from palpate.logs.tables.clock import seconds_of_text
-from palpate.logs.tables.columns import Array, Stated, finite_words, is_finite, place_of
+from palpate.logs.tables.columns import Stated, finite_words, is_finite, place_of
 from palpate.logs.tables.layout import Layout, find_layout
 from palpate.logs.tables.lines import COMMENTS, NO_READING, Parting, first_lines, lines_of
 from palpate.logs.tables.preamble import read_preamble
@@ -60,7 +61,7 @@ class Text:
         preamble = read_preamble(self.layout.above, self.names)
         rows = {name: Stated(symbol, "the row of units") for name, symbol in self.layout.units.items()}
         self.stated: dict[str, Stated] = rows | preamble.columns
-        self.rate, self.rate_said = preamble.rate, preamble.said
+        self.rate = preamble.rate
         self.clocks: set[str] = set()
         self.left_out: dict[str, str] = {}
         self.notes: list[dict[str, Any]] = []

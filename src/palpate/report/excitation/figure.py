@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.excitation import Design
 from palpate.references.waves import Multisine
 from palpate.report import style
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLORS = {"K": style.K, "B": style.B, "M": style.M}
-Array = NDArray[np.float64]
 
 _SHOWN = 4.0  # s of the desired force; more would be a block of ink
 
@@ -42,7 +41,7 @@ def draw(found: Design) -> Figure:
 
 
 def _force(axis: Axes, found: Design) -> None:
-    budget = found.question.budget
+    budget = found.problem.budget
     time, force = found.force()
     shown = time <= found.settle + _SHOWN if isinstance(found.wave, Multisine) else np.full(len(time), True)
     low = min(prediction.force[0] for prediction in found.predictions)
@@ -83,7 +82,7 @@ def lines_of(found: Design) -> tuple[Array, Array, Array]:
     else:
         frequencies = np.geomspace(wave.low, wave.high, 100)
         amplitudes = np.full(len(frequencies), wave.amplitude)
-    return frequencies, amplitudes, np.abs(found.question.forces(2 * np.pi * frequencies, amplitudes))
+    return frequencies, amplitudes, np.abs(found.problem.forces(2 * np.pi * frequencies, amplitudes))
 
 
 def curves(found: Design) -> tuple[Array, dict[str, Array]]:
@@ -104,8 +103,8 @@ def _precision(axis: Axes, found: Design) -> None:
             linewidth=0,
         )  # fmt: skip
         axis.plot(seconds, 100 * widths.max(axis=0), color=COLORS[name], linewidth=1.6, label=name)
-        if name in found.question.precision:
-            asked = 100 * found.question.precision[name]
+        if name in found.problem.precision:
+            asked = 100 * found.problem.precision[name]
             axis.plot(seconds[[0, -1]], [asked, asked], color=COLORS[name], linewidth=0.9, linestyle="--")
     axis.axvline(found.seconds, color=style.MEASURED, linewidth=0.9)
     for which in "xy":

@@ -48,7 +48,7 @@ def check_ending(path: Path) -> None:
 
 def experiment(found: Design) -> str:
     """TOML that `palpate run` takes: the excitation on the surface in the middle of the range."""
-    question, wave = found.question, found.wave
+    problem, wave = found.problem, found.wave
     middle = found.predictions[0].surface
     press = found.settle + found.seconds
     lines = [
@@ -66,7 +66,7 @@ def experiment(found: Design) -> str:
         f"mass = {middle.mass:.6g}",
         "",
         "[force]",
-        f"first = {question.budget.mean:.10g}",
+        f"first = {problem.budget.mean:.10g}",
         "",
     ]
     if isinstance(wave, Multisine):
@@ -76,8 +76,8 @@ def experiment(found: Design) -> str:
         ]
     else:
         lines += ["[force.chirp]", *(f"{key} = {_plain(value)}" for key, value in wave._asdict().items())]
-    if isinstance(question.loop, HybridLoop):
-        loop = question.loop
+    if isinstance(problem.loop, HybridLoop):
+        loop = problem.loop
         lines += [
             "",
             "[controller]",
@@ -90,15 +90,15 @@ def experiment(found: Design) -> str:
 
 def summary(found: Design, remedies: list[Remedy]) -> dict[str, Any]:
     """All of a design as plain JSON values."""
-    question = found.question
+    problem = found.problem
     return {
-        "kind": question.kind,
+        "kind": problem.kind,
         "feasible": found.feasible,
         "duration_s": found.seconds,
         "settle_s": found.settle,
-        "mean_N": question.budget.mean,
+        "mean_N": problem.budget.mean,
         "wave": found.wave._asdict(),
-        "asked": dict(question.precision),
+        "asked": dict(problem.precision),
         "reached": found.made.worst(found.seconds),
         "surfaces": [
             {

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
-from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.excitation import Design, Remedy
-from palpate.files import write_text
 from palpate.report import style
 from palpate.report.excitation.figure import curves, draw, lines_of
 from palpate.report.excitation.table import describe_remedy, describe_wave, percent, reached
 from palpate.report.identification.words import CALLED
-from palpate.report.look.assets import CHARTS, TABLES, data, scripts
+from palpate.report.look.assets import CHARTS, TABLES, data, scripts, text_of
 from palpate.report.look.columns import packed, thinned
 from palpate.report.numbers import plain, quantity
 from palpate.report.page import embedded, render
 from palpate.report.svg import svg
 
-Array = NDArray[np.float64]
-
+_PACKAGE = "palpate.report.excitation"
 _ROWS = 6000
 """Of the desired force that lie in the page, its peaks among them."""
 _SHOWN = 4.0
@@ -32,30 +27,16 @@ _SHOWN = 4.0
 _UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
-def write_page(found: Design, helps: Sequence[Remedy], path: Path, command: str) -> Path:
-    """Writes the page of a design, whole or not at all; it opens without a network.
-
-    Args:
-        found: the design.
-        helps: what would make it enough, if it is not.
-        path: of the HTML file.
-        command: that made it.
-    """
-    write_text(path, page(found, helps, command))
-    return path
-
-
 def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
     """The page as HTML."""
     told = describe_wave(found)
-    codes = (*scripts(*CHARTS, *TABLES), _own("excitation.js"))
+    codes = (*scripts(*CHARTS, *TABLES), text_of("excitation.js", _PACKAGE))
     with style.inked():
         still = embedded(svg(draw(found)), "image/svg+xml")
     return render(
         "excitation.html",
-        "palpate.report.excitation",
+        _PACKAGE,
         room="excite",
-        made=datetime.now(UTC).isoformat(timespec="seconds"),
         title="A force to ask for",
         sentence=_sentence(found),
         about=f"{told[0].upper()}{told[1:]}.",
@@ -72,7 +53,7 @@ def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
 
 
 def _sentence(found: Design) -> str:
-    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.question.precision.items())
+    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     lasts = quantity(found.seconds, "s", digits=3)
     if found.feasible:
         return (
@@ -87,7 +68,7 @@ def _cards(found: Design) -> list[dict[str, str]]:
     worst = found.made.worst(found.seconds)
     cards = []
     for name in found.predictions[0].names:
-        asked = found.question.precision.get(name)
+        asked = found.problem.precision.get(name)
         enough = asked is None or worst[name] <= asked
         cards.append(
             {
@@ -136,7 +117,7 @@ def _rows(found: Design) -> list[list[dict[str, Any]]]:
         values = dict(zip(("K", "B", "M"), one.surface.values, strict=True))
         row = [{"text": plain(values[name], 4), "value": values[name]} for name in one.names]
         for name in one.names:
-            asked = found.question.precision.get(name)
+            asked = found.problem.precision.get(name)
             bad = asked is not None and widths[name] > asked
             row.append({"text": f"± {percent(widths[name])}", "value": widths[name], "bad": bad})
         low, high = one.force
@@ -152,7 +133,7 @@ def _charts(found: Design) -> dict[str, Any]:
     """What the charts are drawn from, in plain values."""
     time, force = found.force()
     rows = thinned(force, _ROWS)
-    budget = found.question.budget
+    budget = found.problem.budget
     n = len(rows)
     over = {
         "t": time[rows],
@@ -167,7 +148,7 @@ def _charts(found: Design) -> dict[str, Any]:
     precision: dict[str, Array] = {"t": seconds}
     for name, share in widths.items():
         precision |= {f"{name}_low": 100 * share.min(axis=0), f"{name}_high": 100 * share.max(axis=0)}
-        asked = found.question.precision.get(name)
+        asked = found.problem.precision.get(name)
         if asked is not None:
             precision[f"{name}_asked"] = np.full(len(seconds), 100 * asked)
     return {
@@ -183,7 +164,3 @@ def _charts(found: Design) -> dict[str, Any]:
         "window": [0.0, min(float(time[-1]), found.settle + _SHOWN)],
         "seconds": found.seconds,
     }
-
-
-def _own(name: str) -> str:
-    return (resources.files("palpate.report.excitation") / name).read_text(encoding="utf-8")

@@ -10,8 +10,9 @@ from rich.text import Text
 
 from palpate.excitation import Design, Remedy
 from palpate.excitation.prediction import Prediction
-from palpate.excitation.question import LONGEST
+from palpate.excitation.problem import LONGEST
 from palpate.references.waves import Multisine
+from palpate.report.terminal import bare_table
 
 
 def show(found: Design, remedies: list[Remedy], console: Console) -> None:
@@ -34,7 +35,7 @@ def describe_remedy(remedy: Remedy, found: Design) -> str:
 
 def describe_wave(found: Design) -> str:
     """What is asked for, in a line."""
-    budget, wave = found.question.budget, found.wave
+    budget, wave = found.problem.budget, found.wave
     if isinstance(wave, Multisine):
         low, high = wave.frequencies[0], wave.frequencies[-1]
         kind = f"multisine of {len(wave.frequencies)} sines, {low:g} to {high:.4g} Hz"
@@ -47,16 +48,10 @@ def describe_wave(found: Design) -> str:
 
 
 def _table(found: Design) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     names = found.predictions[0].names
     units = {"K": "N/m", "B": "N s/m", "M": "kg"}
-    for title in (
-        *(f"{name} [{units[name]}]" for name in names),
-        *(f"± {name}" for name in names),
-        "force [N]",
-        "travel",
-    ):
-        table.add_column(title, justify="right", no_wrap=True)
+    known, widths = [f"{name} [{units[name]}]" for name in names], [f"± {name}" for name in names]
+    table = bare_table(*known, *widths, "force [N]", "travel")
     for prediction in found.predictions:
         table.add_row(*_row(prediction, found))
     return table
@@ -68,7 +63,7 @@ def _row(prediction: Prediction, found: Design) -> list[str | Text]:
     low, high = prediction.force
     return [
         *(f"{values[name]:.4g}" for name in prediction.names),
-        *(_width(widths[name], found.question.precision.get(name)) for name in prediction.names),
+        *(_width(widths[name], found.problem.precision.get(name)) for name in prediction.names),
         f"{low:.1f}-{high:.1f}",
         f"{1e6 * prediction.travel:.0f} um",
     ]
@@ -86,7 +81,7 @@ def percent(share: float) -> str:
 
 def _verdict(found: Design) -> str:
     worst = found.made.worst(found.seconds)
-    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.question.precision.items())
+    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     if found.feasible:
         return f"every surface to within {asked} (95 %): yes, predicted {reached(worst, found)}"
     return f"every surface to within {asked} (95 %): no; the best is {reached(worst, found)}. What would change that:"
@@ -94,4 +89,4 @@ def _verdict(found: Design) -> str:
 
 def reached(widths: dict[str, float], found: Design) -> str:
     """The half-widths of what was asked for."""
-    return ", ".join(f"{name} {percent(widths[name])}" for name in found.question.precision)
+    return ", ".join(f"{name} {percent(widths[name])}" for name in found.problem.precision)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.report.figure_panels.labels import plain
 from palpate.report.look.tokens import DATA, PAIRS, SERIES
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-Array = NDArray[np.float64]
 Kind = tuple[str, str, str]
 
 _NAMES = {code: name for name, code in (DATA | SERIES).items()}

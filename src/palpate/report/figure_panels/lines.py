@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.report.figure_panels.artists import Curve, Kind, Level, NotLines, Stretch, drawn_in
 from palpate.report.figure_panels.labels import plain, title
 from palpate.report.look.columns import ABSENT, packed, thinned
@@ -15,7 +15,6 @@ from palpate.report.look.columns import ABSENT, packed, thinned
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 MOST = 1200
 """Places of a line that lie in the page, about: two for each point of a screen that a panel is wide."""

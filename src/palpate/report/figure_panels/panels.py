@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from palpate.report.figure_panels.artists import Kind, NotLines, kind_of, label_of, look_of
 from palpate.report.figure_panels.labels import plain, title, unit
 from palpate.report.figure_panels.lines import chart_of
-from palpate.report.look.assets import CHARTS, TABLES, data, scripts
+from palpate.report.look.assets import CHARTS, TABLES, data, scripts, text_of
 from palpate.report.page import embedded
 from palpate.report.svg import svg
 
@@ -43,8 +42,7 @@ def panels_of(drawing: Figure) -> list[dict[str, Any]]:
 
 def panel_scripts() -> tuple[str, ...]:
     """What draws the panels of a page; it has them as JSON by the id of the element that holds them, in `#panels`."""
-    own = (resources.files("palpate.report.figure_panels") / "panels.js").read_text(encoding="utf-8")
-    return (*scripts(*CHARTS), own)
+    return (*scripts(*CHARTS), text_of("panels.js", "palpate.report.figure_panels"))
 
 
 def shown_in(figures: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

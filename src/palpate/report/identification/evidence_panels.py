@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.identification.result import DynamicStiffness, Identification, Press, Tangent, Traces
 from palpate.report import style
 from palpate.report.identification.fit_panels import empty, labelled, length_of
@@ -14,7 +14,6 @@ from palpate.report.identification.fit_panels import empty, labelled, length_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 _BAND: dict[str, Any] = {"alpha": 0.22, "lw": 0}
 _HEAD = 1.25
@@ -80,15 +79,15 @@ def _part(
     return scale
 
 
-def shown_by(octaves: tuple[DynamicStiffness, ...], part: str) -> NDArray[np.bool_]:
+def shown_by(octaves: tuple[DynamicStiffness, ...], part: str) -> Mask:
     """Which octaves tell a part more narrowly than the stiffness there is large, shape (n,)."""
     size = np.array([np.hypot(o.storage, o.loss) for o in octaves])
     half = np.array([getattr(o, f"{part}_half") for o in octaves])
-    found: NDArray[np.bool_] = half < size
+    found: Mask = half < size
     return found
 
 
-def _limits(value: Array, half: Array, told: NDArray[np.bool_]) -> tuple[float, float]:
+def _limits(value: Array, half: Array, told: Mask) -> tuple[float, float]:
     """Zero and the points that are told in sight, with as much of their bands as is no larger than they are."""
     if not told.any():
         told = half == half.min()
@@ -100,7 +99,7 @@ def _limits(value: Array, half: Array, told: NDArray[np.bool_]) -> tuple[float, 
     return low - (room if low < 0 else 0.0), high + room
 
 
-def _silent(axes: Axes, frequency: Array, told: NDArray[np.bool_]) -> None:
+def _silent(axes: Axes, frequency: Array, told: Mask) -> None:
     """Octaves that the log does not tell lie in a shade."""
     for i, f in enumerate(frequency[~told]):
         name = "not shown" if i == 0 else None

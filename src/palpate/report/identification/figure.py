@@ -12,7 +12,7 @@ from palpate.report.identification import evidence_panels as evidence
 from palpate.report.identification import fit_panels as fit
 from palpate.report.identification import trust_panels as trust
 from palpate.report.identification.words import MARKS, formatted, model_line, sentence, subtitle
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +64,7 @@ def draw(found: Identification, title: str) -> Figure:
 
 def _head(figure: Any, found: Identification, title: str) -> None:
     """The answer in a sentence, what else is known, and of which log."""
-    lines = [(shown(title), 11.5, style.QUIET), (sentence(found), 14, style.INK)]
+    lines = [(printable(title), 11.5, style.QUIET), (sentence(found), 14, style.INK)]
     values = [f"{name} {formatted(p)} {MARKS[p.verdict]} {p.verdict}" for name, p in found.parameters.items()]
     lines += [(model_line(found), 10, style.QUIET), (";  ".join(values), 10, style.INK)]
     lines += [(subtitle(found), 9, style.QUIET)]

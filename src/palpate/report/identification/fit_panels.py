@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from palpate.report import style
 from palpate.report.identification.spectra import stretches
+from palpate.report.look.columns import with_peaks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from palpate.identification.result import Identification, Traces
 
-Array = NDArray[np.float64]
 
-_BINS = 1200
-"""Of time: more than a page has columns for; each keeps its least and its largest value."""
+_POINTS = 4800
+"""Of a line: more than a page has columns for; each stretch keeps its least and its largest value."""
 _MARGIN = 0.35
 """Of a contact's length, that is shown before and after it."""
 
@@ -27,10 +24,10 @@ def force(axes: Axes, found: Identification, traces: Traces) -> None:
     """Force over time, with the contacts and the model's prediction in them."""
     style.panel(axes, labelled("force", traces.force_unit), "time [s]")
     contacts(axes, found)
-    axes.plot(*thinned(traces.time, traces.force), color=style.MEASURED, lw=1.0, label="measured")
+    axes.plot(*with_peaks(traces.time, traces.force, _POINTS), color=style.MEASURED, lw=1.0, label="measured")
     if len(traces.fitted_time):
         for i, piece in enumerate(stretches(traces.fitted_time)):
-            line = thinned(traces.fitted_time[piece], traces.predicted[piece])
+            line = with_peaks(traces.fitted_time[piece], traces.predicted[piece], _POINTS)
             axes.plot(*line, color=style.INK, lw=1.4, label="model" if i == 0 else None)
     axes.set_xlim(*window(found, traces))
     style.legend_above(axes)
@@ -42,7 +39,7 @@ def residual(axes: Axes, found: Identification, traces: Traces) -> None:
     contacts(axes, found)
     left = traces.fitted_force - traces.predicted
     for i, piece in enumerate(stretches(traces.fitted_time)):
-        line = thinned(traces.fitted_time[piece], left[piece])
+        line = with_peaks(traces.fitted_time[piece], left[piece], _POINTS)
         axes.plot(*line, color=style.MEASURED, lw=0.9, label="measured less model" if i == 0 else None)
     axes.set_xlim(*window(found, traces))
     style.legend_above(axes)
@@ -62,19 +59,6 @@ def window(found: Identification, traces: Traces) -> tuple[float, float]:
     start, end = found.contacts[0][0], found.contacts[-1][1]
     margin = _MARGIN * (end - start)
     return max(first, start - margin), min(last, end + margin)
-
-
-def thinned(time: Array, values: Array) -> tuple[Array, Array]:
-    """A line of so many samples that a page cannot show them all, by the least and the largest of each bin."""
-    size = len(values) // _BINS
-    if size < 4:
-        return time, values
-    whole = size * (len(values) // size)
-    rows = values[:whole].reshape(-1, size)
-    ends = np.stack([rows.argmin(axis=1), rows.argmax(axis=1)])
-    at = np.sort(ends, axis=0).T + size * np.arange(len(rows))[:, None]
-    keep = np.r_[at.ravel(), np.arange(whole, len(values))]
-    return time[keep], values[keep]
 
 
 def labelled(name: str, unit: str) -> str:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.files import write_text
 from palpate.identification.result import Identification, Parameter, Traces, Verdict
 from palpate.report.identification import captions
 from palpate.report.identification import evidence_panels as evidence
@@ -34,7 +32,7 @@ from palpate.report.identification.words import (
 from palpate.report.numbers import plain, quantity, with_half
 from palpate.report.page import embedded, render
 from palpate.report.svg import svg
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,19 +49,6 @@ _MOST_CONTACTS = 20
 """That a page lists one by one."""
 
 
-def write_page(found: Identification, path: Path, source: Source) -> Path:
-    """Write the page of an identification, whole or not at all; it opens without a network and runs nothing.
-
-    Args:
-        found: what to show; figures need its traces.
-        path: of the HTML file.
-        source: where it is from.
-    """
-    text = page(found, source)
-    write_text(path, text)
-    return path
-
-
 def page(found: Identification, source: Source) -> str:
     """The page of an identification as HTML."""
     listed = found.contacts[:_MOST_CONTACTS]
@@ -77,12 +62,12 @@ def page(found: Identification, source: Source) -> str:
         sentence=sentence(found),
         model_line=model_line(found),
         subtitle=subtitle(found),
-        notes=[shown(note) for note in source.notes],
+        notes=[printable(note) for note in source.notes],
         point=_point(found),
         first=_evidence(found),
         cards=[_card(name, p) for name, p in found.parameters.items()],
         warnings=[
-            {"code": w.code.word, "text": shown(w.text), "advice": advice(w.code)} for w in found.warnings
+            {"code": w.code.word, "text": printable(w.text), "advice": advice(w.code)} for w in found.warnings
         ],
         figures=_figures(found),
         models=_models(found),
@@ -93,9 +78,11 @@ def page(found: Identification, source: Source) -> str:
         more=len(found.contacts) - len(listed),
         json=json.dumps(as_json(found, source), indent=1),
         source=source,
-        options=", ".join(f"{shown(str(k))} {shown(str(v))}" for k, v in _told(found, source).items()),
-        file=shown(source.file),
-        command=shown(source.command),
+        options=", ".join(
+            f"{printable(str(k))} {printable(str(v))}" for k, v in _told(found, source).items()
+        ),
+        file=printable(source.file),
+        command=printable(source.command),
     )
 
 
@@ -119,11 +106,11 @@ def _point(found: Identification) -> dict[str, Any] | None:
         "depth": depth,
         "frequency": frequency,
         "next": interval(point.prediction95, own.unit),
-        "reason": shown(own.reason),
+        "reason": printable(own.reason),
         "limit": f"{cause(limit, point.source)}. {next_step(limit, point.source).capitalize()}.",
         "scale": _scale(own, found),
         "source": {"octave": "the most excited octave", "press": "the slope of the way in"}.get(
-            point.source, shown(point.source)
+            point.source, printable(point.source)
         ),
     }
 
@@ -145,7 +132,7 @@ def _card(name: str, p: Parameter) -> dict[str, Any]:
         "number": split(p),
         "tone": TONES[p.verdict],
         "verdict": str(p.verdict),
-        "reason": shown(p.reason),
+        "reason": printable(p.reason),
         "interval": interval(p.ci95, p.unit),
         "own": interval(p.ci95_if_model_holds, p.unit),
         "bar": _bar(p),
@@ -188,7 +175,7 @@ def _budget(p: Parameter) -> list[dict[str, Any]]:
     parts = sorted(p.budget.items(), key=lambda item: -item[1])
     assumed = "calibration" not in p.budget and p.value is not None and p.unit not in {"1", "s"}
     longest = max([half for _, half in parts] + ([abs(p.value or 0) / 100] if assumed else []), default=0.0)
-    rows = [_row(shown(name), half, longest, p, assumed=False) for name, half in parts]
+    rows = [_row(printable(name), half, longest, p, assumed=False) for name, half in parts]
     if assumed and p.value is not None:
         rows.append(_row("scale, if 1 %", abs(p.value) / 100, longest, p, assumed=True))
     return rows
@@ -247,19 +234,23 @@ def _figure(
     size: tuple[int, int],
 ) -> dict[str, str]:
     """A picture at the two widths at which it is looked at, so that its letters keep their size."""
-    assert found.traces is not None
-    words = caption(found, found.traces)
-    wide, narrow = (
-        embedded(svg(drawn(found, found.traces, *own)), "image/svg+xml")
-        for own in (size, (_NARROW, min(size[1], 330)))
-    )
+    traces = found.traces
+    assert traces is not None
+    narrow = (_NARROW, min(size[1], 330))
+    drawn_at = [drawn(found, traces, *own) for own in (size, narrow)]
+    return picture(title, caption(found, traces), drawn_at, full=size[0] > _HALF)
+
+
+def picture(title: str, caption: str, drawn: Sequence[Figure], *, full: bool = False) -> dict[str, str]:
+    """A figure on a page, drawn wide and narrow, with its caption."""
+    wide, narrow = (embedded(svg(one), "image/svg+xml") for one in drawn)
     return {
         "title": title,
         "wide": wide,
         "narrow": narrow,
-        "alt": f"{title}. {words}",
-        "caption": words,
-        "full": "full" if size[0] > _HALF else "",
+        "alt": f"{title}. {caption}",
+        "caption": caption,
+        "full": "full" if full else "",
     }
 
 
@@ -285,7 +276,7 @@ def _models(found: Identification) -> list[dict[str, Any]]:
             "chosen": taken,
             "r2": f"{c.r2:.4f}",
             "rmse": plain(c.rmse, 3),
-            "note": shown(c.note),
+            "note": printable(c.note),
         }
         for c, taken in zip(found.comparison, chosen, strict=True)
     ]

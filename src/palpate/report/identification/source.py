@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.identification.result import Identification
-from palpate.text import shown
+from palpate.text import printable
 
 _CHUNK = 1 << 20
 
@@ -36,7 +36,7 @@ class Source:
     @property
     def title(self) -> str:
         """The log's own name, with nothing in it that a page or a terminal would obey."""
-        return shown(Path(self.file).name or self.file)
+        return printable(Path(self.file).name or self.file)
 
 
 def as_json(found: Identification, source: Source) -> dict[str, Any]:

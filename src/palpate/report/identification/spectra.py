@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.identification.filters.state_variable import ORDER
 from palpate.identification.residuals import whiteness
 from palpate.identification.result import Identification, Traces
-
-Array = NDArray[np.float64]
 
 _SHORTEST = 16
 """Rows of a stretch: with fewer, a Hann window leaves less than an octave between its own width and Nyquist's."""
@@ -172,7 +171,7 @@ def over_noise(found: Identification, traces: Traces) -> float | None:
     return found.rmse / noise if noise > 0 else None
 
 
-def _free(found: Identification, traces: Traces) -> NDArray[np.bool_]:
+def _free(found: Identification, traces: Traces) -> Mask:
     """Where the filters have forgotten every contact; nowhere if the fitted samples passed no filters."""
     time, apart = traces.time, _FORGOTTEN / found.cutoff
     free = np.zeros(len(time), bool)

@@ -21,7 +21,7 @@ from palpate.report.identification.words import (
     units_of,
 )
 from palpate.report.numbers import NONE, between, plain, quantity
-from palpate.text import shown
+from palpate.text import printable
 
 STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 _MANY = 6
@@ -36,8 +36,8 @@ def show(found: Identification, name: str, console: Console) -> None:
         name: of the log.
         console: where to.
     """
-    console.print(Text(shown(sentence(found)), style="bold"))
-    console.print(Text(shown(f"{name}: {_contacts(found)}")))
+    console.print(Text(printable(sentence(found)), style="bold"))
+    console.print(Text(printable(f"{name}: {_contacts(found)}")))
     _point(found, console)
     _press(found, console)
     if found.n:
@@ -128,5 +128,5 @@ def note(console: Console, label: str, text: str, style: str) -> None:
     grid = Table.grid(padding=(0, 1, 0, 0))
     grid.add_column(no_wrap=True)
     grid.add_column()
-    grid.add_row(Text(label, style=style), Text(shown(text)))
+    grid.add_row(Text(label, style=style), Text(printable(text)))
     console.print(grid)

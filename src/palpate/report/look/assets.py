@@ -19,9 +19,9 @@ TABLES = ("tables.js",)
 
 
 @cache
-def text_of(name: str) -> str:
-    """A file of this folder."""
-    return (resources.files("palpate.report.look") / name).read_text(encoding="utf-8")
+def text_of(name: str, package: str = "palpate.report.look") -> str:
+    """A file of a package; of this one, if no other is named."""
+    return (resources.files(package) / name).read_text(encoding="utf-8")
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array, Mask
 
 GAP = -32768
 """Where there is no value."""
@@ -36,7 +36,13 @@ def packed(values: Array) -> dict[str, Any]:
     return {"b": base64.b64encode(codes.tobytes()).decode(), "s": step, "o": low}
 
 
-def thinned(values: Array, most: int, dense: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
+def with_peaks(x: Array, values: Array, most: int) -> tuple[Array, Array]:
+    """A line through values over x, of about so many points that keep its peaks."""
+    rows = thinned(values, most)
+    return x[rows], values[rows]
+
+
+def thinned(values: Array, most: int, dense: Mask | None = None) -> NDArray[np.intp]:
     """Rows to be shown, in order: of every stretch those with the smallest and the largest value.
 
     Args:

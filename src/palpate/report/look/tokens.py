@@ -1,7 +1,7 @@
 """Colours, each with one meaning everywhere: on pages, in figures, on the live page; and the same by light and dark.
 
 A data colour draws, and has a contrast of 3:1 or more on every ground (WCAG 2.2, 1.4.11); what is written in a
-quantity's colour takes its `-text`, of 4.5:1 or more (1.4.3). `tests/report/test_tokens.py` measures both.
+quantity's colour takes its `-text`, of 4.5:1 or more (1.4.3). `tests/report/test_look.py` measures both.
 """
 
 from __future__ import annotations
@@ -67,9 +67,6 @@ PAIRS = {
 }
 """What is turned where the reader's page is dark: grounds, lines, letters."""
 
-GROUNDS = ("paper", "card")
-"""What data is drawn on."""
-
 
 def style_sheet() -> str:
     """The tokens as custom properties of CSS; paper that is printed on is always light."""
@@ -80,18 +77,3 @@ def style_sheet() -> str:
         f":root{{color-scheme:light dark;{light}}}\n"
         f"@media screen and (prefers-color-scheme:dark){{:root:not([data-print]){{{dark}}}}}\n"
     )
-
-
-def contrast(one: str, other: str) -> float:
-    """Of two colours, 1 to 21 (WCAG 2.2, contrast ratio)."""
-    high, low = sorted((_luminance(one), _luminance(other)), reverse=True)
-    return (high + 0.05) / (low + 0.05)
-
-
-def _luminance(colour: str) -> float:
-    def linear(byte: int) -> float:
-        share = byte / 255
-        return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
-
-    red, green, blue = (linear(int(colour[i : i + 2], 16)) for i in (1, 3, 5))
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

@@ -12,7 +12,7 @@ from palpate.report import style
 from palpate.report.identification.words import CALLED
 from palpate.report.many.rows import POINT, LogRow, drawn, quantities
 from palpate.report.many.words import failures, sentence
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -111,5 +111,5 @@ def _together(axis: Axes, pooled: PooledParameter | None) -> None:
 
 
 def _short(row: LogRow) -> str:
-    name = shown(row.source.title)
+    name = printable(row.source.title)
     return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 9]}…{name[-8:]}"

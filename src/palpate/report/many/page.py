@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from palpate.files import write_text
 from palpate.identification.pooling import Pooled, PooledParameter
-from palpate.report.identification.page import TONES, split
+from palpate.report.identification.page import TONES, picture, split
 from palpate.report.identification.source import Source
 from palpate.report.identification.words import CALLED, facts_of, formatted, interval
 from palpate.report.look.assets import TABLES, scripts
@@ -17,19 +15,11 @@ from palpate.report.many import forest
 from palpate.report.many.rows import POINT, LogRow, drawn, json_of, quantities
 from palpate.report.many.words import failures, place, sentence
 from palpate.report.numbers import quantity
-from palpate.report.page import embedded, render
-from palpate.report.svg import svg
-from palpate.text import shown
+from palpate.report.page import render
+from palpate.text import printable
 
 _COLOURED = {POINT: "K", "K": "K", "B": "B", "M": "M"}
 _HALF, _NARROW = 560, 360
-
-
-def write_page(rows: Sequence[LogRow], pooled: Pooled, path: Path) -> Path:
-    """Write the page of many identifications, whole or not at all; it opens without a network."""
-    text = page(rows, pooled)
-    write_text(path, text)
-    return path
 
 
 def page(rows: Sequence[LogRow], pooled: Pooled) -> str:
@@ -54,8 +44,8 @@ def page(rows: Sequence[LogRow], pooled: Pooled) -> str:
         json=json.dumps(json_of(rows, pooled), indent=1),
         source=Source("", source.options, None, source.command, source.made),
         file="",
-        options=", ".join(f"{shown(str(k))} {shown(str(v))}" for k, v in source.options.items()),
-        command=shown(source.command),
+        options=", ".join(f"{printable(str(k))} {printable(str(v))}" for k, v in source.options.items()),
+        command=printable(source.command),
     )
 
 
@@ -72,7 +62,7 @@ def _card(name: str, own: PooledParameter, pooled: Pooled) -> dict[str, Any]:
         "next": interval(own.prediction95, p.unit),
         "between": "" if own.between is None else quantity(own.between, p.unit, digits=2),
         "count": f"{len(own.logs)} of {pooled.count}",
-        "reason": shown(p.reason),
+        "reason": printable(p.reason),
     }
 
 
@@ -83,7 +73,7 @@ def _row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
     return {
         "name": row.source.title,
         "sha256": row.source.sha256,
-        "error": shown(row.error),
+        "error": printable(row.error),
         "cells": [formatted(p) if p is not None and p.value is not None else "–" for p in values],
         "place": ", ".join(facts_of(found, point)) if found and point else "–",
         "model": found.model if found else "–",
@@ -95,19 +85,9 @@ def _row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
 
 def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]:
     title = "Stiffness at the working point" if name == POINT else f"{name}, {CALLED.get(name, name)}"
-    wide, narrow = (
-        embedded(svg(forest.one(rows, pooled, name, width)), "image/svg+xml") for width in (_HALF, _NARROW)
-    )
     own = quantities(pooled)[name].parameter
     words = (
         f"Pooled: {formatted(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
         " own, the brackets hold where the next press falls. Pale: not pooled."
     )
-    return {
-        "title": title,
-        "wide": wide,
-        "narrow": narrow,
-        "alt": f"{title}. {words}",
-        "caption": words,
-        "full": "",
-    }
+    return picture(title, words, [forest.one(rows, pooled, name, width) for width in (_HALF, _NARROW)])

@@ -15,6 +15,7 @@ from palpate.report.identification.words import facts_of, formatted, interval, n
 from palpate.report.many.rows import POINT, LogRow, drawn, quantities
 from palpate.report.many.words import failures, sentence
 from palpate.report.numbers import NONE, quantity
+from palpate.report.terminal import bare_table
 
 _WIDE = 110
 """Letters of a terminal that has room for force, depth and frequency of each log."""
@@ -46,7 +47,7 @@ def _logs(rows: Sequence[LogRow], pooled: Pooled, wide: bool) -> Table:
     names = drawn(rows, pooled)
     own = quantities(pooled)
     units = [f"{'stiffness' if name == POINT else name}{_unit(own[name].parameter)}" for name in names]
-    table = _table("log", *units, *(["at"] if wide else []), "verdict")
+    table = bare_table("log", *units, *(["at"] if wide else []), "verdict", wrapped=("log", "at", "verdict"))
     for row in rows:
         point = row.found.working_point if row.found else None
         cells = [_cell(row.value_of(name)) for name in names]
@@ -67,7 +68,8 @@ def _verdict(row: LogRow) -> Text:
 
 
 def _together(pooled: Pooled) -> Table:
-    table = _table("pooled", "mean ± 95 %", "next press", "between", "logs", "verdict")
+    heads = ("pooled", "mean ± 95 %", "next press", "between", "logs", "verdict")
+    table = bare_table(*heads, wrapped=("pooled", "verdict"))
     for name, own in quantities(pooled).items():
         p = own.parameter
         table.add_row(
@@ -91,12 +93,3 @@ def _cell(p: Parameter | None) -> str:
 
 def _unit(p: Parameter) -> str:
     return f" [{unit(p)}]" if unit(p) else ""
-
-
-def _table(first: str, *others: str) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for title in (first, *others):
-        table.add_column(
-            Text(title), justify="left" if title in (first, "verdict", "at") else "right", overflow="fold"
-        )
-    return table

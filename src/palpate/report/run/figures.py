@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
@@ -106,7 +106,7 @@ def _approach(record: Record) -> Figure:
 
 def _force(record: Record) -> Figure:
     figure, (axis,) = style.figure(1, height=3.4)
-    since, shown = _around_contact(record)
+    since, shown = around_contact(record)
     style.panel(axis, "force on the surface [N]", SINCE)
     axis.plot(
         since,
@@ -128,7 +128,7 @@ def _force(record: Record) -> Figure:
 
 def _identification(record: Record) -> Figure:
     figure, axes = style.figure(3, height=2.0)
-    since, shown = _around_contact(record, 0.0)  # before it there is nothing to be known
+    since, shown = around_contact(record, 0.0)  # before it there is nothing to be known
     truth: dict[str, Any] = record.meta["truth"]
     units = (("K", "N/m"), ("B", "N s/m"), ("M", "kg"))
     for axis, (name, unit) in zip(axes, units, strict=True):
@@ -148,7 +148,7 @@ def _identification(record: Record) -> Figure:
     return figure
 
 
-def _limits(axis: Axes, record: Record, name: str, shown: NDArray[np.bool_]) -> None:
+def _limits(axis: Axes, record: Record, name: str, shown: Mask) -> None:
     """Shows where the estimates come to rest, and the truth, not where they come from."""
     half = np.nonzero(shown)[0][-max(1, int(0.75 * shown.sum())) :]
     seen = [record[f"{name}_{front}"][half] for front in (*FRONT_ENDS, "matched")]
@@ -175,7 +175,7 @@ def _torque(record: Record) -> Figure:
     return figure
 
 
-def _around_contact(record: Record, before: float = BEFORE) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def around_contact(record: Record, before: float = BEFORE) -> tuple[Array, Mask]:
     """Time since contact [s] where it is shown, and which rows those are."""
     t = record["t"]
     start = t[np.argmax(record["phase"] == CONTACT)]
@@ -192,7 +192,7 @@ def _shade(axis: Axes, record: Record) -> None:
         axis.fill_between(record["t"], 0, 1, color=colour, alpha=0.09, **ends)
 
 
-def _mark(axis: Axes, t: NDArray[np.float64], flags: NDArray[np.float64], label: str) -> None:
+def _mark(axis: Axes, t: Array, flags: Array, label: str) -> None:
     """Ticks at the lower edge where a flag is up."""
     up = flags > 0.0
     if up.any():

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.identification.result import Identification
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, formatted
-from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts
+from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts, text_of
 from palpate.report.look.columns import packed, thinned
 from palpate.report.numbers import plain, quantity
 from palpate.report.page import embedded, render
@@ -25,18 +24,18 @@ from palpate.report.run.table import force_rows, thesis_table
 from palpate.report.run.words import alerts, motors, sentence
 from palpate.report.svg import svg
 from palpate.robots.arm3 import Arm3
-from palpate.text import shown
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-Array = NDArray[np.float64]
 
 ROWS = 4000
 """Of the record that lie in the page, the peaks of the measured force among them."""
 _FEWER = 1500
 """Of it in the pictures for a browser that runs no scripts."""
 _PARAMETERS = ("K", "B", "M")
+_PACKAGE = "palpate.report.run"
 _STILL = ("force", "identification")
 
 
@@ -67,13 +66,12 @@ def run_page(record: Record, content: Content) -> str:
     summary = content.summary
     contact = summary["force"] is not None
     worth = len(record) > 2
-    codes = "palpate.report.run"
     return render(
         "run.html",
-        codes,
+        _PACKAGE,
         room="run",
-        title=shown(content.title),
-        about=shown(content.about),
+        title=printable(content.title),
+        about=printable(content.about),
         sentence=sentence(summary),
         alerts=alerts(summary),
         cards=_cards(content),
@@ -85,17 +83,12 @@ def run_page(record: Record, content: Content) -> str:
         source=content.source,
         charts=data(_charts(record, summary)) if worth else "",
         pictures=list(_pictures(record)) if worth else [],
-        scripts=(*scripts(*CHARTS, *ARM, *TABLES), _script()) if worth else scripts(*TABLES),
+        scripts=(*scripts(*CHARTS, *ARM, *TABLES), text_of("run.js", _PACKAGE))
+        if worth
+        else scripts(*TABLES),
         command=summary["command"],
         origin=[("seed", str(summary["seed"])), ("record.parquet", f"sha256 {content.sha256}")],
-        made=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-
-
-def _script() -> str:
-    from importlib import resources
-
-    return (resources.files("palpate.report.run") / "run.js").read_text(encoding="utf-8")
 
 
 def _cards(content: Content) -> list[dict[str, str]]:
@@ -104,7 +97,7 @@ def _cards(content: Content) -> list[dict[str, str]]:
         return []
     lost, end = summary["contacts_lost"], summary["end"]
     kept = not lost and end not in {"lost contact", "diverged"}
-    why = f"from {summary['contact_at_s']:.2f} s on" if kept else shown(summary["why"])
+    why = f"from {summary['contact_at_s']:.2f} s on" if kept else printable(summary["why"])
     cards = [_card("Contact", "kept" if kept else "lost", why=why, tone="ok" if kept else "fail", verdict="")]
     never = "of a changing force there is none" if f["overshoot_N"] is None else "not within the run"
     settled = None if f["settling_s"] is None else plain(f["settling_s"], 3)
@@ -145,7 +138,7 @@ def _stiffness(content: Content) -> dict[str, str]:
         number["text"] if known else "",
         number["unit"],
         half=number["half"],
-        why=shown(own.reason),
+        why=printable(own.reason),
         colour="K wide",
         tone=TONES[own.verdict],
         verdict=str(own.verdict),
@@ -154,7 +147,7 @@ def _stiffness(content: Content) -> dict[str, str]:
 
 def _identified_by(content: Content) -> str:
     if content.found is None:
-        return f"palpate identify says nothing of this record: {shown(content.why)}."
+        return f"palpate identify says nothing of this record: {printable(content.why)}."
     return (
         f"By palpate identify of record.parquet, as the model {content.found.model}; on the bench the truth is known. "
         "The charts are of an estimator on line, which assumes a spring, a damper and a mass."
@@ -174,7 +167,7 @@ def _surface(content: Content) -> list[dict[str, str]]:
             off = "inside the interval" if p.ci95[0] <= known <= p.ci95[1] else "outside the interval"
         rows.append(
             {
-                "name": shown(name),
+                "name": printable(name),
                 "called": CALLED.get(name, ""),
                 "colour": name if name in _PARAMETERS else "other",
                 "tone": TONES[p.verdict],
@@ -290,6 +283,6 @@ def _marks(t: Array, phase: Array) -> list[dict[str, Any]]:
     return found
 
 
-def _stretches(t: Array, inside: NDArray[np.bool_]) -> list[list[float]]:
+def _stretches(t: Array, inside: Mask) -> list[list[float]]:
     edges = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
     return [[float(t[a]), float(t[b - 1])] for a, b in zip(edges[::2], edges[1::2], strict=True)][:40]

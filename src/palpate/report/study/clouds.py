@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.report import style
-from palpate.report.study.axes import COLORS, Array, Scale, bounded, grid
+from palpate.report.study.axes import COLORS, Scale, bounded, grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

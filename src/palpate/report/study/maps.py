@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.report import style
 from palpate.report.look.tokens import MAPS, OUTCOMES
-from palpate.report.study.axes import Array, Scale, decades, grid
+from palpate.report.study.axes import Scale, decades, grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +51,7 @@ class Heat:
     x: Scale
     y: Scale
     values: Array | NDArray[np.str_]
-    failed: NDArray[np.bool_]
+    failed: Mask
     bounds: Sequence[Bound] = ()
 
 

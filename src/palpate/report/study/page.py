@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from palpate.report.look.assets import CHARTS, TABLES, data, scripts
+from palpate.report.look.assets import CHARTS, TABLES, data, scripts, text_of
 from palpate.report.page import Table, captioned, render
 
 
@@ -46,7 +44,7 @@ class StudyPage:
 def study_page(of: StudyPage) -> str:
     """The page as HTML."""
     worth = bool(of.charts.get("figures") or of.charts.get("comparisons"))
-    own = (resources.files("palpate.report.study") / "study.js").read_text(encoding="utf-8")
+    own = text_of("study.js", "palpate.report.study")
     return render(
         "study.html",
         "palpate.report.study",
@@ -63,5 +61,4 @@ def study_page(of: StudyPage) -> str:
         study=of.study,
         origin=of.origin,
         scripts=(*scripts(*TABLES, *CHARTS), own) if worth else scripts(*TABLES),
-        made=datetime.now(UTC).isoformat(timespec="seconds"),
     )

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.report.look.columns import ABSENT
 from palpate.report.look.tokens import MAPS, OUTCOMES
-from palpate.report.study.axes import COLORS, Array, Scale, decades
+from palpate.report.study.axes import COLORS, Scale, decades
 from palpate.report.study.clouds import Cloud, Points, middles
 from palpate.report.study.lines import Curve, Line
 from palpate.report.study.maps import Heat

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed
 from palpate.bench.metrics.window import rms
 from palpate.records import Record
@@ -19,7 +19,6 @@ from palpate.thesis.force_control.tracking import (
     FOAM,
     RUBBER,
     SINE,
-    Slot,
     Tracking,
     since_contact,
     slot,
@@ -67,8 +66,8 @@ OUTSIDE = ("random\nweights", "rate of\nthe listing", "clock\nruns on")
 class Pair:
     """An experiment under both controllers."""
 
-    network: Slot
-    pi: Slot
+    network: Record
+    pi: Record
     network_found: list[Tracking]
     pi_found: list[Tracking]
     ratios: dict[str, list[float]]  # RMS of the network over that of the PI, by variation
@@ -80,7 +79,7 @@ class Data:
     """What `check` and `plot` need."""
 
     pairs: dict[str, Pair]
-    gains: dict[str, NDArray[np.float64]]  # by surface: (rates, seeds) [1/s]
+    gains: dict[str, Array]  # by surface: (rates, seeds) [1/s]
 
 
 def run(runs: Runs) -> Data:
@@ -162,10 +161,15 @@ def plot(data: Data) -> Figure:
 
 def _overlay(axis: Axes, name: str, pair: Pair) -> None:
     axis.plot(
-        pair.network.t, pair.network.true, color=style.SERIES[1], linewidth=3.2, alpha=0.5, label="network"
+        pair.network["t"],
+        pair.network["force"],
+        color=style.SERIES[1],
+        linewidth=3.2,
+        alpha=0.5,
+        label="network",
     )
-    axis.plot(pair.pi.t, pair.pi.true, color=style.SERIES[0], linewidth=1.0, label="PI")
-    axis.plot(pair.pi.t, pair.pi.desired, **style.KNOWN, label="desired")
+    axis.plot(pair.pi["t"], pair.pi["force"], color=style.SERIES[0], linewidth=1.0, label="PI")
+    axis.plot(pair.pi["t"], pair.pi["force_desired"], **style.KNOWN, label="desired")
     limits(axis, pair.network)
     axis.set_title(
         f"{name}: {_median(pair.network_found):.2f} and {_median(pair.pi_found):.2f} N",
@@ -175,7 +179,7 @@ def _overlay(axis: Axes, name: str, pair: Pair) -> None:
     axis.set(ylabel="force [N]", xlim=JUDGED)
 
 
-def _gain_panel(axis: Axes, gains: Mapping[str, NDArray[np.float64]]) -> None:
+def _gain_panel(axis: Axes, gains: Mapping[str, Array]) -> None:
     axis.plot(
         RATES,
         np.array(RATES) * (AMPLITUDE / 2) ** 2 / TICK,
@@ -239,7 +243,7 @@ def _pair(runs: Runs, experiment: Experiment) -> Pair:
 def _held(runs: Runs, experiment: Experiment) -> float:
     """RMS error of the first seed when the network's weights from the torques are held at zero [N]."""
     zero = hold(TORQUES)
-    errors: list[NDArray[np.float64]] = []
+    errors: list[Array] = []
 
     def look(one: Look) -> None:
         zero(one)
@@ -250,7 +254,7 @@ def _held(runs: Runs, experiment: Experiment) -> float:
     return rms(np.concatenate(errors)) if errors else float("nan")
 
 
-def _gains(runs: Runs, experiment: Experiment) -> NDArray[np.float64]:
+def _gains(runs: Runs, experiment: Experiment) -> Array:
     by_rate = [changed(experiment, {"controller.learning_rate": rate, "run.press": FITTED}) for rate in RATES]
     return np.array([runs.over_seeds(e, _gain) for e in by_rate])
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed
 from palpate.thesis.claims import Claim, decided
 from palpate.thesis.conditions import RELAXING_FOAM, moved, rougher
 from palpate.thesis.explanations.e2_integrator import PI
 from palpate.thesis.force_control.divergence_panels import (
     DURATION,
-    Array,
     Course,
     Loss,
     causes_panel,
@@ -150,7 +150,7 @@ def check(data: Data) -> Sequence[Claim]:
                 "and rubber with 480 N s/m take up what the network's answer feeds in, while the relaxing "
                 "foam, with 13 N s/m and little more from its slow branch, does not; give it 200 N s/m and "
                 "it holds. What real styrofoam has decides whether the thesis' controller was on its way to "
-                f"losing it. Times of loss on the relaxing foam: {_told_causes(data.causes)}."
+                f"losing it. Times of loss on the relaxing foam: {_times_by_cause(data.causes)}."
             ),
         ),
     ]
@@ -239,7 +239,7 @@ def _range(times: Sequence[float | None]) -> str:
     return text if len(lost) == len(times) else f"{text} (in {len(lost)} of {len(times)} runs)"
 
 
-def _told_causes(causes: Mapping[str, Sequence[float | None]]) -> str:
+def _times_by_cause(causes: Mapping[str, Sequence[float | None]]) -> str:
     return ", ".join(f"{name} {_range(times)}" for name, times in causes.items())
 
 

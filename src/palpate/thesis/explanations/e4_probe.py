@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.thesis.claims import Claim, decided, often, spread
-from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.neural_identifier import ablation as causes
 from palpate.thesis.neural_identifier import network, panels
 from palpate.thesis.neural_identifier.ablation import PARAMETERS, STRAIGHT, Data, Surface
@@ -53,7 +53,7 @@ def _stiffness(data: Data) -> Claim:
         claim="With thresholds that learn, K by probing is 1.3 to 2.3 times f/x.",
         thesis="0.985 (foam), 0.90 (rubber)",
         measured="; ".join(
-            f"{name} {_told([a.over for a in s.nominal], 'times f/x')}" for name, s in data.items()
+            f"{name} {_spread([a.over for a in s.nominal], 'times f/x')}" for name, s in data.items()
         ),
         tolerance="9 of 10 runs between 1.3 and 2.3 times f/x on each surface",
         verdict=decided(all(often(i) for i in inside.values())),
@@ -225,7 +225,7 @@ def _percent(surface: Surface) -> str:
     return "over 99 %" if part > 0.99 else f"{100 * part:.0f} %"
 
 
-def _told(values: Sequence[float], unit: str) -> str:
+def _spread(values: Sequence[float], unit: str) -> str:
     seeds = len(values) // len(causes.MANY_STARTS)
     return spread(values, unit).replace(
         f"{len(values)} seeds", f"{seeds} seeds x {len(causes.MANY_STARTS)} starts"

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
@@ -27,15 +26,13 @@ from palpate.thesis.conditions import (
 )
 from palpate.thesis.force_control.contact_loss import (
     Recovery,
-    Trace,
     drawn_back,
     found_again,
     loss_panel,
     regained,
-    trace_of,
 )
 from palpate.thesis.force_control.panels import across, dots_panel, panels
-from palpate.thesis.force_control.tracking import since_contact
+from palpate.thesis.force_control.tracking import since_contact, slot
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -60,8 +57,6 @@ PRINTED_BLEND = 0.002
 BLENDS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2)
 HALF, SHAKES = 0.5, 5.0
 """Largest share of the error that is left where compensation works; least ratio of shaking that is called a hammer."""
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -90,13 +85,13 @@ class Ratio:
 class Data:
     """What `check` and `plot` need."""
 
-    traces: dict[str, Trace]
+    traces: dict[str, Record]
     plain: list[Held]
     printed_blend: list[Held]
     sweep: list[list[Held]]  # over BLENDS
     varied: dict[str, list[Ratio]]
     regains: list[Recovery]
-    regain: Trace
+    regain: Record
 
 
 def run(runs: Runs) -> Data:
@@ -108,12 +103,12 @@ def run(runs: Runs) -> Data:
     swept = runs.over(cases, _held)
     sweep = [swept[i * len(few) : (i + 1) * len(few)] for i in range(len(BLENDS))]
     traces = {
-        "as printed: never acts": trace_of(runs.one(PLAIN)),
-        "blend 0.002 rad/s, acting": trace_of(runs.one(_blended(PARAMETERS, PRINTED_BLEND))),
-        "blend 0.05 rad/s": trace_of(runs.one(PARAMETERS)),
+        "as printed: never acts": slot(runs.one(PLAIN)),
+        "blend 0.002 rad/s, acting": slot(runs.one(_blended(PARAMETERS, PRINTED_BLEND))),
+        "blend 0.05 rad/s": slot(runs.one(PARAMETERS)),
     }
     regains = runs.map(lambda seed: regained(drawn_back(seed)), list(runs.seeds))
-    return Data(traces, plain, hammer, sweep, _ratios(runs), regains, trace_of(drawn_back(runs.seeds[0])))
+    return Data(traces, plain, hammer, sweep, _ratios(runs), regains, slot(drawn_back(runs.seeds[0])))
 
 
 def check(data: Data) -> Sequence[Claim]:
@@ -209,7 +204,7 @@ def plot(data: Data) -> Figure:
     drawing, grid = panels([2.3, 2.4, 1.9, 2.2], 2, 11.0)
     wide = [across(grid[i]) for i in (0, 2, 3)]
     for (name, one), color in zip(data.traces.items(), style.SERIES[:3], strict=True):
-        wide[0].plot(one.t, one.signal, color=color, linewidth=1.0, label=name)
+        wide[0].plot(one["t"], one["force"], color=color, linewidth=1.0, label=name)
     wide[0].axhline(20.0, **style.KNOWN)
     wide[0].set(
         xlabel="time since contact [s]",

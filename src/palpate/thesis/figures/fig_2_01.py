@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Vec3
+from palpate.arrays import Array, Mask
 from palpate.bench import changed, load
 from palpate.bench.metrics.summary import losses
 from palpate.controllers import RaibertCraig
@@ -27,7 +27,7 @@ from palpate.thesis.conditions import (
     stops_holding,
 )
 from palpate.thesis.force_control.panels import across, dots_panel, panels
-from palpate.thesis.force_control.tracking import since_contact
+from palpate.thesis.force_control.tracking import since_contact, slot
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -53,8 +53,6 @@ GROWS = 1.0
 """Growth that counts as unstable [1/s]."""
 XS, YS = np.linspace(0.10, 0.53, 65), np.linspace(-0.35, 0.35, 51)
 LAWS = ("without dynamics", "with dynamics")
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -86,20 +84,10 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Trace:
-    """What is drawn of a run, over the time since contact [s]."""
-
-    t: Array
-    force: Array
-    desired: Array
-    phi: Array  # [deg]
-
-
-@dataclass(frozen=True)
 class Data:
     """What `check` and `plot` need."""
 
-    traces: dict[str, Trace]
+    traces: dict[str, Record]
     varied: dict[str, list[Pair]]
     growth: Array  # of the original over the workspace, shape (y, x) [1/s]; NaN out of reach
     any_gain: Array  # the same with a tenth and ten times the gains: the least of the three
@@ -107,11 +95,12 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Both laws in each world; the original's growth at each posture."""
-    worlds = {name: changed(PARAMETERS, changes) for name, changes in _changes().items()}
+    surfaces = {"foam": {}, "rubber": RUBBER_SURFACE, "relaxing\nfoam": RELAXING_FOAM}
+    worlds = {n: changed(PARAMETERS, c) for n, c in {**surfaces, **friction_and_pose(PARAMETERS)}.items()}
     original = by_condition(runs, worlds, lambda e, s: _measured(runs.one(e, s)), {"foam"})
     dynamic = by_condition(runs, worlds, lambda e, s: _measured(runs.one(changed(e, DYNAMIC), s)), {"foam"})
     varied = {n: [Pair(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
-    traces = {LAWS[0]: _trace(runs.one(PARAMETERS)), LAWS[1]: _trace(runs.one(changed(PARAMETERS, DYNAMIC)))}
+    traces = {LAWS[0]: slot(runs.one(PARAMETERS)), LAWS[1]: slot(runs.one(changed(PARAMETERS, DYNAMIC)))}
     growth = _growth(1.0, np.ones((len(YS), len(XS)), dtype=bool))
     others = [_growth(gain, growth > GROWS) for gain in (0.1, 10.0)]
     return Data(traces, varied, growth, np.fmin.reduce([growth, *others]))
@@ -217,11 +206,12 @@ def plot(data: Data) -> Figure:
 
 def _over_time(axis: Axes, data: Data, name: str) -> None:
     for (law, trace), color in zip(data.traces.items(), style.SERIES[:2], strict=True):
-        axis.plot(trace.t, getattr(trace, name), color=color, linewidth=1.1, label=law)
+        values = np.degrees(trace["phi"]) if name == "phi" else trace[name]
+        axis.plot(trace["t"], values, color=color, linewidth=1.1, label=law)
     axis.set_xlim(0.0, PARAMETERS.run.press)
     if name == "force":
         first = next(iter(data.traces.values()))
-        axis.plot(first.t, first.desired, **style.KNOWN, label="desired")
+        axis.plot(first["t"], first["force_desired"], **style.KNOWN, label="desired")
         axis.set_ylabel("true force [N]")
         style.legend(axis)
     else:
@@ -245,16 +235,7 @@ def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
     axis.set_title("growth of the original", loc="left", fontsize=9.5)
 
 
-def _changes() -> dict[str, Mapping[str, Any]]:
-    return {
-        "foam": {},
-        "rubber": RUBBER_SURFACE,
-        "relaxing\nfoam": RELAXING_FOAM,
-        **friction_and_pose(PARAMETERS),
-    }
-
-
-def _growth(gain: float, where: NDArray[np.bool_]) -> Array:
+def _growth(gain: float, where: Mask) -> Array:
     """Of the original's position loop, its stiffness times `gain`, over YS and XS [1/s]; NaN elsewhere."""
     arm: Any = Arm3()
     into = Vec3(1.0, 0.0, 0.0)
@@ -286,11 +267,3 @@ def _measured(record: Record) -> Pressed:
         over.append(max(0.0, float(beyond.max())) / abs(desired - was))
         strays.append(float(np.abs(phi[after] - phi[before].mean()).max()))
     return Pressed(float(np.mean(over)), float(np.degrees(np.mean(strays))), losses(record))
-
-
-def _trace(record: Record) -> Trace:
-    t = since_contact(record)
-    shown = t >= 0.0
-    return Trace(
-        t[shown], record["force"][shown], record["force_desired"][shown], np.degrees(record["phi"][shown])
-    )

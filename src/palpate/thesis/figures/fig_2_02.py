@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
@@ -23,13 +22,13 @@ from palpate.thesis.conditions import (
     RUBBER_SURFACE,
     SHORT,
     by_condition,
-    moved,
+    friction_and_pose,
     rougher,
     stops_holding,
 )
 from palpate.thesis.force_control.disturbances import Change, Disturbance, run_with
 from palpate.thesis.force_control.panels import dots_panel, panels
-from palpate.thesis.force_control.tracking import since_contact
+from palpate.thesis.force_control.tracking import since_contact, slot
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -54,8 +53,6 @@ TOLERANCES = {"K": 0.10, "B": 0.25, "M": 0.25}
 TARGET = {"K": 2000.0, "B": 600.0, "M": 5.0}
 """In x; the same numbers as in PARAMETERS [N/m, N s/m, kg]."""
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Found:
@@ -72,29 +69,11 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Trace:
-    """A force [N] over the time since contact [s]."""
-
-    t: Array
-    force: Array
-
-
-@dataclass(frozen=True)
 class Data:
     """What `check` and `plot` need."""
 
-    traces: dict[str, Trace]
+    traces: dict[str, Record]
     varied: dict[str, list[Found]]
-
-    @property
-    def foam(self) -> list[Found]:
-        """The runs on foam, as chosen."""
-        return self.varied["foam"]
-
-    @property
-    def rubber(self) -> list[Found]:
-        """The runs on rubber."""
-        return self.varied["rubber"]
 
 
 def run(runs: Runs) -> Data:
@@ -103,8 +82,8 @@ def run(runs: Runs) -> Data:
     varied = by_condition(runs, worlds, lambda e, s: _found(_record(e, s)), _ALL)
     rough, free = (_record(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
     traces = {
-        "with friction": _trace(rough),
-        "hardly any friction": _trace(free),
+        "with friction": slot(rough),
+        "hardly any friction": slot(free),
         "target impedance": _ideal(),
     }
     return Data(traces, varied)
@@ -112,10 +91,7 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[Claim]:
     """Spring, damper and mass, each by itself, on foam and rubber."""
-    return [
-        _claim(data, *pair)
-        for pair in (("impedance-holds.K", "K"), ("impedance-holds.B", "B"), ("impedance-holds.M", "M"))
-    ]
+    return [_claim(data, name) for name in TARGET]
 
 
 _WORDS = {"K": "spring", "B": "damper", "M": "mass"}
@@ -138,22 +114,23 @@ _WHY = {
 }
 
 
-def _claim(data: Data, claim: str, name: str) -> Claim:
+def _claim(data: Data, name: str) -> Claim:
+    foam, rubber = (data.varied[surface] for surface in _ALL)
     free = [100 * getattr(f, name) for f in data.varied["hardly any\nfriction"]]
     return Claim(
-        id=claim,
+        id=f"impedance-holds.{name}",
         source="eq. 2.1-2.3, fig. 2.2 (after Hogan)",
         claim=f"Impedance control holds the {_WORDS[name]} of the target impedance.",
         thesis="force and displacement are made to obey (2.2)",
         measured=(
-            f"of the target: foam {spread([100 * getattr(f, name) for f in data.foam], '%', 3)}, rubber "
-            f"{spread([100 * getattr(f, name) for f in data.rubber], '%', 3)}; with hardly any friction "
+            f"of the target: foam {spread([100 * getattr(f, name) for f in foam], '%', 3)}, rubber "
+            f"{spread([100 * getattr(f, name) for f in rubber], '%', 3)}; with hardly any friction "
             f"{spread(free, '%', 3)}"
         ),
         tolerance=(
             f"in 9 of 10 runs on each surface: contact kept, and within {TOLERANCES[name]:.0%} of the target"
         ),
-        verdict=decided(all(often(f.within(name) for f in found) for found in (data.foam, data.rubber))),
+        verdict=decided(all(often(f.within(name) for f in found) for found in (foam, rubber))),
         note=(
             "The thesis only cites impedance control; it reports no experiment with it, and the target's "
             f"numbers are ours. {_WHY[name]} {stops_holding(data.varied, lambda f: f.within(name))}"
@@ -166,7 +143,7 @@ def plot(data: Data) -> Figure:
     drawing, grid = panels([2.6, 1.8, 1.8, 1.8])
     colors = style.SERIES[:3]
     for (name, one), color in zip(data.traces.items(), colors, strict=True):
-        grid[0][0].plot(one.t, one.force, color=color, linewidth=1.2, label=name)
+        grid[0][0].plot(one["t"], one["force"], color=color, linewidth=1.2, label=name)
     grid[0][0].set(xlabel="time since contact [s]", ylabel="force [N]", xlim=(0.0, len(DEPTHS)))
     style.legend(grid[0][0])
     for name, (axis,) in zip(("K", "B", "M"), grid[1:], strict=True):
@@ -199,10 +176,7 @@ def _worlds() -> dict[str, Experiment]:
         "foam": PARAMETERS,
         "rubber": changed(PARAMETERS, RUBBER_SURFACE),
         "hardly any\nfriction": changed(PARAMETERS, FREE),
-        "friction\nhalf": changed(PARAMETERS, rougher(PARAMETERS, 0.5)),
-        "friction\ndouble": changed(PARAMETERS, rougher(PARAMETERS, 2.0)),
-        "wall at\n0.40 m": changed(PARAMETERS, moved(PARAMETERS, 0.40)),
-        "wall at\n0.49 m": changed(PARAMETERS, moved(PARAMETERS, 0.49)),
+        **{name: changed(PARAMETERS, by) for name, by in friction_and_pose(PARAMETERS).items()},
         "relaxing\nfoam": changed(PARAMETERS, RELAXING_FOAM),
     }
 
@@ -245,13 +219,7 @@ def _found(record: Record) -> Found:
     return Found(K / TARGET["K"], B / TARGET["B"], M / TARGET["M"], 0)
 
 
-def _trace(record: Record) -> Trace:
-    t = since_contact(record)
-    shown = t >= 0.0
-    return Trace(t[shown], record["force"][shown])
-
-
-def _ideal() -> Trace:
+def _ideal() -> Record:
     """The target impedance itself on the foam, from rest at the first depth."""
     from scipy.signal import StateSpace, lsim
 
@@ -260,7 +228,7 @@ def _ideal() -> Trace:
     A, G = [[0.0, 1.0], [-k / m, -b / m]], [[0.0], [TARGET["K"] / m]]
     force = [s.stiffness - s.mass * k / m, s.damping - s.mass * b / m]  # of the surface, its mass included
     system = StateSpace(A, G, [force], [[s.mass * TARGET["K"] / m]])
-    t = np.arange(len(DEPTHS) * 1000) * 1e-3
+    t = 1e-3 * np.arange(len(DEPTHS) * 1000, dtype=np.float64)
     depth = np.repeat(DEPTHS, 1000)
     _, out, _ = lsim(system, depth, t, X0=[TARGET["K"] * DEPTHS[0] / k, 0.0], interp=False)
-    return Trace(t.astype(np.float64), np.asarray(out, dtype=np.float64))
+    return Record({"t": t, "force": np.asarray(out)}, {"t": "s", "force": "N"})

@@ -8,11 +8,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.metrics.following import LIMIT, SHARE
 from palpate.bench.metrics.window import SETTLE, rms
-from palpate.bench.one_joint import JOINT_FRICTION, one_joint
+from palpate.bench.one_joint import JOINT_FRICTION, Link, one_joint
 from palpate.controllers.direct_neural import DirectIntegral, DirectNeural, direct_neural
 from palpate.environments import KelvinVoigt, StandardLinearSolid
 from palpate.friction import LuGre
@@ -77,8 +77,6 @@ FOLLOWS = (
     f"most {LIMIT:g} N outside the first {SETTLE:g} s after each step, mean error in the last second of each "
     f"interval at most {SHARE:.0%}"
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -253,20 +251,16 @@ def _network(world: World, rate: float, seed: int) -> DirectNeural:
 
 
 def _neural(world: World, rate: float, seed: int) -> Pressed:
-    bench = one_joint(
-        world.surface, _network(world, rate, seed), _schedule(), friction=world.friction, noise=world.noise
-    )
+    link = Link(world.friction)
+    bench = one_joint(world.surface, _network(world, rate, seed), _schedule(), link=link, noise=world.noise)
     return _measured(bench.run(DURATION, seed), bench.loop.joint.lever)
 
 
 def _integral(world: World, case: tuple[Pressed, int]) -> Pressed:
-    network, seed = case
-    lever = 0.113
-    controller = DirectIntegral(network.gain * 1e-3 * lever)
-    bench = one_joint(
-        world.surface, controller, _schedule(), friction=world.friction, noise=world.noise, lever=lever
-    )
-    return _measured(bench.run(DURATION, seed), lever)
+    (network, seed), link = case, Link(world.friction)
+    controller = DirectIntegral(network.gain * 1e-3 * link.lever)
+    bench = one_joint(world.surface, controller, _schedule(), link=link, noise=world.noise)
+    return _measured(bench.run(DURATION, seed), link.lever)
 
 
 def _measured(record: Record, lever: float) -> Pressed:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.following import LIMIT
@@ -28,11 +27,9 @@ from palpate.thesis.force_control.disturbances import Disturbance, other_surface
 from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
 from palpate.thesis.force_control.tracking import (
     FOLLOWS,
-    Slot,
     Tracking,
     described,
     following,
-    since_contact,
     slot,
     tracking,
 )
@@ -62,7 +59,6 @@ FIXED = {"controller.learning_rate": 1e-12}
 BETTER = 0.9
 """Largest share of the untaught loop's error that counts as better."""
 
-Array = NDArray[np.float64]
 Case = tuple[Experiment, int]
 
 
@@ -70,8 +66,7 @@ Case = tuple[Experiment, int]
 class Data:
     """What `check` and `plot` need."""
 
-    shown: Slot
-    gains: Array  # kf, ki, kd over their middle values, shape (n, 3)
+    shown: Record
     tuned: dict[str, list[Tracking]]
     fixed: dict[str, list[Tracking]]
     turned: list[Tracking]
@@ -85,13 +80,7 @@ def run(runs: Runs) -> Data:
     tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
     fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
     turned = runs.map(lambda seed: measure(_turned(seed)), list(runs.seeds))
-    record = _turned(runs.seeds[0])
-    t = since_contact(record)
-    inside = (t >= SHOWN[0]) & (t < SHOWN[1])
-    c = PARAMETERS.controller
-    middle = np.array([c.kf, c.ki, c.kd])
-    gains = np.column_stack([record[f"adapted{i}"] for i in (1, 2, 3)])[inside] / middle
-    return Data(slot(record, *SHOWN), gains, tuned, fixed, turned)
+    return Data(slot(_turned(runs.seeds[0]), *SHOWN), tuned, fixed, turned)
 
 
 def check(data: Data) -> Sequence[Claim]:
@@ -106,7 +95,7 @@ def _environment(data: Data) -> Claim:
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the environment's dynamics.",
         thesis="robust, by their simulations and experiments",
-        measured=f"foam turned into rubber: {described(data.turned)}; {_told(found)}",
+        measured=f"foam turned into rubber: {described(data.turned)}; {_how_many_follow(found)}",
         tolerance=f"on foam, on rubber and after foam turned into rubber, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(following(f) for f in found.values())),
         note=(
@@ -127,7 +116,7 @@ def _configuration(data: Data) -> Claim:
         source="fig. 2.5, sec. 2.2 (after Fukuda et al.)",
         claim="A controller whose gains a network tunes is robust to a change of the arm's configuration.",
         thesis="robust, by their simulations and experiments",
-        measured=_told(found),
+        measured=_how_many_follow(found),
         tolerance=f"with the wall at 0.40, 0.465 and 0.49 m on foam, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(following(f) for f in found.values())),
         note=(
@@ -167,10 +156,12 @@ def plot(data: Data) -> Figure:
     """The turn, the gains, and the runs."""
     drawing, ((force,), (gains,), (dots,)) = panels([2.8, 1.8, 2.2])
     force_panel(force, data.shown)
-    for i, (name, color) in enumerate(
-        (("K_fp", style.SERIES[0]), ("K_fi", style.SERIES[1]), ("K_fd", style.OK))
-    ):
-        gains.plot(data.shown.t, data.gains[:, i], color=color, linewidth=1.2, label=name)
+    c = PARAMETERS.controller
+    names, colors = ("K_fp", "K_fi", "K_fd"), (*style.SERIES[:2], style.OK)
+    for i, (name, middle, color) in enumerate(zip(names, (c.kf, c.ki, c.kd), colors, strict=True), start=1):
+        gains.plot(
+            data.shown["t"], data.shown[f"adapted{i}"] / middle, color=color, linewidth=1.2, label=name
+        )
     gains.set(xlabel="time since contact [s]", ylabel="gain over middle", xlim=SHOWN, ylim=(0.0, 2.0))
     style.legend(gains)
     for axis in (force, gains):
@@ -229,7 +220,7 @@ def _name(name: str) -> str:
     return name.replace("\n", " ")
 
 
-def _told(found: Mapping[str, Sequence[Tracking]]) -> str:
+def _how_many_follow(found: Mapping[str, Sequence[Tracking]]) -> str:
     return "; ".join(f"{_name(n)} {sum(f.follows for f in v)} of {len(v)} follow" for n, v in found.items())
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.sequence import CONTACT
 from palpate.instruments import analog_filter_190
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 NUMBER = "3.5"
 TITLE = "Spectra of the force signal, with and without the 190 Hz filter"
@@ -179,11 +178,7 @@ def _peak(data: Data, line: str) -> tuple[float, float]:
 
 def plot(data: Data) -> Figure:
     """Both spectra, and the tones."""
-    drawing, _ = style.figure(1, height=3.6)
-    drawing.clear()
-    left, right = drawing.subplots(1, 2, width_ratios=(1.6, 1.0))
-    for axis in (left, right):
-        style.plain(axis)
+    drawing, (left, right) = style.grid((9.0, 4.1), 1, 2, width_ratios=(1.6, 1.0))
     _spectra(left, data)
     _folded(right, data)
     return drawing

@@ -8,8 +8,8 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided
 from palpate.thesis.runs import Runs
@@ -17,7 +17,6 @@ from palpate.thesis.runs import Runs
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 NUMBER = "3.7"
 TITLE = "Gain of the 190 Hz low-pass"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import changed, load
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 NUMBER = "4.2"
 TITLE = "From position control to hybrid control"
@@ -167,11 +166,7 @@ def _threshold(data: Data) -> Claim:
 
 def plot(data: Data) -> Figure:
     """The force around the switch; below, the thresholds."""
-    drawing, _ = style.figure(1, height=5.4)
-    drawing.clear()
-    upper, lower = drawing.subplots(2, 1, height_ratios=(1.5, 1.0))
-    for axis in (upper, lower):
-        style.plain(axis)
+    drawing, (upper, lower) = style.grid((9.0, 5.9), 2, height_ratios=(1.5, 1.0))
     _force(upper, data)
     _thresholds(lower, data)
     return drawing

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.summary import losses
 from palpate.records import Record
@@ -53,7 +53,6 @@ KFS, KIS = np.linspace(0.1, 2.0, 15), np.linspace(0.0, 0.006, 11)
 SURFACES = {"foam": (200.0, 5.2e3), "rubber": (480.0, 34.5e3)}
 """As chosen for the bench: damping [N s/m], stiffness [N/m]."""
 
-Array = NDArray[np.float64]
 Case = tuple[float, float]
 
 
@@ -161,8 +160,8 @@ def _slow(data: Data) -> Claim:
         claim="A low-pass with a low cut-off makes the system unstable by its lag.",
         thesis="the lag of a low cut-off destabilises the loop",
         measured=(
-            f"limit with the foam's gains {_told(slow[0])} at 10 Hz, {_told(fast[0])} at 120 Hz; with the rubber's "
-            f"gains {_told(slow[1])} and {_told(fast[1])}"
+            f"limit with the foam's gains {_text(slow[0])} at 10 Hz, {_text(fast[0])} at 120 Hz; with the rubber's "
+            f"gains {_text(slow[1])} and {_text(fast[1])}"
         ),
         tolerance=(
             "with both sets of gains the limit at 10 Hz is at most half of that at 120 Hz (damping 200 N s/m)"
@@ -243,7 +242,7 @@ def _at(data: Data, cutoff: float) -> list[float]:
     ]
 
 
-def _told(limit: float) -> str:
+def _text(limit: float) -> str:
     return f"{limit / 1e3:.3g} kN/m" if np.isfinite(limit) else "none below 3 MN/m"
 
 

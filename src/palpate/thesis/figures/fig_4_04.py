@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import changed, load
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
@@ -34,9 +34,9 @@ STEADY = 2.0
 class Data:
     """Steady force, and its noise over the seeds."""
 
-    t: NDArray[np.float64]
-    sampled: NDArray[np.float64]
-    filtered: NDArray[np.float64]
+    t: Array
+    sampled: Array
+    filtered: Array
     half_range: list[float]  # of the sampled noise, one a seed [N]
     filtered_half_range: list[float]
 
@@ -81,7 +81,7 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def _steady(record: Record) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _steady(record: Record) -> tuple[Array, Array, Array]:
     t = record["t"]
     last = (record["phase"] == CONTACT) & (t > t[-1] - STEADY)
     return t[last], record["force_sampled"][last], record["force_measured"][last]

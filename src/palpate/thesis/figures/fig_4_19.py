@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
@@ -34,7 +34,7 @@ from palpate.thesis.force_control.decoupling import (
     pressed,
 )
 from palpate.thesis.force_control.panels import across, dots_panel, panels
-from palpate.thesis.force_control.tracking import since_contact
+from palpate.thesis.force_control.tracking import slot
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -57,26 +57,16 @@ FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
 HALF = 0.5
 """Largest share of what the coupled law lets through."""
 
+SIGNALS = {"force": 1.0, "y": 1e3, "phi": float(np.degrees(1.0))}
+"""What is drawn, and its factor to N, mm and degrees."""
 LAWS = ("(4.13), coupled", "(4.19) corrected", "(4.19) as printed")
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Trace:
-    """What is drawn of a run, over the time since contact [s]."""
-
-    t: Array
-    force: Array
-    desired: Array
-    y: Array  # [mm]
-    phi: Array  # [deg]
 
 
 @dataclass(frozen=True)
 class Data:
     """What `check` and `plot` need."""
 
-    traces: list[dict[str, Trace]]  # as chosen, and with hardly any friction
+    traces: list[dict[str, Record]]  # as chosen, and with hardly any friction
     nominal: list[Pair]
     printed: list[Pair]
     varied: dict[str, list[Pair]]
@@ -239,7 +229,7 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def _column(axes: Sequence[Axes], traces: Mapping[str, Trace]) -> None:
+def _column(axes: Sequence[Axes], traces: Mapping[str, Record]) -> None:
     colors = dict(zip(LAWS, style.SERIES[:3], strict=True))
     for name in reversed(LAWS):
         one, pale = traces[name], name == LAWS[2]
@@ -248,13 +238,12 @@ def _column(axes: Sequence[Axes], traces: Mapping[str, Trace]) -> None:
             "linewidth": 0.7 if pale else 1.1,
             "alpha": 0.35 if pale else 1.0,
         }
-        for axis, signal in zip(axes, (one.force, one.y, one.phi), strict=True):
-            axis.plot(one.t, signal, label=name, **options)
+        for axis, (signal, scale) in zip(axes, SIGNALS.items(), strict=True):
+            axis.plot(one["t"], scale * one[signal], label=name, **options)
     shown = traces[LAWS[0]]
-    axes[0].plot(shown.t, shown.desired, **style.KNOWN, label="desired")
-    quiet = [traces[name] for name in LAWS[:2]]
-    for axis, signals in zip(axes[1:], ([q.y for q in quiet], [q.phi for q in quiet]), strict=True):
-        axis.set_ylim(*_limits(signals))
+    axes[0].plot(shown["t"], shown["force_desired"], **style.KNOWN, label="desired")
+    for axis, signal in zip(axes[1:], ("y", "phi"), strict=True):
+        axis.set_ylim(*_limits([SIGNALS[signal] * traces[name][signal] for name in LAWS[:2]]))
     axes[0].set_ylim(0.0, 32.0)
     for axis in axes:
         axis.set_xlim(0.0, PARAMETERS.run.press)
@@ -301,14 +290,7 @@ def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
     return found
 
 
-def _traces(world: Experiment, seed: int, stiffness: float) -> dict[str, Trace]:
+def _traces(world: Experiment, seed: int, stiffness: float) -> dict[str, Record]:
     known = {"controller.stiffness": stiffness}
     experiments = (changed(world, COUPLED), changed(world, known), changed(world, {**known, **PRINTED}))
-    return {name: _trace(pressed(e, seed)) for name, e in zip(LAWS, experiments, strict=True)}
-
-
-def _trace(record: Record) -> Trace:
-    t = since_contact(record)
-    shown = t >= 0.0
-    signals = (record["force"], record["force_desired"], 1e3 * record["y"], np.degrees(record["phi"]))
-    return Trace(t[shown], *(signal[shown] for signal in signals))
+    return {name: slot(pressed(e, seed)) for name, e in zip(LAWS, experiments, strict=True)}

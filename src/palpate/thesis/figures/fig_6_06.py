@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, often, spread
 from palpate.thesis.least_squares import panels
-from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.neural_identifier import network
 from palpate.thesis.neural_identifier.network import Answer, Press
 from palpate.thesis.runs import Runs

@@ -12,9 +12,9 @@ from palpate.bench import changed
 from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
 from palpate.thesis.claims import Claim, decided, often, spread
-from palpate.thesis.conditions import VARIED_SEEDS, stops_holding
+from palpate.thesis.conditions import stops_holding
 from palpate.thesis.force_control.panels import dots_panel, force_panel, panels
-from palpate.thesis.force_control.tracking import FOAM, RUBBER, Slot, since_contact, slot, variations
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, robustness, since_contact, slot
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Ends:
 class Data:
     """What `check` and `plot` need."""
 
-    shown: Slot
+    shown: Record
     nominal: list[Ends]
     varied: dict[str, list[Ends]]
     rubber: list[Ends]
@@ -53,11 +53,7 @@ class Data:
 def run(runs: Runs) -> Data:
     """Fifteen seconds of contact; the same on rubber and under the variations."""
     nominal = runs.over_seeds(PARAMETERS, ends_of)
-    seeds = runs.seeds[:VARIED_SEEDS]
-    cases = [(name, e, seed) for seed in seeds for name, e in variations(PARAMETERS, seed).items()]
-    varied: dict[str, list[Ends]] = {"as\nchosen": nominal}
-    for (name, _, _), ends in zip(cases, runs.over([(e, s) for _, e, s in cases], ends_of), strict=True):
-        varied.setdefault(name, []).append(ends)
+    varied = robustness(runs, PARAMETERS, nominal, ends_of)
     rubber = changed(RUBBER, {**HYBRID, "run.press": 15.0})
     varied["rubber"] = runs.over_seeds(rubber, ends_of)
     return Data(slot(runs.one(PARAMETERS), *SHOWN), nominal, varied, varied["rubber"])

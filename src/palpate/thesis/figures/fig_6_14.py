@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import changed
 from palpate.bench.metrics.following import LIMIT
 from palpate.bench.metrics.window import SETTLE, rms
@@ -22,7 +22,6 @@ from palpate.thesis.force_control.panels import force_panel, panels
 from palpate.thesis.force_control.tracking import (
     FOAM,
     FOLLOWS,
-    Slot,
     Tracking,
     described,
     following,
@@ -56,7 +55,7 @@ OTHERS: Mapping[str, Mapping[str, Any]] = {
 class Course:
     """The error of each cycle outside the steps [N], up to the first loss of contact."""
 
-    error: NDArray[np.float64]  # (cycles,)
+    error: Array  # (cycles,)
     lost: float | None  # when [s]
 
 
@@ -64,7 +63,7 @@ class Course:
 class Data:
     """What `check` and `plot` need."""
 
-    shown: Slot
+    shown: Record
     nominal: list[Tracking]
     courses: dict[str, list[Course]]
 

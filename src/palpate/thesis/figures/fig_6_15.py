@@ -15,7 +15,7 @@ from palpate.report import style
 from palpate.thesis.claims import Claim, decided, often, spread
 from palpate.thesis.conditions import VARIED_SEEDS, rougher
 from palpate.thesis.force_control.panels import dots_panel, panels
-from palpate.thesis.force_control.tracking import FOAM, RUBBER, Slot, since_contact, slot
+from palpate.thesis.force_control.tracking import FOAM, RUBBER, since_contact, slot
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Errors:
 class Data:
     """What `check` and `plot` need."""
 
-    shown: Slot
+    shown: Record
     varied: dict[str, list[Errors]]  # by cause; the first as chosen
 
 
@@ -154,12 +154,13 @@ def _sticks(data: Data) -> Claim:
 def plot(data: Data) -> Figure:
     """The four signals of the thesis' figure, and the causes."""
     drawing, ((desired,), (force,), (y,), (phi,), (dots,)) = panels([0.9, 1.3, 1.0, 1.0, 1.7])
-    t = data.shown.t
-    _signal(desired, t, data.shown.desired, "(a) desired\nforce [N]", style.INK)
-    _signal(force, t, data.shown.measured, "(b) measured\nforce [N]", style.MEASURED)
-    force.plot(t, data.shown.true, color=style.F, linewidth=1.6, label="true")
-    _signal(y, t, 1e3 * data.shown.y, "(c) y error\n[mm]", style.SERIES[0])
-    _signal(phi, t, np.degrees(data.shown.phi), "(d) angle\nerror [degrees]", style.SERIES[0])
+    shown = data.shown
+    t = shown["t"]
+    _signal(desired, t, shown["force_desired"], "(a) desired\nforce [N]", style.INK)
+    _signal(force, t, shown["force_measured"], "(b) measured\nforce [N]", style.MEASURED)
+    force.plot(t, shown["force"], color=style.F, linewidth=1.6, label="true")
+    _signal(y, t, 1e3 * shown["y_measured"], "(c) y error\n[mm]", style.SERIES[0])
+    _signal(phi, t, np.degrees(shown["phi_measured"]), "(d) angle\nerror [degrees]", style.SERIES[0])
     for axis in (y, phi):
         axis.axhline(0.0, **style.KNOWN)
     phi.set_xlabel("time since contact [s]")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import changed
 from palpate.bench.metrics.following import LIMIT
 from palpate.records import Record
@@ -52,8 +52,8 @@ class Data:
     """What `check` and `plot` need."""
 
     tracked: Tracked
-    t: NDArray[np.float64]
-    away: NDArray[np.float64]  # of the first seed: from the settled cycle, smoothed [N]
+    t: Array
+    away: Array  # of the first seed: from the settled cycle, smoothed [N]
     adapted: list[float]  # when the force has come to stay near it, one a seed [s]
 
 
@@ -128,19 +128,17 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def away_from_settled(record: Record) -> NDArray[np.float64]:
+def away_from_settled(record: Record) -> Array:
     """Smoothed distance of the force from the mean of the last two cycles, from contact on [N]."""
     force = record["force"][since_contact(record) >= 0.0]
     ticks = round(CYCLE * 1000)
     cycles = force[: len(force) // ticks * ticks].reshape(-1, ticks)
     away = (cycles - cycles[-2:].mean(axis=0)).ravel()
-    smoothed: NDArray[np.float64] = np.abs(
-        np.convolve(away, np.full(round(SMOOTHED * 1000), 1e-3 / SMOOTHED), "valid")
-    )
+    smoothed: Array = np.abs(np.convolve(away, np.full(round(SMOOTHED * 1000), 1e-3 / SMOOTHED), "valid"))
     return smoothed
 
 
-def adapted_at(away: NDArray[np.float64]) -> float:
+def adapted_at(away: Array) -> float:
     """When the distance has come below the limit for good [s]."""
     beyond = np.nonzero(away > LIMIT)[0]
     return SMOOTHED + (float(beyond[-1]) * 1e-3 if len(beyond) else 0.0)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.bench import changed, load
 from palpate.bench.metrics.following import SHARE
@@ -22,7 +21,6 @@ from palpate.thesis.force_control.tracking import since_contact
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 LOSS = changed(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
 GONE, BACK, FOUND = 2.5, 0.005, 10.0
@@ -44,15 +42,6 @@ class Recovery:
     def well(self) -> bool:
         """Whether it came back in time, and gently."""
         return self.times == 1 and self.took <= FOUND and self.off <= SHARE and self.peak <= PEAK
-
-
-@dataclass(frozen=True)
-class Trace:
-    """A force [N] and the phase over the time since contact [s]."""
-
-    t: Array
-    signal: Array
-    phase: Array
 
 
 def found_again(found: Sequence[Recovery]) -> Claim:
@@ -82,12 +71,12 @@ def found_again(found: Sequence[Recovery]) -> Claim:
     )
 
 
-def loss_panel(axis: Axes, one: Trace) -> None:
+def loss_panel(axis: Axes, one: Record) -> None:
     """The true force, and when there was no contact."""
-    axis.plot(one.t, one.signal, color=style.F, linewidth=1.1, label="true force")
-    away = (one.phase != CONTACT).astype(float)
+    axis.plot(one["t"], one["force"], color=style.F, linewidth=1.1, label="true force")
     shade: dict[str, Any] = {"transform": axis.get_xaxis_transform(), "color": style.GRID, "linewidth": 0}
-    axis.fill_between(one.t, 0.0, 1.0, where=away > 0, label="lost, waiting, looking", **shade)
+    lost = one["phase"] != CONTACT
+    axis.fill_between(one["t"], 0.0, 1.0, where=lost, label="lost, waiting, looking", **shade)
     axis.set(
         xlabel="time since contact [s]",
         ylabel="true force [N]",
@@ -115,10 +104,3 @@ def regained(record: Record) -> Recovery:
     late = (t >= back + AGAIN - 0.1) & (t < back + AGAIN + 0.1)
     off = abs(float(force[late].mean()) / 20.0 - 1.0) if late.any() else np.inf
     return Recovery(float(back - t[lost[0]]), off, float(force[lost[0] :].max()) / 20.0, len(lost))
-
-
-def trace_of(record: Record) -> Trace:
-    """The true force since contact."""
-    t = since_contact(record)
-    shown = t >= 0.0
-    return Trace(t[shown], record["force"][shown], record["phase"][shown])

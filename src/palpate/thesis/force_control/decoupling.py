@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Vec3
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed
 from palpate.bench.metrics.summary import losses
 from palpate.records import Record
 from palpate.thesis.force_control.disturbances import Disturbance, desired_pose, run_with
 from palpate.thesis.force_control.tracking import since_contact
-
-Array = NDArray[np.float64]
 
 COUPLED = {"controller": {"kind": "proportional-integral", "kf": 1.0, "ki": 3.0}}
 """(4.13) with the thesis' gains on foam: 0.003 per sample is 3 per second."""

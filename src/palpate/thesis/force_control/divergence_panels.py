@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.report import style
 from palpate.thesis.force_control.panels import legend_inside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 DURATION = 240.0
 """Seconds of contact that count as steady [s]."""
 PARTS = (

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.signals.filters import butterworth2
 
-Array = NDArray[np.float64]
 TICK = 1e-3
 """[s]"""
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from palpate.bench.metrics.following import LIMIT
+from palpate.records import Record
 from palpate.report import style
-from palpate.thesis.force_control.tracking import Slot, Tracked, Tracking
+from palpate.thesis.force_control.tracking import Tracked, Tracking
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,14 +24,9 @@ FAILED: dict[str, Any] = {"color": style.FAIL, "s": 20, "marker": "x", "linewidt
 
 def panels(heights: Sequence[float], columns: int = 1, width: float = 9.0) -> tuple[Figure, list[list[Axes]]]:
     """Rows of panels of these heights [inches], each with an x axis of its own."""
-    from matplotlib.figure import Figure
-
     size = (width, sum(heights) + 0.45 * len(heights))
-    drawing = Figure(figsize=size, dpi=style.DPI, layout="constrained")
-    grid = drawing.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
-    for axis in grid.flat:
-        style.plain(axis)
-    return drawing, [list(row) for row in grid]
+    drawing, axes = style.grid(size, len(heights), columns, height_ratios=heights)
+    return drawing, [axes[i : i + columns] for i in range(0, len(axes), columns)]
 
 
 def across(row: Sequence[Axes]) -> Axes:
@@ -44,30 +40,25 @@ def across(row: Sequence[Axes]) -> Axes:
     return axis
 
 
-def force_panel(axis: Axes, shown: Slot, title: str = "") -> None:
+def force_panel(axis: Axes, shown: Record, title: str = "") -> None:
     """Measured, true and desired force, and where a motor is at its limit."""
-    axis.plot(shown.t, shown.measured, color=style.MEASURED, linewidth=0.7, label="measured")
-    axis.plot(shown.t, shown.true, color=style.F, linewidth=1.6, label="true")
-    axis.plot(shown.t, shown.desired, **style.KNOWN, label="desired")
+    t = shown["t"]
+    axis.plot(t, shown["force_measured"], color=style.MEASURED, linewidth=0.7, label="measured")
+    axis.plot(t, shown["force"], color=style.F, linewidth=1.6, label="true")
+    axis.plot(t, shown["force_desired"], **style.KNOWN, label="desired")
     limits(axis, shown)
-    axis.set(ylabel="force [N]", xlabel="time since contact [s]", xlim=(shown.t[0], shown.t[-1]))
+    axis.set(ylabel="force [N]", xlabel="time since contact [s]", xlim=(t[0], t[-1]))
     axis.set_title(title, loc="left", fontsize=9.5)
     style.legend(axis)
 
 
-def limits(axis: Axes, shown: Slot) -> None:
+def limits(axis: Axes, shown: Record) -> None:
     """A bar at the lower edge where a motor is at its limit."""
-    if shown.limited.any():
-        axis.fill_between(
-            shown.t,
-            0.0,
-            0.035,
-            where=shown.limited > 0.0,
-            transform=axis.get_xaxis_transform(),
-            color=style.FAIL,
-            linewidth=0,
-            label="a motor at its limit",
-        )
+    limited = np.maximum.reduce([shown[f"saturated{i}"] for i in (1, 2, 3)]) > 0.0
+    if limited.any():
+        look: dict[str, Any] = {"color": style.FAIL, "linewidth": 0, "label": "a motor at its limit"}
+        transform = axis.get_xaxis_transform()
+        axis.fill_between(shown["t"], 0.0, 0.035, where=limited, transform=transform, **look)
 
 
 def dots_panel(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics import Look
 from palpate.bench.metrics.following import LIMIT, SHARE, interval_error
@@ -19,13 +20,14 @@ from palpate.thesis.claims import often, spread
 from palpate.thesis.conditions import RELAXING_FOAM, SHORT, VARIED_SEEDS, friction_and_pose
 from palpate.thesis.runs import Runs
 
+T = TypeVar("T")
+
 FOLLOWING = (
     f"no loss of contact; RMS of the true force's error at most {LIMIT:g} N (10 % of the mean desired force) "
     f"outside the first {SETTLE:g} s after each step; mean error in the last second of each interval at most "
     f"{100 * SHARE:.0f} % of the desired force"
 )
 FOLLOWS = f"in 9 of 10 runs: {FOLLOWING}"
-Array = NDArray[np.float64]
 SINE = {"force.amplitude": 4.0, "force.frequency": 0.5, "force.restart": 5.0}
 """4 sin(pi t), its clock started anew every 5 s as the listing does; that turns the sine's sign each time."""
 FOAM = changed(load("foam-neural"), SHORT)
@@ -98,35 +100,12 @@ def described(found: Sequence[Tracking]) -> str:
     )
 
 
-@dataclass(frozen=True)
-class Slot:
-    """What a figure draws: time since contact and signals."""
-
-    t: Array
-    desired: Array
-    measured: Array
-    true: Array
-    limited: Array  # 1 where a motor is at its limit
-    y: Array  # measured [m]
-    phi: Array  # measured [rad]
-
-
-def slot(record: Record, start: float, end: float) -> Slot:
-    """The signals of a record from `start` to `end` after contact [s]."""
+def slot(record: Record, start: float = 0.0, end: float = np.inf) -> Record:
+    """A record from `start` to `end` after contact [s], its clock at zero at the first contact."""
     t = since_contact(record)
     shown = (t >= start) & (t < end)
-    limited = np.maximum.reduce([record[f"saturated{i}"] for i in (1, 2, 3)])
-    names = ("force_desired", "force_measured", "force")
-    desired, measured, true = (record[n][shown] for n in names)
-    return Slot(
-        t[shown],
-        desired,
-        measured,
-        true,
-        limited[shown],
-        record["y_measured"][shown],
-        record["phi_measured"][shown],
-    )
+    columns = {name: column[shown] for name, column in record.columns.items()}
+    return Record({**columns, "t": t[shown]}, record.units, record.meta)
 
 
 def variations(experiment: Experiment, seed: int) -> dict[str, Experiment]:
@@ -145,13 +124,13 @@ def variations(experiment: Experiment, seed: int) -> dict[str, Experiment]:
 
 
 def robustness(
-    runs: Runs, experiment: Experiment, nominal: Sequence[Tracking], measure: Callable[[Record], Tracking]
-) -> dict[str, list[Tracking]]:
+    runs: Runs, experiment: Experiment, nominal: Sequence[T], measure: Callable[[Record], T]
+) -> dict[str, list[T]]:
     """`measure` of each variation, the nominal case first."""
     seeds = runs.seeds[:VARIED_SEEDS]
     cases = [(name, e, seed) for seed in seeds for name, e in variations(experiment, seed).items()]
     measured = runs.over([(e, seed) for _, e, seed in cases], measure)
-    found: dict[str, list[Tracking]] = {"as\nchosen": list(nominal)}
+    found: dict[str, list[T]] = {"as\nchosen": list(nominal)}
     for (name, _, _), one in zip(cases, measured, strict=True):
         found.setdefault(name, []).append(one)
     return found
@@ -161,7 +140,7 @@ def robustness(
 class Tracked:
     """What the figure of a force that is to be followed is made of."""
 
-    shown: Slot
+    shown: Record
     nominal: list[Tracking]
     varied: dict[str, list[Tracking]]
 

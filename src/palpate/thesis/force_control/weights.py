@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, build
 from palpate.bench.row import COLUMNS
 from palpate.bench.sequence import CONTACT, LOST
@@ -24,7 +24,7 @@ class Look:
     """The controller at a moment, and what went on since the look before."""
 
     t: float  # since contact [s]
-    rows: NDArray[np.float64]  # of the ticks since the look before, in contact, shape (n, columns)
+    rows: Array  # of the ticks since the look before, in contact, shape (n, columns)
     neural: NeuralState | None  # None of any other controller
 
 
@@ -73,7 +73,7 @@ HOLD = 20
 """Ticks after which weights that are held are set back."""
 
 
-def layers(state: NeuralState) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def layers(state: NeuralState) -> tuple[Array, Array]:
     """Weights of the hidden and of the output layer of the 9-12-3 network, shapes (12, 10) and (3, 13); views."""
     w = state.network.weights
     return w[:120].reshape(12, 10), w[120:].reshape(3, 13)

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
 
 import msgspec
 
 from palpate.errors import InputError
-from palpate.files import check_place
-from palpate.studies.journal import decoded, line_of
+from palpate.files import check_place, journal
 
 
 class Head(msgspec.Struct, frozen=True):
@@ -48,12 +45,12 @@ class Tried(msgspec.Struct, frozen=True):
     verdicts: tuple[bool, ...]
 
 
-@dataclass
-class Archive:
-    """Open for writing, by this process alone."""
+class Archive(journal.Journal):
+    """Open for writing, by this process alone: of `opened`."""
 
-    known: dict[int, Tried]
-    _file: FileIO
+    def __init__(self, path: Path, file: FileIO, known: dict[int, Tried]):
+        super().__init__(path, file)
+        self.known = known
 
     def add(self, tried: Tried) -> None:
         """One more.
@@ -61,16 +58,7 @@ class Archive:
         Raises:
             InputError: the disk is full, or cannot be written to.
         """
-        line, before = line_of(msgspec.json.encode(tried)), os.fstat(self._file.fileno()).st_size
-        try:
-            written, why = self._file.write(line), "no space is left"
-        except OSError as error:
-            written, why = 0, str(error.strerror)
-        if written < len(line):
-            os.ftruncate(self._file.fileno(), before)
-            raise InputError(
-                f"{self._file.name}: {why}; free some space, and the same command goes on from there"
-            )
+        self.write(tried)
         self.known[tried.number] = tried
 
 
@@ -82,35 +70,25 @@ def opened(path: Path, head: Head) -> Iterator[Archive]:
         InputError: it is another's, or none.
     """
     check_place(path)
-    if path.exists():
-        there, known, end = read(path)
-        if there != head:
-            raise InputError(
-                f"{path} is of another search, or of other sources; choose another --out, or add --force to begin anew"
-            )
-        os.truncate(path, end)
-    else:
-        path.write_bytes(line_of(msgspec.json.encode(head)))
-        known = {}
-    with path.open("ab", buffering=0) as file:
-        yield Archive(known, file)
+    if not path.exists():
+        journal.begin(path, head)
+    there, known = read(path)
+    if there != head:
+        raise InputError(
+            f"{path} is of another search, or of other sources; choose another --out, or add --force to begin anew"
+        )
+    end = max((at for _, at in journal.entries(path, Tried)), default=journal.end_of_head(path))
+    with journal.opened(path, end) as file:
+        yield Archive(path, file, known)
 
 
-def read(path: Path) -> tuple[Head, dict[int, Tried], int]:
-    """Head, laboratories by number, and where the last whole line ends.
+def read(path: Path) -> tuple[Head, dict[int, Tried]]:
+    """Head, and laboratories by number.
 
     Raises:
         InputError: it is no archive.
     """
-    lines = path.read_bytes().splitlines(keepends=True)
-    head = decoded(lines[0], Head) if lines else None
+    head = journal.head_of(path, Head)
     if head is None:
         raise InputError(f"{path} is no archive of laboratories; choose another --out")
-    known, end = {}, len(lines[0])
-    for line in lines[1:]:
-        tried = decoded(line, Tried)
-        if tried is None:
-            break
-        known[tried.number] = tried
-        end += len(line)
-    return head, known, end
+    return head, {tried.number: tried for tried, _ in journal.entries(path, Tried)}

@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.thesis.inference.archive import Tried
 
 CHANCE = 0.05
@@ -57,9 +58,9 @@ class Table:
     """Verdicts of laboratories, rows, on sentences, columns; `known` where it was not given up before."""
 
     ids: tuple[str, ...]
-    shares: NDArray[np.float64]  # of the priors, where the laboratories lie
-    true: NDArray[np.bool_]
-    known: NDArray[np.bool_]
+    shares: Array  # of the priors, where the laboratories lie
+    true: Mask
+    known: Mask
 
     def alone(self) -> list[Alone]:
         """Each sentence by itself."""
@@ -92,7 +93,7 @@ class Table:
                 )
 
 
-def _expected(true: NDArray[np.bool_], parts: Sequence[int]) -> float:
+def _expected(true: Mask, parts: Sequence[int]) -> float:
     """Laboratories with all, if each part is as frequent as it is and nothing else ties them (Kirkwood, 1935)."""
     n, alone = len(true), true.mean(axis=0)
     shares = np.array(parts) / n

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.thesis.inference.archive import Tried
 from palpate.thesis.inference.contradictions import Table
 from palpate.thesis.inference.sampler import JITTER
@@ -60,22 +61,18 @@ def bred(wanted: Sequence[str], among: Table, runner: Runner, tries: int, seed: 
     return Bred(done, int(true[best].sum()), tuple(shares[best].tolist()))
 
 
-def _children(
-    shares: NDArray[np.float64], true: NDArray[np.bool_], count: int, rng: np.random.Generator
-) -> NDArray[np.float64]:
+def _children(shares: Array, true: Mask, count: int, rng: np.random.Generator) -> Array:
     pools = [_pool(true, column) for column in range(true.shape[1]) if true[:, column].any()]
     return np.array([_child(shares, pools, rng) for _ in range(count)])
 
 
-def _pool(true: NDArray[np.bool_], column: int) -> NDArray[np.int64]:
+def _pool(true: Mask, column: int) -> NDArray[np.int64]:
     """Laboratories that make a sentence true, those with most of the others first; of equals the newest."""
     some = np.flatnonzero(true[:, column])[::-1]
     return some[np.argsort(-true[some].sum(axis=1), kind="stable")][:POOL]
 
 
-def _child(
-    shares: NDArray[np.float64], pools: Sequence[NDArray[np.int64]], rng: np.random.Generator
-) -> NDArray[np.float64]:
+def _child(shares: Array, pools: Sequence[NDArray[np.int64]], rng: np.random.Generator) -> Array:
     first, second = rng.choice(len(pools), 2, replace=len(pools) < 2)
     one, other = shares[rng.choice(pools[first])], shares[rng.choice(pools[second])]
     child = np.where(rng.random(len(one)) < 0.5, one, other)

@@ -29,7 +29,7 @@ def present(result: Result, folder: Path, command: str) -> None:
     """Writes page, document, figure and JSON into the folder."""
     style.save(drawn_figure(result.posterior), folder / FIGURE)
     write_json(folder / FOUND, signed(as_json(result, command)))
-    notes, found = [_told(result), _worth(result.posterior)], tables.found(result)
+    notes, found = [_cross_validated(result), _worth(result.posterior)], tables.found(result)
     whole = page(
         title="The thesis' laboratory, inferred",
         about=(
@@ -60,7 +60,7 @@ def _rows(table: Table) -> str:
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
 
 
-def _told(result: Result) -> str:
+def _cross_validated(result: Result) -> str:
     there, here = result.cross_validation
     follows = "It could take its place." if result.better else "The bench stays the default."
     return (
@@ -91,16 +91,12 @@ def _worth(sample: Sample) -> str:
 
 def drawn_figure(sample: Sample) -> Figure:
     """A small panel for each unknown: where its posterior lies in shares of its prior."""
-    from matplotlib.figure import Figure
-
     columns, bins = 6, 10
     rows = -(-len(UNKNOWNS) // columns)
-    drawing = Figure(figsize=(11.0, 1.3 * rows), dpi=style.DPI, layout="constrained")
-    axes = drawing.subplots(rows, columns).ravel()
+    drawing, axes = style.grid((11.0, 1.3 * rows), rows, columns)
     for axis in axes[len(UNKNOWNS) :]:
         axis.remove()
     for i, (axis, unknown) in enumerate(zip(axes, UNKNOWNS, strict=False)):
-        style.plain(axis)
         count = len(unknown.choices) or bins
         axis.hist(
             sample.visited[:, i], bins=count, range=(0.0, 1.0), density=True, color=style.SERIES[0], alpha=0.8

@@ -118,9 +118,7 @@ class Inference:
         predicted.watched(self.folder / PREDICTED, half.points, PREDICTIVE)
         begun = self.settings.first * self.settings.particles
         ids = tuple(s.id for s in predicted.sentences)
-        _, of_all, _ = archive.read(self.folder / ALL)
-        _, of_half, _ = archive.read(self.folder / HALF)
-        _, drawn_, _ = archive.read(self.folder / PREDICTED)
+        of_all, of_half, drawn_ = (archive.read(self.folder / name)[1] for name in (ALL, HALF, PREDICTED))
         whole, posterior = contradictions.table(ids, of_all), contradictions.table(ids, drawn_)
         prior = contradictions.table(ids, {n: tried for n, tried in of_all.items() if n < begun})
         later = {n: tried for n, tried in of_half.items() if n >= begun}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from palpate.studies.local import unordered
+from palpate.studies.running.local import unordered
 from palpate.thesis.inference.sentences import Sentence, sentences, verdicts
 from palpate.thesis.inference.trial import Trial
 from palpate.thesis.laboratory.laboratory import Laboratory

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.thesis.inference.sampler import Sample
 from palpate.thesis.laboratory.unknowns import LAWS, LISTING, UNKNOWNS, Unknown
 
 TOLD, HARDLY = 0.5, 0.8
 """The middle nine tenths of the posterior take at most this share of the prior's: told; hardly; beyond, not told."""
 MIDDLE = (0.05, 0.5, 0.95)
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -158,23 +158,23 @@ def as_json(result: Result, command: str) -> dict[str, Any]:
         "predictive": [asdict(one) for one in result.predictive],
         "laboratories": {name: values(one.laboratory) for name, one in laboratories(result).items()},
         "largest": [s.id for s in sentences() if result.largest.true(s)],
-        "posterior": [_told_of(m) for m in marginals(result.posterior.visited)],
+        "posterior": [_marginal(m) for m in marginals(result.posterior.visited)],
         "never": [{**asdict(a), "reason": reasons().get(a.id, "")} for a in result.never],
-        "never_together": [_told_together(c) for c in result.contradictions],
+        "never_together": [_contradiction(c) for c in result.contradictions],
         "tried": len(result.table.true),
-        "searches": {name: _told_search(sample) for name, sample in samples(result).items()},
+        "searches": {name: _search(sample) for name, sample in samples(result).items()},
         "sentences": {
             s.id: {name: one.held[s.id] for name, one in laboratories(result).items()} for s in sentences()
         },
     }
 
 
-def _told_of(m: Marginal) -> dict[str, Any]:
+def _marginal(m: Marginal) -> dict[str, Any]:
     own = {"low": m.low, "middle": m.middle, "high": m.high, "width": m.width}
     return {"unknown": m.unknown.name, "unit": m.unknown.unit, **own, "verdict": m.verdict}
 
 
-def _told_together(c: Contradiction) -> dict[str, Any]:
+def _contradiction(c: Contradiction) -> dict[str, Any]:
     return {
         "sentences": list(c.together.ids),
         "laboratories": c.together.tried,
@@ -186,7 +186,7 @@ def _told_together(c: Contradiction) -> dict[str, Any]:
     }
 
 
-def _told_search(sample: Sample) -> dict[str, Any]:
+def _search(sample: Sample) -> dict[str, Any]:
     own = worth(sample)
     effective = {"least": float(own.min()), "median": float(np.median(own)), "most": float(own.max())}
     return {"effective": effective, "stages": [asdict(stage) for stage in sample.stages]}

@@ -9,9 +9,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.studies.sobol import Sobol
+from palpate.arrays import Array, Mask
+from palpate.studies.definition.sobol import Sobol
 
-Array = NDArray[np.float64]
 Evaluate = Callable[[Array, Array], Array]
 """Log-likelihoods of points, shape (n, d) -> (n,). Where one falls below its floor, the second argument of shape (n,),
 any number below the floor will do: the point is refused either way."""
@@ -81,7 +81,7 @@ class Sample:
 
 def sample(
     evaluate: Evaluate,
-    redrawn: NDArray[np.bool_],
+    redrawn: Mask,
     settings: Settings,
     begun: Begun = lambda _power, _count: None,
 ) -> Sample:
@@ -159,7 +159,7 @@ def _swept(
     evaluate: Evaluate,
     points: Array,
     likelihood: Array,
-    redrawn: NDArray[np.bool_],
+    redrawn: Mask,
     beta: float,
     rng: np.random.Generator,
 ) -> float:
@@ -176,7 +176,7 @@ def _swept(
     return accepted / len(points)
 
 
-def _moved(point: Array, others: Array, redrawn: NDArray[np.bool_], rng: np.random.Generator) -> Array:
+def _moved(point: Array, others: Array, redrawn: Mask, rng: np.random.Generator) -> Array:
     """A point some of whose coordinates have gone by a difference of two others, mirrored at the cube's faces."""
     moving = rng.random(len(point)) < TOGETHER
     moving[rng.integers(len(point))] = True

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import sources_stamp
-from palpate.studies.local import unordered
+from palpate.arrays import Array
+from palpate.studies.running.local import unordered
 from palpate.thesis.inference import archive, sampler
 from palpate.thesis.inference.archive import Archive, Head, Tried
 from palpate.thesis.inference.sampler import Sample, Settings
@@ -25,9 +25,8 @@ from palpate.thesis.laboratory.laboratory import drawn
 from palpate.thesis.laboratory.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
-    from palpate.studies.cluster import Cluster
+    from palpate.studies.running.cluster import Cluster
 
-Array = NDArray[np.float64]
 Progress = Callable[[float, int, int], None]
 MOST_WRONG = 0.5
 """At most so probable is it that a sentence does not hold in the very laboratory it was written in: beyond, it would
@@ -157,16 +156,16 @@ class _Asked:
             if other is not None and other.shares == job.shares and job.number not in self.book.known:
                 self.book.add(other)
         missing = [job for job in jobs if job.number not in self.book.known]
-        self._tell(len(jobs) - len(missing))
+        self._progress(len(jobs) - len(missing))
         self._try(missing)
         return np.array([-MISS * self._misses(job) for job in jobs])
 
     def _try(self, jobs: Sequence[Job]) -> None:
         for tried in self.search.runner.tried(jobs, tuple(s.id for s in self.search.sentences)):
             self.book.add(tried)
-            self._tell(1)
+            self._progress(1)
 
-    def _tell(self, more: int) -> None:
+    def _progress(self, more: int) -> None:
         self.done += more
         self.search.progress(self.power, self.done, self.of)
 
@@ -180,7 +179,7 @@ def borrowed(path: Path, head: Head, of: Sequence[Sentence], wanted: Sequence[Se
     """What another search's archive tells of the sentences wanted, where it was not given up; nothing if it is none."""
     if not path.exists():
         return {}
-    there, known, _ = archive.read(path)
+    there, known = archive.read(path)
     if there != head:
         return {}
     at = [of.index(sentence) for sentence in wanted]

@@ -6,13 +6,11 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 from palpate.signals.filters import Biquad, butterworth2, butterworth3
-
-Array = NDArray[np.float64]
 
 CAUSES = {
     "offset": "displacement from the 5 N point",

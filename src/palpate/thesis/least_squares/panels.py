@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.records import Record
 from palpate.report import style
-from palpate.thesis.least_squares.press_runs import Array, between
+from palpate.thesis.least_squares.press_runs import between
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,13 +24,7 @@ CALM = 0.03
 
 def grid(rows: int) -> tuple[Figure, list[Axes]]:
     """Panels two a row, lettered (a), (b), ... along the rows."""
-    from matplotlib.figure import Figure
-
-    drawing = Figure(figsize=(9.0, 2.15 * rows + 0.4), dpi=style.DPI, layout="constrained")
-    axes = list(drawing.subplots(rows, 2).ravel())
-    for axis in axes:
-        style.plain(axis)
-    return drawing, axes
+    return style.grid((9.0, 2.15 * rows + 0.4), rows, 2)
 
 
 def titled(axis: Axes, letter: str, text: str) -> None:

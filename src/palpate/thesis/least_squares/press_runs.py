@@ -6,16 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, changed, load
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 from palpate.thesis.conditions import moved
 from palpate.thesis.laboratory.surfaces import own_damping
 from palpate.thesis.runs import Runs
-
-Array = NDArray[np.float64]
 
 PRESS = 8.0
 """Seconds of contact: the first four as in figures 6.1, 6.3 and 6.4, and the slot of 6.2 and 6.5."""
@@ -58,7 +56,7 @@ def contact(record: Record) -> Record:
     return Record(columns, {name: record.units[name] for name in COLUMNS}, record.meta)
 
 
-def between(press: Record, start: float, stop: float) -> NDArray[np.bool_]:
+def between(press: Record, start: float, stop: float) -> Mask:
     """Which samples of a press lie in a slot of time [s]."""
     return (press["t"] >= start) & (press["t"] < stop)
 

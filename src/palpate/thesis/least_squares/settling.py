@@ -8,14 +8,14 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.least_squares import panels, press_runs
-from palpate.thesis.least_squares.press_runs import Array, Found, median
+from palpate.thesis.least_squares.press_runs import Found, median
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def _held(data: Data, surface: str, key: str, limit: float) -> str:
     )
 
 
-def _reach(good: NDArray[np.bool_]) -> str:
+def _reach(good: Mask) -> str:
     """The part of the sweep of p that is good, in words."""
     p = COVARIANCES[good]
     if not len(p):

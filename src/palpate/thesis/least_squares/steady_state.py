@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.claims import Claim, decided, spread
 from palpate.thesis.laboratory.surfaces import own_damping
 from palpate.thesis.least_squares import panels, press_runs
-from palpate.thesis.least_squares.press_runs import Array, Found, median
+from palpate.thesis.least_squares.press_runs import Found, median
 from palpate.thesis.runs import Runs
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.bench import changed
-from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.neural_identifier import network
 from palpate.thesis.neural_identifier.network import Answer, Choice, Press
 from palpate.thesis.runs import Runs

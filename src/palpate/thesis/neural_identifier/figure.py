@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.bench import Experiment
 from palpate.identifiers.neural_settings import SETTINGS
 from palpate.records import Record
 from palpate.report import style
 from palpate.thesis.least_squares import panels
-from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.neural_identifier import network
 from palpate.thesis.neural_identifier.claims import SMALL, Part, share
 from palpate.thesis.neural_identifier.network import AMPLITUDES, STARTS, WEIGHTS, Answer, Choice, Press

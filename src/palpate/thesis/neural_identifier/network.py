@@ -8,12 +8,12 @@ from itertools import product
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.identifiers.neural_probe import NeuralProbe
 from palpate.identifiers.neural_settings import SETTINGS
 from palpate.records import Record
 from palpate.thesis.least_squares import press_runs
-from palpate.thesis.least_squares.press_runs import Array
 from palpate.thesis.runs import Runs
 
 PRESS = 4.0
@@ -108,15 +108,10 @@ class Choice:
 
     def probe(self, surface: str, start: int) -> NeuralProbe:
         """The 3-4-1 network before it has learned anything."""
-        scale, values = SETTINGS[surface]
+        setting = SETTINGS[surface] if self.scale is None else SETTINGS[surface]._replace(scale=self.scale)
+        weights, thresholds = self.weights, self.thresholds
         return NeuralProbe(
-            self.scale or scale,
-            values,
-            self.amplitude,
-            self.rate,
-            seed=start,
-            weights=self.weights,
-            thresholds=self.thresholds,
+            setting, self.amplitude, self.rate, seed=start, weights=weights, thresholds=thresholds
         )
 
 

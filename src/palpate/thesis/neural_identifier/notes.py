@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identifiers.neural_settings import SETTINGS
 from palpate.thesis.neural_identifier.network import Answer, Choice
 
@@ -104,12 +104,12 @@ def _why_mass(grounds: Grounds) -> str:
     )
 
 
-def _by_start(values: Sequence[float] | NDArray[np.float64], grounds: Grounds) -> str:
+def _by_start(values: Sequence[float] | Array, grounds: Grounds) -> str:
     part = share_of_starts(values, grounds.starts)
     return f"Initial weights make {'over 99%' if part > 0.99 else f'{part:.0%}'} of its variance, noise the rest."
 
 
-def share_of_starts(values: Sequence[float] | NDArray[np.float64], starts: int) -> float:
+def share_of_starts(values: Sequence[float] | Array, starts: int) -> float:
     """Which part of the variance lies between starts; the rest lies between noise seeds of one start."""
     by_start = np.reshape(np.asarray(values, dtype=float), (-1, starts))
     total = float(np.var(by_start))

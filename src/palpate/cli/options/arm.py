@@ -1,0 +1,136 @@
+"""Options that say how an arm's wrench and pose stand to each other, and what lies between sensors and surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Group, Parameter
+
+from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.values import span, vector, with_std
+from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from palpate.contact_frame import Arm, ContactFrame, Payload
+
+
+@Parameter(name="*", group=Group("Wrench and pose, and the sign of the force", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class FrameOptions:
+    """Axes, points and signs of a wrench and a pose.
+
+    Parameters
+    ----------
+    wrench_frame
+        Axes of the wrench: the arm's base, the tool (those of the pose), or a sensor turned against the tool.
+    sensor_rpy
+        How the sensor is turned against the tool: roll,pitch,yaw in degrees, or with :rad.
+    tcp
+        The point that touches, in the tool's axes from the pose's origin: x,y,z in m, or with :mm.
+    wrench_at
+        The point that the torque is about, likewise; the pose's origin if not given.
+    force_sign
+        +1 or action: the force is what the tool exerts, and grows as it presses; -1 or reaction: what the surface
+        exerts on the tool. Found if not given.
+    normal
+        Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Found from the force if not given.
+    gravity_compensated
+        The tool's weight is already taken off the wrench.
+    free
+        BEGIN,END in seconds of a stretch in which nothing is touched; found if not given.
+    """
+
+    wrench_frame: Literal["base", "tool", "sensor"] | None = None
+    sensor_rpy: Annotated[str | None, SIGNED] = None
+    tcp: Annotated[str | None, SIGNED] = None
+    wrench_at: Annotated[str | None, SIGNED] = None
+    force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, SIGNED] = None
+    normal: Annotated[str | None, SIGNED] = None
+    gravity_compensated: Annotated[bool, FLAG] = False
+    free: str | None = None
+
+    @property
+    def sign(self) -> int | None:
+        """1 if the force grows as the tool presses, -1 if it falls; None if nothing was said."""
+        if self.force_sign is None:
+            return None
+        return -1 if self.force_sign in {"reaction", "-1"} else 1
+
+    @property
+    def of_space(self) -> bool:
+        """Whether anything was said that only a wrench and a pose have."""
+        return replace(self, force_sign=None) != FrameOptions()
+
+    def frame(self, hung: Payload | None = None) -> ContactFrame | None:
+        """The contact frame; None if nothing was said."""
+        from palpate.contact_frame import ContactFrame
+
+        if self == FrameOptions() and hung is None:
+            return None
+        sides: dict[int | None, Literal["action", "reaction"] | None] = {
+            None: None,
+            1: "action",
+            -1: "reaction",
+        }
+        axes, colon, plain = (self.normal or "").rpartition(":")
+        if colon and axes not in {"base", "tool"}:
+            raise InputError(f"--normal needs x,y,z, base:x,y,z or tool:x,y,z, got {self.normal!r}")
+        return ContactFrame(
+            wrench_frame=self.wrench_frame,
+            sensor_rpy=vector("sensor-rpy", self.sensor_rpy, "angle"),
+            tcp=vector("tcp", self.tcp, "length") or (0.0, 0.0, 0.0),
+            wrench_at=vector("wrench-at", self.wrench_at, "length") or (0.0, 0.0, 0.0),
+            force_sign=sides[self.sign],
+            normal=vector("normal", plain or None, "number"),
+            normal_frame="tool" if axes == "tool" else "base",
+            gravity_compensated=self.gravity_compensated,
+            free=span("free", self.free),
+            payload=hung,
+        )
+
+
+@Parameter(name="*", group=Group("The arm", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class ArmOptions:
+    """What lies between the sensors and the surface.
+
+    Parameters
+    ----------
+    tool_mass
+        Mass between force sensor and surface in kg, VALUE or VALUE:STD; it is taken out of M.
+    robot_stiffness
+        What gives way between the position sensor and the surface, N/m or N/m:STD; it is taken out of K.
+    robot_stiffness_from
+        A log of a press on a rigid wall, with the same columns or topics: all that gives way in it is the arm.
+    payload
+        What palpate payload wrote of the tool on the sensor: its weight, and the mass to take out of M.
+    position_from
+        joints: the position is made from encoders in the joints, and does not show the arm give way; tip: it is not.
+    """
+
+    tool_mass: str | None = None
+    payload: Path | None = None
+    robot_stiffness: Annotated[str | None, Parameter(name=["--robot-stiffness", "--series-stiffness"])] = None
+    robot_stiffness_from: Path | None = None
+    position_from: Literal["joints", "tip"] | None = None
+
+    def weighed(self) -> Payload | None:
+        """What hangs on the sensor, if it was weighed."""
+        from palpate.contact_frame import load_payload
+
+        return None if self.payload is None else load_payload(self.payload)
+
+    def arm(self) -> Arm:
+        """The arm as far as it was said; a press on a wall is another log."""
+        from palpate.contact_frame import Arm
+
+        if self.robot_stiffness is not None and self.robot_stiffness_from is not None:
+            raise InputError("give --robot-stiffness or --robot-stiffness-from, not both")
+        hung = self.weighed()
+        return Arm(
+            tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02") or (hung.beyond if hung else None),
+            stiffness=with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),
+            position_from=self.position_from,
+        )

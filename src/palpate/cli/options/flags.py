@@ -1,0 +1,42 @@
+"""Kinds of flags that several commands have, and numbers with their units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cyclopts import Parameter, Token
+
+from palpate.errors import InputError
+
+FLAG = Parameter(negative=())
+"""A switch without a `--no-` of its own."""
+SIGNED = Parameter(allow_leading_hyphen=True)
+"""A value that may begin with a minus: it is a number below zero, not another option."""
+
+
+def _whole_number(_: Any, tokens: Sequence[Token]) -> int:
+    (token,) = tokens
+    if not token.value.isdecimal():
+        raise InputError(f"it must be a whole number, 0 or above, got {token.value!r}")
+    return int(token.value)
+
+
+WHOLE = Parameter(converter=_whole_number)
+"""A seed; the conversion of cyclopts would round 1.5 without a word."""
+
+
+def in_si(option: str, text: str, kind: str) -> float:
+    """`NUMBER` or `NUMBER:UNIT` in SI.
+
+    Raises:
+        InputError: no number, or no unit of this kind.
+    """
+    from palpate.excitation.quantities import quantity
+
+    return quantity(option, text, kind)
+
+
+def in_si_if_given(option: str, text: str | None, kind: str) -> float | None:
+    """The same of an option that may be left out."""
+    return None if text is None else in_si(option, text, kind)

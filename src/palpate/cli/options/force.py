@@ -1,0 +1,176 @@
+"""Options of `palpate tune` and `palpate certify`, in groups."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from palpate.cli.options.flags import SIGNED, in_si, in_si_if_given
+from palpate.cli.options.log import LogOptions
+from palpate.cli.options.written import WRITTEN, FileOptions
+from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from palpate.force import Arm
+    from palpate.force.inner_loop import InnerLoop
+
+
+@Parameter(name="*", group=Group("The arm", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class ArmOptions:
+    """What presses.
+
+    Parameters
+    ----------
+    arm
+        ur5e, fr3, panda, iiwa14, thesis, or a TOML file.
+    loop_from
+        A log of commanded and measured position in free motion, from which the arm's inner loop and delay are taken.
+    """
+
+    arm: str
+    loop_from: Path | None = None
+
+    def named(self, columns: ColumnOptions) -> tuple[Arm, InnerLoop | None]:
+        """The arm, and what the log said of its inner loop."""
+        from palpate.force import load_arm
+
+        one = load_arm(self.arm)
+        if self.loop_from is None:
+            return one, None
+        found = inner_loop(self.loop_from, columns)
+        return found.of(one, self.loop_from.name), found
+
+
+@Parameter(name="*", group=Group("The surface", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class SurfaceOptions:
+    """What is known of the surface without a log.
+
+    Parameters
+    ----------
+    stiffness
+        Range of its stiffness, LOW:HIGH in N/m or LOW:HIGH:UNIT.
+    stiffness_cap
+        Stiffest surface that there may be, N/m.
+    surface_speed
+        Of a surface that moves by itself, m/s.
+    """
+
+    stiffness: Annotated[str | None, SIGNED] = None
+    stiffness_cap: Annotated[str | None, SIGNED] = None
+    surface_speed: Annotated[float | None, SIGNED] = None
+
+    @property
+    def cap(self) -> float | None:
+        """The stiffest [N/m]."""
+        return in_si_if_given("--stiffness-cap", self.stiffness_cap, "stiffness")
+
+
+@Parameter(name="*", group=Group("The press", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class PressOptions:
+    """What is asked for.
+
+    Parameters
+    ----------
+    force
+        Desired force, the smallest that will be asked for, N.
+    peak
+        Highest force allowed at the touch, N.
+    """
+
+    force: Annotated[str, SIGNED]
+    peak: Annotated[str | None, SIGNED] = None
+
+    @property
+    def desired(self) -> float:
+        """F_d [N]."""
+        return in_si("--force", self.force, "force")
+
+    @property
+    def highest(self) -> float | None:
+        """Force at the touch [N]."""
+        return in_si_if_given("--peak", self.peak, "force")
+
+
+@Parameter(name="*", group=Group("What is in the logs", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class ColumnOptions:
+    """Columns of a log of a press, and of the one that --loop-from names.
+
+    Parameters
+    ----------
+    time
+        Column of the time, in s if no unit is given.
+    rate
+        Rows per second, for a log without a column of time.
+    position
+        Column of the measured position, as position_mm:mm.
+    log_force
+        Column of the force in the log of a press, as force_mN:mN.
+    command
+        Column of the commanded position in the log of --loop-from, as target_mm:mm.
+    payload
+        Of a log of a press: what palpate payload wrote of the tool on the sensor, whose mass is taken out of M.
+    """
+
+    time: str | None = None
+    rate: float | None = None
+    position: str | None = None
+    log_force: str | None = None
+    command: str | None = None
+    payload: Path | None = None
+
+    @property
+    def of_press(self) -> LogOptions:
+        """As `palpate identify` takes them."""
+        return LogOptions(time=self.time, rate=self.rate, position=self.position, force=self.log_force)
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions(FileOptions):
+    """Where results go.
+
+    Parameters
+    ----------
+    out
+        Where to write the gains (a TOML file) or the certificate (a JSON file).
+    """
+
+    out: Path | None = None
+
+
+def one_thread() -> None:
+    """A proof is made of many small matrices: NumPy's threads would cost ten times what they bring."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def inner_loop(log: Path, columns: ColumnOptions) -> InnerLoop:
+    """The inner loop that a log of commanded and measured position shows.
+
+    Raises:
+        InputError: the log or its columns are wrong, or it does not excite the loop.
+    """
+    from palpate.force.inner_loop import identify_inner_loop
+    from palpate.logs import read_log
+
+    names: dict[str, Any] = {"command": columns.command, "position": columns.position, "time": columns.time}
+    lacking = [f"--{role}" for role in ("command", "position") if names[role] is None]
+    if columns.time is None and columns.rate is None:
+        lacking.append("--time (or --rate)")
+    if lacking:
+        raise InputError(
+            f"name the columns of {log} with {', '.join(lacking)} (palpate topics {log} lists them)"
+        )
+    for role in ("command", "position"):
+        if ":" not in names[role]:
+            names[role] += ":m"
+    given = {role: name for role, name in names.items() if name is not None}
+    record = read_log(log, rate=columns.rate, **given)
+    return identify_inner_loop(record["time"], record["command"], record["position"], where=str(log))

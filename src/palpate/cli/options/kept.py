@@ -1,0 +1,197 @@
+"""Options of a cell, kept in a TOML file: read before a command's own words, which win over it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cyclopts import Group, Parameter
+
+from palpate.errors import InputError, unknown
+from palpate.files import check_place, read_bytes, write_text
+from palpate.files.ownership import MADE
+
+if TYPE_CHECKING:
+    from cyclopts import App
+
+_SAID = {"--options": "options", "--preset": "preset"}
+_NEVER = {
+    "options", "preset", "save-options", "figure", "no-figure", "report", "json", "out", "replace",
+    "wire", "yes", "dry-run", "record", "recover",
+}  # fmt: skip
+"""What is of one call and not of a cell; above all what moves an arm."""
+_TYPED = {"press": {"force", "position", "seconds"}}
+"""By command, what is of a call there, though the same word is of the cell elsewhere."""
+_PATHS = {"payload", "robot-stiffness-from", "gains", "certificate"}
+"""Options that name a file: beside the options' own file, unless the path is absolute."""
+_KNOWN_BY = ("identify", "press")
+"""Commands that take one file together: what one of them knows is no mistake to the other."""
+_LARGEST = 1 << 16
+"""Bytes that are read: a file with every option is a hundredth of it."""
+
+
+@Parameter(name="*", group=Group("Options from a file", sort_key=7))
+@dataclass(frozen=True, kw_only=True)
+class CellOptions:
+    """Options that are kept.
+
+    Parameters
+    ----------
+    options
+        A TOML file of options of palpate identify, as wrench-frame = "tool"; what is typed wins over it.
+    preset
+        ur-rtde, franka or ros2: how these name their columns or topics, units and frames; --options wins over it.
+    save_options
+        Where to write what was said of log, frame, arm and model, for --options.
+    """
+
+    options: Path | None = None
+    preset: str | None = None
+    save_options: Path | None = None
+
+    def check(self) -> None:
+        """Refuse a place before any work is done."""
+        if self.save_options is not None:
+            check_place(self.save_options, "--save-options", ending=".toml")
+
+    def save(self, parts: Iterable[Any], command: str = "") -> None:
+        """Write what was said, if that was asked.
+
+        Args:
+            parts: dataclasses of options.
+            command: whose options they are: what is of one call of it is not kept.
+        """
+        if self.save_options is not None:
+            once = _NEVER | _TYPED.get(command, set())
+            kept = {name: value for name, value in options_given(parts).items() if name not in once}
+            write_text(self.save_options, _toml(kept))
+
+
+def options_given(parts: Iterable[Any]) -> dict[str, Any]:
+    """What is not left at its default, by the option's name."""
+    return {
+        field.name.replace("_", "-"): value
+        for part in parts
+        for field in fields(part)
+        if (value := getattr(part, field.name)) != field.default
+    }
+
+
+def presets() -> list[str]:
+    """Names of those that come with palpate."""
+    return sorted(f.name.removesuffix(".toml") for f in files("palpate.cli").joinpath("presets").iterdir())
+
+
+def expanded(argv: Sequence[str], app: App) -> list[str]:
+    """The words of a command with its options file and preset written out behind them.
+
+    Raises:
+        InputError: no such file or preset, a key that is no option, a value that is none.
+    """
+    words = list(argv)
+    given = {name: _value_of(words, flag) for flag, name in _SAID.items()}
+    if not words or (given["options"] is None and given["preset"] is None) or words[0] not in _commands(app):
+        return words
+    flags = _flags(app, words[0])
+    if "options" not in flags:
+        return words
+    known = set(flags).union(*(_flags(app, name) for name in _KNOWN_BY))
+    kept: dict[str, Any] = {}
+    if given["preset"] is not None:
+        kept |= _preset(given["preset"], known)
+    if given["options"] is not None:
+        kept |= _file(Path(given["options"]), known)
+    typed = {word.partition("=")[0] for word in words if word.startswith("--")}
+    own = set(flags) - _TYPED.get(words[0], set())
+    kept = {key: value for key, value in kept.items() if key in own and not typed & set(flags[key])}
+    return [*words, *(word for key, value in kept.items() for word in _written(key, value))]
+
+
+def _commands(app: App) -> list[str]:
+    return [str(name) for name in app]
+
+
+def _flags(app: App, command: str) -> dict[str, tuple[str, ...]]:
+    """The options of a command: by plain name, all names that they go by."""
+    arguments = app[command].assemble_argument_collection()
+    return {
+        name.removeprefix("--"): tuple(one.names)
+        for one in arguments
+        for name in one.names
+        if name.startswith("--") and not name.startswith("--no-")
+    }
+
+
+def _value_of(words: Sequence[str], flag: str) -> str | None:
+    """The value of a flag; None where it does not stand, or has none."""
+    for i, word in enumerate(words):
+        if word.startswith(f"{flag}="):
+            return word.partition("=")[2]
+        if word == flag and i + 1 < len(words):
+            return words[i + 1]
+    return None
+
+
+def _preset(name: str, known: set[str]) -> dict[str, Any]:
+    if name not in presets():
+        raise unknown("preset", name, presets())
+    text = files("palpate.cli").joinpath("presets", f"{name}.toml").read_text(encoding="utf-8")
+    return _checked(tomllib.loads(text), f"preset {name}", known)
+
+
+def _file(path: Path, known: set[str]) -> dict[str, Any]:
+    data = read_bytes(path, _LARGEST, "no options")
+    try:
+        table = tomllib.loads(data.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not TOML: {error}") from None
+    kept = _checked(table, str(path), known)
+    if "preset" in table:
+        kept = _preset(str(table["preset"]), known) | kept
+    for key in _PATHS & set(kept):
+        kept[key] = str(path.parent / str(kept[key]))
+    return kept
+
+
+def _checked(table: Mapping[str, Any], where: str, known: set[str]) -> dict[str, Any]:
+    kept = {}
+    for key, value in table.items():
+        name = key.replace("_", "-")
+        if name == "preset":
+            continue
+        if name in _NEVER or name not in known:
+            try:
+                raise unknown("option", name, known - _NEVER)
+            except InputError as error:
+                raise InputError(f"{where}: {error}") from None
+        plain = isinstance(value, str | bool | int | float)
+        if not plain and not (
+            isinstance(value, list) and all(isinstance(v, str | int | float) for v in value)
+        ):
+            raise InputError(f"{where}: {key} must be a text, a number, true or false, got {value!r}")
+        kept[name] = value
+    return kept
+
+
+def _written(key: str, value: Any) -> list[str]:
+    if isinstance(value, bool):
+        return [f"--{key}"] if value else []
+    if isinstance(value, list):
+        return [f"--{key}={one}" for one in value]
+    return [f"--{key}={value}"]
+
+
+def _toml(table: Mapping[str, Any]) -> str:
+    import msgspec
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, Path):
+            return str(value.absolute())
+        return list(value) if isinstance(value, tuple) else value
+
+    lines = [f"{key} = {msgspec.json.encode(plain(value)).decode()}" for key, value in table.items()]
+    return "\n".join([f"{MADE} --save-options; --options takes it.", *lines]) + "\n"

@@ -1,0 +1,80 @@
+"""What `run` and `study` share: a TOML file named on the command line, which may only be listed or printed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Group, Parameter
+
+from palpate.cli._terminal import print_lines
+from palpate.cli.options.flags import FLAG
+from palpate.errors import InputError
+from palpate.text import printable
+
+if TYPE_CHECKING:
+    from palpate.bench.experiments.toml_files import TomlFiles
+
+
+@Parameter(name="*", group=Group("What there is", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class KnownOptions:
+    """To look, and to run nothing.
+
+    Parameters
+    ----------
+    list_
+        List what can be named and stop.
+    print_
+        Print the file of the one named, to copy and edit, and stop.
+    """
+
+    list_: Annotated[bool, FLAG, Parameter(name="--list")] = False
+    print_: Annotated[bool, FLAG, Parameter(name="--print")] = False
+
+
+@Parameter(name="*", group=Group("What is written", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class FolderOptions:
+    """Where results go.
+
+    Parameters
+    ----------
+    out
+        Folder for results; when left out, one in runs/ with the name of what is run.
+    force
+        Replace the results that stand there already.
+    json
+        Print the summary as JSON and nothing else.
+    """
+
+    out: Path | None = None
+    force: Annotated[bool, FLAG] = False
+    json: Annotated[bool, FLAG] = False
+
+
+def listed(files: TomlFiles, title: Callable[[str], str]) -> None:
+    """Prints the names of all that come with palpate, each with its title."""
+    width = 2 + max(map(len, files.names()))
+    for name in files.names():
+        print_lines(f"{name:<{width}}{title(name)}")
+
+
+def source_of(files: TomlFiles, name: str | None, verb: str, printed: bool) -> str | None:
+    """The text of the file named; None if it was only to be printed, and has been.
+
+    Raises:
+        InputError: no name, or none that there is.
+    """
+    if name is None:
+        raise InputError(
+            f"{verb} what? Name {files.article} {files.kind} (palpate {verb} --list shows them) or a TOML file"
+        )
+    source = files.source(name)
+    if not printed:
+        return source
+    sys.stdout.write(printable(source))
+    return None

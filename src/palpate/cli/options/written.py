@@ -1,0 +1,104 @@
+"""Options of what a command writes, and how a place is found wrong before any work is done."""
+
+# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Group, Parameter
+
+from palpate.cli.options.flags import FLAG
+from palpate.errors import InputError
+from palpate.files import check_place
+
+WRITTEN = Group("What is written", sort_key=6)
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class JsonOption:
+    """An answer for programs.
+
+    Parameters
+    ----------
+    json
+        Print one JSON object and nothing else.
+    """
+
+    json: Annotated[bool, FLAG] = False
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class ReportOption:
+    """A page.
+
+    Parameters
+    ----------
+    report
+        Where to write a page with everything, an HTML file.
+    """
+
+    report: Path | None = None
+
+    def page(self) -> Path | None:
+        """Where the page goes; found wrong before any work is done."""
+        if self.report is not None:
+            check_place(self.report, "--report", ending=".html")
+        return self.report
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class FileOptions(JsonOption):
+    """A file of results.
+
+    Parameters
+    ----------
+    out
+        Where to write the result.
+    replace
+        Replace what stands at --out.
+    """
+
+    out: Path | None = None
+    replace: Annotated[bool, FLAG] = False
+
+    def check_new(self, path: Path | None, option: str = "--out", ending: str = "") -> None:
+        """Refuses a place before any work is done; a file that stands there too, unless it is to be replaced.
+
+        Raises:
+            InputError: in one line.
+        """
+        if path is None:
+            return
+        check_place(path, option, ending=ending)
+        if path.exists() and not self.replace:
+            raise InputError(f"{path} exists; choose another place, or add --replace")
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class PictureOptions(ReportOption, JsonOption):
+    """A figure, a page, an answer for programs.
+
+    Parameters
+    ----------
+    no_figure
+        Write no figure.
+    json
+        Print one JSON object and nothing else; a figure is written only if --figure is given.
+    """
+
+    figure: Path | None = None
+    no_figure: Annotated[bool, FLAG] = False
+    json: Annotated[bool, FLAG] = False
+
+    def picture(self, default: str, endings: tuple[str, ...] = (".png",)) -> Path | None:
+        """Where the figure goes; found wrong before any work is done."""
+        if self.no_figure or (self.figure is None and self.json):
+            return None
+        path = self.figure or Path(default)
+        ending = path.suffix.lower()
+        check_place(path, "--figure", ending=ending if ending in endings else endings[0])
+        return path

@@ -1,0 +1,1 @@
+"""A tool weighed by a log of free motion."""

@@ -1,0 +1,1 @@
+"""A weighed tool: its table and page, its looks in Python."""

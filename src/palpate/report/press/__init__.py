@@ -1,0 +1,1 @@
+"""A press of a simulated arm: its page, with a film."""

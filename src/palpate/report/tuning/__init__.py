@@ -1,0 +1,1 @@
+"""A tuned force loop: its table, its page, its looks in Python."""

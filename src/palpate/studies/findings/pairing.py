@@ -1,0 +1,248 @@
+"""Which setting is better, surface by surface: what was drawn at random is not chosen, and is the same for all.
+
+Where a study draws its surfaces at random, its settings (control laws, gains) are compared on the same surfaces with
+the same noise: the difficulty that they share falls out. A run that failed is worse than any that was done, so that
+none is left out. The median of the differences has its interval from the order statistics, exact whatever their
+distribution (Conover, Practical Nonparametric Statistics, 1999, sec. 3.2); a share won has that of Clopper and Pearson
+(1934).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.arrays import Array, Mask
+from palpate.bench.ending import DONE
+from palpate.bench.metrics import metric_of
+from palpate.studies.definition.parameters import Label
+from palpate.studies.definition.plan import MAIN, Part, Plan
+
+if TYPE_CHECKING:
+    from polars import DataFrame
+
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A setting over all surfaces.
+
+    Args:
+        name: its chosen values in words.
+        at: these.
+        values: of the metric, the mean over the seeds of each surface, shape (n,); NaN where it has none.
+        failed: where a run was not done, shape (n,).
+    """
+
+    name: str
+    at: dict[str, Label]
+    values: Array
+    failed: Mask
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One setting against another, on the same surfaces.
+
+    Args:
+        median: of the differences, one a surface, in the metric's unit; infinite where one of both failed on most
+            surfaces, None where there is none.
+        low, high: its 95 % interval, infinite where it reaches among the failures; None for too few surfaces.
+        won, lost: shares of the surfaces.
+        won_low, won_high: the 95 % interval of the share won.
+        surfaces: on which at least one of both was done.
+    """
+
+    median: float | None
+    low: float | None
+    high: float | None
+    won: float
+    lost: float
+    won_low: float
+    won_high: float
+    surfaces: int
+
+    @property
+    def decided(self) -> bool:
+        """Whether one is better than the other beyond doubt."""
+        return self.low is not None and self.high is not None and (self.low > 0.0 or self.high < 0.0)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The settings of a study by one metric, the best first.
+
+    Args:
+        of: the values of the parameters for which there is a comparison each, [best] each.
+        metric: its name.
+        most: whether more of it is better.
+        entrants: by their mean rank over the surfaces.
+        ranks: these, 1 being best on every surface.
+        behind: each against the first.
+        conditions: the surfaces, a column for each parameter drawn, shape (n,) each.
+    """
+
+    of: dict[str, Label]
+    metric: str
+    most: bool
+    entrants: tuple[Entrant, ...]
+    ranks: tuple[float, ...]
+    behind: tuple[Pair, ...]
+    conditions: dict[str, list[Label]]
+
+    def pair(self, one: int, other: int) -> Pair:
+        """One entrant against another."""
+        return compared(self.entrants[one], self.entrants[other], self.most)
+
+
+def conditions_of(plan: Plan) -> list[str]:
+    """The parameters that are not chosen but met, as a surface is: those drawn at random, and [best] over."""
+    over = plan.study.best.over if plan.study.best else []
+    if plan.study.search is not None:
+        return []
+    return [a.name for a in plan.parts[0].axes if a.drawn or a.name in over]
+
+
+def comparisons(frame: DataFrame, plan: Plan) -> list[Comparison]:
+    """For each metric that has a better side, the one of [best] first, and each value of what is given."""
+    conditions, best = conditions_of(plan), plan.study.best
+    if not conditions or best is None:
+        return []
+    sides = {best.metric: bool(best.most)}
+    for name in plan.study.metrics:
+        better = metric_of(name).better
+        if better and name not in sides:
+            sides[name] = better == "most"
+    found = []
+    for of, rows in _groups(frame, plan, conditions):
+        if len(rows) > 1:
+            found += [_comparison(of, rows, name, most, conditions) for name, most in sides.items()]
+    return found
+
+
+Rows = dict[str, tuple[dict[str, Label], "DataFrame"]]
+
+
+def _groups(frame: DataFrame, plan: Plan, conditions: Sequence[str]) -> list[tuple[dict[str, Label], Rows]]:
+    """The rows of each setting, by the values of what is given."""
+    import polars
+
+    found: dict[tuple[tuple[str, Label], ...], Rows] = {}
+    each = plan.study.best.each if plan.study.best else []
+    for part in plan.parts:
+        own = frame.filter(polars.col("part") == part.name) if "part" in frame.columns else frame
+        names = [a.name for a in part.axes if "seed" not in a.targets and a.name not in conditions]
+        if not {a.name for a in part.axes} >= set(conditions):
+            continue
+        cuts = own.partition_by(names, as_dict=True) if names else {(): own}
+        for values, rows in cuts.items():
+            at = dict(zip(names, values, strict=True))
+            given = tuple((name, at.pop(name)) for name in each if name in at)
+            found.setdefault(given, {})[_name(plan, part, at)] = (at, rows)
+    return [(dict(given), rows) for given, rows in found.items()]
+
+
+def _name(plan: Plan, part: Part, at: Mapping[str, Any]) -> str:
+    """A setting's values in words; a parameter's name only where its value alone would not say it."""
+    several = len(at) > 1
+    words = [f"{v:.4g}" if isinstance(v, float) else str(v) for v in at.values()]
+    labels = {a.name: a.parameter.label or a.name for a in part.axes}
+    named = [
+        f"{labels[name]} {word}" if several or not isinstance(value, str) else word
+        for (name, value), word in zip(at.items(), words, strict=True)
+    ]
+    own = [] if part.name == MAIN else [part.name]
+    return ", ".join([*own, *named]) or plan.study.title
+
+
+def _comparison(
+    of: dict[str, Label], rows: Rows, metric: str, most: bool, conditions: Sequence[str]
+) -> Comparison:
+    places = sorted({key for _, one in rows.values() for key in one.select(conditions).iter_rows()}, key=str)
+    entrants = [
+        Entrant(name, at, *_values(one, metric, conditions, places)) for name, (at, one) in rows.items()
+    ]
+    ranks = mean_ranks(entrants, most)
+    order = sorted(range(len(entrants)), key=lambda i: ranks[i])
+    first = tuple(entrants[i] for i in order)
+    return Comparison(
+        of,
+        metric,
+        most,
+        first,
+        tuple(ranks[i] for i in order),
+        tuple(compared(one, first[0], most) for one in first),
+        {name: [place[i] for place in places] for i, name in enumerate(conditions)},
+    )
+
+
+def _values(
+    rows: DataFrame, metric: str, conditions: Sequence[str], places: Sequence[tuple[Any, ...]]
+) -> tuple[Array, Mask]:
+    """A setting's metric on each surface, and where it has none."""
+    import polars
+
+    grouped = rows.group_by(conditions).agg(
+        polars.col(metric).mean().alias("_value"),
+        ((polars.col("result") != DONE) | polars.col(metric).is_null()).any().alias("_failed"),
+    )
+    known = {row[:-2]: row[-2:] for row in grouped.select([*conditions, "_value", "_failed"]).iter_rows()}
+    found = [known.get(place, (None, True)) for place in places]
+    values = np.array([math.nan if bad or value is None else value for value, bad in found])
+    return values, np.array([bool(bad) for _, bad in found])
+
+
+def compared(one: Entrant, other: Entrant, most: bool) -> Pair:
+    """One setting against another: differences of the metric, one a surface.
+
+    A run that failed is worse than any that was done; where both failed nothing is known.
+    """
+    from scipy.stats import binomtest
+
+    worse = -math.inf if most else math.inf
+    either = ~(one.failed & other.failed)
+    difference = np.where(one.failed, worse, np.where(other.failed, -worse, one.values - other.values))[
+        either
+    ]
+    n = len(difference)
+    if one is other or n == 0:
+        return Pair(None, None, None, 0.0, 0.0, 0.0, 1.0, n)
+    better = difference > 0.0 if most else difference < 0.0
+    won, lost = int(better.sum()), int((~better & (difference != 0.0)).sum())
+    share = binomtest(won, n).proportion_ci(LEVEL)
+    low, high = median_interval(difference)
+    return Pair(_median(difference), low, high, won / n, lost / n, float(share.low), float(share.high), n)
+
+
+def _median(values: Array) -> float | None:
+    with np.errstate(invalid="ignore"):  # between a failure of the one and of the other there is no middle
+        middle = float(np.median(values))
+    return None if math.isnan(middle) else middle
+
+
+def median_interval(values: Array) -> tuple[float | None, float | None]:
+    """The 95 % interval of a median by order statistics; None where there are too few values for one."""
+    from scipy.stats import binom
+
+    n = len(values)
+    k = int(
+        binom.ppf((1.0 - LEVEL) / 2.0, n, 0.5)
+    )  # that fewer than k lie below the median has at most 2.5 %
+    if k == 0:
+        return None, None
+    ordered = np.sort(values)
+    return float(ordered[k - 1]), float(ordered[n - k])
+
+
+def mean_ranks(entrants: Sequence[Entrant], most: bool) -> list[float]:
+    """Of each entrant the mean over the surfaces of its rank there, ties shared (Friedman, 1937)."""
+    from scipy.stats import rankdata
+
+    worst = math.inf
+    values = np.array([np.where(e.failed, worst, -e.values if most else e.values) for e in entrants])
+    return [float(r) for r in rankdata(values, axis=0).mean(axis=1)]
