@@ -227,17 +227,6 @@ def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():
     assert fig_4_03._quiet(runs.one(fig_4_03._press(case, stiffness, 1.0)))
 
 
-@pytest.mark.long
-def test_figures_draw_what_they_ran_and_check_it(tmp_path):
-    """The cheapest study whole; the others go the same way in the program's own test."""
-    data = fig_2_04.run(Runs((0, 1)))
-    claims = fig_2_04.check(data)
-    assert [c.id for c in claims] == ["network-alone", "network-alone.integrator"]
-    drawing = fig_2_04.plot(data)
-    drawing.savefig(tmp_path / "one.png")
-    assert (tmp_path / "one.png").stat().st_size > 10_000
-
-
 def test_rougher_friction_is_what_it_says():
     half = changed(FOAM, rougher(FOAM, 0.5))
     assert half.friction.coulomb == tuple(0.5 * v for v in FOAM.friction.coulomb)

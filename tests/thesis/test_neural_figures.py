@@ -222,15 +222,3 @@ def test_each_study_says_what_it_shows_and_what_was_chosen(number):
     assert len(one.TITLE) > 10
     assert len(one.CAPTION) > 60
     assert one.PARAMETERS
-
-
-@pytest.mark.long
-def test_a_figure_from_its_runs_to_its_file(tmp_path):
-    from palpate.report import style
-
-    one = study("6.13")
-    data = one.run(Runs(range(2)))
-    (claim,) = one.check(data)
-    assert claim.id == "neural-slow-rate.first"
-    assert claim.verdict in ("reproduced", "differs")
-    assert style.save(one.plot(data), tmp_path / "6.13.png").stat().st_size > 10_000
