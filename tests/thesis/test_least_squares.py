@@ -211,7 +211,7 @@ def test_the_filters_gain_is_that_of_the_printed_transfer_function():
 
 
 def test_where_the_sampling_puts_a_tone():
-    bins, lines = fig_3_05._tones()
+    bins, lines = fig_3_05.tones_sampled()
     at = {name: float(bins[int(np.argmax(line))]) for name, line in lines.items()}
     assert at == {"480 Hz": 480.0, "480 Hz, filtered": 480.0, "960 Hz": 40.0, "960 Hz, filtered": 40.0}
     assert lines["960 Hz"].max() == pytest.approx(fig_3_05.AMPLITUDE, rel=1e-3)
@@ -227,7 +227,7 @@ def test_a_clean_switch_keeps_contact_and_reaches_the_force():
 
 def test_the_starts_reach_is_told_in_words():
     some = settling.COVARIANCES >= 1e7
-    assert settling._reach(some) == "p from 1e+07 up"
-    assert settling._reach(some | True) == "every p"
-    assert settling._reach(~some & some) == "no p"
-    assert settling._reach(settling.COVARIANCES == 1e3) == "p = 1e+03"
+    assert settling.reach_in_words(some) == "p from 1e+07 up"
+    assert settling.reach_in_words(some | True) == "every p"
+    assert settling.reach_in_words(~some & some) == "no p"
+    assert settling.reach_in_words(settling.COVARIANCES == 1e3) == "p = 1e+03"

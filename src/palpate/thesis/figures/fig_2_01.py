@@ -112,8 +112,8 @@ def run(runs: Runs) -> Data:
     dynamic = by_condition(runs, worlds, lambda e, s: _measured(runs.one(changed(e, DYNAMIC), s)), {"foam"})
     varied = {n: [Pair(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
     traces = {LAWS[0]: _trace(runs.one(PARAMETERS)), LAWS[1]: _trace(runs.one(changed(PARAMETERS, DYNAMIC)))}
-    growth = _growth(1.0, np.ones((len(YS), len(XS)), dtype=bool))
-    others = [_growth(gain, growth > GROWS) for gain in (0.1, 10.0)]
+    growth = growth_over(1.0, np.ones((len(YS), len(XS)), dtype=bool))
+    others = [growth_over(gain, growth > GROWS) for gain in (0.1, 10.0)]
     return Data(traces, varied, growth, np.fmin.reduce([growth, *others]))
 
 
@@ -254,7 +254,7 @@ def _changes() -> dict[str, Mapping[str, Any]]:
     }
 
 
-def _growth(gain: float, where: NDArray[np.bool_]) -> Array:
+def growth_over(gain: float, where: NDArray[np.bool_]) -> Array:
     """Of the original's position loop, its stiffness times `gain`, over YS and XS [1/s]; NaN elsewhere."""
     arm: Any = Arm3()
     into = Vec3(1.0, 0.0, 0.0)
