@@ -1,12 +1,13 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench live attack soak trust leaderboard force-figures laboratory docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench live attack soak trust leaderboard force-figures laboratory claims docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PIP_INSTALL := $(PIP) install --only-binary :all: --no-warn-script-location
-PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
+# Bytecode is kept whatever the environment says: tests start many processes, which would compile the sources each.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 # The Python to build .venv with; `make test PYTHON=python3.13` picks another.
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python3.14 python; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then echo $$p; break; fi; done)
@@ -72,6 +73,10 @@ laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and 
 	cp runs/laboratory/inferred.toml src/palpate/thesis/laboratory/shipped/inferred.toml
 	$(BIN)/palpate thesis --laboratory inferred --out runs/thesis-inferred --force
 	$(BIN)/python benchmarks/laboratory/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
+
+claims: .venv/dev.stamp ## measure the whole thesis again, say which claims changed, and keep what they are now for the tests
+	$(BIN)/palpate thesis --out runs/claims --force
+	$(BIN)/python tests/thesis/frozen.py runs/claims
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean --strict

@@ -3,12 +3,15 @@
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
 
+from palpate._jit import registry
+from palpate._jit.stamp import home_of
 from palpate.cli import main
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -27,16 +30,33 @@ sys.path.insert(0, str(ROOT / "benchmarks" / "live"))
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-REAL_TIME = (ROOT / "tests" / "wires", ROOT / "tests" / "live")
-"""What runs against a clock. A machine that halts for half a second makes an arm late in truth, so these may try
-again; a fault of ours fails each time."""
+REAL_TIME = ROOT / "tests" / "wires"
+"""A press over a wire runs against a clock: a machine that halts for half a second makes an arm late in truth, and the
+press ends as it should. So these may try again; a fault of ours fails each time. All others wait for a condition."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let the tests that run against a clock begin again, twice."""
     for item in items:
-        if any(folder in item.path.parents for folder in REAL_TIME):
+        if REAL_TIME in item.path.parents:
             item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=2))
+
+
+@pytest.fixture(autouse=True)
+def _forgotten_afterwards(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Forgets what a test has registered from a module in a folder of its own.
+
+    A kernel of the tests may call whatever is registered: each such module would have all that follow compiled anew.
+    """
+    registered = (registry.parts, registry.foreign_laws, registry.foreign_files)
+    before = [set(known) for known in registered]
+    yield
+    own = tmp_path_factory.getbasetemp()
+    for known, old in zip(registered, before, strict=True):
+        for one in set(known) - old:
+            home = one if isinstance(one, Path) else home_of(one)
+            if own in home.parents or not home.is_file():
+                known.pop(one) if isinstance(known, dict) else known.remove(one)
 
 
 @pytest.fixture(scope="session")

@@ -75,7 +75,7 @@ def test_a_full_disk_leaves_whole_files(tmp_path):
     assert not [word for word in told if word.startswith("defect")], told
 
 
-@pytest.mark.parametrize("name", ["foam-hybrid", "foam-neural"])
+@pytest.mark.parametrize("name", [pytest.param("foam-hybrid", marks=pytest.mark.long), "foam-neural"])
 def test_a_minute_of_an_experiment_keeps_its_promises(name):
     one = lasted(name, 60.0)
     assert one.finite

@@ -202,7 +202,7 @@ def test_keys_are_the_parts_own_fields():
 def test_a_record_that_names_a_part_imports_nothing(module, tmp_path):
     """A log is a stranger's: the names in it are texts."""
     name = module("raise RuntimeError('imported')")
-    record = build(quick("foam-hybrid")).run(0.6, seed=1, compiled=False)
+    record = build(quick("foam-hybrid")).run(0.6, seed=1)
     experiment = {**record.meta["experiment"], "controller": {"kind": f"{name}:Bad"}}
     poisoned = type(record)(record.columns, record.units, {**record.meta, "experiment": experiment})
     write_record(poisoned, tmp_path / "record.parquet")

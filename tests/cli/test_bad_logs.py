@@ -37,11 +37,6 @@ def _state(folder, log):
     return {path: path.stat().st_mtime_ns for path in places}
 
 
-@pytest.fixture(autouse=True)
-def inside(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
 def folder_without_a_bag(path):
     path.mkdir()
     (path / "notes.md").write_text("nothing")

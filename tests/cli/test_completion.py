@@ -8,6 +8,9 @@ import shlex
 import shutil
 import subprocess
 import time
+from contextlib import redirect_stdout
+from functools import cache
+from io import StringIO
 
 import pytest
 
@@ -29,17 +32,23 @@ def needed(shell):
         pytest.skip(f"there is no {shell} on this machine (Debian: apt-get install {shell})")
 
 
+@cache
+def printed(shell):
+    """The script of a shell, which takes a third of a second to make."""
+    with redirect_stdout(StringIO()) as script:
+        assert main(["completion", shell]) == 0
+    return script.getvalue()
+
+
 @pytest.fixture
-def script(capsys, tmp_path, monkeypatch):
+def script(tmp_path):
     """The script of a shell, in a folder that is the working one and holds a file of no interest."""
 
     def made(shell, name):
         needed(shell)
-        assert main(["completion", shell]) == 0
-        (tmp_path / name).write_text(capsys.readouterr().out, encoding="utf-8")
+        (tmp_path / name).write_text(printed(shell), encoding="utf-8")
         return tmp_path / name
 
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "a-file.csv").touch()
     return made
 

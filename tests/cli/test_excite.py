@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from cli import asked
 from palpate.bench.experiments.tables import parse
 from palpate.cli import main
 from palpate.logs.store import read_record
@@ -20,17 +21,7 @@ ASKED = (*SURFACES, "--force", "15", "--peak", "20:N", "--precision", "K=10%,B=1
 
 
 def ask(capsys, *words):
-    """Run `palpate excite ... --json`; the exit code and the object."""
-    code = main(["excite", *map(str, words), "--json"])
-    printed = capsys.readouterr()
-    assert printed.err == ""
-    return code, json.loads(printed.out)
-
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    return asked.ask(capsys, "excite", *words)
 
 
 def test_the_contract_of_json(capsys, elsewhere):

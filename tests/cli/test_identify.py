@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 
 import palpate
+from cli import asked
 from identification.synthetic_contacts import pressed
 from palpate import identify, read_log
 from palpate.cli import main
@@ -22,11 +22,7 @@ FIELDS = {"value", "std", "ci95", "ci95_if_model_holds", "budget", "unit", "verd
 
 
 def ask(capsys, *words):
-    """Run `palpate identify ... --json`; the exit code and the object."""
-    code = main(["identify", *map(str, words), "--json"])
-    printed = capsys.readouterr()
-    assert printed.err == ""
-    return code, json.loads(printed.out)
+    return asked.ask(capsys, "identify", *words)
 
 
 def codes(found):
@@ -34,8 +30,7 @@ def codes(found):
 
 
 @pytest.fixture
-def log(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def log(tmp_path):
     record = pressed()
     table = np.column_stack([record["time"], record["position"] * 1e3, record["force"]])
     path = tmp_path / "press.csv"

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from html import unescape
 
 import numpy as np
 import pytest
 
+from cli.asked import ask
 from contact_frame.synthetic_arm import log_of
 from identification.synthetic_contacts import pressed
 from logs.arm_bags import a_press, press_bag, topics_of
 from logs.ros_bags import joints, pose, storage, wrench, write_bag
 from palpate.cli import main
 from palpate.records import Record
-
-
-def ask(capsys, *words):
-    """Run a command with --json; the exit code and the object."""
-    code = main([*map(str, words), "--json"])
-    printed = capsys.readouterr()
-    assert printed.err == ""
-    return code, json.loads(printed.out)
 
 
 def codes(found):
@@ -32,12 +24,9 @@ def stiffness(found):
     return found["parameters"]["K"]["value"]
 
 
-@pytest.fixture(autouse=True)
-def inside(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
-@pytest.mark.parametrize("kind", ["bag1", "sqlite", "mcap"])
+@pytest.mark.parametrize(
+    "kind", [*(pytest.param(k, marks=pytest.mark.long) for k in ("bag1", "sqlite")), "mcap"]
+)
 def test_a_bag_with_one_wrench_and_one_pose_needs_no_words(tmp_path, capsys, kind):
     press_bag(tmp_path / "press.bag", kind)
     code, found = ask(capsys, "identify", "press.bag")

@@ -69,7 +69,6 @@ def test_within_noticed_nothing_is_raised_and_it_is_told():
 @pytest.mark.long
 def test_results_that_are_being_written_are_written(tmp_path, monkeypatch):
     """It comes while the page is made: everything is there, and the code says that it came."""
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")
     page = pages.run_page
 
@@ -83,15 +82,9 @@ def test_results_that_are_being_written_are_written(tmp_path, monkeypatch):
     assert read_record(tmp_path / "results" / "record.parquet").meta["end"] == "done"
 
 
-@pytest.mark.parametrize(
-    "error",
-    [
-        pytest.param(MemoryError("Unable to allocate"), marks=pytest.mark.long),
-        OSError(28, "No space left on device"),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("error", [MemoryError("Unable to allocate"), OSError(28, "No space left on device")])
 def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeypatch, capsys, error):
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")
 
     def full(*words):

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cli.asked import ask, refused
 from contact_frame.synthetic_arm import any_world, log_of
-from palpate.cli import main
 from palpate.cli.options.kept import presets
-
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 @pytest.fixture
@@ -37,20 +29,6 @@ def ur_log(elsewhere):
     rows = np.column_stack([record["time"], *force, *pose])
     np.savetxt("ur.csv", rows, delimiter=",", header=",".join(names), comments="", fmt="%.10g")
     return elsewhere / "ur.csv"
-
-
-def ask(capsys, *words):
-    code = main([*map(str, words), "--json"])
-    printed = capsys.readouterr()
-    assert printed.err == ""
-    return code, json.loads(printed.out)
-
-
-def refused(capsys, *words):
-    assert main(list(map(str, words))) == 2
-    printed = capsys.readouterr()
-    assert printed.err.count("\n") == 1
-    return printed.err
 
 
 def test_a_preset_and_a_saved_file_say_the_same_as_all_words(ur_log, capsys):

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cli.asked import ask
 from contact_frame.synthetic_arm import any_world
 from contact_frame.synthetic_arm import log_of as press_of
 from contact_frame.turning_tool import Tool, log_of, six
 from palpate.cli import main
 from palpate.logs import write_record
 from palpate.records import Record
-
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def ask(capsys, *words):
-    code = main([*map(str, words), "--json"])
-    printed = capsys.readouterr()
-    assert printed.err == ""
-    return code, json.loads(printed.out)
 
 
 def write(record, name):

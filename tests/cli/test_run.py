@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from contextlib import chdir, redirect_stdout
-from html.parser import HTMLParser
 from io import StringIO
 from pathlib import Path
 
@@ -15,6 +14,8 @@ import numpy as np
 import pytest
 
 import palpate.logs
+from cli import asked
+from cli.asked import References
 from palpate.bench import bench as running
 from palpate.bench import names, simulation, source
 from palpate.bench.any_experiment import FILES as EXPERIMENTS
@@ -38,6 +39,10 @@ FILES = {
 }
 
 
+def refused(capsys, *words):
+    return asked.refused(capsys, "run", *words)
+
+
 def text_of(**lines):
     """The text of foam-hybrid, near the wall; each keyword replaces the line of that key."""
     text = source("foam-hybrid") + NEAR
@@ -50,37 +55,15 @@ def text_of(**lines):
 
 
 @pytest.fixture
-def mine(tmp_path, monkeypatch):
+def mine(tmp_path):
     """A quick experiment in a file, in an empty folder that is the working one."""
-    monkeypatch.chdir(tmp_path)
     file = tmp_path / "mine.toml"
     file.write_text(text_of(), encoding="utf-8")
     return file
 
 
-def refused(capsys, *words):
-    """Runs and is refused: the one line on standard error."""
-    assert main(["run", *map(str, words)]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("palpate: ")
-    assert captured.err.count("\n") == 1
-    return captured.err
-
-
 def nothing_but(folder, *names):
     assert {path.name for path in folder.iterdir()} == set(names)
-
-
-class References(HTMLParser):
-    """Whatever a page would fetch."""
-
-    def __init__(self):
-        super().__init__()
-        self.found = []
-
-    def handle_starttag(self, tag, attrs):
-        self.found += [v for k, v in attrs if k in {"src", "href", "srcset", "data", "action"}]
 
 
 @pytest.fixture(scope="module")
@@ -147,12 +130,19 @@ def test_the_same_seed_writes_the_same_record_and_prints_its_summary(mine, done,
         np.testing.assert_array_equal(a[name], b[name])
 
 
-def test_what_is_in_the_file_cannot_break_the_page(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    evil = text_of(title='"</title><script>alert(1)</script>"', about='"<b>&"')
-    (tmp_path / "evil name.toml").write_text(evil, encoding="utf-8")
-    assert main(["run", "evil name.toml", "--out", "results"]) == 0
-    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+@pytest.fixture(scope="module")
+def evil(tmp_path_factory):
+    """The results of a longer press by a file whose name and text are no good HTML."""
+    folder = tmp_path_factory.mktemp("evil")
+    text = text_of(press=2.0, title='"</title><script>alert(1)</script>"', about='"<b>&"')
+    (folder / "evil name.toml").write_text(text, encoding="utf-8")
+    with chdir(folder):
+        assert main(["run", "evil name.toml", "--out", "results"]) == 0
+    return folder / "results"
+
+
+def test_what_is_in_the_file_cannot_break_the_page(evil):
+    page = (evil / "report.html").read_text(encoding="utf-8")
     assert "<script>alert" not in page
     assert "&lt;script&gt;" in page
     assert "palpate run &#39;evil name.toml&#39; --seed 0" in page
@@ -238,14 +228,12 @@ def test_without_a_name_it_says_what_to_do(capsys):
     assert "palpate run --list" in refused(capsys)
 
 
-def test_an_unknown_experiment_names_the_nearest(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_an_unknown_experiment_names_the_nearest(capsys, tmp_path):
     assert "did you mean 'rubber-hybrid'" in refused(capsys, "rubber-hybird")
     nothing_but(tmp_path)
 
 
-def test_a_missing_file(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_missing_file(capsys, tmp_path):
     assert "absent.toml: no such file" in refused(capsys, "absent.toml")
     nothing_but(tmp_path)
 
@@ -277,11 +265,17 @@ def test_a_seed_is_a_whole_number_from_zero_on(mine, capsys, seed):
     nothing_but(mine.parent, "mine.toml")
 
 
-def test_results_are_not_written_over_and_figures_are_of_the_kinds_asked_for(mine, done, capsys):
+def test_results_are_not_written_over(mine, done, capsys):
     results = shutil.copytree(done[0] / "results", mine.parent / "results")
     before = (results / "record.parquet").read_bytes()
     assert "--force" in refused(capsys, "mine.toml", "--seed", "9", "--out", "results")
     assert (results / "record.parquet").read_bytes() == before
+
+
+@pytest.mark.long
+def test_results_are_replaced_by_force_and_figures_are_of_the_kinds_asked_for(mine, done):
+    results = shutil.copytree(done[0] / "results", mine.parent / "results")
+    before = (results / "record.parquet").read_bytes()
     kinds = ("--figures", "svg", "--figures", "pdf")
     assert main(["run", "mine.toml", "--seed", "9", "--out", "results", "--force", *kinds]) == 0
     assert (results / "record.parquet").read_bytes() != before
@@ -382,15 +376,12 @@ def test_a_warm_run_compiles_nothing():
     assert ran.stdout.strip() == "True"
 
 
-def test_the_verdict_is_that_of_identify(mine, capsys):
+def test_the_verdict_is_that_of_identify(evil, capsys):
     """On whatever was run: the page, the summary and `palpate identify` of the record say one thing."""
-    mine.write_text(text_of(press=2.0), encoding="utf-8")
-    assert main(["run", "mine.toml", "--out", "results"]) == 0
-    capsys.readouterr()
-    assert main(["identify", "results/record.parquet", "--json"]) in {0, 1}
+    assert main(["identify", str(evil / "record.parquet"), "--json"]) in {0, 1}
     found = json.loads(capsys.readouterr().out)
-    summary = json.loads((mine.parent / "results" / "summary.json").read_text())
+    summary = json.loads((evil / "summary.json").read_text())
     assert summary["identification"]["parameters"] == found["parameters"]
-    page = (mine.parent / "results" / "report.html").read_text(encoding="utf-8")
+    page = (evil / "report.html").read_text(encoding="utf-8")
     for own in found["parameters"].values():
         assert f">{own['verdict']}</span>" in page

@@ -12,9 +12,8 @@ from palpate.cli import main
 
 
 @pytest.fixture
-def mine(tmp_path, monkeypatch):
+def mine(tmp_path):
     """A quick experiment in the working folder."""
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")
     return tmp_path
 

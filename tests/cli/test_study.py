@@ -7,11 +7,12 @@ import signal
 import subprocess
 import sys
 import time
-from html.parser import HTMLParser
 
 import polars
 import pytest
 
+from cli import asked
+from cli.asked import References
 from palpate.cli import main
 from palpate.studies.definition.study import names
 from studies.small import NEAR, SMALL, text
@@ -27,19 +28,25 @@ FILES = {
 }
 
 
+def refused(capsys, *words):
+    return asked.refused(capsys, "study", *words)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with the studies `small.toml` and `many.toml`, and the results of both."""
+    """A folder with the studies `small.toml` and `many.toml`, and the results of the first."""
     folder = tmp_path_factory.mktemp("studies")
     for name, source in (("small", SMALL), ("many", MANY)):
         (folder / f"{name}.toml").write_text(source, encoding="utf-8")
-        assert main(["study", str(folder / f"{name}.toml"), "--out", str(folder / name)]) == 0
+    assert main(["study", str(folder / "small.toml"), "--out", str(folder / "small")]) == 0
     return folder
 
 
-@pytest.fixture(autouse=True)
-def _here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(scope="module")
+def many(folder):
+    """The table of the study of 240 runs, run through."""
+    assert main(["study", str(folder / "many.toml"), "--out", str(folder / "many")]) == 0
+    return (folder / "many" / "results.parquet").read_bytes()
 
 
 def started(*words, **options):
@@ -54,27 +61,6 @@ def wait_for(path, lines):
     while not path.exists() or path.read_bytes().count(b"\n") <= lines:
         assert time.monotonic() < deadline
         time.sleep(0.003)
-
-
-def refused(capsys, *words):
-    """Runs and is refused: the one line on standard error."""
-    assert main(["study", *map(str, words)]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith("palpate: ")
-    assert captured.err.count("\n") == 1
-    return captured.err
-
-
-class References(HTMLParser):
-    """Whatever a page would fetch."""
-
-    def __init__(self):
-        super().__init__()
-        self.found = []
-
-    def handle_starttag(self, tag, attrs):
-        self.found += [v for k, v in attrs if k in {"src", "href"}]
 
 
 def test_the_list_has_a_name_and_a_title_a_line(capsys):
@@ -122,7 +108,7 @@ def test_a_finished_study_is_shown_again_and_json_is_all_there_is(folder, capsys
 
 
 @pytest.mark.long
-def test_killed_at_any_moment_it_goes_on_and_the_table_is_the_same_to_the_byte(folder, tmp_path):
+def test_killed_at_any_moment_it_goes_on_and_the_table_is_the_same_to_the_byte(folder, many, tmp_path):
     out = tmp_path / "out"
     for runs in (0, 40, 150):
         process = started(folder / "many.toml", "--out", out)
@@ -134,7 +120,7 @@ def test_killed_at_any_moment_it_goes_on_and_the_table_is_the_same_to_the_byte(f
     process = started(folder / "many.toml", "--out", out)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
-    assert (out / "results.parquet").read_bytes() == (folder / "many" / "results.parquet").read_bytes()
+    assert (out / "results.parquet").read_bytes() == many
     assert not list(out.glob(".*"))
 
 
@@ -154,7 +140,7 @@ def test_ctrl_c_saves_and_says_how_to_go_on(folder, tmp_path):
 
 
 @pytest.mark.long
-def test_on_a_full_disk_what_is_done_is_kept(folder, tmp_path):
+def test_on_a_full_disk_what_is_done_is_kept(folder, many, tmp_path):
     out = tmp_path / "out"
 
     def little_room():
@@ -170,7 +156,7 @@ def test_on_a_full_disk_what_is_done_is_kept(folder, tmp_path):
     assert 10 < journal.count(b"\n") < 40
     assert main(["study", str(folder / "many.toml"), "--out", str(out)]) == 0
     assert (out / "runs.jsonl").read_bytes().startswith(journal)
-    assert (out / "results.parquet").read_bytes() == (folder / "many" / "results.parquet").read_bytes()
+    assert (out / "results.parquet").read_bytes() == many
 
 
 def test_a_thousand_million_runs_are_not_begun_unasked(capsys, tmp_path):

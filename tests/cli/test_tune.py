@@ -7,6 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from cli import asked
+from cli.asked import refused
 from force.gained import gains_of
 from force.test_inner_loop import TRUE
 from force.test_inner_loop import log as loop_log
@@ -21,6 +23,10 @@ CONTRACT = {
 RANGE = ("--stiffness", "1e2:1e6", "--arm", "ur5e", "--force", "20")
 
 
+def ask(capsys, *words):
+    return asked.ask(capsys, "tune", *words)
+
+
 def found(K=5000.0, half=200.0, unit="N/m", B=20.0, **others):
     def one(value, width, of):
         return {
@@ -33,27 +39,6 @@ def found(K=5000.0, half=200.0, unit="N/m", B=20.0, **others):
         "parameters": {"K": one(K, half, unit), "B": one(B, 5.0, "N s/m")},
         **others,
     }
-
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def ask(capsys, *words):
-    code = main(["tune", *map(str, words), "--json"])
-    printed = capsys.readouterr()
-    assert printed.err == ""
-    return code, json.loads(printed.out)
-
-
-def refused(capsys, *words):
-    assert main(list(map(str, words))) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert printed.err.count("\n") == 1
-    return printed.err
 
 
 @pytest.mark.long

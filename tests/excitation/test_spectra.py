@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.excitation.spectra import CRITERIA, _sensitivity, covariance, optimal
+from palpate.excitation.spectra import CRITERIA, covariance, optimal, sensitivity_of
 
 NOTHING = np.zeros((2, 2))
 UNIT = np.full(2, 1.96)  # so that the criteria are those of the plain covariance
@@ -58,7 +58,7 @@ def test_the_sensitivity_is_the_derivative(criterion):
         values = CRITERIA[criterion](C / np.outer(wanted[:2], wanted[:2]) * 1.96**2)[0]
         return (values**8).sum() ** (1 / 8)
 
-    found = _sensitivity(information, prior, wanted, asked, powers, CRITERIA[criterion])
+    found = sensitivity_of(information, prior, wanted, asked, powers, CRITERIA[criterion])
     step = 1e-6 * np.eye(10)
     slope = np.array([(value(powers - h) - value(powers + h)) / 2e-6 for h in step])
     assert found / found.sum() == pytest.approx(slope / slope.sum(), rel=1e-4)

@@ -37,7 +37,9 @@ def test_a_press_on_skin_leaves_with_a_stiffness_and_what_it_belongs_to(force):
 
 
 @measured
-@pytest.mark.parametrize("force", [20, 40, 400, 600, 800])
+@pytest.mark.parametrize(
+    "force", [20, 800, *(pytest.param(f, marks=pytest.mark.long) for f in (40, 400, 600))]
+)
 def test_no_log_gives_a_confident_negative_mass_or_damping(force):
     for model in (None, "kelvin-voigt-mass"):
         found = identify(skin(force), model=model)

@@ -32,17 +32,26 @@ def misses(made, found):
     return out
 
 
+@pytest.mark.parametrize("seed", [2000, *(pytest.param(n, marks=pytest.mark.long) for n in (2001, 2002))])
 @pytest.mark.parametrize("fault", FAULTS)
-def test_nothing_is_confidently_wrong(fault):
+def test_nothing_is_confidently_wrong(fault, seed):
     """Confidently wrong: off by more than a quarter, or by three half-widths and 2 %."""
-    for seed in range(2000, 2003):
-        made = press(seed, fault)
-        for name, (widths, share) in misses(made, identified(made).estimate()).items():
-            assert share < 0.25, (seed, name, widths)
-            assert widths < 3 or share < 0.02, (seed, name, share)
+    made = press(seed, fault)
+    for name, (widths, share) in misses(made, identified(made).estimate()).items():
+        assert share < 0.25, (name, widths)
+        assert widths < 3 or share < 0.02, (name, share)
 
 
-@pytest.mark.parametrize("fault", ["none", "dropped", "not a number", "loss of contact", "begins in air"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "loss of contact",
+        *(
+            pytest.param(f, marks=pytest.mark.long)
+            for f in ("none", "dropped", "not a number", "begins in air")
+        ),
+    ],
+)
 def test_a_stiffness_is_known_all_the_same(fault):
     """Of five presses four at least, each to a tenth."""
     known = 0
@@ -92,7 +101,7 @@ def test_an_estimator_that_starts_again_is_trusted_again():
     assert all(held)
 
 
-@pytest.mark.parametrize("seed", [1, 3, 5, 8])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.long) for n in (3, 5, 8))])
 def test_stream_and_log_agree(seed):
     """Each within what both leave open."""
     made = press(seed)

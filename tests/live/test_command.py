@@ -8,13 +8,17 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from cli import asked
 from live.conftest import PATIENCE, Stream, headless, near
 from palpate.bench import build
-from palpate.cli import main
 from palpate.live.view import AT
 from palpate.logs import write_record
 
 ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/[\w-]{24}/")
+
+
+def refused(capsys, *words):
+    return asked.refused(capsys, "live", *words)
 
 
 @contextmanager
@@ -31,14 +35,6 @@ def record(tmp_path_factory):
     path = tmp_path_factory.mktemp("run") / "record.parquet"
     write_record(build(near()).run(20.0, seed=1, press=1.0), path)
     return path
-
-
-def refused(capsys, *words):
-    assert main(["live", *map(str, words)]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.count("\n") == 1
-    return told.err
 
 
 @pytest.mark.long

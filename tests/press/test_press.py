@@ -34,7 +34,10 @@ def asked(**changes):
     return record, summarise(record, pressing.asked)
 
 
-@pytest.mark.parametrize(("arm", "mode", "stiffness"), [("fr3", "torque", 6e4), ("ur5e", "position", 5e3)])
+@pytest.mark.parametrize(
+    ("arm", "mode", "stiffness"),
+    [pytest.param("fr3", "torque", 6e4, marks=pytest.mark.long), ("ur5e", "position", 5e3)],
+)
 def test_it_presses_with_the_force_asked_for_and_finds_the_surface(arm, mode, stiffness):
     record, summary = asked(arm=arm, mode=mode, surface=surface_of(f"K={stiffness},B=50"), seconds=4.0)
     assert summary["end"] == "done"

@@ -153,23 +153,23 @@ class Deadly:
 
 
 def test_of_runs_that_kill_workers_each_is_tried_alone_and_becomes_a_row():
-    hand = clusters._Hand(None, "tcp://somewhere", 1.0)
-    assert hand._taken(Deadly(), jobs(2)) is None
-    ((row, record),) = hand._taken(Deadly(), jobs(1))
+    hand = clusters.Hand(None, "tcp://somewhere", 1.0)
+    assert hand.taken(Deadly(), jobs(2)) is None
+    ((row, record),) = hand.taken(Deadly(), jobs(1))
     assert (row.run, row.result, row.metrics, record) == (0, "failed", (None, None, None), None)
     assert "tcp://10.0.0.7:1" in row.why
 
 
 def test_batches_grow_to_the_unit():
-    batches = clusters._Batches(iter(jobs(12) * 100))
+    batches = clusters.Batches(iter(jobs(12) * 100))
     first = next(batches)
     assert 0.5 * clusters.UNIT < len(first) * 0.2 * 1000 * clusters.TICK < 1.5 * clusters.UNIT
     batches.took(
         [(row, None) for row, _ in Formula(lambda _: 0.0).run(first[:1])]
     )  # which says that it took 1 s
-    batches._seconds = 0.05
+    batches.seconds = 0.05
     assert len(next(batches)) == 4
-    batches._seconds = 5.0
+    batches.seconds = 5.0
     assert len(next(batches)) == 1
     batches.again(first[:2])
     assert [len(next(batches)) for _ in range(3)] == [1, 1, 1]

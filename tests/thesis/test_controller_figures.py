@@ -117,16 +117,16 @@ def test_a_hopeless_loop_has_no_limit():
 
 def test_without_friction_the_arm_is_the_target_spring_and_damper():
     e = changed(fig_2_02.PARAMETERS, fig_2_02.FREE)
-    found = fig_2_02._found(fig_2_02._record(e, 0))
+    found = fig_2_02.found_in(fig_2_02.recorded(e, 0))
     assert pytest.approx(1.0, abs=0.05) == found.K
     assert pytest.approx(1.0, abs=0.25) == found.B
     assert pytest.approx(1.0 - 600.0 * 0.007 / 5.0, abs=0.15) == found.M  # the velocity's lag takes the rest
-    rough = fig_2_02._found(fig_2_02._record(fig_2_02.PARAMETERS, 0))
+    rough = fig_2_02.found_in(fig_2_02.recorded(fig_2_02.PARAMETERS, 0))
     assert abs(rough.K - 1.0) > 0.3
 
 
 def test_the_target_impedance_itself_settles_at_what_two_springs_agree_on():
-    ideal = fig_2_02._ideal()
+    ideal = fig_2_02.ideal_trace()
     for i, depth in enumerate(fig_2_02.DEPTHS):
         end = ideal["force"][1000 * (i + 1) - 1]
         assert end == pytest.approx(depth * 2000.0 * 5200.0 / 7200.0, rel=0.01)
@@ -155,13 +155,13 @@ def stray_of(y=1.0, phi=1.0, force=0.01, lost=0):
 )
 def test_what_counts_as_decoupled(decoupled, angle, force):
     pair = Pair(stray_of(), decoupled, 5200.0)
-    assert fig_4_19._angle_kept(pair) == angle
-    assert fig_4_19._force_kept(pair) == force
+    assert fig_4_19.angle_kept(pair) == angle
+    assert fig_4_19.force_kept(pair) == force
 
 
 def test_the_original_is_unstable_near_the_stretched_arm_and_not_where_the_experiments_are():
     everywhere = np.ones((len(fig_2_01.YS), len(fig_2_01.XS)), dtype=bool)
-    growth = fig_2_01._growth(1.0, everywhere)
+    growth = fig_2_01.growth_over(1.0, everywhere)
     line = growth[np.argmin(np.abs(fig_2_01.YS))]
     where = (fig_2_01.XS >= 0.40) & (fig_2_01.XS <= 0.49)
     assert np.isfinite(line[where]).all()
@@ -172,22 +172,22 @@ def test_the_original_is_unstable_near_the_stretched_arm_and_not_where_the_exper
 
 def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
     record = run_with(compensation.PLAIN, 0, [])
-    assert compensation._listing_factor(record) < 1e-6
+    assert compensation.listing_factor(record) < 1e-6
     slow = {f"q{i}": record[f"q{i}"] for i in (1, 2, 3)}
     finer = changed(compensation.PLAIN, {"encoders.counts": (6.144e8, 4.096e8, 2e6)})
     patched = type(record)({**record.columns, **slow}, record.units, record.meta)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compensation, "PLAIN", finer)
-        assert compensation._listing_factor(patched) > 0.5
+        assert compensation.listing_factor(patched) > 0.5
 
 
 def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
     plain, wide, short = (
-        compensation._held(run_with(e, 0, []))
+        compensation.held_in(run_with(e, 0, []))
         for e in (
             compensation.PLAIN,
             compensation.PARAMETERS,
-            compensation._blended(compensation.PARAMETERS, 0.002),
+            compensation.blended(compensation.PARAMETERS, 0.002),
         )
     )
     assert wide.error < 0.5 * plain.error
@@ -206,12 +206,12 @@ def test_a_regain_that_is_late_hard_or_missing_is_not_well():
 
 
 def test_the_network_alone_follows_and_an_untaught_one_does_not():
-    assert fig_2_04._neural(fig_2_04.FOAM, 5e-5, 0).follows
-    assert not fig_2_04._neural(fig_2_04.FOAM, 1e-7, 0).follows
+    assert fig_2_04.by_network(fig_2_04.FOAM, 5e-5, 0).follows
+    assert not fig_2_04.by_network(fig_2_04.FOAM, 1e-7, 0).follows
 
 
 def test_the_turn_of_figure_2_5_changes_the_surface():
-    record = fig_2_05._turned(0)
+    record = fig_2_05.turned_into_rubber(0)
     t, force, depth = since_contact(record), record["force"], record["penetration"]
     for at, stiffness in ((4.9, 5200.0), (9.9, 34500.0)):
         late = (t > at - 0.2) & (t < at)
@@ -222,20 +222,9 @@ def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():
     case = (60.0, 1.0, 0.003)
     stiffness = 2.0 * fig_4_03.loop(1.0, 0.003, 60.0).limit()
     runs = Runs((0,))
-    free = changed(fig_4_03._press(case, stiffness, fig_4_03.FREE), fig_4_03.FREE_SIDE)
-    assert not fig_4_03._quiet(runs.one(free))
-    assert fig_4_03._quiet(runs.one(fig_4_03._press(case, stiffness, 1.0)))
-
-
-@pytest.mark.long
-def test_figures_draw_what_they_ran_and_check_it(tmp_path):
-    """The cheapest study whole; the others go the same way in the program's own test."""
-    data = fig_2_04.run(Runs((0, 1)))
-    claims = fig_2_04.check(data)
-    assert [c.id for c in claims] == ["network-alone", "network-alone.integrator"]
-    drawing = fig_2_04.plot(data)
-    drawing.savefig(tmp_path / "one.png")
-    assert (tmp_path / "one.png").stat().st_size > 10_000
+    free = changed(fig_4_03.press_of(case, stiffness, fig_4_03.FREE), fig_4_03.FREE_SIDE)
+    assert not fig_4_03.stays_quiet(runs.one(free))
+    assert fig_4_03.stays_quiet(runs.one(fig_4_03.press_of(case, stiffness, 1.0)))
 
 
 def test_rougher_friction_is_what_it_says():

@@ -153,9 +153,9 @@ def test_the_identifiers_unknowns_enter_its_answer():
     t = np.arange(4000) * 1e-3
     inputs = np.column_stack([4e-3 * t / 4.0, np.full(4000, 1e-3), np.zeros(4000)])
     press = Press("foam", inputs, 20.0 * t / 4.0, 5000.0, np.zeros((4000, 3)))
-    base = Trial(Laboratory(start=1.0))._answer(press)
+    base = Trial(Laboratory(start=1.0)).identifiers_answer(press)
     for of in ({"amplitude": 80.0}, {"weights": 1.5}, {"start": 2.0}):
-        assert Trial(Laboratory(**{"start": 1.0, **of}))._answer(press) != base
+        assert Trial(Laboratory(**{"start": 1.0, **of})).identifiers_answer(press) != base
 
 
 def test_foams_of_all_laws_sink_in_alike_from_5_to_20_N():

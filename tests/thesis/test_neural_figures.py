@@ -119,11 +119,11 @@ def test_ends_of_intervals_are_told_apart_by_level():
 
 def test_the_course_of_the_error_ends_with_the_contact():
     record = pressed(lambda t, d: d - 2.0, seconds=20.0)
-    whole = fig_6_14._course(record)
+    whole = fig_6_14.course_of(record)
     assert whole.error == pytest.approx([2.0] * 4)
     assert whole.lost is None
     record.columns["phase"][12200:12300] = LOST
-    cut = fig_6_14._course(record)
+    cut = fig_6_14.course_of(record)
     assert len(cut.error) == 2
     assert cut.lost == pytest.approx(12.0, abs=2e-3)
 
@@ -149,7 +149,7 @@ def test_the_gain_of_an_integrator_is_found_under_noise():
     pressing = record["phase"] == CONTACT
     error = (record["force_desired"] - record["force_measured"]) * pressing
     record.columns["memory_fx"][1:] = 7.0 * TICK * np.cumsum(error)[:-1]
-    assert e2_integrator._gain(record) == pytest.approx(7.0, rel=1e-9)
+    assert e2_integrator.gain_of(record) == pytest.approx(7.0, rel=1e-9)
 
 
 def test_the_text_s_learning_rate_is_five_per_second():
@@ -186,7 +186,7 @@ def test_sizes_of_the_weights_add_up():
     from palpate.networks import Perceptron
 
     neural = Neural.thesis()
-    sizes = e3_divergence._sizes(neural.start())
+    sizes = e3_divergence.sizes_of(neural.start())
     perceptron = Perceptron.thesis()
     parts = (perceptron.hidden[:, 7:], perceptron.hidden[:, 1:7], perceptron.hidden[:, 0])
     assert sizes[:3] == pytest.approx([np.linalg.norm(part) for part in parts])
@@ -212,7 +212,7 @@ def test_torque_gains_are_the_slope_of_the_network():
         step = np.zeros(9)
         step[i] = 1e-6
         slopes.append((perceptron.forward(inputs + step)[0] - perceptron.forward(inputs - step)[0]) / 2e-6)
-    assert e3_divergence._torque_gains(state) == pytest.approx(slopes, rel=1e-5)
+    assert e3_divergence.torque_gains_of(state) == pytest.approx(slopes, rel=1e-5)
 
 
 @pytest.mark.parametrize("number", OURS)
@@ -222,15 +222,3 @@ def test_each_study_says_what_it_shows_and_what_was_chosen(number):
     assert len(one.TITLE) > 10
     assert len(one.CAPTION) > 60
     assert one.PARAMETERS
-
-
-@pytest.mark.long
-def test_a_figure_from_its_runs_to_its_file(tmp_path):
-    from palpate.report import style
-
-    one = study("6.13")
-    data = one.run(Runs(range(2)))
-    (claim,) = one.check(data)
-    assert claim.id == "neural-slow-rate.first"
-    assert claim.verdict in ("reproduced", "differs")
-    assert style.save(one.plot(data), tmp_path / "6.13.png").stat().st_size > 10_000

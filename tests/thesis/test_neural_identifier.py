@@ -7,7 +7,6 @@ import pytest
 
 from palpate.thesis.explanations import e4_probe
 from palpate.thesis.figures import fig_6_06, fig_6_08
-from palpate.thesis.figures import neural_identifier_first_seconds as first_seconds
 from palpate.thesis.neural_identifier import ablation, claims, network, notes
 from palpate.thesis.neural_identifier.network import Answer, Choice, Press
 from palpate.thesis.runs import Runs
@@ -170,55 +169,17 @@ def test_a_sign_is_firm_when_no_noise_seed_turns_it():
     assert e4_probe.firm_signs(values).tolist() == [True, True, False]
 
 
-@pytest.mark.parametrize(
-    ("study", "ids", "panels"),
-    [
-        (fig_6_06, ["network-learning-rate.slower", "network-learning-rate.too-large"], 4),
-        pytest.param(
-            first_seconds.FOAM,
-            [
-                "network-foam.time-K",
-                "network-foam.time-B",
-                "network-foam.time-M",
-                "network-foam.K",
-                "network-foam.B",
-                "network-foam.M",
-            ],
-            10,
-            marks=pytest.mark.long,
-        ),
-        (fig_6_08, ["network-foam.error"], 4),
-        pytest.param(
-            first_seconds.RUBBER,
-            [
-                "network-rubber.time-K",
-                "network-rubber.time-B",
-                "network-rubber.time-M",
-                "network-rubber.K",
-                "network-rubber.B",
-                "network-rubber.M",
-            ],
-            10,
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            e4_probe,
-            ["network-probe.K", "network-probe.M", "network-probe.outside", "network-probe.scale"],
-            8,
-            marks=pytest.mark.long,
-        ),
-    ],
-    ids=lambda value: getattr(value, "NUMBER", ""),
-)
-def test_a_study_runs_and_says_why(study, ids, panels):
+@pytest.mark.parametrize("study", [fig_6_06, fig_6_08], ids=lambda one: one.NUMBER)
+def test_a_study_runs_and_says_why(study):
+    """By one seed; what all come to over ten: test_frozen_claims.py."""
     data = study.run(Runs(seeds=(3,)))
     claims = study.check(data)
-    assert [c.id for c in claims] == ids
+    assert claims
     for claim in claims:
         assert len(claim.note) > 150
         assert "nan" not in claim.measured + claim.note
         assert all((claim.tolerance, claim.thesis, claim.measured))
     drawing = study.plot(data)
     lettered = [axis for axis in drawing.axes if axis.get_title(loc="left").startswith("(")]
-    assert len(lettered) == panels
+    assert len(lettered) == 4
     drawing.canvas.draw()

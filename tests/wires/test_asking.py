@@ -86,11 +86,10 @@ QUESTION = "the arm will move; type press to go on"
 @pytest.mark.parametrize(
     ("keys", "code", "says"),
     [
-        (b"no\n", 2, "nothing was moved"),
-        (b"\x04", 2, "nothing was moved"),  # end of file
-        (b"\x03", 130, ""),  # Ctrl-C
+        pytest.param(b"no\n", 2, "nothing was moved", id="no"),
+        pytest.param(b"\x04", 2, "nothing was moved", id="end of file", marks=pytest.mark.long),
+        pytest.param(b"\x03", 130, "", id="Ctrl-C", marks=pytest.mark.long),
     ],
-    ids=["no", "end of file", "Ctrl-C"],
 )
 def test_whoever_does_not_say_so_moves_nothing(folder, tmp_path, keys, code, says):
     with arm(folder) as (_, address), relayed(address, lambda *_: None) as relay:

@@ -14,6 +14,7 @@ import time
 import numpy as np
 import pytest
 
+from cli.asked import refused
 from cli.json_keys import documented
 from palpate.cli import main
 from palpate.force import ForceLoop
@@ -29,25 +30,12 @@ def folder(tmp_path_factory):
     return made
 
 
-@pytest.fixture
-def here(folder, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def press(capsys, folder, address, *words):
     """Exit code and what was printed, as JSON."""
     code = main(["press", "--wire", address, "--gains", str(folder / "gains.toml"), *WORDS, "--json", *words])
     printed = capsys.readouterr()
     assert printed.err == ""
     return code, json.loads(printed.out)
-
-
-def refused(capsys, *words):
-    assert main(list(map(str, words))) == 2
-    printed = capsys.readouterr()
-    assert printed.err.count("\n") == 1
-    return printed.err
 
 
 def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folder, here, capsys, root):
@@ -117,8 +105,7 @@ FAULTS = {
     "name",
     [
         "silence",
-        "garbage",
-        *(pytest.param(n, marks=pytest.mark.long) for n in ("delay", "a delay that grows")),
+        *(pytest.param(n, marks=pytest.mark.long) for n in ("garbage", "delay", "a delay that grows")),
     ],
 )
 def test_a_fault_on_the_wire_stops_the_arm_in_time_and_loses_nothing(folder, here, capsys, name):
@@ -232,6 +219,7 @@ def test_an_arm_rests_when_its_master_dies_and_its_record_is_recovered(folder, h
     assert "broken off" in (here / "rec" / "press.json").read_text()
 
 
+@pytest.mark.long  # by a terminal in every run: test_asking.py
 def test_ctrl_c_brings_the_arm_to_rest_and_keeps_the_record(folder, here):
     with arm(folder, "--gap", "0.05") as (_, address):
         words = [w for w in words_of(folder, address) if w != "--json"]

@@ -70,16 +70,9 @@ def spoiled_press(kind, fault, folder, where, *more):
     return told, theta, took
 
 
-CASES = [
-    ("rtde", "delay"),
-    *(
-        pytest.param(*case, marks=pytest.mark.long)
-        for case in (("rtde", "garbage"), ("franka", "garbage"), ("franka", "delay"))
-    ),
-]
-
-
-@pytest.mark.parametrize(("kind", "fault"), CASES)
+@pytest.mark.long  # silence, in every run: test_faults.py and test_sim.py
+@pytest.mark.parametrize("fault", ["delay", "garbage"])
+@pytest.mark.parametrize("kind", ["rtde", "franka"])
 def test_a_spoiled_wire_ends_the_press_in_time_and_loses_nothing(folders, tmp_path, kind, fault):
     told, theta, took = spoiled_press(kind, fault, folders[kind], tmp_path, "--gap", "0.05")
     found = json.loads(told.stdout)
@@ -93,7 +86,8 @@ def test_a_spoiled_wire_ends_the_press_in_time_and_loses_nothing(folders, tmp_pa
     assert len(read_record(tmp_path / "rec" / "record.parquet")) == found["lateness"]["ticks"] > 20
 
 
-@pytest.mark.parametrize("kind", ["rtde", pytest.param("franka", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["rtde", "franka"])
 def test_packets_that_are_lost_are_counted_and_borne(folders, tmp_path, kind):
     told, _, _ = spoiled_press(kind, "loss", folders[kind], tmp_path, "--stiffness", "4000")
     found = json.loads(told.stdout)

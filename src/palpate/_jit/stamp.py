@@ -10,7 +10,7 @@ from typing import Any
 
 from palpate._jit.registry import PACKAGE, foreign_files, foreign_laws, parts
 
-_IMPORT = re.compile(r"^\s*from (palpate[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+_IMPORT = re.compile(r"^\s*(?:from|import) (palpate[\w.]*)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE)
 
 
 def sources_stamp(*files: Path) -> str:
@@ -49,18 +49,23 @@ def stamp_of(function: Callable[..., Any], types_of_arguments: tuple[Any, ...]) 
 
     A kernel of the package that is given only the package's parts depends on its own file, theirs, and what those
     import. With something of the user's among them it may call any law and part registered from outside. Without a
-    file there is nothing to ask; and a class of a script is another class the next time that the script runs.
+    file there is nothing to ask; and a class of a script is another class the next time that the script runs. The
+    package's own files count where those import them, whatever else this process has imported so far.
     """
     classes = set(parts_among(types_of_arguments))
     if any(cls.__module__ == "__main__" for cls in classes):
         return None
     things = {function, *classes}
     beside: set[Path] = set()
-    if any(PACKAGE not in home_of(x).parents for x in things):
-        things |= {*foreign_laws, *parts}
+    if any(_foreign(x) for x in things):
+        things |= {x for x in (*foreign_laws, *parts) if _foreign(x)}
         beside = foreign_files
     files = {home_of(x) for x in things} | beside
     return sources_stamp(*files) if all(f.is_file() for f in files) else None
+
+
+def _foreign(thing: Any) -> bool:
+    return PACKAGE not in home_of(thing).parents
 
 
 def home_of(thing: Any) -> Path:

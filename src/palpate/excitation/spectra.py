@@ -68,7 +68,7 @@ def optimal(
     powers = np.full(count, 1.0) if start is None else start + 1e-3 * start.max()
     powers = powers / (powers @ price)
     for _ in range(_ROUNDS):
-        sensitivity = _sensitivity(information, prior, wanted, asked, powers, CRITERIA[criterion]) / price
+        sensitivity = sensitivity_of(information, prior, wanted, asked, powers, CRITERIA[criterion]) / price
         mean = float(powers @ (price * sensitivity))
         gap = float(sensitivity.max()) / mean - 1
         if gap < _CLOSE:
@@ -87,7 +87,7 @@ def covariance(information: Array, prior: Array) -> Array:
     return inverse / (scale[..., :, None] * scale[..., None, :])
 
 
-def _sensitivity(
+def sensitivity_of(
     information: Array,
     prior: Array,
     wanted: Array,

@@ -148,9 +148,9 @@ class Cluster:
         Raises:
             InputError: the scheduler went away, no worker is left, or the workers cannot run palpate.
         """
-        hand = _Hand(self._client, self.address, self._patience)
+        hand = Hand(self._client, self.address, self._patience)
         try:
-            yield from hand.all(_Batches(jobs))
+            yield from hand.all(Batches(jobs))
         finally:
             hand.drop()
 
@@ -187,26 +187,26 @@ def _security(certificates: Certificates | None) -> Any:
     )
 
 
-class _Batches:
+class Batches:
     """Jobs in batches that take long enough, by what the runs so far took."""
 
     def __init__(self, jobs: Iterable[Job]):
         self._jobs = iter(jobs)
         self._again: list[list[Job]] = []
-        self._seconds: float | None = None
+        self.seconds: float | None = None
 
     def __next__(self) -> list[Job]:
         if self._again:
             return self._again.pop()
         first = next(self._jobs)
-        seconds = self._seconds if self._seconds is not None else _guessed(first)
+        seconds = self.seconds if self.seconds is not None else _guessed(first)
         count = min(math.ceil(UNIT / max(seconds, 1e-9)), LARGEST_KEPT if first.keep else LARGEST)
         return list(chain([first], islice(self._jobs, count - 1)))
 
     def took(self, done: Sequence[Done]) -> None:
         """What the runs of a batch took."""
         mean = sum(row.seconds for row, _ in done) / len(done)
-        self._seconds = mean if self._seconds is None else 0.8 * self._seconds + 0.2 * mean
+        self.seconds = mean if self.seconds is None else 0.8 * self.seconds + 0.2 * mean
 
     def again(self, jobs: list[Job]) -> None:
         """Runs that a worker died of are tried one by one."""
@@ -224,7 +224,7 @@ def _guessed(job: Job) -> float:
 
 
 @dataclass
-class _Hand:
+class Hand:
     """The batches that are with the cluster."""
 
     client: Any
@@ -235,7 +235,7 @@ class _Hand:
         self._pending: dict[Any, list[Job]] = {}
         self._room, self._looked, self._alone = 0, -math.inf, time.monotonic()
 
-    def all(self, batches: _Batches) -> Iterator[Done]:
+    def all(self, batches: Batches) -> Iterator[Done]:
         """Sends the batches, and takes back what is done."""
         more = True
         while more or self._pending:
@@ -243,7 +243,7 @@ class _Hand:
             more = more and self._send(batches)
             for future in self._done():
                 jobs = self._pending.pop(future)
-                done = self._taken(future, jobs)
+                done = self.taken(future, jobs)
                 if done is None:
                     batches.again(jobs)
                     more = True
@@ -257,7 +257,7 @@ class _Hand:
             self.client.cancel(list(self._pending), force=True)
         self._pending.clear()
 
-    def _send(self, batches: _Batches) -> bool:
+    def _send(self, batches: Batches) -> bool:
         """Fills the cluster's hands; whether there may be more."""
         while len(self._pending) < self._room:
             try:
@@ -311,7 +311,7 @@ class _Hand:
                 "is saved, and the same command goes on from there"
             )
 
-    def _taken(self, future: Any, jobs: list[Job]) -> list[Done] | None:
+    def taken(self, future: Any, jobs: list[Job]) -> list[Done] | None:
         """What a batch came to; None if a worker died of one of several runs."""
         from distributed import KilledWorker
 

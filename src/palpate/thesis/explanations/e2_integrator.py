@@ -256,10 +256,10 @@ def _held(runs: Runs, experiment: Experiment) -> float:
 
 def _gains(runs: Runs, experiment: Experiment) -> Array:
     by_rate = [changed(experiment, {"controller.learning_rate": rate, "run.press": FITTED}) for rate in RATES]
-    return np.array([runs.over_seeds(e, _gain) for e in by_rate])
+    return np.array([runs.over_seeds(e, gain_of) for e in by_rate])
 
 
-def _gain(record: Record) -> float:
+def gain_of(record: Record) -> float:
     """Slope of the network's command over the integral of the measured force error [1/s]."""
     pressing = since_contact(record) >= 0.0
     error = (record["force_desired"] - record["force_measured"])[pressing]

@@ -178,21 +178,21 @@ def _course(runs: Runs, experiment: Experiment, seed: int) -> Course:
     def look(one: Look) -> None:
         assert one.neural is not None
         t.append(one.t)
-        sizes.append(_sizes(one.neural))
-        gains.append(_torque_gains(one.neural))
+        sizes.append(sizes_of(one.neural))
+        gains.append(torque_gains_of(one.neural))
 
     lost = watch(experiment, seed, DURATION, look, runs.waiting)
     return Course(np.array(t), np.array(sizes), np.array(gains), lost)
 
 
-def _sizes(state: NeuralState) -> Array:
+def sizes_of(state: NeuralState) -> Array:
     """Root of the sum of squares of each of `PARTS`, shape (5,)."""
     hidden, output = layers(state)
     parts = (hidden[:, 7:], hidden[:, 1:7], hidden[:, 0], output[0, 1:], output[:, 0])
     return np.array([np.sqrt(np.sum(part**2)) for part in parts])
 
 
-def _torque_gains(state: NeuralState) -> Array:
+def torque_gains_of(state: NeuralState) -> Array:
     """Change of the network's force for a change of each torque among its inputs [N per N m], shape (3,)."""
     hidden, output = layers(state)
     inside, out = state.network.signals[9:21], state.network.signals[21]

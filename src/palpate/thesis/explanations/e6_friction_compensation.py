@@ -96,15 +96,15 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Presses without compensation, over blends, in other worlds; and presses whose surface goes."""
-    plain = runs.over_seeds(PLAIN, _held)
-    hammer = runs.over_seeds(_blended(PARAMETERS, PRINTED_BLEND), _held)
+    plain = runs.over_seeds(PLAIN, held_in)
+    hammer = runs.over_seeds(blended(PARAMETERS, PRINTED_BLEND), held_in)
     few = runs.seeds[:VARIED_SEEDS]
-    cases = [(_blended(PARAMETERS, b), seed) for b in BLENDS for seed in few]
-    swept = runs.over(cases, _held)
+    cases = [(blended(PARAMETERS, b), seed) for b in BLENDS for seed in few]
+    swept = runs.over(cases, held_in)
     sweep = [swept[i * len(few) : (i + 1) * len(few)] for i in range(len(BLENDS))]
     traces = {
         "as printed: never acts": slot(runs.one(PLAIN)),
-        "blend 0.002 rad/s, acting": slot(runs.one(_blended(PARAMETERS, PRINTED_BLEND))),
+        "blend 0.002 rad/s, acting": slot(runs.one(blended(PARAMETERS, PRINTED_BLEND))),
         "blend 0.05 rad/s": slot(runs.one(PARAMETERS)),
     }
     regains = runs.map(lambda seed: regained(drawn_back(seed)), list(runs.seeds))
@@ -254,7 +254,8 @@ def _quanta() -> list[float]:
     return [float(r) * PLAIN.run.rate for r in encoder.resolution]
 
 
-def _blended(experiment: Experiment, blend: float) -> Experiment:
+def blended(experiment: Experiment, blend: float) -> Experiment:
+    """The experiment with another blend for all motors [rad/s]."""
     return changed(experiment, {"compensation.blend": (blend, blend, blend)})
 
 
@@ -269,22 +270,23 @@ def _worlds() -> dict[str, Mapping[str, Any]]:
 
 def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
     def ratio(world: Mapping[str, Any], seed: int) -> Ratio:
-        without = _held(runs.one(changed(PLAIN, world), seed))
+        without = held_in(runs.one(changed(PLAIN, world), seed))
         compensated = runs.one(changed(PARAMETERS, world), seed)
-        return Ratio(_held(compensated).error / without.error, losses(compensated) > 0)
+        return Ratio(held_in(compensated).error / without.error, losses(compensated) > 0)
 
     return by_condition(runs, _worlds(), ratio, {"foam"})
 
 
-def _held(record: Record) -> Held:
+def held_in(record: Record) -> Held:
+    """The last second of a press of `PLAIN.run.press` seconds."""
     late = since_contact(record) >= PLAIN.run.press - 1.0
     force, desired = record["force"][late], record["force_desired"][late]
     if not late.any():
-        return Held(np.nan, np.nan, _listing_factor(record))
-    return Held(abs(float((force - desired).mean())), float(force.std()), _listing_factor(record))
+        return Held(np.nan, np.nan, listing_factor(record))
+    return Held(abs(float((force - desired).mean())), float(force.std()), listing_factor(record))
 
 
-def _listing_factor(record: Record) -> float:
+def listing_factor(record: Record) -> float:
     """Largest share of the level that the listing's rule comes to, over motors 1 and 2 and all ticks."""
     encoder = Encoder(Vec3(*PLAIN.encoders.counts), Vec3(*(float(record[f"q{i}"][0]) for i in (1, 2, 3))))
     largest = 0.0

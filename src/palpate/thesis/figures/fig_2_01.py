@@ -101,8 +101,8 @@ def run(runs: Runs) -> Data:
     dynamic = by_condition(runs, worlds, lambda e, s: _measured(runs.one(changed(e, DYNAMIC), s)), {"foam"})
     varied = {n: [Pair(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
     traces = {LAWS[0]: slot(runs.one(PARAMETERS)), LAWS[1]: slot(runs.one(changed(PARAMETERS, DYNAMIC)))}
-    growth = _growth(1.0, np.ones((len(YS), len(XS)), dtype=bool))
-    others = [_growth(gain, growth > GROWS) for gain in (0.1, 10.0)]
+    growth = growth_over(1.0, np.ones((len(YS), len(XS)), dtype=bool))
+    others = [growth_over(gain, growth > GROWS) for gain in (0.1, 10.0)]
     return Data(traces, varied, growth, np.fmin.reduce([growth, *others]))
 
 
@@ -235,7 +235,7 @@ def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
     axis.set_title("growth of the original", loc="left", fontsize=9.5)
 
 
-def _growth(gain: float, where: Mask) -> Array:
+def growth_over(gain: float, where: Mask) -> Array:
     """Of the original's position loop, its stiffness times `gain`, over YS and XS [1/s]; NaN elsewhere."""
     arm: Any = Arm3()
     into = Vec3(1.0, 0.0, 0.0)

@@ -79,12 +79,12 @@ class Data:
 def run(runs: Runs) -> Data:
     """Jumps of the desired depth on foam and rubber, and under what is varied."""
     worlds = _worlds()
-    varied = by_condition(runs, worlds, lambda e, s: _found(_record(e, s)), _ALL)
-    rough, free = (_record(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
+    varied = by_condition(runs, worlds, lambda e, s: found_in(recorded(e, s)), _ALL)
+    rough, free = (recorded(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
     traces = {
         "with friction": slot(rough),
         "hardly any friction": slot(free),
-        "target impedance": _ideal(),
+        "target impedance": ideal_trace(),
     }
     return Data(traces, varied)
 
@@ -198,12 +198,13 @@ def _aimed(controller: Any, x: float) -> Any:
     return controller._replace(first=_aimed(controller.first, x), second=_aimed(controller.second, x))
 
 
-def _record(experiment: Experiment, seed: int) -> Record:
+def recorded(experiment: Experiment, seed: int) -> Record:
+    """A run whose desired depth jumps each second to the next of `DEPTHS`."""
     disturbances = [Disturbance(float(i), drawn_to(experiment.wall.x + d)) for i, d in enumerate(DEPTHS) if i]
     return run_with(experiment, seed, disturbances)
 
 
-def _found(record: Record) -> Found:
+def found_in(record: Record) -> Found:
     """Spring from the ends of the intervals; damper and mass by least squares on the true motion between the jumps."""
     t, f, x = since_contact(record), record["force"], record["x"]
     interval = np.clip(np.floor(t + 5e-7).astype(int), 0, len(DEPTHS) - 1)
@@ -219,7 +220,7 @@ def _found(record: Record) -> Found:
     return Found(K / TARGET["K"], B / TARGET["B"], M / TARGET["M"], 0)
 
 
-def _ideal() -> Record:
+def ideal_trace() -> Record:
     """The target impedance itself on the foam, from rest at the first depth."""
     from scipy.signal import StateSpace, lsim
 

@@ -109,14 +109,14 @@ def run(runs: Runs) -> Data:
     worlds: dict[str, World] = PARAMETERS["worlds"]  # type: ignore[assignment]
     two = {"foam": FOAM, "rubber": RUBBER}
     pressed = {
-        name: runs.map(partial(_neural, world, RATE), _seeds(runs, name)) for name, world in worlds.items()
+        name: runs.map(partial(by_network, world, RATE), _seeds(runs, name)) for name, world in worlds.items()
     }
     integral = {
         name: runs.map(partial(_integral, world), list(zip(pressed[name], runs.seeds, strict=True)))
         for name, world in two.items()
     }
     rates = {
-        name: [runs.map(partial(_neural, world, rate), runs.seeds[:VARIED_SEEDS]) for rate in RATES]
+        name: [runs.map(partial(by_network, world, rate), runs.seeds[:VARIED_SEEDS]) for rate in RATES]
         for name, world in two.items()
     }
     record = one_joint(FOAM.surface, _network(FOAM, RATE, runs.seeds[0]), _schedule()).run(
@@ -250,7 +250,8 @@ def _network(world: World, rate: float, seed: int) -> DirectNeural:
     return direct_neural(rate, hidden=6, force=world.force, seed=seed)
 
 
-def _neural(world: World, rate: float, seed: int) -> Pressed:
+def by_network(world: World, rate: float, seed: int) -> Pressed:
+    """The network alone on one joint, at a learning rate."""
     link = Link(world.friction)
     bench = one_joint(world.surface, _network(world, rate, seed), _schedule(), link=link, noise=world.noise)
     return _measured(bench.run(DURATION, seed), bench.loop.joint.lever)

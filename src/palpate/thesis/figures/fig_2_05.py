@@ -79,8 +79,8 @@ def run(runs: Runs) -> Data:
     full = {*_SURFACES, *_POSES}
     tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
     fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
-    turned = runs.map(lambda seed: measure(_turned(seed)), list(runs.seeds))
-    return Data(slot(_turned(runs.seeds[0]), *SHOWN), tuned, fixed, turned)
+    turned = runs.map(lambda seed: measure(turned_into_rubber(seed)), list(runs.seeds))
+    return Data(slot(turned_into_rubber(runs.seeds[0]), *SHOWN), tuned, fixed, turned)
 
 
 def check(data: Data) -> Sequence[Claim]:
@@ -204,7 +204,8 @@ def _worlds() -> dict[str, Experiment]:
     return {name: changed(PARAMETERS, changes) for name, changes in by.items()}
 
 
-def _turned(seed: int) -> Record:
+def turned_into_rubber(seed: int) -> Record:
+    """A run on foam that becomes rubber at `TURN`."""
     return run_with(PARAMETERS, seed, [Disturbance(TURN, other_surface(UNDER))])
 
 

@@ -62,7 +62,7 @@ def run(runs: Runs) -> Data:
     spectra = _pairs(runs, [(PARAMETERS, seed) for seed in runs.seeds])
     cases = conditions(PARAMETERS)
     others = _pairs(runs, [(e, runs.seeds[0]) for e in cases.values()])
-    bins, lines = _tones()
+    bins, lines = tones_sampled()
     return Data(
         frequency=_frequency(),
         plain=spectra[0][0],
@@ -104,7 +104,7 @@ def _apart(plain: Array, filtered: Array) -> float:
     return float(np.max(np.abs(10.0 * np.log10(filtered[inside] / plain[inside]))))
 
 
-def _tones() -> tuple[Array, dict[str, Array]]:
+def tones_sampled() -> tuple[Array, dict[str, Array]]:
     """A tone of 480 Hz and one of 960 Hz, sampled at 1 kHz, through the filter and past it."""
     from scipy.signal import lfilter
 

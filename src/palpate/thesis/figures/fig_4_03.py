@@ -252,7 +252,8 @@ def _needed(data: Data) -> float:
     return float(np.exp(np.interp(np.log(44e3), np.log(curve), np.log(DAMPINGS))))
 
 
-def _press(case: tuple[float, float, float], stiffness: float, friction: float) -> Experiment:
+def press_of(case: tuple[float, float, float], stiffness: float, friction: float) -> Experiment:
+    """A press with this damping and these gains on a surface of this stiffness [N/m], the friction times a share."""
     damping, kf, ki = case
     surface = {"surface.stiffness": stiffness, "surface.damping": damping, "surface.mass": 0.05}
     return changed(
@@ -261,7 +262,8 @@ def _press(case: tuple[float, float, float], stiffness: float, friction: float) 
     )
 
 
-def _quiet(record: Record) -> bool:
+def stays_quiet(record: Record) -> bool:
+    """Whether contact is kept and the true force rests from two seconds on."""
     late = since_contact(record) >= 2.0
     return losses(record) == 0 and bool(late.any()) and float(record["force"][late].std()) <= SHAKES
 
@@ -269,8 +271,8 @@ def _quiet(record: Record) -> bool:
 def _stable(runs: Runs, limits: dict[Case, float], share: float) -> dict[Case, list[bool]]:
     found = {}
     for case in _cases():
-        experiment = changed(_press(case, share * limits[case[:2]], FREE), FREE_SIDE)
-        found[case[:2]] = runs.over_seeds(experiment, _quiet)
+        experiment = changed(press_of(case, share * limits[case[:2]], FREE), FREE_SIDE)
+        found[case[:2]] = runs.over_seeds(experiment, stays_quiet)
     return found
 
 
@@ -279,8 +281,8 @@ def _rough(runs: Runs, limits: dict[Case, float]) -> dict[Case, list[float]]:
     seeds = runs.seeds[:VARIED_SEEDS]
     found: dict[Case, list[float]] = {}
     for case in _cases():
-        tried = [(_press(case, k * limits[case[:2]], 1.0), seed) for seed in seeds for k in STIFFER]
-        quiet = np.array(runs.over(tried, _quiet)).reshape(len(seeds), len(STIFFER))
+        tried = [(press_of(case, k * limits[case[:2]], 1.0), seed) for seed in seeds for k in STIFFER]
+        quiet = np.array(runs.over(tried, stays_quiet)).reshape(len(seeds), len(STIFFER))
         borne = [int(np.argmin(row)) if not row.all() else len(row) for row in quiet]
         found[case[:2]] = [STIFFER[n - 1] if n else 0.0 for n in borne]
     return found

@@ -137,7 +137,7 @@ def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
         tolerance=(
             "in 9 of 10 runs: contact kept, and at most half as far as under (4.13) with the thesis' gains"
         ),
-        verdict=decided(often(map(_angle_kept, data.nominal))),
+        verdict=decided(often(map(angle_kept, data.nominal))),
         note=(
             "The spike that (4.13) gives the angle at each step is gone, as the right half of the figure "
             f"shows; there the corrected law leaves {spread([100 * p.angle for p in free], '%', 2)}, most of "
@@ -145,7 +145,7 @@ def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
             "wrist's own friction holds the angle anywhere within a degree or two; a step shakes it loose "
             "and it settles elsewhere, whatever the law. The law has no integral either, so what friction "
             "holds back of the force stays. The threshold of one half is ours. "
-            f"{stops_holding(data.varied, _angle_kept)}"
+            f"{stops_holding(data.varied, angle_kept)}"
         ),
         **same,
     )
@@ -190,13 +190,13 @@ def _force(data: Data, same: Mapping[str, Any]) -> Claim:
             f"in 9 of 10 runs: contact kept; within a second of a jump by {1e3 * JUMP:.0f} mm the true force "
             f"strays by at most {SHARE:.0%} of the desired one"
         ),
-        verdict=decided(often(map(_force_kept, data.nominal))),
+        verdict=decided(often(map(force_kept, data.nominal))),
         note=(
             "Neither law lets u_x into the force: even (4.18) couples one way only. What disturbs the force "
             "is the joints' friction: once y moves, joint 2 slides, and its friction is the force's main "
             "error. The corrected law strays further than the coupled one even without friction, because its "
             "higher gain turns more of the sensor's noise into motion, which the number includes. At 20 N a "
-            f"jump like this would also find motor 2 at its limit. {stops_holding(data.varied, _force_kept)}"
+            f"jump like this would also find motor 2 at its limit. {stops_holding(data.varied, force_kept)}"
         ),
         **same,
     )
@@ -219,7 +219,7 @@ def plot(data: Data) -> Figure:
         dots,
         data.varied,
         lambda p: 100 * p.angle,
-        _angle_kept,
+        angle_kept,
         limit=100 * HALF,
         label="share [%]",
         title=(
@@ -258,7 +258,8 @@ def _limits(signals: Sequence[Array]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _angle_kept(pair: Pair) -> bool:
+def angle_kept(pair: Pair) -> bool:
+    """Whether contact is kept and the angle strays at most half as far as under (4.13)."""
     return pair.decoupled.lost == 0 and pair.angle <= HALF
 
 
@@ -266,12 +267,13 @@ def _side_kept(pair: Pair) -> bool:
     return pair.decoupled.lost == 0 and pair.side <= HALF
 
 
-def _force_kept(pair: Pair) -> bool:
+def force_kept(pair: Pair) -> bool:
+    """Whether contact is kept and the force strays little."""
     return pair.decoupled.lost == 0 and pair.decoupled.force <= SHARE
 
 
 def _all(pair: Pair) -> bool:
-    return _angle_kept(pair) and _side_kept(pair) and _force_kept(pair)
+    return angle_kept(pair) and _side_kept(pair) and force_kept(pair)
 
 
 def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:

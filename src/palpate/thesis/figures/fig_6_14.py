@@ -70,11 +70,11 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """190 s of contact; on the other foam and with the plain integral controller as well."""
-    both = runs.over_seeds(PARAMETERS, lambda record: (tracking(*JUDGED)(record), _course(record)))
+    both = runs.over_seeds(PARAMETERS, lambda record: (tracking(*JUDGED)(record), course_of(record)))
     courses = {"foam": [course for _, course in both]}
     seeds = runs.seeds[:2]
     for name, changes in OTHERS.items():
-        courses[name] = runs.over([(changed(PARAMETERS, changes), seed) for seed in seeds], _course)
+        courses[name] = runs.over([(changed(PARAMETERS, changes), seed) for seed in seeds], course_of)
     return Data(slot(runs.one(PARAMETERS), *SHOWN), [found for found, _ in both], courses)
 
 
@@ -131,7 +131,8 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def _course(record: Record) -> Course:
+def course_of(record: Record) -> Course:
+    """The error of each whole cycle up to the first loss of contact."""
     t, phase = since_contact(record), record["phase"]
     gone = np.nonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT))[0]
     end = float(t[gone[0]]) if len(gone) else float(t[-1]) + 1e-3

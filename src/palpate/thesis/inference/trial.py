@@ -92,19 +92,20 @@ class Trial:
     @cached_property
     def foam_answer(self) -> Answer | None:
         """Figures 6.7 and 6.8."""
-        return None if self.foam is None else self._answer(self.foam.network)
+        return None if self.foam is None else self.identifiers_answer(self.foam.network)
 
     @cached_property
     def rubber_answer(self) -> Answer | None:
         """Figure 6.9, on a rubber of its own."""
         record = self.record(network.RUBBER)
-        return self._answer(network.press_of(record, "rubber")) if _whole(record) else None
+        return self.identifiers_answer(network.press_of(record, "rubber")) if _whole(record) else None
 
     def answer_at(self, rate: float) -> Answer | None:
         """Figure 6.6: the network of figure 6.7 at another learning rate."""
-        return None if self.foam is None else self._answer(self.foam.network, rate)
+        return None if self.foam is None else self.identifiers_answer(self.foam.network, rate)
 
-    def _answer(self, press: Press, rate: float = Choice().rate) -> Answer:
+    def identifiers_answer(self, press: Press, rate: float = Choice().rate) -> Answer:
+        """What the network says of K, B and M over a press, at a learning rate."""
         lab = self.laboratory
         choice = replace(Choice(lab.amplitude, lab.weights), rate=rate)
         return network.answer(press, choice, int(self.seed if lab.start is None else lab.start))

@@ -122,7 +122,7 @@ def _held(data: Data, surface: str, key: str, limit: float) -> str:
     """Over which part of the sweep of P(0) and K(0) the claim holds."""
     column = "MBK".index(key)
     parts = [
-        f"{_reach(times[:, column] <= limit)} with K(0) = {start} and {shape}"
+        f"{reach_in_words(times[:, column] <= limit)} with K(0) = {start} and {shape}"
         for (start, shape), times in data.started[surface].items()
     ]
     return (
@@ -130,7 +130,7 @@ def _held(data: Data, surface: str, key: str, limit: float) -> str:
     )
 
 
-def _reach(good: Mask) -> str:
+def reach_in_words(good: Mask) -> str:
     """The part of the sweep of p that is good, in words."""
     p = COVARIANCES[good]
     if not len(p):
