@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.identification.contacts import Contacts
 from palpate.identification.estimators.fit import Fit
-from palpate.identification.estimators.question import lag_open
+from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.filters.state_variable import Chain, block_means
 from palpate.identification.options import Options
 from palpate.identification.prior import LAG

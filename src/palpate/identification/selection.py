@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.question import lag_open
+from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.estimators.robust import answer
 from palpate.identification.models import (

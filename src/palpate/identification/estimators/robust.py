@@ -18,7 +18,7 @@ from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.by_octave import Solution, estimate, held, solve
 from palpate.identification.estimators.effects import TOUCH
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.estimators.question import Question
+from palpate.identification.estimators.linearisation import Linearisation
 from palpate.identification.filters.bandwidth import highest_motion
 from palpate.identification.models import Model, from_surface
 from palpate.identification.prior import LAG
@@ -38,10 +38,10 @@ def answer(problem: Problem, model: Model) -> Answer:
     Raises:
         InputError: the stretches in contact are too short.
     """
-    question, solution = _in_contact(problem, model)
-    plain = question.answered(solution)
+    local, solution = _in_contact(problem, model)
+    plain = local.answered(solution)
     wider = None if model.nonlinear else problem.with_approach
-    found = None if wider is None else _over_approach(wider, problem.in_contact, question, solution)
+    found = None if wider is None else _over_approach(wider, problem.in_contact, local, solution)
     if found is None:
         return plain
     found = replace(
@@ -54,62 +54,62 @@ def answer(problem: Problem, model: Model) -> Answer:
     return found if found.half_of("K") < plain.half_of("K") else plain
 
 
-def _in_contact(problem: Problem, model: Model) -> tuple[Question, Solution]:
+def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution]:
     """Over the rows in contact; the lag looked for within its prior, the columns formed again at each."""
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
         raise InputError("every stretch in contact is too short; log longer or faster")
     about: dict[str, float] = {}
     if problem.lag.std > 0 and not model.nonlinear:  # its column needs parameters that are roughly right
-        exact = Question.of(replace(problem, lag=replace(problem.lag, std=0.0)), model, segments, {})
+        exact = Linearisation.of(replace(problem, lag=replace(problem.lag, std=0.0)), model, segments, {})
         about = dict(zip(exact.names, estimate(exact.system).theta.tolist(), strict=True))
-    best = question = _start(Question.of(problem, model, segments, about))
-    places, least = list(question.searched), np.inf
+    best = local = _start(Linearisation.of(problem, model, segments, about))
+    places, least = list(local.searched), np.inf
     for _ in range(_ROUNDS if places else 0):
-        here = held(question.system, question.searched)
-        misfit = question.misfit(here)
+        here = held(local.system, local.searched)
+        misfit = local.misfit(here)
         if misfit < least:
-            best, least, theta = question, misfit, here.theta
-            asked = solve(question.system, here.noise)
+            best, least, theta = local, misfit, here.theta
+            asked = solve(local.system, here.noise)
             step = asked.theta[places] - theta[places]
             rests = _FOUND * np.sqrt(np.diag(asked.cov)[places])
         else:  # beyond the linearisation's reach
             step = step / 2
         if np.all(np.abs(step) <= rests):
             break
-        question = Question.of(problem, model, segments, best.moved(theta, step))
+        local = Linearisation.of(problem, model, segments, best.moved(theta, step))
     return best, estimate(best.system)
 
 
-def _start(question: Question) -> Question:
+def _start(local: Linearisation) -> Linearisation:
     """The likeliest of some lags within two deviations of the prior, a radian of the fastest motion apart at most.
 
     Nearer to each other no two lags fit, one by taking a mass or a damping for the other.
     """
-    problem, lag = question.problem, question.problem.lag
+    problem, lag = local.problem, local.problem.lag
     band = highest_motion(problem.motion)
     if lag.std == 0 or not np.isfinite(band):
-        return question
+        return local
     reach = 2 * lag.std
     count = 1 + int(np.ceil(2 * reach * 2 * np.pi * band))
     if count < 3:  # all of them are about where it starts
-        return question
-    fixed = {name: question.at[name] for name in question.at if name != LAG}
-    likeliest = question
-    least = question.misfit(held(question.system, question.searched))
+        return local
+    fixed = {name: local.at[name] for name in local.at if name != LAG}
+    likeliest = local
+    least = local.misfit(held(local.system, local.searched))
     for at in np.linspace(lag.value - reach, lag.value + reach, min(count, _STARTS)):
-        other = Question.of(problem, question.model, question.segments, fixed | {LAG: float(at)})
+        other = Linearisation.of(problem, local.model, local.segments, fixed | {LAG: float(at)})
         here = held(other.system, other.searched)
         if other.misfit(here) < least:
             likeliest, least = other, other.misfit(here)
             about = dict(zip(other.names, here.theta.tolist(), strict=True))
-    if likeliest is question:
-        return question
-    return Question.of(problem, question.model, question.segments, about)
+    if likeliest is local:
+        return local
+    return Linearisation.of(problem, local.model, local.segments, about)
 
 
 def _over_approach(
-    problem: Problem, inside: NDArray[np.bool_], known: Question, found: Solution
+    problem: Problem, inside: NDArray[np.bool_], known: Linearisation, found: Solution
 ) -> Answer | None:
     """Over the approach too: how the force rises from nothing tells most of a press that then rests.
 
@@ -118,7 +118,7 @@ def _over_approach(
     Args:
         problem: with the rows of the approach.
         inside: samples of the position that are in contact.
-        known: the question of the rows in contact.
+        known: what it is over the rows in contact.
         found: its answer.
 
     Returns:
@@ -131,16 +131,16 @@ def _over_approach(
     surface = 0.0
     for _ in range(_ROUNDS if len(way) else 0):
         motion = from_surface(problem.motion, inside, surface)
-        question = Question.of(
+        local = Linearisation.of(
             replace(problem, motion=motion), known.model, segments, theta | {LAG: known.lag}
         )
-        solution = estimate(question.system)
-        theta = dict(zip(question.names, solution.theta, strict=True))
-        i = question.names.index(TOUCH)
+        solution = estimate(local.system)
+        theta = dict(zip(local.names, solution.theta, strict=True))
+        i = local.names.index(TOUCH)
         if theta["K"] <= 0:
             return None
         if theta[TOUCH] ** 2 < _FOUND**2 * solution.cov[i, i]:
-            return question.answered(solution)
+            return local.answered(solution)
         step = -theta[TOUCH] / theta["K"]
         surface += float(np.clip(step, (way.min() - surface) / 2, (way.max() - surface) / 2))
     return None

@@ -1,4 +1,4 @@
-"""The question that a model puts to a log: its columns by octave, linear about some parameters and a lag."""
+"""A model made linear about some parameters and a lag, and its columns summed by octave."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def lag_open(problem: Problem) -> bool:
 
 
 @dataclass(frozen=True)
-class Question:
-    """A model put to a log.
+class Linearisation:
+    """A model of a log, linear about some parameters and a lag.
 
     Args:
         problem: of the log.
@@ -69,7 +69,7 @@ class Question:
         model: Model,
         segments: list[Segment],
         theta: dict[str, float],
-    ) -> Question:
+    ) -> Linearisation:
         """Linearise a model about some parameters, and sum its columns by octave.
 
         Args:
