@@ -17,8 +17,8 @@ from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.by_octave import Solution, estimate, held, solve
 from palpate.identification.estimators.effects import TOUCH
-from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.estimators.linearisation import Linearisation
+from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.filters.bandwidth import highest_motion
 from palpate.identification.models import Model, from_surface
 from palpate.identification.prior import LAG
