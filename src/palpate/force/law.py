@@ -314,7 +314,7 @@ def bounded(law, bound, stage, w, known):
         return bound
     now = bound if stage.phase == LOCKED else from_slow(law, known)
     p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
-    sure, factor = (sqrt(EVIDENT), 1.3) if stage.phase == LOCKED else (1.0, 1.0)
+    sure, factor = (law.z, 1.3) if stage.phase == LOCKED else (1.0, 1.0)
     if highest(law, p, -sure * alone, -sure * both) > factor * now:
         return min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), law.cap)
     return now

@@ -223,7 +223,7 @@ def _apart(depth: Array, force: Array, rows: NDArray[np.intp], slope: float, var
     if len(rows) < _LINE or np.ptp(depth[rows]) <= 0:
         return abs(slope)
     own, doubt, _ = _line(depth[rows], force[rows])
-    return max(abs(own - slope) - _NORMAL * float(np.sqrt(variance + doubt)), 0.0)
+    return max(abs(own - slope) - _NORMAL * float(np.sqrt(max(variance + doubt, 0.0))), 0.0)
 
 
 def unseen(problem: Problem) -> float:
