@@ -30,7 +30,7 @@ FIGURES = {
     "Hours": "hours.py --runs 10",
     "The thesis' arm": "on_the_bench.py --seeds 1 --controllers foam-cautious",
     "The thesis' arm, friction twice": "on_the_bench.py --friction 2 --seeds 1 --controllers foam-cautious",
-    "The thesis' arm, surfaces that sway or change": "moving_on_the_bench.py --seeds 1 --controllers foam-cautious",
+    "The thesis' arm, surfaces that sway or change": "moving_on_the_bench.py --seeds 3 --controllers foam-cautious",
     "Dither": "dither.py --seeds 5 --arms ur5e",
     "Learning": "learning.py --seeds 5 --arms ur5e",
     "Proofs: UR5e": "falsify.py --draws 200000 --runs 500",
