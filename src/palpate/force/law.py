@@ -17,7 +17,6 @@ from palpate.force.contact_evidence import (
     AIR,
     CONTACT,
     EDGE,
-    EVIDENT,
     LEVEL,
     Watch,
     behind,

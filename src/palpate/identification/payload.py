@@ -23,7 +23,7 @@ _SEEN = 10.0
 _FEWEST = 20
 """Rows of a stay in the air that its own level is taken from."""
 _LEAST = 0.05
-"""Share of the acceleration's power that a part of the motion needs to tell the mass again."""
+"""Of the sum of squares of the acceleration in the part that has most, what a part needs to tell the mass again."""
 _MOST = 0.5
 _OTHERS = 2.0
 """Share of the force's power that the acceleration accounts for at least, and over that of speed or place: as measured
@@ -99,7 +99,7 @@ def _of_parts(force: Array, motion: Array, stays: list[tuple[int, int]], level: 
     edges = np.sort(np.concatenate([ends, (ends[:-1] + ends[1:]) // 2]))
     parts = [(motion[a:b] - motion[a:b].mean(), force[a:b]) for a, b in pairwise(edges.tolist())]
     size = np.array([float(own @ own) for own, _ in parts])
-    told = size > _LEAST * size.sum()
+    told = size > _LEAST * size.max()
     masses = np.array([float(own @ f) for own, f in parts])[told] / size[told]
     return random_effects(masses, level / size[told])
 
