@@ -70,7 +70,8 @@ def verdicts(
         parameters = _showing(parameters, found, point)
     elif point is not None and {"K", "M"} <= set(found.names):
         parameters = _agreeing(parameters, found, point)
-    parameters = _passive(_of_lag(parameters, found, lag, terms))
+    weighed = choice.problem.contacts.payload is not None
+    parameters = _passive(_of_lag(parameters, found, lag, terms), weighed)
     if not choice.problem.contacts.signed:
         parameters = {name: _refused(p, _UNSIGNED) for name, p in parameters.items()}
     if found.fit.model.of_power and choice.problem.contacts.bonded:
@@ -199,18 +200,24 @@ def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Te
     return parameters | refused
 
 
-def _passive(parameters: dict[str, Parameter]) -> dict[str, Parameter]:
-    """Where one of B and M is below zero for sure, a force that the model has not is in both."""
+def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Parameter]:
+    """Where one of B and M is below zero for sure, a force that the model has not is in both.
+
+    Args:
+        parameters: as found.
+        weighed: a tool's inertia was found in the air and taken out: it is not that, and K rests on the same fit.
+    """
     negative = [name for name in ("B", "M") if name in parameters and "below zero" in parameters[name].reason]
     if len(negative) != 1:
         return parameters
     reason = (
         f"{negative[0]} is below zero for sure: a force of the motion is in the log that the model has not"
     )
+    touched = ("B", "M", "K") if weighed else ("B", "M")
     return parameters | {
         name: replace(_refused(p, reason), verdict=Verdict.REJECTED)
         for name, p in parameters.items()
-        if name in ("B", "M") and p.verdict is Verdict.IDENTIFIED
+        if name in touched and p.verdict is Verdict.IDENTIFIED
     }
 
 
