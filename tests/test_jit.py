@@ -10,7 +10,7 @@ import pytest
 
 import own_parts
 import palpate
-from palpate._jit import kernel, law, part, registry
+from palpate._jit import kernel, law, part, stamp
 from palpate._jit.stamp import stamp_of
 from palpate._vector import ZERO3, Mat3, solve, sqrt
 
@@ -109,11 +109,15 @@ def test_an_integer_is_another_type_and_the_plain_function_stays():
 
 def test_a_user_kernel_depends_on_what_is_registered_outside_and_on_what_that_imports(monkeypatch):
     """Whatever else of the package this process has imported makes no kernel stale."""
+    # What other tests of this process have registered is no part of the question.
+    monkeypatch.setattr(stamp, "parts", {})
+    monkeypatch.setattr(stamp, "foreign_laws", [])
+    monkeypatch.setattr(stamp, "foreign_files", set())
 
     def stamp_with(module):
         registered = type("Registered", (), {"__module__": module})
         with monkeypatch.context() as patch:
-            patch.setitem(registry.parts, registered, None)
+            patch.setitem(stamp.parts, registered, None)
             return stamp_of(adding.plain, ())
 
     known = stamp_of(adding.plain, ())
