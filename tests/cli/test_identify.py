@@ -61,7 +61,7 @@ OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N
 def test_skin_has_a_stiffness_at_its_working_point_and_no_damping_or_mass(
     measured, capsys, load, softest, stiffest
 ):
-    """The tangents of these presses lie between the two; the tissue stiffens and relaxes: no number but such a slope."""
+    """The tangents of these presses lie between the two; the tissue stiffens and relaxes: no number but a slope."""
     code, found = ask(capsys, measured / f"skin_indentation/press_{load}mN.csv", *SKIN)
     assert code == 0
     assert found["working_point"]["source"] == "press"
