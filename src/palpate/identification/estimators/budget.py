@@ -22,7 +22,7 @@ HIDDEN_SHARE = 0.5
 """Share of the unexplained amplitude of an octave that may lie along a parameter's own column: of a force in an
 unknown phase, in phase and in quadrature, half of the power is along either. `make trust` measures the coverage that
 follows."""
-_NORMAL = 1.96
+NORMAL = 1.96
 """Deviations of a 95 % interval."""
 
 
@@ -170,7 +170,7 @@ def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Sp
         others: its budget.
     """
     own, less = (sum((part.variance for part in b.values()), np.zeros(len(theta))) for b in (budget, others))
-    apart = np.abs(other - theta) - _NORMAL * np.sqrt(np.maximum(less - own, 0.0))
+    apart = np.abs(other - theta) - NORMAL * np.sqrt(np.maximum(less - own, 0.0))
     return Spread(np.maximum(apart, 0.0) ** 2)
 
 

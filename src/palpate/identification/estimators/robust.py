@@ -87,8 +87,10 @@ def _start(local: Linearisation) -> Linearisation:
     Nearer to each other no two lags fit, one by taking a mass or a damping for the other.
     """
     problem, lag = local.problem, local.problem.lag
+    if lag.std == 0:
+        return local
     band = highest_motion(problem.motion)
-    if lag.std == 0 or not np.isfinite(band):
+    if not np.isfinite(band):
         return local
     reach = 2 * lag.std
     count = 1 + int(np.ceil(2 * reach * 2 * np.pi * band))
@@ -100,8 +102,9 @@ def _start(local: Linearisation) -> Linearisation:
     for at in np.linspace(lag.value - reach, lag.value + reach, min(count, _STARTS)):
         other = Linearisation.of(problem, local.model, local.segments, fixed | {LAG: float(at)})
         here = held(other.system, other.searched)
-        if other.misfit(here) < least:
-            likeliest, least = other, other.misfit(here)
+        misfit = other.misfit(here)
+        if misfit < least:
+            likeliest, least = other, misfit
             about = dict(zip(other.names, here.theta.tolist(), strict=True))
     if likeliest is local:
         return local

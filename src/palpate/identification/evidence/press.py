@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.identification.estimators.budget import NORMAL
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.evidence.work import way_out
 from palpate.identification.filters.state_variable import ORDER, Chain
@@ -31,8 +32,6 @@ _LINE = 4
 _STILL = 0.02
 """Share of the highest speed below which a probe rests: encoders and loops leave a per cent or so."""
 _SHOWN = 400
-_NORMAL = 1.96
-"""Deviations of a 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -223,7 +222,7 @@ def _apart(depth: Array, force: Array, rows: NDArray[np.intp], slope: float, var
     if len(rows) < _LINE or np.ptp(depth[rows]) <= 0:
         return abs(slope)
     own, doubt, _ = _line(depth[rows], force[rows])
-    return max(abs(own - slope) - _NORMAL * float(np.sqrt(max(variance + doubt, 0.0))), 0.0)
+    return max(abs(own - slope) - NORMAL * float(np.sqrt(max(variance + doubt, 0.0))), 0.0)
 
 
 def unseen(problem: Problem) -> float:
@@ -301,7 +300,7 @@ def _tangent(strokes: list[Stroke], later: list[Stroke], level: float) -> Tangen
     found, other = _tangent_of(strokes, level), _tangent_of(later, level)
     if found is None or other is None:
         return None
-    by_lag = _NORMAL * (other.stiffness - found.stiffness)
+    by_lag = NORMAL * (other.stiffness - found.stiffness)
     return replace(found, half=float(np.hypot(found.half, by_lag)))
 
 
