@@ -22,7 +22,8 @@ from palpate.identification.problem import Problem
 Array = NDArray[np.float64]
 
 _SEEN = 10.0
-"""Power of the position over that of its noise below which an octave is left out: it would be off by a tenth."""
+"""Power of a column over that of the position's noise in it, below which an octave is left out: its parameter would be
+off by a tenth."""
 _ROUNDED = 100.0
 """Last digits of a position that its way through the filters may round."""
 
