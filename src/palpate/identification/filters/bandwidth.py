@@ -68,22 +68,28 @@ def _smooth(power: Array) -> Array:
 def highest_motion(motion: Motion) -> float:
     """The frequency below which the position moved while it was fitted [Hz]; infinite if all contacts are too short.
 
-    Below it lies 99 % of the power of the probe's speed, as far as that stands above the position's own noise; of
-    several contacts (the longest, where they are many) in the fastest. Where a clean spectrum at last meets its floor
-    is far above that, and no motion.
+    Below it lies 99 % of the energy of the probe's speed in the contacts (the longest, where they are many), as far as
+    that stands above the position's own noise. Where a clean spectrum at last meets its floor is far above that, and no
+    motion.
     """
     chain, rows = motion.chain, motion.rows
     rows = chain.instants[rows].astype(np.intp) if isinstance(chain, SensorPath) else rows
     step = np.diff(rows)
     contacts = np.split(rows, np.flatnonzero(step > _APART * np.median(step)) + 1)
     stretches = [motion.position[own[0] : own[-1] + 1] for own in contacts]
-    longest = sorted(stretches, key=len)[-_CONTACTS:]
-    bands = [_band(stretch, chain.dt) for stretch in longest if len(stretch) >= _FEWEST_SEGMENT]
-    return max(bands, default=float("inf"))
+    told = [stretch for stretch in sorted(stretches, key=len)[-_CONTACTS:] if len(stretch) >= _FEWEST_SEGMENT]
+    if not told:
+        return float("inf")
+    spectra = [_energy(stretch) for stretch in told]
+    frequency, energy = (np.concatenate(parts) for parts in zip(*spectra, strict=True))
+    order = np.argsort(frequency, kind="stable")
+    below = np.cumsum(energy[order])
+    least = 1 / max(map(len, told))
+    return max(float(frequency[order][np.searchsorted(below, _MOST * below[-1])]), least) / chain.dt
 
 
-def _band(position: Array, dt: float) -> float:
-    """Of one stretch of motion."""
+def _energy(position: Array) -> tuple[Array, Array]:
+    """Of the speed in a stretch, by frequency [1/sample], where it stands above the position's noise; shape (l,) each."""
     from scipy.fft import next_fast_len
     from scipy.signal import periodogram
 
@@ -91,6 +97,4 @@ def _band(position: Array, dt: float) -> float:
     frequency, power = periodogram(speed, window=_TAPER, nfft=next_fast_len(len(speed), real=True))
     noise = position_noise([position])
     floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
-    moved = np.cumsum(np.where(power > _ABOVE_FLOOR * floor, power, 0.0))
-    last = int(np.searchsorted(moved, _MOST * moved[-1])) if moved[-1] else 1
-    return float(frequency[max(last, 1)]) / dt
+    return frequency, np.where(power > _ABOVE_FLOOR * floor, power, 0.0) * len(speed) / len(frequency)
