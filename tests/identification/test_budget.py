@@ -12,7 +12,6 @@ from identification.test_by_octave import DT, ROWS, level, system
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import HIDDEN_SHARE, Spread
 from palpate.identification.estimators.by_octave import System, estimate, solve
-from palpate.identification.estimators.octaves import PERIODS
 
 NOISE = 0.1
 
@@ -97,25 +96,6 @@ def test_a_stretch_that_alone_has_the_motion_is_not_held_against_the_rest():
     asked = system(column, 5.0 * column[:, 0] + np.random.default_rng(2).normal(0, NOISE, ROWS))
     whole = estimate(asked)
     assert causes.of_stretches(asked, whole).variance[0] < 2 * whole.cov[0, 0]
-
-
-@pytest.mark.parametrize("off", [0.0, 3.0])
-def test_an_octave_that_differs_is_seen_by_leaving_it_out(off):
-    """Its pull on the answer of all is what the jackknife finds, and no more than a deviation where none differs."""
-    column = flat_columns()
-    at = PERIODS / (ROWS // 16 * DT)
-    noise = np.random.default_rng(1).normal(0, NOISE, ROWS)
-    asked = system(column, stiffer_about(column[:, 0], at, off) + noise)
-    whole = solve(asked, level(asked, NOISE**2))
-    found = np.sqrt(causes.of_octaves(asked, whole).variance[0])
-    pull = abs(whole.theta[0] - 5.0)
-    std = np.sqrt(whole.cov[0, 0])
-    if off:
-        assert pull > 10 * std
-        assert found > pull / 2  # the octaves beside it overlap with it
-        assert found < 2 * pull
-    else:
-        assert found < 3 * std
 
 
 def test_a_force_that_nothing_explains_is_bounded_by_what_is_seen_of_it():

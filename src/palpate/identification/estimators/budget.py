@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.identification.estimators.by_octave import Solution, System, solve, worth
+from palpate.identification.estimators.by_octave import Solution, System, worth
 from palpate.identification.least_squares import inverse
 
 Array = NDArray[np.float64]
@@ -103,19 +103,6 @@ def of_position_noise(system: System, solution: Solution, noise: Array) -> Sprea
     weight = np.where(system.lines > 0, 1 / solution.noise, 0.0)
     pulled = solution.cov @ np.tensordot(weight, noise, axes=1) @ solution.theta
     return Spread(pulled**2)
-
-
-def of_octaves(system: System, solution: Solution) -> Spread:
-    """What the answer moves by when one octave is left out, beyond what its covariance grows by."""
-    var = np.diag(solution.cov)
-    excess = np.zeros(system.size)
-    for octave in np.flatnonzero(system.lines > 0):
-        use = np.ones(len(system.lines), bool)
-        use[octave] = False
-        other = solve(system, solution.noise, use)
-        grown = np.maximum(np.diag(other.cov) - var, 0.0)
-        excess = np.maximum(excess, (other.theta - solution.theta) ** 2 - grown)
-    return Spread(excess)
 
 
 def of_stretches(system: System, solution: Solution) -> Spread:

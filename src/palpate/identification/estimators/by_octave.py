@@ -22,7 +22,7 @@ _STEPS = 3
 rest, a model that does not hold would end up fitting the octaves with the most lines and the least force."""
 _NEIGHBOUR = 2.0
 """Lines that the level of an octave borrows from the next higher one: its own few may be fitted by chance."""
-_LARGEST = 3.0
+LARGEST = 3.0
 """Deviation of the weak prior of a term's force, over the force's. It counts only where the log says nothing of the
 term, as for a damping that friction may stand for; there any number of this size does."""
 
@@ -76,7 +76,7 @@ def system_of(octaves: Octaves, names: tuple[str, ...], prior: dict[str, tuple[f
     p, total = len(names), octaves.total
     power = np.diag(total.sum(axis=0))
     mean = np.zeros(p)
-    weight = power[:p] / (_LARGEST**2 * max(float(power[-1]), 1e-300))
+    weight = power[:p] / (LARGEST**2 * max(float(power[-1]), 1e-300))
     for name, (value, std) in prior.items():
         i = names.index(name)
         mean[i], weight[i] = value, 1 / std**2

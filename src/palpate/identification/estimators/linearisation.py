@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.budget import Spread
+from palpate.identification.estimators.averaging import Member, averaged, mean_budget, members, of_octaves
+from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.by_octave import Solution, System, system_of, worth
 from palpate.identification.estimators.effects import FRICTION, effect_columns
 from palpate.identification.estimators.fit import Prediction, fit, linearised, slope_of_lag
@@ -149,15 +150,12 @@ class Linearisation:
     def answered(self, solution: Solution) -> Answer:
         """The answer with its budget."""
         sensor, told = self._sensor(solution)
-        budget = causes.of_noise(self.system, solution, self.names, self.own, LAG)
-        budget["position noise"] = causes.of_position_noise(self.system, solution, self._position_noise())
-        budget["octaves"] = causes.of_octaves(self.system, solution)
-        budget["repetition"] = causes.of_stretches(self.system, solution)
-        sensors = np.minimum(sensor + self._by_position(solution), solution.noise)
-        budget["unexplained"] = causes.of_unexplained(self.system, solution, sensors, told)
-        explained, left, hidden = self._explained(solution, sensors)
-        if lag_open(self.problem) and {"K", "B", LAG} <= set(self.names):
-            budget["lag"] = self._lag_of_damping(solution, budget["lag"])
+        question = self.system, solution.noise, self._with_position(solution, sensor), self._forces()
+        likely = members(*question)
+        solution = averaged(likely)
+        budget = mean_budget(likely, [self._budget(own, sensor, told) for own in likely], solution.theta)
+        budget["octaves"] = of_octaves(*question)
+        explained, left, hidden = self._explained(solution, self._with_position(solution, sensor))
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}
@@ -168,6 +166,36 @@ class Linearisation:
         return Answer(
             names, solution.theta[kept], cov, budget, predicted, explained, left, hidden, noise, self.problem
         )
+
+    def _forces(self) -> list[list[int]]:
+        """Places of the columns of each force that may be there or not."""
+        of = {
+            kind: [
+                i
+                for i, name in enumerate(self.names[self.own :], self.own)
+                if name.split(" ")[0].split("^")[0] == kind
+            ]
+            for kind in (FRICTION, "depth", "hysteresis")
+        }
+        return [places for places in of.values() if places]
+
+    def _budget(self, member: Member, sensor: Array, told: Array) -> Budget:
+        """By cause, with what a member supposes."""
+        system, solution = member.system, member.solution
+        budget = causes.of_noise(system, solution, self.names, self.own, LAG)
+        budget["position noise"] = causes.of_position_noise(system, solution, self._position_noise())
+        budget["repetition"] = causes.of_stretches(system, solution)
+        budget["unexplained"] = causes.of_unexplained(
+            system, solution, self._with_position(solution, sensor), told
+        )
+        if lag_open(self.problem) and {"K", "B", LAG} <= set(self.names):
+            budget["lag"] = self._lag_of_damping(solution, budget["lag"])
+        return budget
+
+    def _with_position(self, solution: Solution, sensor: Array) -> Array:
+        """Variance of a line by the noise of both channels, shape (octaves,)."""
+        found: Array = np.minimum(sensor + self._by_position(solution), solution.noise)
+        return found
 
     def _line(self) -> Array:
         """Power of the position's noise in a line of each octave, shape (octaves,)."""

@@ -89,7 +89,7 @@ def highest_motion(motion: Motion) -> float:
 
 
 def _energy(position: Array) -> tuple[Array, Array]:
-    """Of the speed in a stretch, by frequency [1/sample], where it stands above the position's noise; shape (l,) each."""
+    """Of the speed in a stretch by frequency [1/sample], where it stands above the noise; both of shape (l,)."""
     from scipy.fft import next_fast_len
     from scipy.signal import periodogram
 

@@ -1,0 +1,154 @@
+"""An answer averaged over which other forces are in a log, and of what size: nobody knows either beforehand.
+
+Bayesian model averaging (Hoeting, Madigan, Raftery and Volinsky, 1999). A force that the log would show, and does not,
+hardly counts; one that it could not show widens the interval as if it were there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.identification.estimators.budget import Budget, Spread
+from palpate.identification.estimators.by_octave import LARGEST, Solution, System, solve
+
+Array = NDArray[np.float64]
+
+_SIZES = (0.003, 0.03, 0.3, LARGEST)
+"""Deviations of the prior of a force's size, over that of the whole force: it is not there, or of some order of
+magnitude. `make trust` measures the coverage that follows."""
+_SINGULAR = 1e-12
+"""Share of its columns' size below which a direction is not in the log."""
+_WINDOW = 0.02
+"""Probability over the highest below which a member is left out (Occam's window, Madigan and Raftery 1994)."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One supposition of the sizes of other forces: how likely the log makes it, and the answer with it."""
+
+    weight: float
+    system: System
+    solution: Solution
+
+
+def members(
+    system: System,
+    noise: Array,
+    sensor: Array,
+    forces: list[list[int]],
+    use: NDArray[np.bool_] | None = None,
+) -> list[Member]:
+    """What is likely, the weights adding up to one.
+
+    What is left beyond the sensor's noise is not chance, so that it counts as that much less evidence (a likelihood
+    raised to a power: Miller and Dunson, 2019).
+
+    Args:
+        system: of the log, each force's prior that of the largest size.
+        noise: variance of a line in each octave, shape (octaves,).
+        sensor: the same of the sensors' own noise, no larger.
+        forces: places of the columns of each.
+        use: octaves that count, shape (octaves,); all if not given.
+    """
+    weights = np.array([_prior(system, forces, sizes) for sizes in product(_SIZES, repeat=len(forces))])
+    counts = system.lines > 0 if use is None else use & (system.lines > 0)
+    worth = np.where(counts, sensor / noise / noise, 0.0)
+    whole = np.tensordot(worth, system.products, axes=1)
+    evidence = _evidence(whole, weights, system.prior_mean)
+    share = np.exp(evidence - evidence.max())
+    kept = share > _WINDOW
+    systems = [replace(system, prior_weight=own) for own in weights[kept]]
+    found = zip((share[kept] / share[kept].sum()).tolist(), systems, strict=True)
+    return [Member(weight, own, solve(own, noise, use)) for weight, own in found]
+
+
+def _prior(system: System, forces: list[list[int]], sizes: tuple[float, ...]) -> Array:
+    """Weights of the prior with forces of such sizes, shape (p,)."""
+    found = system.prior_weight.copy()
+    for places, size in zip(forces, sizes, strict=True):
+        found[places] *= (LARGEST / size) ** 2
+    return found
+
+
+def _evidence(whole: Array, weights: Array, mean: Array) -> Array:
+    """Log of the probability of the log under each prior, but for a constant, shape (priors,).
+
+    Args:
+        whole: normal equations with the force in the last place, shape (p + 1, p + 1).
+        weights: of the priors, shape (priors, p).
+        mean: of the priors, shape (p,).
+    """
+    size = np.sqrt(np.maximum(np.diag(whole)[:-1] + weights, 1e-300))
+    normal = (whole[:-1, :-1] + weights[:, :, None] * np.eye(len(mean))) / size[:, :, None] / size[:, None, :]
+    right = (whole[:-1, -1] + weights * mean) / size
+    value, vector = np.linalg.eigh(normal)
+    value = np.maximum(value, _SINGULAR)
+    along = np.einsum("mij,mi->mj", vector, right)
+    explained = (np.where(value > _SINGULAR, along**2, 0.0) / value).sum(axis=1)
+    spread = np.log(value).sum(axis=1) + 2 * np.log(size).sum(axis=1) - np.log(weights + 1e-300).sum(axis=1)
+    found: Array = (explained - weights @ mean**2 - spread) / 2
+    return found
+
+
+def averaged(parts: list[Member]) -> Solution:
+    """The answer over all members; what they differ by is in its covariance."""
+    weight = np.array([part.weight for part in parts])
+    thetas = np.stack([part.solution.theta for part in parts])
+    theta = weight @ thetas
+    cov = np.einsum("m,mij->ij", weight, np.stack([part.solution.cov for part in parts]))
+    cov = cov + np.einsum("m,mi,mj->ij", weight, thetas - theta, thetas - theta)
+    return Solution(theta, cov, parts[0].solution.noise)
+
+
+def of_octaves(system: System, noise: Array, sensor: Array, forces: list[list[int]]) -> Spread:
+    """What the answer moves by when one octave is left out, beyond what its covariance grows by.
+
+    The rest has to tell by itself which other forces are there.
+
+    Args:
+        system: of the log.
+        noise: variance of a line in each octave, shape (octaves,).
+        sensor: the same of the sensors' own noise, no larger.
+        forces: places of the columns of each.
+    """
+    whole = averaged(members(system, noise, sensor, forces))
+    excess = np.zeros(system.size)
+    for octave in np.flatnonzero(system.lines > 0):
+        use = np.arange(len(system.lines)) != octave
+        other = averaged(members(system, noise, sensor, forces, use))
+        grown = np.maximum(np.diag(other.cov) - np.diag(whole.cov), 0.0)
+        excess = np.maximum(excess, (other.theta - whole.theta) ** 2 - grown)
+    return Spread(excess)
+
+
+def mean_budget(parts: list[Member], budgets: list[Budget], theta: Array) -> Budget:
+    """The budget over all members: what they differ by is of the other forces.
+
+    Args:
+        parts: the members.
+        budgets: of each.
+        theta: the answer over all of them, shape (p,).
+    """
+    weight = np.array([part.weight for part in parts])
+    apart = np.stack([part.solution.theta for part in parts]) - theta
+    budget = {cause: _mean(weight, [own[cause] for own in budgets]) for cause in budgets[0]}
+    others = budget["other forces"]
+    return budget | {"other forces": Spread(others.variance + weight @ apart**2, others.freedom)}
+
+
+def _mean(weight: Array, spreads: list[Spread]) -> Spread:
+    """Of the variances, and of their degrees of freedom as each adds to it."""
+    variance = np.stack([own.variance for own in spreads]) * weight[:, None]
+    whole = variance.sum(axis=0)
+    loss = sum(
+        (
+            own / np.broadcast_to(spread.freedom, own.shape)
+            for own, spread in zip(variance, spreads, strict=True)
+        ),
+        np.zeros(len(whole)),
+    )
+    return Spread(whole, np.where(loss > 0, whole / np.where(loss > 0, loss, 1.0), np.inf))
