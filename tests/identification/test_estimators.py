@@ -9,6 +9,7 @@ from identification.problems import problem
 from identification.synthetic_contacts import pressed, shaken
 from palpate.errors import InputError
 from palpate.identification.estimators.methods import estimated_by
+from palpate.identification.estimators.robust import answer
 from palpate.identification.least_squares import covariance, noise_of
 from palpate.identification.models import (
     KELVIN_VOIGT,
@@ -25,7 +26,7 @@ ASKED = problem(LOG, bonded=True, cutoff=60.0)
 
 @cache
 def by(method):
-    return estimated_by(method, KELVIN_VOIGT_MASS, ASKED, channels_of(LOG))
+    return estimated_by(method, answer(ASKED, KELVIN_VOIGT_MASS), ASKED, channels_of(LOG))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -58,7 +59,7 @@ def test_what_a_method_cannot_do(method, model, words):
     log = pressed()
     asked = problem(log)
     with pytest.raises(InputError, match=words) as caught:
-        estimated_by(method, model(asked.motion), asked, channels_of(log))
+        estimated_by(method, answer(asked, model(asked.motion)), asked, channels_of(log))
     assert "\n" not in str(caught.value)
 
 

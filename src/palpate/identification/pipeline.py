@@ -8,7 +8,6 @@ from palpate.identification import in_series
 from palpate.identification.contacts import contacts_of
 from palpate.identification.estimators.methods import estimated_by
 from palpate.identification.evidence import evidence_of
-from palpate.identification.filters.bandwidth import highest_motion
 from palpate.identification.options import LEAST_SQUARES, Options
 from palpate.identification.outcome import nothing, outcome
 from palpate.identification.problem import problem_of, reduced
@@ -84,9 +83,9 @@ def identify(
     if not contacts.spans:
         return nothing(channels, chain, options, terms, warnings)
     problem = reduced(problem_of(channels, chain, contacts, options))
-    terms = replace(terms, band=highest_motion(problem.motion))
+    terms = replace(terms, band=problem.band)
     choice = choose(problem, options)
-    holds = estimated_by(method, choice.answer.fit.model, choice.problem, channels)
+    holds = estimated_by(method, choice.answer, choice.problem, channels)
     follows = max(choice.answer.fit.r2, holds.r2) > _FOLLOWS
     if not (contacts.clear or bonded or follows):
         text = f"the force (rms {choice.answer.unexplained:.3g} N) does not follow the position: nothing seems touched"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.identification.contacts import Contacts
+from palpate.identification.filters.bandwidth import highest_motion
 from palpate.identification.filters.filter_bank import low_passed
 from palpate.identification.filters.position_noise import PositionNoise, noise_within
 from palpate.identification.filters.sensor_path import SensorPath
@@ -98,6 +100,11 @@ class Problem:
     def time(self) -> Array:
         """Of each row [s], shape (m,)."""
         return self.motion.chain.times(self.motion.rows)
+
+    @cached_property
+    def band(self) -> float:
+        """The frequency below which the probe moved [Hz]; infinite if all contacts are too short."""
+        return highest_motion(self.motion)
 
     @property
     def resting(self) -> float:

@@ -19,8 +19,6 @@ Array = NDArray[np.float64]
 _ROUNDS = 30
 _CONVERGED = 1e-6
 _ROUNDING = 1e-9
-_WALK = (-0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
-"""Where the search for a lag that nobody knows starts, in its deviations."""
 
 
 @dataclass(frozen=True)
@@ -87,19 +85,19 @@ class _Point:
     cost: float  # rss, and what the knowledge from before has against it
 
 
-def fit(model: Model, motion: Motion, force: Array, lag: Lag) -> Fit:
+def fit(model: Model, motion: Motion, force: Array, lag: Lag, start: float | None = None) -> Fit:
     """Fit a model.
 
     Args:
         model: which.
         motion: the position.
         force: filtered, at the motion's rows, shape (n,).
-        lag: what is known about it; if it is not known, its uncertainty is part of every interval.
-        The lag is looked for in the log within its prior.
+        lag: what is known about it; if it is not known, it is looked for within its prior, and its uncertainty is part
+            of every interval.
+        start: where that search begins [s]; the prior's value if not given.
     """
     asks = lag.std > 0
-    lags = lag.value + lag.std * np.array(_WALK if asks and not lag.known else (0.0,))
-    best = min((_best_start(model, motion, force, float(at)) for at in lags), key=lambda point: point.rss)
+    best = _best_start(model, motion, force, lag.value if start is None else start)
     known = NOTHING
     for _ in range(2 if asks or lag.mass else 1):
         best = _descend(model, motion, force, best, lag, asks, known)

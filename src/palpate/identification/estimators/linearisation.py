@@ -150,12 +150,13 @@ class Linearisation:
     def answered(self, solution: Solution) -> Answer:
         """The answer with its budget."""
         sensor, told = self._sensor(solution)
-        question = self.system, solution.noise, self._with_position(solution, sensor), self._forces()
+        both = self._with_position(solution, sensor)
+        explained, left, hidden = self._explained(solution, both)  # of what may be another force's, nothing
+        question = self.system, solution.noise, both, self._forces()
         likely = members(*question)
         solution = averaged(likely)
         budget = mean_budget(likely, [self._budget(own, sensor, told) for own in likely], solution.theta)
         budget["octaves"] = of_octaves(*question)
-        explained, left, hidden = self._explained(solution, self._with_position(solution, sensor))
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
+from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit, fit
 from palpate.identification.estimators.instrumental_variables import ORDERS, refined_instrumental
 from palpate.identification.estimators.output_error import output_error
 from palpate.identification.least_squares import noise_of
-from palpate.identification.models import Model
 from palpate.identification.options import LEAST_SQUARES
 from palpate.identification.problem import Problem
 from palpate.identification.sampling import Channels
@@ -21,19 +21,19 @@ from palpate.signals.types import Estimate
 Array = NDArray[np.float64]
 
 
-def estimated_by(method: str, model: Model, problem: Problem, channels: Channels) -> Fit:
+def estimated_by(method: str, answer: Answer, problem: Problem, channels: Channels) -> Fit:
     """The fit that holds if the model does.
 
     Args:
         method: of `METHODS`; all but least squares work on the longest of the contacts.
-        model: which.
+        answer: whose model it is of; its lag is where the search for it begins.
         problem: what it is fitted to.
         channels: as read; the force at the samples of the motion's position.
 
     Raises:
         InputError: a method that cannot fit this model.
     """
-    fitted = fit(model, problem.motion, problem.force, problem.lag)
+    fitted = fit(answer.fit.model, problem.motion, problem.force, problem.lag, answer.fit.lag)
     if method == LEAST_SQUARES:
         return fitted
     force = problem.contacts.force_sign * channels.force

@@ -165,10 +165,8 @@ def white_lines(gain: Callable[[Array], Array], dt: float, longest: int, octaves
     found = np.empty(len(octaves.frequency))
     for o in range(len(found)):
         length = longest if o == 0 else longest >> (o - 1)
-        phase, level = _phase(length, _WHOLE_LINES if o == 0 else _LINES)
-        seen = phase - level[0] @ level[1]
-        tied = matmul_toeplitz(correlation[:length], seen)
-        found[o] = np.mean(np.sum(seen.conj() * tied, axis=0).real) / 2
+        seen = _seen(length, _WHOLE_LINES if o == 0 else _LINES)
+        found[o] = np.mean(np.sum(seen * matmul_toeplitz(correlation[:length], seen), axis=0))
     return np.maximum(found, np.finfo(float).eps)
 
 
@@ -176,15 +174,13 @@ def _sums(
     own: Array, starts: NDArray[np.intp], group: NDArray[np.intp], length: int, numbers: tuple[float, ...]
 ) -> list[tuple[int, tuple[Array, int]]]:
     """Products and lines of the blocks of each group."""
-    phase, level = _phase(length, numbers)
-    width = own.shape[1]
+    seen, width = _seen(length, numbers), own.shape[1]
     found: dict[int, tuple[Array, int]] = {}
     some = max(_AT_ONCE // (length * width), 1)
     views = np.lib.stride_tricks.sliding_window_view(own, length, axis=0)
     for first in range(0, len(starts), some):
         block = views[starts[first : first + some]]  # (blocks, p, length)
-        lines = block @ phase - (block @ level[0]) @ level[1]
-        real = np.concatenate([lines.real, lines.imag], axis=2)  # (blocks, p, 2 lines)
+        real = block @ seen  # (blocks, p, 2 lines)
         mine = group[first : first + some]
         for g in np.unique(mine).tolist():
             flat = real[mine == g].transpose(0, 2, 1).reshape(-1, width)
@@ -194,10 +190,11 @@ def _sums(
 
 
 @lru_cache(maxsize=64)
-def _phase(
-    length: int, numbers: tuple[float, ...]
-) -> tuple[NDArray[np.complex128], tuple[Array, NDArray[np.complex128]]]:
-    """The transform of a block, and that of its mean and slope; the power of white noise stays what it is."""
+def _seen(length: int, numbers: tuple[float, ...]) -> Array:
+    """The transform of a block without its mean and slope, real parts and then imaginary ones, shape (length, 2 lines).
+
+    The power of white noise stays what it is.
+    """
     time = np.arange(length)
     window = np.hanning(length + 2)[1:-1]
     window /= np.sqrt(window @ window / 2)
@@ -205,4 +202,5 @@ def _phase(
     plain = np.column_stack([np.ones(length), 2 * time / (length - 1) - 1])
     weighted = window[:, None] * plain
     fitted = np.linalg.solve(weighted.T @ plain, weighted.T)  # (2, length)
-    return phase, (np.ascontiguousarray(fitted.T), plain.T @ phase)
+    found = phase - fitted.T @ (plain.T @ phase)
+    return np.concatenate([found.real, found.imag], axis=1)

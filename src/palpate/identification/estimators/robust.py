@@ -19,7 +19,6 @@ from palpate.identification.estimators.by_octave import Solution, estimate, held
 from palpate.identification.estimators.effects import TOUCH
 from palpate.identification.estimators.linearisation import Linearisation
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.filters.bandwidth import highest_motion
 from palpate.identification.models import Model, from_surface
 from palpate.identification.prior import LAG
 from palpate.identification.problem import Problem
@@ -89,11 +88,10 @@ def _start(local: Linearisation) -> Linearisation:
     problem, lag = local.problem, local.problem.lag
     if lag.std == 0:
         return local
-    band = highest_motion(problem.motion)
-    if not np.isfinite(band):
+    if not np.isfinite(problem.band):
         return local
     reach = 2 * lag.std
-    count = 1 + int(np.ceil(2 * reach * 2 * np.pi * band))
+    count = 1 + int(np.ceil(2 * reach * 2 * np.pi * problem.band))
     if count < 3:  # all of them are about where it starts
         return local
     fixed = {name: local.at[name] for name in local.at if name != LAG}
