@@ -82,6 +82,7 @@ class Problem:
         contacts: as found.
         counted: the force is counted from where it rests out of contact, and the rows begin before the touches.
         read: the force before any filter, at the samples of the motion's position, shape (n,); None if it is another's.
+        rounding: deviation of a sample of the force by the last digit of the log [N].
     """
 
     motion: Motion
@@ -95,6 +96,7 @@ class Problem:
     contacts: Contacts
     counted: bool = False
     read: Array | None = None
+    rounding: float = 0.0
 
     @property
     def time(self) -> Array:
@@ -176,7 +178,8 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     rows, spans = _rows(channels, chain, contacts)
     origin = _origin(chain(position, 0, lag.value), rows, contacts)
     position = position - origin
-    motion = Motion(chain, position, rows, contacts.bonded, _noise(position, rows, spans))
+    noise = _noise(position, rows, spans, channels.rounding[0])
+    motion = Motion(chain, position, rows, contacts.bonded, noise)
     touch = approach = None
     if not contacts.bonded:
         margin = int(np.ceil(chain.settling / chain.dt))
@@ -186,7 +189,10 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
         approach = touching(force, contacts.resting, rows, spans, begins, margin, usable, reach=1)
     free = _free(force, channels, chain, contacts)
     read = force_raw if contacts.payload is None else None
-    return Problem(motion, force[rows], spans, lag, free, touch, approach, origin, contacts, read=read)
+    return Problem(
+        motion, force[rows], spans, lag, free, touch, approach, origin, contacts,
+        read=read, rounding=channels.rounding[1],
+    )  # fmt: skip
 
 
 MOST_ROWS = 1 << 16
@@ -238,10 +244,15 @@ def _step(chain: Chain) -> int:
     return max(int(1 / (8 * chain.cutoff * chain.dt)), 1)
 
 
-def _noise(position: Array, rows: Rows, spans: Rows) -> PositionNoise:
-    """That of the position: white by its highest differences, and the jumps of an encoder where its counts are seen."""
+def _noise(position: Array, rows: Rows, spans: Rows, rounding: float) -> PositionNoise:
+    """That of the position: white by its highest differences, and the jumps of an encoder where its counts are seen.
+
+    No less than what the log's last digit hides, which does not show where the probe rests.
+    """
     found = noise_within(position, rows, spans)
-    return PositionNoise(white_noise(position), found.jump if found.count else 0.0, found.count)
+    if found.count:
+        return PositionNoise(white_noise(position), found.jump, found.count)
+    return PositionNoise(max(white_noise(position), rounding), 0.0, 0.0)
 
 
 def _origin(filtered: Array, rows: Rows, contacts: Contacts) -> float:

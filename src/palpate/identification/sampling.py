@@ -29,6 +29,10 @@ _FASTEST = 1e7
 """Rows a second: faster no force is recorded, and a lag of some ms would be more rows than a log has."""
 _LONG_STEP = 0.5
 """Between two rows [s]: so slow a log is more likely one whose time is not in seconds."""
+_ROUNDED = 1e3
+"""Last places of a floating-point number below which a step is its own rounding, no log's."""
+_WHOLE = 0.05
+"""Of a step that a multiple of it may be off by: sums and units round too."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,7 @@ class Channels:
         rate: fresh readings per second of the slower channel [1/s].
         raw: the rows behind it.
         warnings: of this stage.
+        rounding: standard deviations of what the last digits of position [m] and force [N] in the log hide in a sample.
     """
 
     start: float
@@ -71,6 +76,7 @@ class Channels:
     rate: float
     raw: Raw
     warnings: tuple[Warn, ...] = ()
+    rounding: tuple[float, float] = (0.0, 0.0)
 
     @property
     def duration(self) -> float:
@@ -118,7 +124,21 @@ def channels_of(record: Record) -> Channels:
     x, f, valid = _common(grid, time, (position, use_x), (force, use_f), even)
     own_x, near_x = _bridge(grid, time[use_x], position[use_x])
     raw = Raw(float(time[0]), dt, own_x, _held(grid + dt / 4, time, force), near_x & valid)
-    return Channels(float(time[0]), dt, x, f, valid, rate, raw, tuple(warnings))
+    rounding = last_digit(position) / 12**0.5, last_digit(force) / 12**0.5
+    return Channels(float(time[0]), dt, x, f, valid, rate, raw, tuple(warnings), rounding)
+
+
+def last_digit(values: Array) -> float:
+    """The step whose multiples all readings are: what a log of few digits was rounded to; 0 if there is none."""
+    found = np.unique(values[np.isfinite(values)])
+    steps = np.diff(found)
+    least = _ROUNDED * float(np.spacing(np.abs(found).max()))
+    if len(found) < _FEWEST or float(steps.min()) <= least:
+        return 0.0
+    step = float(steps.min())
+    whole = np.rint((found - found[0]) / step)
+    step = float((found[-1] - found[0]) / whole[-1])  # the mean of many is finer than one
+    return step if float(np.abs(found - found[0] - whole * step).max()) < _WHOLE * step else 0.0
 
 
 def thinned(channels: Channels, size: int) -> Channels:
@@ -130,7 +150,18 @@ def thinned(channels: Channels, size: int) -> Channels:
     start = channels.start + (size - 1) / 2 * channels.dt
     dt = channels.dt * size
     rate = min(channels.rate, 1 / dt)
-    return replace(channels, start=start, dt=dt, position=position, force=force, valid=valid, rate=rate)
+    own, other = channels.rounding
+    rounding = own / size**0.5, other / size**0.5
+    return replace(
+        channels,
+        start=start,
+        dt=dt,
+        position=position,
+        force=force,
+        valid=valid,
+        rate=rate,
+        rounding=rounding,
+    )
 
 
 def _common(

@@ -71,7 +71,7 @@ class Choice:
             slope = float(u @ residuals) / max(float(u @ u), 1e-300)
             left += float(np.sum((residuals - residuals.mean() - slope * u) ** 2))
             whole += float(np.sum((force - force.mean()) ** 2))
-        noise = self.answer.sensor * len(spans)
+        noise = self.answer.noise * len(spans)
         return 1 - max(left - noise, 0.0) / max(whole - noise, 1e-300)
 
 
@@ -86,7 +86,7 @@ def choose(problem: Problem, options: Options) -> Choice:
         plain = answer(problem, KELVIN_VOIGT if name == KELVIN_VOIGT.name else KELVIN_VOIGT_MASS)
         best, at = plain, problem
         tried = [_compared(plain, "")]
-        if name is None and options.series_stiffness is None and plain.unexplained > _sensor_rms(plain):
+        if name is None and options.series_stiffness is None and plain.unexplained > _noise_rms(plain):
             # A power of the depth needs the place of the surface, and looks like a lag that nobody has told.
             one_sided = problem.with_touches is not None and not lag_open(problem)
             for make in (standard_linear_solid, *([hunt_crossley, quasi_linear] if one_sided else [])):
@@ -126,8 +126,8 @@ def _against(rich: Answer, plain: Answer, tolerance: float) -> str:
     return unrecovered(rich)
 
 
-def _sensor_rms(found: Answer) -> float:
-    return float(np.sqrt(max(found.sensor, 0.0)))
+def _noise_rms(found: Answer) -> float:
+    return float(np.sqrt(max(found.noise, 0.0)))
 
 
 def _compared(found: Answer, note: str) -> Comparison:

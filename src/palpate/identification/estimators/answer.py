@@ -28,7 +28,7 @@ class Answer:
         explained: share of the force's variance in contact that the model alone accounts for.
         unexplained: rms of what is left beyond the sensor's noise [N].
         hidden: share of the force's amplitude in contact that the other forces beside the model do not explain either.
-        sensor: mean square of the sensor's own noise [N^2].
+        noise: mean square of what both channels' own noise leaves of the force [N^2].
         problem: the rows that it was fitted to.
     """
 
@@ -40,7 +40,7 @@ class Answer:
     explained: float
     unexplained: float
     hidden: float
-    sensor: float
+    noise: float
     problem: Problem
 
     def __getitem__(self, name: str) -> float:

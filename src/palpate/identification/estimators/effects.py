@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 FRICTION = "Fc"
 TOUCH = "touch"
-_BREAKAWAY = (0.03, 0.1)
+_BREAKAWAY = (0.03, 0.1, 0.3)
 """Ways that friction turns within, of the reach in contact, half a decade apart from the longest that is no matter of
 the stiffness on. Without them K took the spring that friction is before it slips: `make trust`, surface friction."""
 

@@ -16,6 +16,7 @@ from palpate.identification.estimators.by_octave import Solution, System, system
 from palpate.identification.estimators.effects import FRICTION, effect_columns
 from palpate.identification.estimators.fit import Prediction, fit, linearised, slope_of_lag
 from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of, white_lines
+from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model, Motion
 from palpate.identification.prior import LAG, mass_std
 from palpate.identification.problem import Problem
@@ -162,7 +163,7 @@ class Linearisation:
         budget = {cause: part.of(kept) for cause, part in budget.items()}
         values = self.at or dict(zip(self.names, solution.theta.tolist(), strict=True))
         predicted = Prediction.of(self.model, self.problem.motion, self.problem.force, values, self.lag)
-        noise = float(sensor @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
+        noise = float(both @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
         return Answer(
             names, solution.theta[kept], cov, budget, predicted, explained, left, hidden, noise, self.problem
@@ -189,8 +190,8 @@ class Linearisation:
         budget["unexplained"] = causes.of_unexplained(
             system, solution, self._with_position(solution, sensor), told
         )
-        if lag_open(self.problem) and {"K", "B", LAG} <= set(self.names):
-            budget["lag"] = self._lag_of_damping(solution, budget["lag"])
+        if lag_open(self.problem) and LAG in self.names:
+            budget["lag"] = self._by_prior_of_lag(member, budget["lag"])
         return budget
 
     def _with_position(self, solution: Solution, sensor: Array) -> Array:
@@ -226,16 +227,21 @@ class Linearisation:
                     found[:, *at] = power * (2 * np.pi * frequency) ** (i + j) * (-1) ** ((i - j) // 2)
         return found
 
-    def _lag_of_damping(self, solution: Solution, found: Spread) -> Spread:
-        """A lag T counts as a damping of -K T: B knows of a lag nobody has calibrated what the prior says, no more.
+    def _by_prior_of_lag(self, member: Member, found: Spread) -> Spread:
+        """What is seen in time knows of a lag that nobody has calibrated what the prior says, no more.
 
-        Whatever else shifts the force in time moves the lag that a fit finds, and B with it.
+        A lag T counts as a damping of -K T, and as a branch that relaxes. Whatever else shifts the force in time moves
+        the lag that a fit finds, and them with it: they count as if it were held anywhere in its prior.
         """
-        variance = found.variance.copy()
-        i = self.names.index("B")
-        by_prior = (solution.theta[self.names.index("K")] * self.problem.lag.std) ** 2
-        variance[i] = max(variance[i], by_prior)
-        return Spread(variance, found.freedom)
+        lag = self.names.index(LAG)
+        others = [i for i in range(len(self.names)) if i != lag]
+        normal = inverse(member.solution.cov)
+        slope = np.zeros(len(self.names))
+        slope[others] = inverse(normal[np.ix_(others, others)]) @ normal[others, lag]
+        seen = self.names[: self.own] if self.model.nonlinear else ("B", "M")
+        in_time = np.array([name in seen and name != LAG for name in self.names])
+        by_prior = np.where(in_time, (slope * self.problem.lag.std) ** 2, 0.0)
+        return Spread(np.maximum(found.variance, by_prior), found.freedom)
 
     def _sensor(self, solution: Solution) -> tuple[Array, Array]:
         """Variance of a line by the sensor's own noise in each octave, and the lines that tell it, shape (octaves,).
@@ -252,7 +258,8 @@ class Linearisation:
         else:
             lines = rest.all_lines
             level = rest.total[:, 0, 0] / np.maximum(lines, 1.0)
-        sensor = causes.white_level(level / gain, lines) * gain
+        digits = self.problem.rounding**2 * self.problem.motion.chain.dt / self.dt
+        sensor = max(causes.white_level(level / gain, lines), digits) * gain
         told = np.full(len(sensor), float(lines.sum()))
         if rest is not None:
             louder = (lines > 0) & (level > sensor)
