@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 import palpate
 from palpate.identification import Verdict
@@ -101,3 +102,38 @@ def test_an_inertia_taken_off_twice_is_no_mass_behind_a_lag():
     for trial in list(wrong_payload(None))[:2]:
         said, faults = outcome(trial)
         assert not faults, said
+
+
+@pytest.mark.parametrize("seed", [2, 6])
+def test_a_spring_that_is_tapped_is_no_branch_that_relaxes_behind_a_lag(seed):
+    """Nobody told the lag: a branch whose time is a tap's does to a force what a lag does."""
+    t = np.arange(0, 8, 1 / 250)
+    x = 3.9e-3 * np.clip(np.sin(2 * np.pi * 2.3 * (t - 1)), 0, 1) ** 2 * ((t > 1) & (t < 7)) - 0.9e-3
+    f = K * np.clip(x, 0, None) + 2e-3 * np.random.default_rng(seed).standard_normal(len(t))
+    found = identified(t, np.round(x, 6), f)
+    assert found.model != "standard-linear-solid"
+    assert in_range(found.parameters["K"], K, K)
+    assert in_range(found.working_point.stiffness, K, K)
+    assert found.working_point.stiffness.budget["lag"] > 0
+
+
+def test_a_shaken_contact_gives_back_no_more_than_it_takes():
+    """The share is of all work put in, and a spring beside a damper loses what the damper does in all cycles."""
+    t = np.arange(0, 10, 1e-3)
+    on = np.clip((t - 1) / 0.5, 0, 1) * np.clip((9.5 - t) / 0.5, 0, 1)
+    x = -5e-4 + 2.5e-3 * on + np.where((t > 2) & (t < 8), 5e-4 * np.sin(16 * np.pi * t), 0.0)
+    v = np.gradient(x, t)
+    f = np.where(x > 0, np.maximum(K * x + 30 * v, 0), 0)
+    work, inside = f * v, x > 0
+    share = 1 + work[inside & (v < 0)].sum() / work[inside & (v > 0)].sum()
+    found = identified(t, x, f + 0.01 * np.random.default_rng(0).standard_normal(len(t)), lag=0.0)
+    assert found.press.hysteresis_loss == pytest.approx(share, rel=0.1)
+
+
+def test_a_lag_that_was_told_is_said_again_with_the_filter_in_it():
+    t = np.arange(0, 4, 1e-3)
+    x = 2e-3 + 1e-3 * np.sin(2 * np.pi * (0.5 + 2 * t) * t)
+    low_pass = butter(1, 40, fs=1000, output="sos")
+    f = sosfilt(low_pass, K * x) + 0.01 * np.random.default_rng(0).standard_normal(len(t))
+    found = identified(t, x, f, lag=4e-3, lag_std=1e-4, force_filter="butterworth1:40", bonded=True)
+    assert (found.lag.value, found.lag.kind) == (pytest.approx(4e-3), "told")

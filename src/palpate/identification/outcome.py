@@ -120,14 +120,14 @@ def _plain_options(options: Options) -> dict[str, object]:
 
 
 def _lag(choice: Choice) -> LagFound | None:
-    prior, found = choice.problem.lag, choice.answer
+    prior, found, filtered = choice.problem.lag, choice.answer, choice.problem.filtered
     if prior.known:
-        told = prior.value != 0 or prior.std > 0
-        return LagFound(prior.value, prior.std, 1.96 * prior.std, "told") if told else None
+        told = prior.value + filtered != 0 or prior.std > 0
+        return LagFound(prior.value + filtered, prior.std, 1.96 * prior.std, "told") if told else None
     half = found.half_of(LAG) if LAG in found.names else 1.96 * prior.std
     if half <= _NARROWER * 1.96 * prior.std and choice.explains and not lag_open(choice.problem):
-        return LagFound(found[LAG], half / 1.96, half, "measured")
-    return LagFound(prior.value, prior.std, 1.96 * prior.std, "prior")
+        return LagFound(found[LAG] + filtered, half / 1.96, half, "measured")
+    return LagFound(prior.value + filtered, prior.std, 1.96 * prior.std, "prior")
 
 
 def _late(press: Press | None, problem: Problem, warnings: tuple[Warn, ...]) -> list[Warn]:

@@ -83,6 +83,7 @@ class Problem:
         counted: the force is counted from where it rests out of contact, and the rows begin before the touches.
         read: the force before any filter, at the samples of the motion's position, shape (n,); None if it is another's.
         rounding: deviation of a sample of the force by the last digit of the log [N].
+        filtered: part of the force's lag that the position was sent through beforehand, so that `lag` is the rest [s].
     """
 
     motion: Motion
@@ -97,6 +98,7 @@ class Problem:
     counted: bool = False
     read: Array | None = None
     rounding: float = 0.0
+    filtered: float = 0.0
 
     @property
     def time(self) -> Array:
@@ -161,15 +163,16 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     Raises:
         InputError: too few rows in contact.
     """
-    low_pass = options.force_filter
+    low_pass, filtered = options.force_filter, 0.0
     if low_pass is not None and low_pass.roll_off >= 2 and _COARSEST * low_pass.cutoff * channels.raw.dt <= 1:
         return _of_sensor_path(channels, chain, contacts, options)
     position = contacts.position_sign * channels.position
     force_raw = contacts.force_sign * channels.force
     if low_pass is not None:  # the position through the same low-pass, then both through the chain
         position = contacts.position_sign * low_passed(channels.position, low_pass, channels.dt)
+        filtered = low_pass.lag
         if options.lag is not None:
-            options = replace(options, lag=options.lag - low_pass.lag)
+            options = replace(options, lag=options.lag - filtered)
     period = 1 / channels.rate
     lag = lag_prior(options.lag, options.lag_std, period, 0.0, options.mass)
     force = chain(force_raw)
@@ -191,7 +194,7 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     read = force_raw if contacts.payload is None else None
     return Problem(
         motion, force[rows], spans, lag, free, touch, approach, origin, contacts,
-        read=read, rounding=channels.rounding[1],
+        read=read, rounding=channels.rounding[1], filtered=filtered,
     )  # fmt: skip
 
 

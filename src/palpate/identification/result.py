@@ -130,7 +130,7 @@ class Press(Compared):
     Args:
         tangent: on the way in, by force.
         loading, unloading: depth [m] and force [N] on the way in and out, shape (2, n); empty if it is not there.
-        hysteresis_loss: share of the work of the way in that does not come back; None without a way out.
+        hysteresis_loss: share of the work put in that does not come back; None without a way out.
         relaxation: None without a hold.
         late: by how much the force is read after the position by the work that comes back beyond what went in, and its
             half-width [s]; None if no more comes back.

@@ -160,6 +160,22 @@ def _last(columns: Array, stroke: Stroke, least: float) -> float:
     return float(theta[-1] / size[-1])
 
 
+def slope_in(problem: Problem, segments: list[Segment]) -> Slope | None:
+    """The slope of a log's ways in; with it what it moves by if the force is later than assumed.
+
+    Args:
+        problem: of the log.
+        segments: of its rows.
+    """
+    lag = problem.lag
+    found = slope_of(strokes_in(problem, lag.value, segments))
+    later = slope_of(strokes_in(problem, lag.value + lag.std, segments)) if found and lag.std > 0 else None
+    if found is None or later is None:
+        return found
+    by_lag = NORMAL * abs(later.stiffness - found.stiffness)
+    return replace(found, half=float(np.hypot(found.half, by_lag)), budget=found.budget | {"lag": by_lag})
+
+
 def slope_of(strokes: list[Stroke]) -> Slope | None:
     """Slope in the upper part of the force; None without a way in that rises.
 
@@ -284,7 +300,7 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
         _thin(loading.depth, loading.force),
         _thin(*back.curve),
         back.loss,
-        _relaxation(problem, lag, segments, slope_of(strokes)),
+        _relaxation(problem, lag, segments, slope_in(problem, segments)),
         back.late,
     )
 

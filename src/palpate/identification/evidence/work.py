@@ -22,7 +22,7 @@ class WayOut:
 
     Args:
         curve: depth [m] and force [N] on that of the deepest contact, shape (2, n); empty if there is none.
-        loss: share of the work of its way in that does not come back; None without a way out.
+        loss: share of the work put into it that does not come back; None without a way out.
         late: by how much the force is read after the position, if it gives back more work than it took, and the
             half-width of that [s]; None if it does not, or if the contacts do not agree on it.
     """
@@ -72,10 +72,11 @@ def _ends(x: Array) -> tuple[int, int]:
 
 
 def _works(x: Array, f: Array) -> tuple[float, float]:
-    """Work of the way in, and what of it comes back over the same depths [J]."""
-    top, (first, last) = int(np.argmax(x)), _ends(x)
-    into = float(np.trapezoid(f[first : top + 1], x[first : top + 1]))
-    return into, -float(np.trapezoid(f[top : last + 1], x[top : last + 1]))
+    """Work put in, and what of it comes back over the same depths [J]; a shaken contact takes and gives many times."""
+    first, last = _ends(x)
+    way = np.diff(x[first : last + 1])
+    work = (f[first:last] + f[first + 1 : last + 1]) / 2 * way
+    return float(work[way > 0].sum()), -float(work[way < 0].sum())
 
 
 def _late(contacts: list[tuple[Array, Array, Array, Array]]) -> tuple[float, float] | None:

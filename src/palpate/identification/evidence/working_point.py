@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from palpate.identification.estimators.budget import HIDDEN_SHARE
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import Slope, slope_of, strokes_in, unseen
+from palpate.identification.evidence.press import Slope, slope_in, unseen
 from palpate.identification.in_series import slope_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
@@ -37,7 +37,7 @@ def working_point(
     """
     lag, tolerance = problem.lag.value, options.tolerance
     segments = segments_of(problem.motion.rows, problem.spans)
-    slope = slope_of(strokes_in(problem, lag, segments))
+    slope = slope_in(problem, segments)
     if slope is not None and options.series_stiffness is not None:
         series = options.series_stiffness, options.series_std
         value, half = slope_without_series(slope.stiffness, slope.half, *series)

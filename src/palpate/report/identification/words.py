@@ -122,7 +122,7 @@ def lost(share: float) -> str:
     """What becomes of the work of a press, by the share of it that does not come back."""
     if share < 0:
         return f"{-100 * share:.2g} % more work comes back than went in, as of a force that is read late"
-    return f"{100 * share:.2g} % of the work of the way in does not come back"
+    return f"{100 * share:.2g} % of the work put in does not come back"
 
 
 def limited_by(found: Identification) -> str | None:
