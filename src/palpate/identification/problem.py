@@ -250,11 +250,13 @@ def _step(chain: Chain) -> int:
 def _noise(position: Array, rows: Rows, spans: Rows, rounding: float) -> PositionNoise:
     """That of the position: white by its highest differences, and the jumps of an encoder where its counts are seen.
 
-    No less than what the log's last digit hides, which does not show where the probe rests.
+    No less than what the log's last digit hides, which does not show where the probe rests; nor than what counts are
+    seen to hide in contact, which is all of them where each reading is counts away from the one before.
     """
     found = noise_within(position, rows, spans)
     if found.count:
-        return PositionNoise(white_noise(position), found.jump, found.count)
+        counts = min(found.white, found.count / 12**0.5)
+        return PositionNoise(max(white_noise(position), counts), found.jump, found.count)
     return PositionNoise(max(white_noise(position), rounding), 0.0, 0.0)
 
 

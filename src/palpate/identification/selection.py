@@ -12,6 +12,7 @@ from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.estimators.robust import answer
+from palpate.identification.filters.state_variable import Chain
 from palpate.identification.models import (
     KELVIN_VOIGT,
     KELVIN_VOIGT_MASS,
@@ -86,7 +87,11 @@ def choose(problem: Problem, options: Options) -> Choice:
         plain = answer(problem, KELVIN_VOIGT if name == KELVIN_VOIGT.name else KELVIN_VOIGT_MASS)
         best, at = plain, problem
         tried = [_compared(plain, "")]
-        if name is None and options.series_stiffness is None and plain.unexplained > _noise_rms(plain):
+        if (
+            name is None
+            and options.series_stiffness is None
+            and plain.unexplained > _noise_rms(plain) + _between_readings(problem)
+        ):
             # A power of the depth needs the place of the surface, and looks like a lag that nobody has told.
             one_sided = problem.with_touches is not None and not lag_open(problem)
             for make in (standard_linear_solid, *([hunt_crossley, quasi_linear] if one_sided else [])):
@@ -124,6 +129,18 @@ def _against(rich: Answer, plain: Answer, tolerance: float) -> str:
         if value <= 0 or not known:
             return f"the log does not tell its {name} ({value:.3g} +- {half:.2g})"
     return unrecovered(rich)
+
+
+def _between_readings(problem: Problem) -> float:
+    """Force that straight lines between readings may be off by where a lag that nobody knows moves them [N].
+
+    Of a sine, (omega dt)^2/8 of its amplitude; omega is that of the fastest motion that the filter passes.
+    """
+    chain = problem.motion.chain
+    if not lag_open(problem) or not isinstance(chain, Chain):
+        return 0.0
+    fastest = min(problem.band, chain.cutoff)
+    return float((2 * np.pi * fastest * chain.dt) ** 2 / 8 * np.std(problem.force))
 
 
 def _noise_rms(found: Answer) -> float:

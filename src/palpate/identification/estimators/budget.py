@@ -27,7 +27,7 @@ NORMAL = 1.96
 
 
 _ALONE = 1e-8
-"""Share of a direction that all other stretches have: below it, one stretch alone tells it and shows nothing of it."""
+"""Share of a direction that is told by other than one stretch, or by other than noise: below it, by nothing else."""
 
 
 @dataclass(frozen=True)
@@ -90,10 +90,11 @@ def _freedom(system: System, solution: Solution) -> Array:
 
 
 def of_position_noise(system: System, solution: Solution, noise: Array) -> Spread:
-    """What noise of the position pulls the answer by, to the first order: cov N theta (Fuller, 1987, ch. 1).
+    """What noise of the position pulls the answer by, (A - N)^-1 N theta, and what it only pretends to tell.
 
-    Where the columns tell two parameters apart by little more than their noise, as K from M at one frequency, it is
-    all that is told.
+    A are the normal equations, N what the noise adds to them (errors in variables: Fuller, 1987, ch. 1). Where the
+    columns tell two parameters apart by little more than their noise, as K from M at one frequency, nothing is told:
+    (A - N)^-1 has no bound there.
 
     Args:
         system: of the log.
@@ -101,8 +102,14 @@ def of_position_noise(system: System, solution: Solution, noise: Array) -> Sprea
         noise: N by octave, products of the columns' noise with each other, shape (octaves, p, p).
     """
     weight = np.where(system.lines > 0, 1 / solution.noise, 0.0)
-    pulled = solution.cov @ np.tensordot(weight, noise, axes=1) @ solution.theta
-    return Spread(pulled**2)
+    added = np.tensordot(weight, noise, axes=1)
+    size = np.sqrt(np.maximum(np.diag(solution.cov), 1e-300))
+    value, vector = np.linalg.eigh(solution.cov / np.outer(size, size))
+    half = size[:, None] * vector * np.sqrt(np.maximum(value, 0.0))  # cov = half half^T
+    share, turn = np.linalg.eigh(half.T @ added @ half)
+    own, kept = half @ turn, np.maximum(1 - share, _ALONE)
+    pulled = (own / kept) @ (own.T @ added @ solution.theta)
+    return Spread(pulled**2 + np.sum(own**2 * np.maximum(kept**-2 - 1, 0.0), axis=1))
 
 
 def of_stretches(system: System, solution: Solution) -> Spread:

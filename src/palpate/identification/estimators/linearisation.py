@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -15,7 +16,7 @@ from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.by_octave import Solution, System, system_of, worth
 from palpate.identification.estimators.effects import FRICTION, effect_columns
 from palpate.identification.estimators.fit import Prediction, fit, linearised, slope_of_lag
-from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of, white_lines
+from palpate.identification.estimators.octaves import Octaves, Segment, lines_of, longest_of, octaves_of
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model, Motion
 from palpate.identification.prior import LAG, mass_std
@@ -50,6 +51,7 @@ class Linearisation:
         segments: rows without a gap.
         octaves: sums of the columns with each other; the force that they add up to is the last.
         use: octaves that count, shape (octaves,).
+        noisy: of the position's noise, power of derivative k / 2 in a line of each octave, shape (octaves,), by k.
         system: the normal equations of those.
     """
 
@@ -63,6 +65,7 @@ class Linearisation:
     segments: list[Segment]
     octaves: Octaves
     use: NDArray[np.bool_]
+    noisy: dict[int, Array]
     system: System
 
     @classmethod
@@ -102,11 +105,14 @@ class Linearisation:
             prior["M"] = (problem.lag.mass[0], mass_std(problem.lag.mass))
         whole = octaves_of(np.column_stack(columns), segments, dt, longest_of(segments))
         octaves = Octaves(whole.products[:, :, :-1, :-1], whole.lines, whole.frequency)
-        places = {free.index(name): k for name, k in model.derivatives.items()} if not model.nonlinear else {}
-        use = _seen(motion, dt, whole, {-1: 0, **places})
+        orders = model.derivatives if not model.nonlinear else {}
+        most = max(orders.values(), default=0) + (LAG in free)
+        noisy = _noisy_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
+        places = {free.index(name): k for name, k in orders.items()}
+        use = _seen(motion, noisy, whole, {-1: 0, **places})
         names = (*free, *effects, *bending)
         system = system_of(octaves.only(use), names, prior)
-        return cls(problem, model, lag, at, names, len(free), prior, segments, octaves, use, system)
+        return cls(problem, model, lag, at, names, len(free), prior, segments, octaves, use, noisy, system)
 
     @property
     def searched(self) -> dict[int, float]:
@@ -185,7 +191,7 @@ class Linearisation:
         """By cause, with what a member supposes."""
         system, solution = member.system, member.solution
         budget = causes.of_noise(system, solution, self.names, self.own, LAG)
-        budget["position noise"] = causes.of_position_noise(system, solution, self._position_noise())
+        budget["position noise"] = causes.of_position_noise(system, solution, self._position_noise(solution))
         budget["repetition"] = causes.of_stretches(system, solution)
         budget["unexplained"] = causes.of_unexplained(
             system, solution, self._with_position(solution, sensor), told
@@ -199,33 +205,38 @@ class Linearisation:
         found: Array = np.minimum(sensor + self._by_position(solution), solution.noise)
         return found
 
-    def _line(self) -> Array:
-        """Power of the position's noise in a line of each octave, shape (octaves,)."""
-        motion = self.problem.motion
-        return _line_of_noise(motion, self.octaves.frequency) * motion.chain.dt / self.dt
-
     def _by_position(self, solution: Solution) -> Array:
         """Variance of a line by what the model makes of the position's noise in each octave, shape (octaves,)."""
-        if self.model.nonlinear:
-            return np.zeros(len(self.octaves.frequency))
-        omega = 2j * np.pi * self.octaves.frequency
-        own = dict(zip(self.names, solution.theta.tolist(), strict=True))
-        stiffness = sum(own[name] * omega**i for name, i in self.model.derivatives.items())
-        found: Array = np.abs(stiffness) ** 2 * self._line()
-        return found
+        own = np.append(solution.theta[: self.own], np.zeros(len(self.names) - self.own))
+        if LAG in self.names:
+            own[self.names.index(LAG)] = 0.0
+        return np.einsum("i,oij,j->o", own, self._position_noise(solution), own) / np.maximum(
+            self.system.lines, 1.0
+        )
 
-    def _position_noise(self) -> Array:
-        """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p)."""
-        frequency = self.octaves.frequency
-        power = self._line() * self.system.lines
-        found = np.zeros((len(frequency), len(self.names), len(self.names)))
-        own = self.model.derivatives if not self.model.nonlinear else {}
-        for a, i in own.items():
-            for b, j in own.items():
-                if (i + j) % 2 == 0:  # the others are in quadrature
-                    at = self.names.index(a), self.names.index(b)
-                    found[:, *at] = power * (2 * np.pi * frequency) ** (i + j) * (-1) ** ((i - j) // 2)
-        return found
+    def _position_noise(self, solution: Solution) -> Array:
+        """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p).
+
+        The column of the lag is of the next derivatives: its noise is that of the speed's, as the damping's is.
+        """
+        found = np.zeros((len(self.octaves.frequency), len(self.names), len(self.names)))
+        if self.model.nonlinear:
+            return found
+        of = np.zeros((len(self.names), 1 + max(self.noisy) // 2))  # derivatives in each column
+        for name, k in self.model.derivatives.items():
+            i = self.names.index(name)
+            of[i, k] = 1.0
+            if LAG in self.names:
+                of[self.names.index(LAG), k + 1] = -solution.theta[i]
+        order = np.arange(of.shape[1])
+        both = np.add.outer(order, order)
+        tied = np.stack([self.noisy.get(k, np.zeros(len(found))) for k in range(int(both.max()) + 1)])[both]
+        turned = np.where(
+            both % 2 == 0, 1 - np.abs(np.subtract.outer(order, order)) % 4, 0
+        )  # else in quadrature
+        return (
+            np.einsum("ai,ijo,bj->oab", of, tied * turned[:, :, None], of) * self.system.lines[:, None, None]
+        )
 
     def _by_prior_of_lag(self, member: Member, found: Spread) -> Spread:
         """What is seen in time knows of a lag that nobody has calibrated what the prior says, no more.
@@ -249,7 +260,9 @@ class Linearisation:
         Out of contact it is seen; where the log has no such stretch, it is what the quietest octaves have in common.
         """
         longest = longest_of(self.segments)
-        gain = white_lines(self.problem.motion.chain.force_gain, self.dt, longest, self.octaves)
+        passed = self.problem.motion.chain.force_gain
+        gain = lines_of(lambda f: passed(f) ** 2, self.dt, longest, len(self.octaves.frequency))
+        gain = np.maximum(gain, np.finfo(float).eps)
         rest = self._rest(longest)
         if rest is None:
             own = self.octaves.total[:, -1, -1] / np.maximum(self.octaves.all_lines, 1.0)
@@ -334,24 +347,35 @@ def _moved_by_lag(
     return found
 
 
-def _line_of_noise(motion: Motion, frequency: Array) -> Array:
-    """Power of the filtered position's noise in a line at frequencies [Hz]."""
-    line: Array = motion.noise.power(frequency, motion.chain.dt) * motion.chain.position_gain(frequency) ** 2
-    return line
+def _noisy_lines(motion: Motion, dt: float, longest: int, count: int, most: int) -> dict[int, Array]:
+    """Power of derivative k / 2 of the position's noise in a line of each octave, by even k up to twice the highest."""
+    chain = motion.chain
+
+    def power(k: int) -> Callable[[Array], Array]:
+        return lambda f: (
+            motion.noise.power(f, chain.dt)
+            * chain.position_gain(f) ** 2
+            * (2 * np.pi * f) ** k
+            * chain.dt
+            / dt
+        )
+
+    return {k: lines_of(power(k), dt, longest, count) for k in range(0, 2 * most + 1, 2)}
 
 
-def _seen(motion: Motion, dt: float, octaves: Octaves, derivatives: dict[int, int]) -> NDArray[np.bool_]:
+def _seen(
+    motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives: dict[int, int]
+) -> NDArray[np.bool_]:
     """Octaves up to the first in which a column is mostly the position's noise, which pulls its parameter to zero.
 
     Args:
         motion: of the log.
-        dt: from row to row [s].
+        noisy: power of the position's noise, as of the linearisation.
         octaves: of the columns.
         derivatives: place of a column, and which derivative of the position it is.
     """
-    line, chain = _line_of_noise(motion, octaves.frequency), motion.chain
     rounding = (_ROUNDED * np.finfo(float).eps * float(np.abs(motion.position).max())) ** 2
-    noise = octaves.all_lines * np.maximum(line * chain.dt / dt, rounding)
+    omega2 = (2 * np.pi * octaves.frequency) ** 2
     power = np.stack([octaves.total[:, place, place] for place in derivatives])
-    least = np.stack([noise * (2 * np.pi * octaves.frequency) ** (2 * k) for k in derivatives.values()])
-    return np.logical_and.accumulate(np.all(power >= _SEEN * least, axis=0))
+    noise = [np.maximum(octaves.all_lines * noisy[2 * k], rounding * omega2**k) for k in derivatives.values()]
+    return np.logical_and.accumulate(np.all(power >= _SEEN * np.stack(noise), axis=0))

@@ -32,8 +32,6 @@ OVERLAP = 0.75
 TIED = 35 / 18
 """Power of white noise along a sine's own lines, over that of a line: Hann's window ties neighbouring lines, so that
 three of them are worth about one and a half (n sum w^4 / (sum w^2)^2)."""
-_MEMORY = 1 << 13
-"""Rows in which filtered noise has forgotten itself, with room."""
 _AT_ONCE = 1 << 22
 """Numbers of one channel's blocks that are in memory at a time."""
 
@@ -145,29 +143,32 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
     )
 
 
-def white_lines(gain: Callable[[Array], Array], dt: float, longest: int, octaves: Octaves) -> Array:
-    """Variance of a line of filtered white noise of variance 1 in each octave, shape (octaves,).
+def lines_of(power: Callable[[Array], Array], dt: float, longest: int, count: int) -> Array:
+    """Variance that a stationary noise has in a line of each octave, shape (count,).
 
-    What a block's window leaks from the filter's pass band is in it: beyond the cut-off there is little else.
+    What a block's window leaks from where the noise is largest is in it: of a noise of accelerations, little else.
 
     Args:
-        gain: of the filter's amplitude at frequencies [Hz].
+        power: of the noise at frequencies [Hz], over that of white noise of variance 1.
         dt: from row to row [s].
         longest: rows of the block of the first octave.
-        octaves: for their number.
+        count: of the octaves.
     """
-    from scipy.linalg import matmul_toeplitz
-
-    correlation = np.zeros(longest)
-    frequency = np.asarray(np.fft.rfftfreq(2 * _MEMORY, dt), np.float64)
-    short = np.fft.irfft(gain(frequency) ** 2)[: min(_MEMORY, longest)]
-    correlation[: len(short)] = short
-    found = np.empty(len(octaves.frequency))
-    for o in range(len(found)):
+    found = np.empty(count)
+    for o in range(count):
         length = longest if o == 0 else longest >> (o - 1)
-        seen = _seen(length, _WHOLE_LINES if o == 0 else _LINES)
-        found[o] = np.mean(np.sum(seen * matmul_toeplitz(correlation[:length], seen), axis=0))
-    return np.maximum(found, np.finfo(float).eps)
+        window = _window(length, _WHOLE_LINES if o == 0 else _LINES)
+        found[o] = window @ power(np.asarray(np.fft.rfftfreq(2 * length, dt), np.float64))
+    return found
+
+
+@lru_cache(maxsize=64)
+def _window(length: int, numbers: tuple[float, ...]) -> Array:
+    """What a line sees of each frequency, the mean of all lines of a block, shape (length + 1,)."""
+    spectra = np.abs(np.fft.rfft(_seen(length, numbers), 2 * length, axis=0)) ** 2
+    found: Array = spectra.mean(axis=1) / (2 * length)
+    found[1:-1] *= 2
+    return found
 
 
 def _sums(
