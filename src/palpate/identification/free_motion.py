@@ -129,6 +129,10 @@ def free_motion_of(
     for bound in (np.inf, _OUTLYING):
         if slope and not any(found):
             found = [_share(force, way * position, (way * slope, steep), bound, none) for way in (1.0, -1.0)]
+            found = [
+                own * _quieter(force, way * position, own)
+                for own, way in zip(found, (1.0, -1.0), strict=True)
+            ]
     way = 1.0 if found[0] >= found[1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
         return None
@@ -214,6 +218,17 @@ def _share(
         if abs(least) < FLAT * abs(slope) or abs(least) < FLAT * steep():
             return float(share)
     return 0.0
+
+
+def _quieter(force: Array, position: Array, share: float) -> bool:
+    """Whether the force has less of a range at the lower end of the position's than at the upper one.
+
+    Steps that a damper ends leave no slope of force over position at the deep end either.
+    """
+    if not share:
+        return False
+    low, high = (force[way * position <= _limit(way * position, share)] for way in (1.0, -1.0))
+    return float(np.ptp(np.percentile(low, [0.1, 99.9]))) <= float(np.ptp(np.percentile(high, [0.1, 99.9])))
 
 
 def stays_in(inside: Rows) -> list[tuple[int, int]]:
