@@ -106,8 +106,10 @@ def test_an_inertia_taken_off_twice_is_no_mass_behind_a_lag():
 
 @pytest.mark.parametrize(("rate", "frequency", "seed"), [(250, 2.3, 2), (1000, 2.3, 1), (250, 1.2, 0)])
 def test_a_spring_that_is_tapped_is_no_branch_that_relaxes_behind_a_lag(rate, frequency, seed):
-    """Nobody told the lag: a branch whose time is a tap's does to a force what a lag does. In contact a tap is one sine,
-    of which the position's last digit seems to tell K from M."""
+    """Nobody told the lag: a branch whose time is a tap's does to a force what a lag does.
+
+    In contact a tap is one sine, of which the position's last digit seems to tell K from M.
+    """
     t = np.arange(0, 8, 1 / rate)
     x = 3.9e-3 * np.clip(np.sin(2 * np.pi * frequency * (t - 1)), 0, 1) ** 2 * ((t > 1) & (t < 7)) - 0.9e-3
     f = K * np.clip(x, 0, None) + 2e-3 * np.random.default_rng(seed).standard_normal(len(t))
