@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,22 +11,22 @@ from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.averaging import Member, averaged, mean_budget, members, of_octaves
 from palpate.identification.estimators.budget import Budget, Spread
-from palpate.identification.estimators.by_octave import Solution, System, system_of, worth
+from palpate.identification.estimators.by_octave import Solution, System, system_of
 from palpate.identification.estimators.effects import FRICTION, effect_columns
 from palpate.identification.estimators.fit import Prediction, fit, linearised, slope_of_lag
-from palpate.identification.estimators.octaves import Octaves, Segment, lines_of, longest_of, octaves_of
+from palpate.identification.estimators.noise_lines import (
+    derivative_products,
+    position_lines,
+    seen,
+    sensor_lines,
+)
+from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of
 from palpate.identification.least_squares import inverse
-from palpate.identification.models import Model, Motion
+from palpate.identification.models import Model
 from palpate.identification.prior import LAG, mass_std
 from palpate.identification.problem import Problem
 
 Array = NDArray[np.float64]
-
-_SEEN = 10.0
-"""Power of a column over that of the position's noise in it, below which an octave is left out: its parameter would be
-off by a tenth."""
-_ROUNDED = 100.0
-"""Last digits of a position that its way through the filters may round."""
 
 
 def lag_open(problem: Problem) -> bool:
@@ -107,9 +105,9 @@ class Linearisation:
         octaves = Octaves(whole.products[:, :, :-1, :-1], whole.lines, whole.frequency)
         orders = model.derivatives if not model.nonlinear else {}
         most = max(orders.values(), default=0) + (LAG in free)
-        noisy = _noisy_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
+        noisy = position_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
         places = {free.index(name): k for name, k in orders.items()}
-        use = _seen(motion, noisy, whole, {-1: 0, **places})
+        use = seen(motion, noisy, whole, {-1: 0, **places})
         names = (*free, *effects, *bending)
         system = system_of(octaves.only(use), names, prior)
         return cls(problem, model, lag, at, names, len(free), prior, segments, octaves, use, noisy, system)
@@ -156,7 +154,9 @@ class Linearisation:
 
     def answered(self, solution: Solution) -> Answer:
         """The answer with its budget."""
-        sensor, told = self._sensor(solution)
+        sensor, told = sensor_lines(
+            self.problem, self.segments, self.octaves, self.use, self.system, solution
+        )
         both = self._with_position(solution, sensor)
         explained, left, hidden = self._explained(solution, both)  # of what may be another force's, nothing
         question = self.system, solution.noise, both, self._forces()
@@ -177,15 +177,11 @@ class Linearisation:
 
     def _forces(self) -> list[list[int]]:
         """Places of the columns of each force that may be there or not."""
-        of = {
-            kind: [
-                i
-                for i, name in enumerate(self.names[self.own :], self.own)
-                if name.split(" ")[0].split("^")[0] == kind
-            ]
-            for kind in (FRICTION, "depth", "hysteresis")
-        }
-        return [places for places in of.values() if places]
+        others = list(enumerate(self.names))[self.own :]
+        found = (
+            [i for i, name in others if name.startswith(kind)] for kind in (FRICTION, "depth", "hysteresis")
+        )
+        return [places for places in found if places]
 
     def _budget(self, member: Member, sensor: Array, told: Array) -> Budget:
         """By cause, with what a member supposes."""
@@ -202,40 +198,27 @@ class Linearisation:
 
     def _with_position(self, solution: Solution, sensor: Array) -> Array:
         """Variance of a line by the noise of both channels, shape (octaves,)."""
-        found: Array = np.minimum(sensor + self._by_position(solution), solution.noise)
-        return found
-
-    def _by_position(self, solution: Solution) -> Array:
-        """Variance of a line by what the model makes of the position's noise in each octave, shape (octaves,)."""
-        own = np.append(solution.theta[: self.own], np.zeros(len(self.names) - self.own))
-        if LAG in self.names:
-            own[self.names.index(LAG)] = 0.0
-        return np.einsum("i,oij,j->o", own, self._position_noise(solution), own) / np.maximum(
-            self.system.lines, 1.0
+        own = np.array(
+            [solution.theta[i] * (name in self.model.derivatives) for i, name in enumerate(self.names)]
         )
+        by_position = np.einsum("i,oij,j->o", own, self._position_noise(solution), own)
+        found: Array = np.minimum(sensor + by_position / np.maximum(self.system.lines, 1.0), solution.noise)
+        return found
 
     def _position_noise(self, solution: Solution) -> Array:
         """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p).
 
         The column of the lag is of the next derivatives: its noise is that of the speed's, as the damping's is.
         """
-        found = np.zeros((len(self.octaves.frequency), len(self.names), len(self.names)))
-        if self.model.nonlinear:
-            return found
         of = np.zeros((len(self.names), 1 + max(self.noisy) // 2))  # derivatives in each column
-        for name, k in self.model.derivatives.items():
+        for name, k in ({} if self.model.nonlinear else self.model.derivatives).items():
             i = self.names.index(name)
             of[i, k] = 1.0
             if LAG in self.names:
                 of[self.names.index(LAG), k + 1] = -solution.theta[i]
-        order = np.arange(of.shape[1])
-        both = np.add.outer(order, order)
-        tied = np.stack([self.noisy.get(k, np.zeros(len(found))) for k in range(int(both.max()) + 1)])[both]
-        turned = np.where(
-            both % 2 == 0, 1 - np.abs(np.subtract.outer(order, order)) % 4, 0
-        )  # else in quadrature
         return (
-            np.einsum("ai,ijo,bj->oab", of, tied * turned[:, :, None], of) * self.system.lines[:, None, None]
+            np.einsum("ai,oij,bj->oab", of, derivative_products(self.noisy), of)
+            * self.system.lines[:, None, None]
         )
 
     def _by_prior_of_lag(self, member: Member, found: Spread) -> Spread:
@@ -253,40 +236,6 @@ class Linearisation:
         in_time = np.array([name in seen and name != LAG for name in self.names])
         by_prior = np.where(in_time, (slope * self.problem.lag.std) ** 2, 0.0)
         return Spread(np.maximum(found.variance, by_prior), found.freedom)
-
-    def _sensor(self, solution: Solution) -> tuple[Array, Array]:
-        """Variance of a line by the sensor's own noise in each octave, and the lines that tell it, shape (octaves,).
-
-        Out of contact it is seen; where the log has no such stretch, it is what the quietest octaves have in common.
-        """
-        longest = longest_of(self.segments)
-        passed = self.problem.motion.chain.force_gain
-        gain = lines_of(lambda f: passed(f) ** 2, self.dt, longest, len(self.octaves.frequency))
-        gain = np.maximum(gain, np.finfo(float).eps)
-        rest = self._rest(longest)
-        if rest is None:
-            own = self.octaves.total[:, -1, -1] / np.maximum(self.octaves.all_lines, 1.0)
-            level = np.where(self.use, solution.noise, own)
-            lines = np.where(self.use, worth(self.system), self.octaves.all_lines)
-        else:
-            lines = rest.all_lines
-            level = rest.total[:, 0, 0] / np.maximum(lines, 1.0)
-        digits = self.problem.rounding**2 * self.problem.motion.chain.dt / self.dt
-        sensor = max(causes.white_level(level / gain, lines), digits) * gain
-        told = np.full(len(sensor), float(lines.sum()))
-        if rest is not None:
-            louder = (lines > 0) & (level > sensor)
-            sensor, told = np.where(louder, level, sensor), np.where(louder, lines, told)
-        return np.minimum(sensor, solution.noise), told
-
-    def _rest(self, longest: int) -> Octaves | None:
-        """The force out of contact by the octaves of the contacts; None if there is too little of it."""
-        if not self.problem.free:
-            return None
-        edges = np.cumsum([0, *(len(f) for f in self.problem.free)])
-        stretches = [Segment(int(a), int(b)) for a, b in pairwise(edges)]
-        found = octaves_of(np.concatenate(self.problem.free)[:, None], stretches, self.dt, longest)
-        return found if found.lines.any() else None
 
     def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float, float]:
         """What the model explains of the force in contact, noise left aside.
@@ -345,37 +294,3 @@ def _moved_by_lag(
     for s in segments:
         found[s.first : s.last] = -np.gradient(force[s.first : s.last], dt)
     return found
-
-
-def _noisy_lines(motion: Motion, dt: float, longest: int, count: int, most: int) -> dict[int, Array]:
-    """Power of derivative k / 2 of the position's noise in a line of each octave, by even k up to twice the highest."""
-    chain = motion.chain
-
-    def power(k: int) -> Callable[[Array], Array]:
-        return lambda f: (
-            motion.noise.power(f, chain.dt)
-            * chain.position_gain(f) ** 2
-            * (2 * np.pi * f) ** k
-            * chain.dt
-            / dt
-        )
-
-    return {k: lines_of(power(k), dt, longest, count) for k in range(0, 2 * most + 1, 2)}
-
-
-def _seen(
-    motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives: dict[int, int]
-) -> NDArray[np.bool_]:
-    """Octaves up to the first in which a column is mostly the position's noise, which pulls its parameter to zero.
-
-    Args:
-        motion: of the log.
-        noisy: power of the position's noise, as of the linearisation.
-        octaves: of the columns.
-        derivatives: place of a column, and which derivative of the position it is.
-    """
-    rounding = (_ROUNDED * np.finfo(float).eps * float(np.abs(motion.position).max())) ** 2
-    omega2 = (2 * np.pi * octaves.frequency) ** 2
-    power = np.stack([octaves.total[:, place, place] for place in derivatives])
-    noise = [np.maximum(octaves.all_lines * noisy[2 * k], rounding * omega2**k) for k in derivatives.values()]
-    return np.logical_and.accumulate(np.all(power >= _SEEN * np.stack(noise), axis=0))
