@@ -130,8 +130,7 @@ def free_motion_of(
         if slope and not any(found):
             found = [_share(force, way * position, (way * slope, steep), bound, none) for way in (1.0, -1.0)]
             found = [
-                own * _quieter(force, way * position, own)
-                for own, way in zip(found, (1.0, -1.0), strict=True)
+                own * _quiet(force, way * position, own) for own, way in zip(found, (1.0, -1.0), strict=True)
             ]
     way = 1.0 if found[0] >= found[1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
@@ -220,15 +219,16 @@ def _share(
     return 0.0
 
 
-def _quieter(force: Array, position: Array, share: float) -> bool:
-    """Whether the force has less of a range at the lower end of the position's than at the upper one.
+def _quiet(force: Array, position: Array, share: float) -> bool:
+    """Whether the force has no clearly larger range at the lower end of the position's than at the upper one.
 
     Steps that a damper ends leave no slope of force over position at the deep end either.
     """
     if not share:
         return False
     low, high = (force[way * position <= _limit(way * position, share)] for way in (1.0, -1.0))
-    return float(np.ptp(np.percentile(low, [0.1, 99.9]))) <= float(np.ptp(np.percentile(high, [0.1, 99.9])))
+    own, other = (float(np.ptp(np.percentile(end, [0.1, 99.9]))) for end in (low, high))
+    return FLAT * own <= other
 
 
 def stays_in(inside: Rows) -> list[tuple[int, int]]:
