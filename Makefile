@@ -7,7 +7,9 @@ OUT := runs/foam-hybrid
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PIP_INSTALL := $(PIP) install --only-binary :all: --no-warn-script-location
 # Bytecode is kept whatever the environment says: tests start many processes, which would compile the sources each.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --numprocesses auto --dist worksteal
+# One thread for algebra and tables: the tests take all cores already, and threads without a core of their own wait spinning.
+PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 POLARS_MAX_THREADS=1 \
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 # The Python to build .venv with; `make test PYTHON=python3.13` picks another.
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python3.14 python; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then echo $$p; break; fi; done)

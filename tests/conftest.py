@@ -30,6 +30,11 @@ sys.path.insert(0, str(ROOT / "benchmarks" / "live"))
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """One process more than there are cores: what waits for a wire, a page or a clock leaves a core to the others."""
+    return len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1) + 1
+
+
 REAL_TIME = ROOT / "tests" / "wires"
 """A press over a wire runs against a clock: a machine that halts for half a second makes an arm late in truth, and the
 press ends as it should. So these may try again; a fault of ours fails each time. All others wait for a condition."""

@@ -21,13 +21,21 @@ MOST = 14
 """Options that a group has at most: what a reader takes in without a search."""
 
 
+@pytest.fixture(scope="module")
+def pages():
+    """Help that was printed, by its command: several tests look at each."""
+    return {}
+
+
 @pytest.fixture
-def help_of(capsys, monkeypatch):
+def help_of(pages, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(WIDTH))
 
     def shown(*command):
-        assert main([*command, "--help"]) == 0
-        return capsys.readouterr().out
+        if command not in pages:
+            assert main([*command, "--help"]) == 0
+            pages[command] = capsys.readouterr().out
+        return pages[command]
 
     return shown
 

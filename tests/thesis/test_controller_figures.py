@@ -210,7 +210,9 @@ def test_the_network_alone_follows_and_an_untaught_one_does_not():
     assert not fig_2_04.by_network(fig_2_04.FOAM, 1e-7, 0).follows
 
 
+@pytest.mark.long
 def test_the_turn_of_figure_2_5_changes_the_surface():
+    """Its controller is compiled for this alone; above, another surface takes over under the bench's own."""
     record = fig_2_05.turned_into_rubber(0)
     t, force, depth = since_contact(record), record["force"], record["penetration"]
     for at, stiffness in ((4.9, 5200.0), (9.9, 34500.0)):

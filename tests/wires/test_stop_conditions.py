@@ -12,19 +12,22 @@ from palpate.press.loops import gains_for
 from palpate.wires import AtRest, Limits, Sense, Task, checked
 from palpate.wires.stop_conditions import Moment, reason_to_stop, spoiled
 
-ORDER = checked(
-    ForceLoop(gains_for(load_arm("ur5e"), 10.0)),
-    Task(10.0, (0.0, 0.0, -1.0), 3.0, 0.001),
-    Limits(force=40.0, speed=0.02, travel=0.01, seconds=20.0),
-)
-THETA = ORDER.loop.gains.theta
+GAINS = gains_for(load_arm("ur5e"), 10.0)
+THETA = GAINS.theta
 SENSE = Sense(100.0, 5.0, (0.0, 0.0, -10.0), (0.0,) * 3, (0.4, 0.0, 0.3), (1.0, 0.0, 0.0, 0.0))
 REST = AtRest(np.array(SENSE.position), np.zeros(3), 0.1, 500.0, SENSE)
 MOMENT = Moment(SENSE, 10.0, 0.001, 0.0, 0, 0.0, 1.0, None)
 
 
-def test_a_press_within_its_limits_goes_on():
-    assert reason_to_stop(MOMENT, ORDER, REST) is None
+@pytest.fixture(scope="module")
+def order():
+    """Made by the first test: a loop is compiled where there is none yet."""
+    task = Task(10.0, (0.0, 0.0, -1.0), 3.0, 0.001)
+    return checked(ForceLoop(GAINS), task, Limits(force=40.0, speed=0.02, travel=0.01, seconds=20.0))
+
+
+def test_a_press_within_its_limits_goes_on(order):
+    assert reason_to_stop(MOMENT, order, REST) is None
 
 
 @pytest.mark.parametrize(
@@ -41,8 +44,8 @@ def test_a_press_within_its_limits_goes_on():
         ({"age": 1.01 * THETA}, "late, more than the loop's lag"),
     ],
 )
-def test_each_limit_says_what_was_passed(changed, says):
-    assert says in reason_to_stop(MOMENT._replace(**changed), ORDER, REST)
+def test_each_limit_says_what_was_passed(order, changed, says):
+    assert says in reason_to_stop(MOMENT._replace(**changed), order, REST)
 
 
 @pytest.mark.parametrize(
