@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate._jit import kernel
-from palpate.instruments import Converter, Differentiator, Encoder, analog_filter_190, force_sensor
+from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
 from palpate.signals.filters import butterworth2
 
 PHYSICS, LOOP = 20000, 1000.0
@@ -75,18 +75,6 @@ def test_the_force_chain_plain_is_compiled():
 def test_the_whole_force_chain_is_7_6_ms_late():
     assert stated()[2] == pytest.approx(7.6e-3, abs=0.05e-3)
     assert lag_by_ramp(chain)[2] == pytest.approx(7.6e-3, abs=0.1e-3)
-
-
-def test_a_differentiator_is_half_a_sample_late():
-    part = Differentiator(LOOP)
-    time = np.arange(100) / LOOP
-    state = part.start()
-    rates = []
-    for t in time:
-        rate, state = part.step(state, 0.5 * t**2)
-        rates.append(rate)
-    assert (time - rates)[-1] == pytest.approx(part.lag, abs=1e-12)
-    assert part.lag == 0.5 / LOOP
 
 
 @pytest.mark.parametrize(

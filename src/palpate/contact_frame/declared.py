@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from palpate.contact_frame.vectors import Vector
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.contact_frame.payload import Payload
-
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from palpate.contact_frame.declared import Vector
+from palpate.contact_frame.vectors import Vector
 from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.force.arm import NotNegative, Table, from_toml, read_small

@@ -8,6 +8,7 @@ from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.signals.quaternions import continuous
 
+Vector = tuple[float, float, float]
 FEWEST = 20
 """Rows for a mean that is said of a log: its standard deviation is then a fifth of a reading's, or less."""
 _UNIT = 0.1

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.declared import ContactFrame, Vector
+from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.free_motion.inertia import BLOCKS, free_inertia
 from palpate.contact_frame.payload import Payload
 from palpate.contact_frame.signals_in_base import Signals, signals_of
-from palpate.contact_frame.vectors import FEWEST, read_rows
+from palpate.contact_frame.vectors import FEWEST, Vector, read_rows
 from palpate.contact_frame.weighing.checks import noise_of, notes_against
 from palpate.contact_frame.weighing.estimate import (
     Estimated,
