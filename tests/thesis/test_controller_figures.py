@@ -1,7 +1,10 @@
 """What the figures of the controllers stand on: changes in mid-run, the linear force loop, and their measures."""
 
+from functools import reduce
+
 import numpy as np
 import pytest
+from scipy import signal
 
 from palpate._vector import Vec3
 from palpate.bench import build, changed, load
@@ -97,6 +100,35 @@ def test_the_linear_limit_is_where_a_stepped_loop_begins_to_swing(gains):
     limit = loop.limit()
     assert swings(loop, 0.85 * limit) < 1.0
     assert swings(loop, 1.15 * limit) > 1.0
+
+
+def by_transfer_functions(kf, ki, damping, stiffness):
+    """The largest root of the same loop: plant and low-pass held, 3.125 ticks late, smoothed, and the PI."""
+    low_pass = signal.butter(3, 2.0 * np.pi * 120.0, analog=True)
+    above = np.polymul([damping, stiffness], low_pass[0])
+    below = np.polymul([8.2 + 0.05, damping, stiffness], low_pass[1])
+    (plant,), poles, _ = signal.cont2discrete((above, below), 1e-3)
+    smooth = signal.butter(2, 120.0, fs=1000.0)
+    loop = reduce(np.polymul, (plant, smooth[0], [0.875, 0.125], [kf + ki, -kf]))
+    return np.abs(
+        np.roots(np.polyadd(reduce(np.polymul, (poles, smooth[1], [1, 0, 0, 0, 0], [1, -1])), loop))
+    ).max()
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        (1.0, 0.003, 60.0, 6e3),
+        (1.0, 0.003, 60.0, 24e3),
+        (0.25, 0.0015, 480.0, 4e5),
+        (0.25, 0.0015, 480.0, 8e5),
+    ],
+)
+def test_the_linear_loop_is_its_transfer_functions(case):
+    """On either side of the limit; roots of order 14 near the unit circle are known to 1e-9."""
+    kf, ki, damping, stiffness = case
+    (radius,) = ForceLoop(kf, ki, damping, 8.2).radius(np.array([stiffness]))
+    assert radius == pytest.approx(by_transfer_functions(*case), abs=1e-8)
 
 
 def test_without_gain_every_surface_is_stable():
