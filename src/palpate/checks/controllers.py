@@ -45,11 +45,11 @@ def a_moment() -> tuple[Sense, Task, Any]:
     return sense, task, arm.model(q, qd)
 
 
-def ticks(controller: Any, count: int = 5) -> tuple[Array, Any]:
-    """Torques [N m] of so many equal ticks, shape (count, 3), and the state after them."""
+def ticks(controller: Any) -> tuple[Array, Any]:
+    """Torques [N m] of five equal ticks, shape (5, 3), and the state after them."""
     sense, task, model = a_moment()
     state, torques = controller.start(), []
-    for _ in range(count):
+    for _ in range(5):
         torque, state = controller.step(state, sense, task, model)
         torques.append(torque)
     return np.array(torques), state

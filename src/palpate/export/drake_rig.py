@@ -66,8 +66,9 @@ class DrakeRig:
         path: SDF or URDF file.
         surface, probe: paths of the collisions; the probe's is None for a sphere of its own above the origin.
         rigid: point stiffness of that sphere [N/m].
-        time_step: of the plant [s].
     """
+
+    time_step = TIME_STEP
 
     def __init__(
         self,
@@ -75,13 +76,11 @@ class DrakeRig:
         surface: tuple[str, ...],
         probe: tuple[str, ...] | None,
         rigid: float,
-        time_step: float = TIME_STEP,
     ) -> None:
-        self.time_step = time_step
         library = drake()
         builder = library.DiagramBuilder()
         config = library.MultibodyPlantConfig(
-            time_step=time_step, contact_model="point", discrete_contact_approximation="sap"
+            time_step=self.time_step, contact_model="point", discrete_contact_approximation="sap"
         )
         self.plant, self.scene = library.AddMultibodyPlant(config, builder)
         try:

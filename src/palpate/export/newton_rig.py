@@ -23,13 +23,14 @@ class NewtonRig:
 
     Args:
         path: the exported module.
-        time_step: [s].
 
     Raises:
         InputError: Newton is not installed.
     """
 
-    def __init__(self, path: Path, time_step: float = 1e-3) -> None:
+    time_step = 1e-3
+
+    def __init__(self, path: Path) -> None:
         if find_spec("newton") is None:
             raise InputError(
                 "pressing in Newton needs Newton: pip install 'palpate[newton]', or leave out --check"
@@ -38,7 +39,7 @@ class NewtonRig:
         warp.config.log_level = warp.LOG_ERROR  # what it tells of itself goes to standard output
         newton = import_module("newton")
 
-        self.time_step, self._library, self._warp = time_step, newton, warp
+        self._library, self._warp = newton, warp
         builder = newton.ModelBuilder(up_axis=newton.Axis.Z, gravity=(0.0, 0.0, 0.0))
         plain = newton.ModelBuilder.ShapeConfig(density=0.0, mu=0.0, kf=0.0)
         at = warp.transform((0.0, 0.0, -0.05), warp.quat_identity())

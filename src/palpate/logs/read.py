@@ -94,7 +94,7 @@ def _record(loaded: Loaded, path: Path, start: float | None, end: float | None) 
     return Record(kept, {name: loaded.units[name] for name in kept}, meta)
 
 
-def columns_of(path: str | Path, delimiter: str | None = None, limits: Limits | None = None) -> list[str]:
+def columns_of(path: str | Path, delimiter: str | None = None) -> list[str]:
     """Names of a log's columns; numbers from 0 if it has no header.
 
     Raises:
@@ -103,7 +103,7 @@ def columns_of(path: str | Path, delimiter: str | None = None, limits: Limits | 
     kind = kind_of(Path(path))
     if kind.is_bag:
         raise InputError(f"{path} is a bag and has topics, not columns; palpate topics {path} lists them")
-    return list(open_table(Path(path), kind, delimiter, limits).names)
+    return list(open_table(Path(path), kind, delimiter).names)
 
 
 def _cut(arrays: dict[str, Array], start: float | None, end: float | None, path: Path) -> dict[str, Array]:

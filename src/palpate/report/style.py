@@ -56,11 +56,9 @@ def inked(size: float | None = None) -> Iterator[None]:
         yield
 
 
-def figure(
-    rows: int = 1, *, height: float = 2.6, width: float = 9.0, **subplots: Any
-) -> tuple[Figure, list[Axes]]:
+def figure(rows: int = 1, *, height: float = 2.6, **subplots: Any) -> tuple[Figure, list[Axes]]:
     """A figure of so many panels above each other that share their x axis; each `height` inches high."""
-    return grid((width, height * rows + 0.5), rows, sharex=True, **subplots)
+    return grid((9.0, height * rows + 0.5), rows, sharex=True, **subplots)
 
 
 def grid(

@@ -35,25 +35,19 @@ class Disturbance:
     change: Change
 
 
-def run_with(
-    experiment: Experiment,
-    seed: int,
-    disturbances: Sequence[Disturbance],
-    waiting: Callable[[], None] | None = None,
-) -> Record:
+def run_with(experiment: Experiment, seed: int, disturbances: Sequence[Disturbance]) -> Record:
     """Runs like `Bench.run`, from the same random numbers, for `press` seconds of contact, through the disturbances.
 
     Args:
         experiment: any; it runs on after losses of contact.
         seed: of the noise.
         disturbances: in the order of their times.
-        waiting: called when the loop has to be compiled first.
 
     Returns:
         All rows up to the end, or up to the first number that is none; ``meta["disturbances"]`` holds the times [s].
     """
     bench = build(experiment)
-    tick, march = bench.loop.tick, bench.simulation(seed, waiting=waiting)
+    tick, march = bench.loop.tick, bench.simulation(seed)
     rows = [march.advance(LOOK)]
     while march.ticks < round(experiment.run.duration / tick) and _finite(rows) and march.contact is None:
         rows.append(march.advance(LOOK))

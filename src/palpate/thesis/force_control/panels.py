@@ -40,7 +40,7 @@ def across(row: Sequence[Axes]) -> Axes:
     return axis
 
 
-def force_panel(axis: Axes, shown: Record, title: str = "") -> None:
+def force_panel(axis: Axes, shown: Record) -> None:
     """Measured, true and desired force, and where a motor is at its limit."""
     t = shown["t"]
     axis.plot(t, shown["force_measured"], color=style.MEASURED, linewidth=0.7, label="measured")
@@ -48,7 +48,6 @@ def force_panel(axis: Axes, shown: Record, title: str = "") -> None:
     axis.plot(t, shown["force_desired"], **style.KNOWN, label="desired")
     limits(axis, shown)
     axis.set(ylabel="force [N]", xlabel="time since contact [s]", xlim=(t[0], t[-1]))
-    axis.set_title(title, loc="left", fontsize=9.5)
     style.legend(axis)
 
 

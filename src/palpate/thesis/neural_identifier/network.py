@@ -177,9 +177,9 @@ def answer(press: Press, choice: Choice, start: int) -> Answer:
     )
 
 
-def tangent(probe: NeuralProbe, x: float, share: float = 0.02) -> float:
+def tangent(probe: NeuralProbe, x: float) -> float:
     """Slope of the network's force over displacement at x, by central difference [N/m]."""
-    d = share * x
+    d = 0.02 * x
     return (probe.force((x + d, 0.0, 0.0)) - probe.force((x - d, 0.0, 0.0))) / (2.0 * d)
 
 
