@@ -40,9 +40,16 @@ def samples(n, count, seed=0):
     return phi, phi @ np.arange(1.0, n + 1.0) + 0.1 * random.standard_normal(count)
 
 
-@pytest.mark.parametrize(("policy", "forgotten"), POLICIES.values(), ids=POLICIES)
-@pytest.mark.parametrize("n", [3, 4])
-def test_it_is_its_definition(n, policy, forgotten):
+@pytest.mark.parametrize(
+    ("n", "name"),
+    [
+        *((3, name) for name in POLICIES),
+        (4, "exponential"),  # each policy is compiled again for a fourth parameter
+        *(pytest.param(4, name, marks=pytest.mark.long) for name in ("directional", "SIFt")),
+    ],
+)
+def test_it_is_its_definition(n, name):
+    policy, forgotten = POLICIES[name]
     phi, y = samples(n, 150)
     variances = 10.0 ** np.linspace(3, 5, n)
     information, theta = np.diag(1.0 / variances), np.zeros(n)
