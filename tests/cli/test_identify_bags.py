@@ -117,6 +117,7 @@ def test_one_axis_of_a_joint(tmp_path, capsys):
     assert tip["parameters"]["K"]["verdict"] == "identified"
 
 
+@pytest.mark.long
 def test_the_robot_s_stiffness_from_a_press_on_a_wall(tmp_path, capsys):
     """Poses made from the joints: each is off by what the arm gives way, f / 40 kN/m."""
     for name, surface in (("wall", 4e7), ("foam", 5000.0)):
