@@ -50,6 +50,7 @@ def test_what_has_no_interval_is_told():
         stable_intervals(surface(1e4, 60.0, 1.0, 0.003), "surface.stiffnes", 1.0, 2.0)
 
 
+@pytest.mark.long
 def test_a_bench_has_the_boundary_of_its_experiment():
     base = surface(1e4, 480.0, 1.0, 0.003)
     ends = "surface.stiffness", 1e5, 1.1e5

@@ -50,7 +50,7 @@ class Foreign(NamedTuple):
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        (Misspelt(1.0), "'Task' object has no attribute 'force'"),
+        pytest.param(Misspelt(1.0), "'Task' object has no attribute 'force'", marks=pytest.mark.long),
         (Fickle(1.0), "the state of the controller changes its types"),
         (Foreign(1.0), "cannot be compiled"),
     ],

@@ -43,7 +43,7 @@ def kinds_of_loop():
     return list(found.values())
 
 
-FEW = ("foam-hybrid", "foam-neural", "foam-viscoelastic")
+FEW = ("foam-hybrid", "foam-neural")
 """Kinds of loop of which each test run asks; the others take as long and are `long`."""
 OF_ITS_OWN = ("cautious", "self-tuning")
 """Controllers of which each has a loop compiled for itself; the others share one."""

@@ -114,6 +114,7 @@ class Zsh:
         return found[1] if found.groups() else found[0]
 
 
+@pytest.mark.long
 def test_zsh(script):
     path = script("zsh", "_palpate")
     shell = Zsh(path.parent)

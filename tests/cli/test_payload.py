@@ -55,6 +55,7 @@ def test_poses_that_do_not_tell_are_exit_code_1_and_nothing_is_written(elsewhere
     assert not (elsewhere / "tool.toml").exists()
 
 
+@pytest.mark.long
 def test_a_press_is_identified_with_the_payload(elsewhere, capsys):
     tool = Tool(side=-1.0, taken_off=1.0)
     write(log_of(tool, six(), np.random.default_rng(0)), "turning.parquet")

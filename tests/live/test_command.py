@@ -85,6 +85,7 @@ def test_an_arm_presses_in_space_and_viewers_see_all_of_it():
         assert {"/palpate/contact", "/palpate/arm"} <= set(offered)
 
 
+@pytest.mark.long
 def test_viewers_are_served_beside_the_page(record):
     """Foxglove's protocol, by a client of its own: what is offered, and that messages come."""
     from websockets.sync.client import connect

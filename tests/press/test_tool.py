@@ -108,6 +108,7 @@ def test_it_presses_with_the_force_asked_for_and_the_tools_mass_is_taken_off():
     assert not found["sensor_saturated"]
 
 
+@pytest.mark.long
 def test_a_wrong_sign_is_named_and_mass_and_damping_are_refused(tmp_path, capsys):
     (tmp_path / "tool.toml").write_text(changed(inertia=-0.3).to_toml())
     words = [

@@ -86,7 +86,7 @@ QUESTION = "the arm will move; type press to go on"
 @pytest.mark.parametrize(
     ("keys", "code", "says"),
     [
-        pytest.param(b"no\n", 2, "nothing was moved", id="no"),
+        pytest.param(b"no\n", 2, "nothing was moved", id="no", marks=pytest.mark.long),
         pytest.param(b"\x04", 2, "nothing was moved", id="end of file", marks=pytest.mark.long),
         pytest.param(b"\x03", 130, "", id="Ctrl-C", marks=pytest.mark.long),
     ],

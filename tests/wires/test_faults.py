@@ -119,7 +119,8 @@ def test_a_controller_that_starts_again_is_lost_and_then_met_anew(folders, here,
         assert said(capsys)["rate_Hz"] == pytest.approx(100, rel=0.05)
 
 
-@pytest.mark.parametrize("kind", ["rtde", pytest.param("ros2", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["rtde", "ros2"])
 def test_gains_of_another_rate_are_refused(folders, here, capsys, kind):
     with standing(kind, folders) as (_, words):
         other = str(folders[1000] / "gains.toml")

@@ -77,6 +77,7 @@ def test_a_node_that_dies_ends_the_press(folder, here, capsys):
     assert len(read_record(here / "rec" / "record.parquet")) > 20
 
 
+@pytest.mark.long
 def test_nothing_that_listens_and_nothing_that_speaks_are_refused(folder, here, capsys):
     assert main(words_of(folder, "--dry-run")) == 2
     assert "nothing to read in ROS domain" in capsys.readouterr().err
