@@ -17,7 +17,7 @@ import palpate.thesis
 from palpate.bench import changed, load
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.thesis.claims import Claim, decided, spread, with_wholes
+from palpate.thesis.claims import Claim, decided, often, spread, with_wholes
 from palpate.thesis.figure import studies, study
 from palpate.thesis.measure import STATE, Written, measure
 from palpate.thesis.page import chapter_of
@@ -105,6 +105,11 @@ def one_line(ran: subprocess.CompletedProcess) -> str:
     assert ran.stderr.count("\n") == 1
     assert "Traceback" not in ran.stderr
     return ran.stderr
+
+
+def test_often_is_nine_runs_of_ten():
+    assert often([True] * 9 + [False])
+    assert not often([True] * 8 + [False] * 2)
 
 
 def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
