@@ -101,6 +101,7 @@ def test_pause_stops_step_steps_and_reset_begins_again(browser, served_simulatio
         until(page, f"palpate.live.state.playing && palpate.live.latest.t < {before}")
 
 
+@pytest.mark.long
 def test_two_pages_at_once_see_the_same(browser, served_simulation):
     _, address = served_simulation
     with opened(browser, address) as one, opened(browser, address) as other:
@@ -166,6 +167,7 @@ def test_nothing_is_wider_than_the_screen(browser, served_simulation, width):
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
+@pytest.mark.long
 @by_the_clock
 def test_a_frame_costs_less_than_half_of_its_time(browser, served_simulation):
     """In time of the processor, not of the clock, so that other programs hardly count; 60 a second leave 16.7 ms."""
@@ -180,6 +182,7 @@ def test_a_frame_costs_less_than_half_of_its_time(browser, served_simulation):
         assert max(one["drawn_of_shown"] for one in found) > 0.6, found
 
 
+@pytest.mark.long
 @by_the_clock
 def test_a_slider_is_in_the_picture_within_fifty_milliseconds(browser, served_simulation):
     """The fastest of ten: what is in the way of the others is another program's."""

@@ -47,8 +47,18 @@ def opened(browser, path, **context):
         own.close()
 
 
-@pytest.mark.parametrize("name", ["enough", "little", "thesis"])
-@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
+@pytest.mark.parametrize(
+    ("name", "width", "scheme"),
+    [
+        ("enough", 1400, "light"),
+        ("little", 400, "dark"),
+        ("thesis", 400, "dark"),
+        *(
+            pytest.param(*case, marks=pytest.mark.long)
+            for case in (("enough", 400, "dark"), ("little", 1400, "light"), ("thesis", 1400, "light"))
+        ),
+    ],
+)
 def test_it_opens_alone_and_is_no_wider_than_the_screen(browser, pages, name, width, scheme):
     with opened(browser, pages[name], viewport={"width": width, "height": 860}, color_scheme=scheme) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= width
