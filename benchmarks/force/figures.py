@@ -20,7 +20,7 @@ from palpate.force.gains import LAW
 HERE = Path(__file__).parent
 FIGURES = {
     "First touches: UR5e": "first_touches.py --touches 5000 --arms ur5e",
-    "First touches: FR3": "first_touches.py --touches 3000 --arms fr3",
+    "First touches: FR3": "first_touches.py --touches 5000 --arms fr3",
     "A law that knows the surface": "first_touches.py --touches 1000 --laws knowing",
     "Known, the touch told: UR5e": "first_touches.py --touches 1000 --laws told --arms ur5e",
     "Known, the touch told: FR3": "first_touches.py --touches 1000 --laws told --arms fr3",
@@ -33,7 +33,7 @@ FIGURES = {
     "The thesis' arm, surfaces that sway or change": "moving_on_the_bench.py --seeds 3 --controllers foam-cautious",
     "Dither": "dither.py --seeds 5 --arms ur5e",
     "Learning": "learning.py --seeds 5 --arms ur5e",
-    "Proofs: UR5e": "falsify.py --draws 200000 --runs 500",
+    "Proofs: UR5e": "falsify.py",
     "Proofs: FR3": "falsify.py --arms fr3 --draws 20000 --runs 300",
     "The peak at the touch": "peak.py",
     "Commands in vain": "in_vain.py --touches 60",

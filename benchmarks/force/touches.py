@@ -36,7 +36,7 @@ class Draw:
 
 @dataclass(frozen=True)
 class Judged:
-    """Settling time [s] (NaN if not), overshoot, losses of contact, least K_eff(K_u)/K_eff(K) above F_d/3."""
+    """Settling time [s] (NaN if not), overshoot, losses of contact, least K_eff(K_u)/K_eff(K + B/theta) above F_d/3."""
 
     settling: float
     overshoot: float
@@ -83,6 +83,7 @@ class Rig:
         firm = int(np.argmax(force > 0.5 * draw.F)) if (force > 0.5 * draw.F).any() else len(force)
         lost = int(((force[firm:-1] > 0.0) & (force[firm + 1 :] <= 0.0)).sum())
         felt = draw.K if self.arm.kind == "torque" else self.arm.seen(draw.K)
+        felt *= 1.0 + draw.B / draw.K / self.theta
         pressing = rows[force > draw.F / 3.0, 1]
         own = 1.0 / self.arm.series if self.arm.kind == "torque" else 0.0
         least = float((own + 1.0 / felt) / (own + 1.0 / pressing.min())) if len(pressing) else np.nan

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from palpate.force.arm import PositionLoop
-from palpate.force.cells import Box
+from palpate.force.cells import Box, Prover
 from palpate.force.certificate import FORM, Certificate, with_inner
 from palpate.force.claims import Claim, ProvedCell, adapting_claims, held_claim, one_sided_claim
 from palpate.force.cover import Cell, covered
@@ -23,6 +23,9 @@ SOFTEST = 1e-3
 """Of the cap: as far down as a held gain is proved by default."""
 EXACT_SHARE = 0.99
 """Of the exact interval of a held gain: as far up as it is proved by default."""
+RINGS, CUTS = 3, 8
+"""Into which an adapting law's damping times, and what lies near the edge of a held gain, are cut before a norm is
+searched: they decide how long the search takes, not what it finds."""
 PART = 0.06
 """Relative width of w^2 and of 2 z w that one norm is asked to serve."""
 
@@ -136,7 +139,8 @@ def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None
     prover = claim.prover(gains)
     cells: list[Cell] = []
     whole = claim.boxes(gains)
-    for start in starts or (whole if prover.fading else [s for box in whole for s in _starts(box)]):
+    edge = exact_interval(gains)[1] / claim.shares[1]
+    for start in starts or [s for box in whole for s in _starts(prover, box, edge)]:
         found, left = covered(prover, start)
         if left:
             return None
@@ -151,12 +155,54 @@ def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None
     return msgspec.structs.replace(claim, cells=proved)
 
 
-def _starts(box: Box) -> list[Box]:
-    """The box, its bounds cut into decades from above: a norm seldom serves more."""
+def _starts(prover: Prover, box: Box, edge: float) -> list[Box]:
+    """The box cut as the search would cut it at last: by decades; for a position arm, finer towards the edge.
+
+    Args:
+        prover: of the box.
+        box: of surfaces.
+        edge: K + B/theta without damping from which on the loop with the gain held grows [N/m].
+    """
+    if prover.fading:
+        return [box]
+    if box.low == box.high:
+        return _rings(box, prover.theta, RINGS)
+    if prover.loop.arm.kind == "torque" or box.most == 0.0 or box.high <= 0.5 * edge:
+        return _decades(box)
+    soft = _decades(replace(box, high=0.5 * edge)) if box.low < 0.5 * edge else []
+    return soft + _graded(replace(box, low=max(box.low, 0.5 * edge)), prover.theta, edge)
+
+
+def _decades(box: Box) -> list[Box]:
+    """Its bounds cut into decades from above: a norm seldom serves more."""
     edges = [box.high]
     while edges[-1] / 10.0 > box.low:
         edges.append(edges[-1] / 10.0)
     edges.append(box.low)
-    if box.low == box.high:
-        return [box]
     return [replace(box, low=a, high=b) for b, a in pairwise(edges)]
+
+
+def _rings(box: Box, theta: float, cuts: int) -> list[Box]:
+    """Its damping times cut so often, each time the lower half."""
+    if cuts == 0 or box.most == box.least:
+        return [box]
+    lower, upper = box.halves(theta, damping=True)
+    return [upper, *_rings(lower, theta, cuts - 1)]
+
+
+def _graded(box: Box, theta: float, edge: float) -> list[Box]:
+    """Cut towards the corner nearest to the edge: a norm serves surfaces whose distances to it differ by four times."""
+    upper, rest = _rings(box, theta, 1)
+    found, distance = [upper], edge - box.low
+    for _ in range(CUTS):
+        upper, rest = _rings(rest, theta, 1)
+        found.append(upper)
+        distance *= 0.5
+        middle = edge - distance
+        if not rest.low < middle < rest.high:
+            break
+        found.append(replace(rest, high=middle))
+        rest = replace(rest, low=middle)
+        if edge - rest.high > 0.25 * distance:
+            break
+    return [*found, rest]

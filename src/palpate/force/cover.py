@@ -29,21 +29,26 @@ class Cell:
 
 def proved_cell(prover: Prover, box: Box) -> Cell | None:
     """The box with a norm that proves it; None if none was found."""
-    roomy = prover if prover.exact else replace(prover, wider=ROOM, _known={}, _loops={})
-    corners = roomy.matrices(box)
-    if max(map(radius, corners)) >= 1.0:
-        return None
     if prover.fading:
-        L = common_beside(corners, prover.equilibrium(box))
-        return Cell(box, L) if L is not None and Cell(box, L).proved(prover) else None
+        return _of(prover, box, common_beside(_corners(prover, box), prover.equilibrium(box)))
     middle = _middle(prover, box)
-    L = single(middle)
-    if L is not None and Cell(box, L).proved(prover):
-        return Cell(box, L)
-    if len(corners) == 1 or _hopeless(prover, box):
+    cell = _of(prover, box, single(middle))
+    if cell is not None or _hopeless(prover, box):
+        return cell
+    corners = _corners(prover, box)
+    if len(corners) == 1 or max(map(radius, corners)) >= 1.0:
         return None
-    L = common(corners, middle)
-    return Cell(box, L) if L is not None and Cell(box, L).proved(prover) else None
+    return _of(prover, box, common(corners, middle))
+
+
+def _of(prover: Prover, box: Box, L: Array | None) -> Cell | None:
+    cell = None if L is None else Cell(box, L)
+    return cell if cell is not None and cell.proved(prover) else None
+
+
+def _corners(prover: Prover, box: Box) -> list[Array]:
+    roomy = prover if prover.exact else replace(prover, wider=ROOM, _known={}, _loops={})
+    return roomy.matrices(box)
 
 
 ROOM = 1.3

@@ -6,6 +6,7 @@ What these functions find is not trusted: `cells` checks it by norms alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ Array = NDArray[np.float64]
 _STEPS = 60
 _MARGIN = 1e-9
 _HEAVIER, _HEAVIEST = 8.0, 1e13
-_ROWS = 16
+_ROWS = 64
 """Of a product at a time: below the size from which BLAS starts threads, which cost more than they bring here."""
 
 
@@ -39,7 +40,8 @@ def single(Phi: Array) -> Array | None:
 def common(matrices: Sequence[Array], near: Array) -> Array | None:
     """L with |L^T Phi L^-T| < 1 for all of these matrices, shape (n, n); None if none is found.
 
-    Newton's method on the barrier -log det of P - Phi_i^T P Phi_i + s, of P and of 1 - P, s being made small.
+    Newton's method on the barrier -log det of P - Phi_i^T P Phi_i + s W, of P and of 1 - P, s being made small; W is
+    what `near` contracts by in its own norm, so that a slow direction is asked for no more than it can.
 
     Args:
         matrices: each of shape (n, n).
@@ -50,7 +52,8 @@ def common(matrices: Sequence[Array], near: Array) -> Array | None:
         return None
     back = np.linalg.inv(start.T)
     inside = [start.T @ Phi @ back for Phi in matrices]
-    P = _interior(inside)
+    middle = start.T @ near @ back
+    P = _interior(inside, np.eye(len(middle)) - middle.T @ middle)
     if P is None:
         return None
     return start @ _chol(P)
@@ -81,41 +84,74 @@ def common_beside(matrices: Sequence[Array], still: Array) -> Array | None:
     T[-1, -1] = np.sqrt(np.linalg.norm(apart[:-1, -1]) / max(float(np.linalg.norm(apart[-1, :-1])), 1e-300))
     back = np.asarray(np.linalg.inv(T))
     inside = [T @ into @ Phi @ S @ back for Phi in matrices]
-    n = len(S)
-    P = _interior(inside, np.array([D for D in _symmetric(n) if not D[:-1, -1].any()]))
+    P = _interior(inside, np.eye(len(S)), apart=1)
     return None if P is None else (T @ into).T @ _chol(P)
 
 
-def _interior(matrices: Sequence[Array], basis: Array | None = None) -> Array | None:
-    n = len(matrices[0])
-    basis = _symmetric(n) if basis is None else basis  # (m, n, n)
-    m = len(basis)
-    flat = basis.reshape(m, -1)
-    images = [flat - (Phi.T @ basis @ Phi).reshape(m, -1) for Phi in matrices]
-    P = 0.5 * np.eye(n)
-    s = 2.0 * max(float(np.linalg.eigvalsh(Phi.T @ P @ Phi - P)[-1]) for Phi in matrices) + 1.0
+def _interior(matrices: Sequence[Array], slack: Array, apart: int = 0) -> Array | None:
+    """P, 0 < P < 1, with Phi^T P Phi < P for all.
+
+    Args:
+        matrices: each of shape (n, n).
+        slack: W > 0 in P - Phi^T P Phi + s W, of which s is brought below 0, shape (n, n).
+        apart: rows of P, the last ones, that have nothing beside the diagonal.
+    """
+    Phi = np.array(matrices)
+    n = Phi.shape[1]
+    pairs = _pairs(n, apart)
+    P, unit = 0.5 * np.eye(n), np.linalg.inv(np.linalg.cholesky(slack))
+    s = 2.0 * float(np.linalg.eigvalsh(unit @ (_turned(P, Phi) - P) @ unit.T).max()) + 1.0
     weight = 1.0
     for _ in range(_STEPS):
         for _ in range(4):
-            gradient, hessian = np.zeros(m + 1), np.zeros((m + 1, m + 1))
-            gradient[m] = weight
-            for D, Phi in [(flat, None), (-flat, None), *zip(images, matrices, strict=True)]:
-                F = _value(P, s, D, Phi, flat)
-                _add(gradient, hessian, np.asarray(np.linalg.inv(F)), D, Phi is not None)
+            gradient, hessian = _barrier(P, s, Phi, slack, pairs)
+            gradient[-1] += weight
             step = _newton(hessian, gradient)
             if step is None:
-                return P if _contracts(P, matrices) else None
+                return P if _contracts(P, Phi) else None
             decrement = float(-gradient @ step)
-            P, s = _along(P, s, step, basis, matrices)
-            if s < 0.0 and _contracts(P, matrices):
+            P, s = _along(P, s, step, Phi, slack, pairs)
+            if s < 0.0 and _contracts(P, Phi):
                 return P
             if decrement < 0.3:
                 break
         # On the central path s is within (sum of all sizes)/weight of the least there is.
-        if s > 2.0 * n * (len(matrices) + 2) / weight or weight > _HEAVIEST:
+        if s > 2.0 * n * (len(Phi) + 2) / weight or weight > _HEAVIEST:
             return None
         weight *= _HEAVIER
     return None
+
+
+def _barrier(P: Array, s: float, Phi: Array, W: Array, pairs: Pairs) -> tuple[Array, Array]:
+    """Gradient and Hessian, by P's free elements and s, of -log det of P, 1 - P and all P - Phi^T P Phi + s W.
+
+    With F^-1 = G: tr(G dF G dF) for dF = D - Phi^T D Phi is the quadratic form of G x G, -(G Phi^T) x (G Phi^T) and its
+    transpose, and (Phi G Phi^T) x (Phi G Phi^T) in D, x being Kronecker's product: sums of outer products.
+    """
+    n, eye = len(P), np.eye(len(P))
+    inverses = np.linalg.inv(np.concatenate([[P, eye - P], _constraints(P, s, Phi, W)]))
+    G, back = inverses[2:], Phi.transpose(0, 2, 1)
+    across, through = G @ back, Phi @ G @ back
+    slid = G @ W
+    square = slid @ G
+    gradient = inverses[1] - inverses[0] + (through - G).sum(axis=0)
+    beside = (square - Phi @ square @ back).sum(axis=0)
+    hessian = np.empty((len(pairs) + 1, len(pairs) + 1))
+    mixed = _products(across)
+    hessian[:-1, :-1] = pairs.folded(_products(np.concatenate([inverses, through])) - mixed - mixed.T)
+    hessian[-1, :-1] = hessian[:-1, -1] = pairs.of(beside)
+    hessian[-1, -1] = float((slid * slid.transpose(0, 2, 1)).sum())
+    return np.append(pairs.of(gradient), -float(np.trace(slid.sum(axis=0)))), hessian
+
+
+def _products(matrices: Array) -> Array:
+    """Sum of Kronecker's products of each with itself, shape (n n, n n)."""
+    n = matrices.shape[1]
+    flat = matrices.reshape(len(matrices), n * n)
+    outer = np.empty((n * n, n * n))
+    for row in range(0, n * n, _ROWS):
+        outer[row : row + _ROWS] = flat[:, row : row + _ROWS].T @ flat
+    return outer.reshape(n, n, n, n).transpose(0, 2, 1, 3).reshape(n * n, n * n)
 
 
 def _newton(hessian: Array, gradient: Array) -> Array | None:
@@ -134,51 +170,32 @@ def _newton(hessian: Array, gradient: Array) -> Array | None:
     return step if np.isfinite(step).all() else None
 
 
-def _value(P: Array, s: float, D: Array, Phi: Array | None, flat: Array) -> Array:
-    n = len(P)
-    if Phi is not None:
-        return P - Phi.T @ P @ Phi + s * np.eye(n)
-    return P if D is flat else np.eye(n) - P
+def _turned(P: Array, Phi: Array) -> Array:
+    return Phi.transpose(0, 2, 1) @ P @ Phi
 
 
-def _add(gradient: Array, hessian: Array, G: Array, D: Array, slack: bool) -> None:
-    """Gradient and Hessian of -log det of one constraint, G being its inverse."""
-    m, n = len(D), len(G)
-    turned = (G @ D.reshape(m, n, n) @ G).reshape(m, -1)
-    gradient[:m] -= D @ G.ravel()
-    for row in range(0, m, _ROWS):
-        some = slice(row, min(row + _ROWS, m))
-        hessian[some, :m] += turned[some] @ D.T
-    if slack:
-        square = G @ G
-        gradient[m] -= np.trace(G)
-        across = D @ square.ravel()
-        hessian[:m, m] += across
-        hessian[m, :m] += across
-        hessian[m, m] += np.trace(square)
+def _constraints(P: Array, s: float, Phi: Array, W: Array) -> Array:
+    return P - _turned(P, Phi) + s * W
 
 
-def _along(P: Array, s: float, step: Array, basis: Array, matrices: Sequence[Array]) -> tuple[Array, float]:
+def _along(P: Array, s: float, step: Array, Phi: Array, W: Array, pairs: Pairs) -> tuple[Array, float]:
     """As far along a step as all constraints stay met."""
-    n = len(P)
-    dP, ds = np.tensordot(step[:-1], basis, axes=1), float(step[-1])
+    dP, ds = pairs.matrix(step[:-1]), float(step[-1])
     length = 1.0
     for _ in range(40):
         Q, t = P + length * dP, s + length * ds
-        if all(
-            _positive(F)
-            for F in (Q, np.eye(n) - Q, *(Q - Phi.T @ Q @ Phi + t * np.eye(n) for Phi in matrices))
-        ):
+        if _positive(np.concatenate([[Q, np.eye(len(P)) - Q], _constraints(Q, t, Phi, W)])):
             return (Q, t) if length == 1.0 else (P + 0.9 * length * dP, s + 0.9 * length * ds)
         length *= 0.7
     return P, s
 
 
-def _contracts(P: Array, matrices: Sequence[Array]) -> bool:
-    return _positive(P) and all(_positive((1.0 - _MARGIN) * P - Phi.T @ P @ Phi) for Phi in matrices)
+def _contracts(P: Array, Phi: Array) -> bool:
+    return _positive(P) and _positive((1.0 - _MARGIN) * P - _turned(P, Phi))
 
 
 def _positive(F: Array) -> bool:
+    """Whether all of these matrices are positive definite, shape (..., n, n)."""
     try:
         np.linalg.cholesky(F)
     except np.linalg.LinAlgError:
@@ -186,12 +203,48 @@ def _positive(F: Array) -> bool:
     return True
 
 
-def _symmetric(n: int) -> Array:
+@dataclass(frozen=True)
+class Pairs:
+    """The free elements of a symmetric matrix, as coordinates of length 1.
+
+    Args:
+        size: n of the matrix.
+        upper: number of (i, j) in it, row by row, i <= j.
+        lower: of (j, i).
+        weight: 1/sqrt(2); 1/2 on the diagonal.
+    """
+
+    size: int
+    upper: Array
+    lower: Array
+    weight: Array
+
+    def __len__(self) -> int:
+        return len(self.upper)
+
+    def of(self, M: Array) -> Array:
+        """<M, D> for each coordinate's matrix D, M being symmetric."""
+        return 2.0 * self.weight * M.ravel()[self.upper]
+
+    def matrix(self, coordinates: Array) -> Array:
+        """The symmetric matrix."""
+        flat = np.zeros(self.size * self.size)
+        flat[self.upper] += self.weight * coordinates
+        flat[self.lower] += self.weight * coordinates
+        return flat.reshape(self.size, self.size)
+
+    def folded(self, form: Array) -> Array:
+        """A quadratic form of all elements, by coordinates."""
+        rows = self.weight[:, None] * (form[self.upper] + form[self.lower])
+        return (rows[:, self.upper] + rows[:, self.lower]) * self.weight
+
+
+def _pairs(n: int, apart: int) -> Pairs:
     rows, columns = np.triu_indices(n)
-    basis = np.zeros((len(rows), n, n))
-    index = np.arange(len(rows))
-    basis[index, rows, columns] = basis[index, columns, rows] = np.where(rows == columns, 1.0, np.sqrt(0.5))
-    return basis
+    free = (columns < n - apart) | (rows == columns)
+    rows, columns = rows[free], columns[free]
+    weight = np.where(rows == columns, 0.5, np.sqrt(0.5))
+    return Pairs(n, rows * n + columns, columns * n + rows, weight)
 
 
 def _balanced(Phi: Array) -> Array:
