@@ -20,7 +20,9 @@ from touches import Draw, Rig
 
 from palpate._jit import part
 from palpate._vector import cos, sin, sqrt
-from palpate.force.law import LOCKED, Cautious, CautiousState
+from palpate.force.law import Cautious, CautiousState
+from palpate.force.stage import LOCKED
+from palpate.force.stiffness_bound import Bound
 
 CHANGES = ((7e3, 62e3), (1e3, 1e6), (7e3, 7e3))
 SWAYING = (7e3, 62e3)
@@ -63,17 +65,17 @@ class Dithered(NamedTuple):
         if age * law.tick > 3.0 * self.memory and moved > 0.0:
             spread = sqrt(inner.watch.variance * law.period / self.memory)
             seen = (sqrt(fc * fc + fs * fs) + law.z * spread) / moved
-            if seen - 2.0 * law.z * spread / moved > inner.bound:
+            if seen - 2.0 * law.z * spread / moved > inner.bound.used:
                 bound = min((1.0 + law.eps) * seen, law.cap)
                 inner = CautiousState(
-                    inner.ticks, inner.desired, inner.watch, inner.follow, inner.stage, inner.known, bound,
-                    inner.backstop,
+                    inner.ticks, inner.desired, inner.watch, inner.follow, inner.stage, inner.known,
+                    inner.starts, Bound(bound, bound, 0.0), inner.backstop,
                 )  # fmt: skip
-        speed += self.share * desired / inner.bound * self.rate * c
+        speed += self.share * desired / inner.bound.used * self.rate * c
         return speed, (inner, ticks + 1.0, fc, fs, xc, xs, f0, x0, age)
 
-    def told(self, state):
-        return state[0].bound
+    def stiffness_bound(self, state):
+        return state[0].bound.used
 
 
 def main() -> None:

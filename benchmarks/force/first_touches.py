@@ -112,7 +112,9 @@ def report(rig: Rig, rows: list[dict[str, float]], seed: int) -> None:
     print(f"  overshoot above 10 %                 {(over > 0.1).sum()} of {touches}")
     print(f"  contact lost                         {(lost > 0).sum()} of {touches}")
     low = (least < 0.5).sum()
-    print(f"  smallest K_eff(K_u)/K_eff(K + B/theta) {np.nanmin(least):.3f}; below 0.5 in {low} of {touches},")
+    print(
+        f"  smallest K_eff(K_u)/K_eff(K + B/theta) {np.nanmin(least):.3f}; below 0.5 in {low} of {touches},"
+    )
     print(f"    {(least[damping <= rig.theta] < 0.5).sum()} of them where B/K is at most theta")
 
 

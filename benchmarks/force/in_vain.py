@@ -17,7 +17,7 @@ from touches import Rig
 from palpate.force import ForceLoop
 from palpate.force.flat import STATE
 from palpate.force.force_loop import FARTHEST
-from palpate.force.worlds import ENCODER
+from palpate.force.simulated_press import ENCODER
 
 SECONDS = 2.0
 _VAIN = STATE + 3

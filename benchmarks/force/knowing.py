@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate._jit import part
 from palpate.force.gains import Gains
-from palpate.force.law import least_for
+from palpate.force.stiffness_bound import least_for
 
 
 @part
@@ -29,7 +29,7 @@ class Knowing(NamedTuple):
             return self.approach, 0.0
         return max(min(self.gain * (desired - force), self.speed), -self.speed), 1.0
 
-    def told(self, state):
+    def stiffness_bound(self, state):
         return self.bound
 
 

@@ -19,7 +19,8 @@ from touches import Draw, Rig
 
 from palpate._jit import part
 from palpate._vector import Vec3
-from palpate.force.law import LOCKED, Cautious, gain
+from palpate.force.law import Cautious, gain
+from palpate.force.stage import LOCKED
 
 FORCE, NOISE, SECONDS = 20.0, 0.1, 40.0
 CASES = {
@@ -58,11 +59,11 @@ class Taught(NamedTuple):
         error = desired - inner.watch.mean
         taught = desired if abs(error) > self.dead else inner.watch.mean
         push, net = self.network.step(net, taught, inner.watch.mean, position)
-        unit = gain(self.law, inner.bound) * desired
+        unit = gain(self.law, inner.bound.used) * desired
         return speed + unit * max(min(push, self.bound), -self.bound), (inner, net)
 
-    def told(self, state):
-        return state[0].bound
+    def stiffness_bound(self, state):
+        return state[0].bound.used
 
 
 def main() -> None:

@@ -33,7 +33,7 @@ class AfterTouch(NamedTuple):
         speed, inner = self.law.step(inner, desired, force, position)
         return speed, (1.0, inner)
 
-    def told(self, state):
+    def stiffness_bound(self, state):
         return 0.0
 
 

@@ -15,7 +15,7 @@ from rich.progress import track
 from palpate.force.arm import load_arm
 from palpate.force.gains import LAW, Gains, gains_for, known_lag
 from palpate.force.lag import sum_of_lags
-from palpate.force.worlds import pressed, surface, world_of
+from palpate.force.simulated_press import pressed, surface, world_of
 
 SECONDS = 4.0
 BAND = 0.05

@@ -7,7 +7,7 @@ from palpate.bench import changed, names, summarise
 from palpate.bench.any_experiment import FILES, build_any, load_any, parse_any
 from palpate.bench.one_direction.tables import OneDirection
 from palpate.errors import InputError
-from palpate.force.worlds import ENCODER
+from palpate.force.simulated_press import ENCODER
 
 PRESSES = sorted(set(FILES.names()) - set(names()))
 GOOD = """

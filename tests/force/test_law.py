@@ -8,10 +8,10 @@ import pytest
 from force.gained import gains_of
 from palpate._vector import Vec3
 from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
-from palpate.force.law import LOCKED
 from palpate.force.regression import AXIS_K, PRIOR, Fit, fit_through, without_offset
+from palpate.force.simulated_press import pressed, surface, world_of
+from palpate.force.stage import LOCKED
 from palpate.force.touching import touch
-from palpate.force.worlds import pressed, surface, world_of
 
 
 def run(name, K, B=0.0, force=20.0, noise=0.1, seconds=2.0, seed=0, desired=None, **others):

@@ -6,9 +6,9 @@ import pytest
 
 from force.gained import gains_of
 from palpate.force.gains import ALPHA
-from palpate.force.law import least_for
 from palpate.force.sampled_loop import SampledLoop
 from palpate.force.sensitivity import MOST, PEAK, relief_of, sensitivity
+from palpate.force.stiffness_bound import least_for
 
 RATIOS = (0.0, 0.1, 0.3, 0.7, 1.0, 2.0, 6.0)
 """B/K over theta."""

@@ -20,12 +20,6 @@ PRIVATE = {
 }  # fmt: skip
 """A private word, and the field's for it (CONVENTIONS.md)."""
 WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
-STILL = {
-    "src/palpate/force/law.py",
-    "src/palpate/force/telling.py",
-    "src/palpate/force/worlds.py",
-}
-"""Files whose names and public names are still to be changed; to be emptied, and to stay empty."""
 
 
 def words(name):
@@ -53,10 +47,7 @@ def test_names_are_those_of_the_field(root):
     for path in sorted((root / "src" / "palpate").rglob("*.py")):
         if private(path):
             found[path.relative_to(root).as_posix()] = private(path)
-    assert found
-    fresh = [f"{path}: {', '.join(names)}" for path, names in found.items() if path not in STILL]
-    assert not fresh, "\n".join(fresh)
-    assert not STILL - found.keys(), "these say it in the field's terms now: take them off the list"
+    assert not found, "\n".join(f"{path}: {', '.join(names)}" for path, names in found.items())
 
 
 def test_a_private_word_is_found_in_whatever_it_stands():

@@ -161,10 +161,10 @@ def _checked(path: Path, gains: Path | None, json: bool) -> int:
 
 def _print(certificate: Certificate, verdict: Verdict, json: bool) -> None:
     if json:
-        from palpate.force.telling import told
+        from palpate.force.describe import as_json
 
-        print_answer(told(certificate, verdict))
+        print_answer(as_json(certificate, verdict))
         return
-    from palpate.force.telling import lines
+    from palpate.force.describe import lines
 
     print_lines(*lines(certificate, verdict))

@@ -69,7 +69,7 @@ class CautiousPress(NamedTuple):
     def report(self, state):
         """Nothing learned of force; K_u [N/m], phase, evidence of a contact."""
         inner = state.inner
-        return Vec3(0.0, 0.0, 0.0), Vec3(inner.bound, inner.stage.phase, inner.watch.evidence)
+        return Vec3(0.0, 0.0, 0.0), Vec3(inner.bound.used, inner.stage.phase, inner.watch.evidence)
 
 
 class CautiousController(ControllerTable, tag="cautious"):

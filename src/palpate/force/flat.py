@@ -76,4 +76,4 @@ LAST, VARIANCE, TIDE = (_PLACES.index(("watch", name)) for name in ("last", "var
 PHASE = _PLACES.index(("stage", "phase"))
 SINCE = _PLACES.index(("known", "since"))
 FOUND, STD = (_PLACES.index(("known", name, "x")) for name in ("found", "std"))
-BOUND = _PLACES.index(("bound",))
+BOUND = _PLACES.index(("bound", "used"))

@@ -30,7 +30,7 @@ from palpate.force.flat import (
     state_in,
 )
 from palpate.force.gains import Gains, load_gains
-from palpate.force.law import LEARNING, LOCKED
+from palpate.force.stage import LEARNING, LOCKED
 
 if TYPE_CHECKING:
     from palpate.force.certificate import Certificate

@@ -184,7 +184,12 @@ def touch(world, surface, control, start, desired, noise, line, out):
         for j in range(world.steps):
             body = moved(world, surface, body, held, (k * world.steps + j) * h, h, noise, 8 * k)
             mean += body.force
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = mean / world.steps, control.told(state), body.x, speed
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = (
+            mean / world.steps,
+            control.stiffness_bound(state),
+            body.x,
+            speed,
+        )
         out[k, 4] = felt
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from palpate._vector import ZERO3
 from palpate.force.arm import Arm, load_arm
+from palpate.force.simulated_press import surface, world_of
 from palpate.force.touching import BodyState, Surface, World, moved
-from palpate.force.worlds import surface, world_of
 
 START = 0.3
 """Height of the surface in the base [m]."""

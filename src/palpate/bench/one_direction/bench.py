@@ -18,8 +18,8 @@ from palpate.bench.sequence import APPROACH, CONTACT, LOST
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop, load_arm
 from palpate.force.gains import Gains, gains_for, known_lag
+from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.touching import Surface
-from palpate.force.worlds import pressed, surface, world_of
 from palpate.records import Record
 from palpate.references import ForceSchedule
 

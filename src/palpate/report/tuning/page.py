@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.force.describe import UNCOVERED
 from palpate.force.steps import BAND, frequency_response
-from palpate.force.telling import UNCOVERED
 from palpate.force.tuning import RIGID, Tuning
 from palpate.report import style
 from palpate.report.figure_panels.panels import panels_of, shown_in

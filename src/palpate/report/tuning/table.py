@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from palpate.force.describe import UNCOVERED, sentence
 from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
-from palpate.force.telling import UNCOVERED, sentence
 from palpate.force.tuning import Tuning
 
 if TYPE_CHECKING:

@@ -86,7 +86,7 @@ def pressed(
     Args:
         world: arm and sensor.
         touched: the surface.
-        control: a part with start(), step(state, desired, force, position) and told(state).
+        control: a part with start(), step(state, desired, force, position) and stiffness_bound(state).
         gap: between tip and surface at the start [m].
         desired: F_d at each tick [N], shape (n,).
         seed: of the noise.

@@ -59,7 +59,7 @@ def lines(certificate: Certificate, verdict: Verdict) -> list[str]:
     return [*found, "not covered: " + "; ".join(UNCOVERED)]
 
 
-def told(certificate: Certificate, verdict: Verdict) -> dict[str, Any]:
+def as_json(certificate: Certificate, verdict: Verdict) -> dict[str, Any]:
     """The certificate as plain JSON values, without its norms."""
     return {
         "holds": verdict.holds,
