@@ -5,7 +5,8 @@ from palpate.force.certificate import Certificate
 from palpate.force.certifying import certify
 from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains, load_gains
-from palpate.force.tuning import Known, Tuning, known_from, tune
+from palpate.force.known_surface import Known, known_from
+from palpate.force.tuning import Tuning, tune
 
 __all__ = [
     "Arm",

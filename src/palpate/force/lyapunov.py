@@ -6,7 +6,7 @@ What these functions find is not trusted: `cells` checks it by norms alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 _STEPS = 60
 _MARGIN = 1e-9
 _HEAVIER, _HEAVIEST = 8.0, 1e13
-_ROWS = 64
+_ROWS = 16
 """Of a product at a time: below the size from which BLAS starts threads, which cost more than they bring here."""
 
 
@@ -98,19 +98,20 @@ def _interior(matrices: Sequence[Array], slack: Array, apart: int = 0) -> Array 
     """
     Phi = np.array(matrices)
     n = Phi.shape[1]
-    pairs = _pairs(n, apart)
+    basis = _symmetric(n, apart)
+    images = np.array([[*basis, slack], *([*(basis - _turned(basis, M[None])), slack] for M in Phi)])
     P, unit = 0.5 * np.eye(n), np.linalg.inv(np.linalg.cholesky(slack))
     s = 2.0 * float(np.linalg.eigvalsh(unit @ (_turned(P, Phi) - P) @ unit.T).max()) + 1.0
     weight = 1.0
     for _ in range(_STEPS):
         for _ in range(4):
-            gradient, hessian = _barrier(P, s, Phi, slack, pairs)
+            gradient, hessian = _barrier(P, s, Phi, images)
             gradient[-1] += weight
             step = _newton(hessian, gradient)
             if step is None:
                 return P if _contracts(P, Phi) else None
             decrement = float(-gradient @ step)
-            P, s = _along(P, s, step, Phi, slack, pairs)
+            P, s = _along(P, s, step, Phi, images[0])
             if s < 0.0 and _contracts(P, Phi):
                 return P
             if decrement < 0.3:
@@ -122,36 +123,29 @@ def _interior(matrices: Sequence[Array], slack: Array, apart: int = 0) -> Array 
     return None
 
 
-def _barrier(P: Array, s: float, Phi: Array, W: Array, pairs: Pairs) -> tuple[Array, Array]:
+def _barrier(P: Array, s: float, Phi: Array, images: Array) -> tuple[Array, Array]:
     """Gradient and Hessian, by P's free elements and s, of -log det of P, 1 - P and all P - Phi^T P Phi + s W.
 
-    With F^-1 = G: tr(G dF G dF) for dF = D - Phi^T D Phi is the quadratic form of G x G, -(G Phi^T) x (G Phi^T) and its
-    transpose, and (Phi G Phi^T) x (Phi G Phi^T) in D, x being Kronecker's product: sums of outer products.
+    With F = C C^T the Hessian is that of the images C^-1 dF C^-T, as long vectors, with each other.
     """
-    n, eye = len(P), np.eye(len(P))
-    inverses = np.linalg.inv(np.concatenate([[P, eye - P], _constraints(P, s, Phi, W)]))
-    G, back = inverses[2:], Phi.transpose(0, 2, 1)
-    across, through = G @ back, Phi @ G @ back
-    slid = G @ W
-    square = slid @ G
-    gradient = inverses[1] - inverses[0] + (through - G).sum(axis=0)
-    beside = (square - Phi @ square @ back).sum(axis=0)
-    hessian = np.empty((len(pairs) + 1, len(pairs) + 1))
-    mixed = _products(across)
-    hessian[:-1, :-1] = pairs.folded(_products(np.concatenate([inverses, through])) - mixed - mixed.T)
-    hessian[-1, :-1] = hessian[:-1, -1] = pairs.of(beside)
-    hessian[-1, -1] = float((slid * slid.transpose(0, 2, 1)).sum())
-    return np.append(pairs.of(gradient), -float(np.trace(slid.sum(axis=0)))), hessian
+    eye, m = np.eye(len(P)), images.shape[1] - 1
+    factors = np.linalg.cholesky(np.concatenate([[P, eye - P], _constraints(P, s, Phi, images[0, -1])]))
+    gradient, hessian = np.zeros(m + 1), np.zeros((m + 1, m + 1))
+    for i, back in enumerate(np.linalg.inv(factors)):
+        D = images[0, :-1] if i < 2 else images[i - 1]
+        turned = _whitened(D, back)
+        k = len(D)
+        gradient[:k] += (1.0 if i == 1 else -1.0) * np.trace(turned, axis1=1, axis2=2)
+        long = _long(turned)
+        for row in range(0, k, _ROWS):
+            hessian[row : min(row + _ROWS, k), :k] += long[row : row + _ROWS] @ long.T
+    return gradient, hessian
 
 
-def _products(matrices: Array) -> Array:
-    """Sum of Kronecker's products of each with itself, shape (n n, n n)."""
-    n = matrices.shape[1]
-    flat = matrices.reshape(len(matrices), n * n)
-    outer = np.empty((n * n, n * n))
-    for row in range(0, n * n, _ROWS):
-        outer[row : row + _ROWS] = flat[:, row : row + _ROWS].T @ flat
-    return outer.reshape(n, n, n, n).transpose(0, 2, 1, 3).reshape(n * n, n * n)
+def _whitened(D: Array, back: Array) -> Array:
+    """back D_k back^T of many symmetric D_k, shape (k, n, n), by two products of long matrices."""
+    half = (D.reshape(-1, len(back)) @ back.T).reshape(D.shape)
+    return (half.transpose(0, 2, 1).reshape(-1, len(back)) @ back.T).reshape(D.shape)
 
 
 def _newton(hessian: Array, gradient: Array) -> Array | None:
@@ -178,13 +172,13 @@ def _constraints(P: Array, s: float, Phi: Array, W: Array) -> Array:
     return P - _turned(P, Phi) + s * W
 
 
-def _along(P: Array, s: float, step: Array, Phi: Array, W: Array, pairs: Pairs) -> tuple[Array, float]:
+def _along(P: Array, s: float, step: Array, Phi: Array, basis: Array) -> tuple[Array, float]:
     """As far along a step as all constraints stay met."""
-    dP, ds = pairs.matrix(step[:-1]), float(step[-1])
+    dP, ds = np.tensordot(step[:-1], basis[:-1], axes=1), float(step[-1])
     length = 1.0
     for _ in range(40):
         Q, t = P + length * dP, s + length * ds
-        if _positive(np.concatenate([[Q, np.eye(len(P)) - Q], _constraints(Q, t, Phi, W)])):
+        if _positive(np.concatenate([[Q, np.eye(len(P)) - Q], _constraints(Q, t, Phi, basis[-1])])):
             return (Q, t) if length == 1.0 else (P + 0.9 * length * dP, s + 0.9 * length * ds)
         length *= 0.7
     return P, s
@@ -203,48 +197,26 @@ def _positive(F: Array) -> bool:
     return True
 
 
-@dataclass(frozen=True)
-class Pairs:
-    """The free elements of a symmetric matrix, as coordinates of length 1.
-
-    Args:
-        size: n of the matrix.
-        upper: number of (i, j) in it, row by row, i <= j.
-        lower: of (j, i).
-        weight: 1/sqrt(2); 1/2 on the diagonal.
-    """
-
-    size: int
-    upper: Array
-    lower: Array
-    weight: Array
-
-    def __len__(self) -> int:
-        return len(self.upper)
-
-    def of(self, M: Array) -> Array:
-        """<M, D> for each coordinate's matrix D, M being symmetric."""
-        return 2.0 * self.weight * M.ravel()[self.upper]
-
-    def matrix(self, coordinates: Array) -> Array:
-        """The symmetric matrix."""
-        flat = np.zeros(self.size * self.size)
-        flat[self.upper] += self.weight * coordinates
-        flat[self.lower] += self.weight * coordinates
-        return flat.reshape(self.size, self.size)
-
-    def folded(self, form: Array) -> Array:
-        """A quadratic form of all elements, by coordinates."""
-        rows = self.weight[:, None] * (form[self.upper] + form[self.lower])
-        return (rows[:, self.upper] + rows[:, self.lower]) * self.weight
-
-
-def _pairs(n: int, apart: int) -> Pairs:
+def _symmetric(n: int, apart: int) -> Array:
+    """Matrices of length 1 that all symmetric ones are sums of, shape (m, n, n); see `_interior` for `apart`."""
     rows, columns = np.triu_indices(n)
     free = (columns < n - apart) | (rows == columns)
     rows, columns = rows[free], columns[free]
-    weight = np.where(rows == columns, 0.5, np.sqrt(0.5))
-    return Pairs(n, rows * n + columns, columns * n + rows, weight)
+    basis, index = np.zeros((len(rows), n, n)), np.arange(len(rows))
+    basis[index, rows, columns] = basis[index, columns, rows] = np.where(rows == columns, 1.0, np.sqrt(0.5))
+    return basis
+
+
+def _long(matrices: Array) -> Array:
+    """Symmetric matrices as vectors of the same length, shape (k, n (n + 1)/2)."""
+    rows, columns, lengths = _upper(matrices.shape[-1])
+    return lengths * matrices[:, rows, columns]
+
+
+@cache
+def _upper(n: int) -> tuple[Array, Array, Array]:
+    rows, columns = np.triu_indices(n)
+    return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
 
 
 def _balanced(Phi: Array) -> Array:
