@@ -1,25 +1,27 @@
 """The thesis' arm with LuGre friction, coarse encoders and torque limits: cautious against what the bench has.
 
-    python benchmarks/force/on_the_bench.py [--seeds 4] [--friction 1]
+    python benchmarks/force/on_the_bench.py [--seeds 4] [--friction 1] [--minutes 3.5]
 
 Springs and dampers from soft to stiff, a relaxing solid, Hunt and Crossley's law: 20 N asked, 4 s of contact. None of
 the surfaces was used for tuning; the gains of the others are the bench's, not retuned. Settled: within 5 % of 20 N for
-good, the force a mean over 10 ms.
+good, the force a mean over 10 ms. Every run is kept as it ends: the same command goes on where it stopped.
 """
 
 from __future__ import annotations
 
 import argparse
 from itertools import product
+from pathlib import Path
 
 import numpy as np
-from rich.progress import track
+from touches import Key, resumed
 
 from palpate.bench.build import build
 from palpate.bench.experiments.tables import changed, load
 
 CONTROLLERS = ("foam-cautious", "foam-hybrid", "foam-pi", "foam-neural")
 PRESS = 4.0
+JUDGED = ("settling", "over", "lost", "rms", "limited")
 SPRINGS = list(product((600.0, 1.8e3, 9e3, 2.7e4, 8e4, 1.6e5), (0.03, 0.4)))
 OTHERS = {
     "relaxing": {"kind": "standard-linear-solid", "stiffness": 4e3, "damping": 60.0, "mass": 0.1,
@@ -43,16 +45,26 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--friction", type=float, default=1.0)
     parser.add_argument("--controllers", nargs="+", default=CONTROLLERS)
+    parser.add_argument("--minutes", type=float, default=float("inf"))
+    parser.add_argument("--out", type=Path, default=Path("runs/on_the_bench"))
     told = parser.parse_args()
     print(f"{len(surfaces())} surfaces, {told.seeds} seeds, friction x {told.friction:g}")
     print(
         "                 settled   p50    p95 [s]   most over   lost   rms [N]   not settled, a motor at its limit"
     )
+    seeds, which = range(100, 100 + told.seeds), list(surfaces().values())
+
+    def run(key: Key) -> dict[str, float]:
+        name, seed, i = key
+        return dict(zip(JUDGED, judged(name, which[i], seed, told.friction), strict=True))
+
+    keys = [(name, seed, i) for name in told.controllers for i in range(len(which)) for seed in seeds]
+    known = resumed(told.out / f"friction-{told.friction:g}.jsonl", keys, run, told.minutes)
     for name in told.controllers:
-        found = []
-        for surface in track(surfaces().values(), name, transient=True):
-            found += [judged(name, surface, seed, told.friction) for seed in range(100, 100 + told.seeds)]
-        settling, over, lost, rms, limited = np.array(found).T
+        found = [row for key, row in known.items() if key[0] == name]
+        if not found:
+            continue
+        settling, over, lost, rms, limited = (np.array([row[key] for row in found]) for key in JUDGED)
         settled = np.isfinite(settling)
         middle, late = np.nanpercentile(settling, (50, 95)) if settled.any() else (np.nan, np.nan)
         print(

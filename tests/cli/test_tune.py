@@ -144,6 +144,7 @@ def test_straight_from_a_log(capsys, root):
         (("--stiffness", "0:1e4", "--arm", "ur5e", "--force", "20"), "above 0"),
         (("--stiffness", "-5:1e4", "--arm", "ur5e", "--force", "20"), "above 0"),
         (("--stiffness", "1e2:nan", "--arm", "ur5e", "--force", "20"), "number"),
+        (("--stiffness", "1e2:1e300", "--arm", "fr3", "--force", "20"), "comes nowhere"),
         (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "0"), "above 0 N"),
         (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "-20"), "above 0 N"),
         (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "0.5"), "noise"),
@@ -184,6 +185,11 @@ def test_bad_input_is_one_line(capsys, words, says):
         (json.dumps(found(unit="1/m")), "1/m"),
         (json.dumps(found(K=-500.0, half=10.0)), "press on"),
         (json.dumps({"logs": [], "pooled": None}), "identify"),
+        (json.dumps({"logs": [], "pooled": [1]}), "identify"),
+        (
+            json.dumps({"parameters": {"K": {"value": 1e3, "ci95": [500, True], "unit": "N/m"}}}),
+            "no interval",
+        ),
     ],
 )
 def test_a_bad_identification_is_one_line(capsys, elsewhere, text, says):
@@ -201,6 +207,7 @@ def test_a_bad_identification_is_one_line(capsys, elsewhere, text, says):
         (("gains.toml", "--damping-time", "0.1:0.2"), "0:T"),
         (("gains.toml", "--out", "proof.txt"), "json"),
         (("bad.toml",), "law"),
+        (("hasty.toml",), "faster than the arm's limit"),
         (("none.toml",), "none.toml"),
     ],
 )
@@ -208,6 +215,7 @@ def test_bad_words_to_certify(capsys, elsewhere, words, says):
     (elsewhere / "gains.toml").write_text(gains_of("fr3").to_toml())
     text = (elsewhere / "gains.toml").read_text()
     (elsewhere / "bad.toml").write_text(text.replace(LAW, "another law"))
+    (elsewhere / "hasty.toml").write_text(text.replace("approach = ", "approach = 1"))
     assert says in refused(capsys, "certify", *words)
 
 
@@ -225,6 +233,7 @@ def arm_text(root, *change):
         (("stiffness = 5e4", "# "), "something rigid"),
         (("noise = 0.1", "# "), "in the air"),
         (("sampling = 480", "sampling = 50"), "faster sensor"),
+        (("bandwidth = 10 ", "bandwidth = 1e-5 "), "run the force loop slower"),
         (("rate = 500", "rate = 500\nsurface = 1"), "surface"),
         (("damping = 0.9", "damping = 0.9\ndamping_interval = [1.0, 2.0]"), "interval around"),
         (("delay = 0.01", "delay = 0.01\ndelay_interval = [0.0, 1.0]"), "ticks"),

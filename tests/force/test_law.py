@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from force.gained import gains_of
-from palpate._vector import Vec3
+from palpate._vector import Mat3, Vec3
 from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
 from palpate.force.regression import AXIS_K, PRIOR, Fit, fit_through, without_offset
 from palpate.force.simulated_press import pressed, surface, world_of
-from palpate.force.stage import LOCKED
+from palpate.force.stage import LOCKED, Stage
+from palpate.force.stiffness_bound import Bound, bounded
 from palpate.force.touching import touch
 
 
@@ -135,6 +136,27 @@ def test_a_step_after_it_was_locked_is_followed():
     assert abs(force[900:1000].mean() - 20.0) < 0.3
     assert abs(force[-100:].mean() - 30.0) < 0.3
     assert force.max() < 1.1 * 30.0
+
+
+def evident(law, stiffness, std):
+    """What the last theta alone shows: a stiffness with its standard deviation, in caps, and no damping."""
+    start = law.start().known
+    N = Mat3(Vec3(1.0 / std**2, 0.0, 0.0), Vec3(0.0, 1e12, 0.0), Vec3(0.0, 0.0, 1e12))
+    return start._replace(fast=Fit(N, Vec3(stiffness / std**2, 0.0, 0.0)), since=1e3)
+
+
+def test_a_rise_on_suspicion_is_taken_back_and_one_on_evidence_stays():
+    law = gains_of().cautious()
+    locked, known = Stage(LOCKED, 1e3, 1e3, 1e3), 0.01 * law.cap
+    suspected = bounded(law, Bound(known, known, 1e3), locked, evident(law, 0.05, 0.01))  # by 3.7 deviations
+    assert suspected.used > 0.05 * law.cap
+    assert suspected.held == known
+    later = suspected
+    for _ in range(round(3.0 * law.theta / law.tick) + 1):
+        later = bounded(law, later, locked, evident(law, 0.01, 0.01))
+    assert later.used == later.held == known
+    shown = bounded(law, Bound(known, known, 1e3), locked, evident(law, 0.05, 0.005))  # by 7.4
+    assert shown.used == shown.held > 0.05 * law.cap
 
 
 def test_the_flat_state_is_the_state():

@@ -48,6 +48,10 @@ _SURE, _ROOM = 1.5, 0.03
 Measured by benchmarks/force/first_touches.py, as K_eff(K_u)/K_eff: in one touch of some thousand it is below the half
 that the proof asks for.
 """
+CREEP = 1e-6
+"""Slowest approach that is tuned for [m/s]: a micrometre a second, the step of an encoder of many arms."""
+LONGEST = 2000
+"""Ticks of lag that are tuned for: a press is foretold tick by tick, for tens of lags."""
 _FORGOTTEN = 5.0
 """Decay times of the sensor's low-pass after which an edge counts as forgotten: e^-5 of it, 0.7 %, is left."""
 
@@ -88,6 +92,10 @@ class Gains(Table):
             raise InputError(
                 f"the force limit must lie between the force of {self.force:g} N and the sensor's full scale of "
                 f"{self.arm.sensor.full_scale:g} N, got {self.force_limit:g} N"
+            )
+        if self.approach > self.arm.limits.speed:
+            raise InputError(
+                f"the approach of {self.approach:g} m/s is faster than the arm's limit of {self.arm.limits.speed:g} m/s"
             )
         if self.arm.sensor.sampling < 4.0 / self.theta:
             raise InputError(
@@ -179,16 +187,32 @@ def gains_for(
     """
     theta = known_lag(arm) if theta is None else theta
     cap = arm.limits.stiffness if cap is None else cap
+    approach = approach_speed(arm, force, theta, cap)
+    if approach < CREEP:
+        raise InputError(
+            f"surfaces of up to {cap:g} N/m allow an approach of {approach:.2g} m/s, which comes nowhere; lower the "
+            "stiffness cap, or press harder"
+        )
     return Gains(
         arm=arm, force=force, theta=theta, cap=cap, relief=_known_relief(_any_noise(arm), theta),
         force_limit=arm.sensor.full_scale if limit is None else limit,
-        approach=approach_speed(arm, force, theta, cap),
+        approach=approach,
     )  # fmt: skip
 
 
 def known_lag(arm: Arm) -> float:
-    """theta of an arm [s], worked out once."""
-    return _known_lag(_any_noise(arm))
+    """theta of an arm [s], worked out once.
+
+    Raises:
+        InputError: a lag of so many ticks that the loop is to be run slower.
+    """
+    theta = _known_lag(_any_noise(arm))
+    if theta * arm.rate > LONGEST:
+        raise InputError(
+            f"{arm.title}: the loop's lag of {theta:.3g} s is {theta * arm.rate:.3g} ticks; at most {LONGEST} are "
+            "taken: check [inner], or run the force loop slower"
+        )
+    return theta
 
 
 @lru_cache(maxsize=64)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from typing import Any, TypeGuard
 
 from palpate.errors import InputError
 from palpate.force.lag import SOFTEST
@@ -41,7 +41,7 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
     """
     if "logs" in found:
         found = found.get("pooled") or {}
-    parameters = found.get("parameters")
+    parameters = found.get("parameters") if isinstance(found, Mapping) else None
     if not isinstance(parameters, Mapping):
         raise InputError(
             f"{source}: not what palpate identify --json prints; give that, a log, or --stiffness A:B"
@@ -69,7 +69,7 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
     return Known(
         (max(low, SOFTEST), high),
         (max(damping[0], 0.0), max(damping[1], 0.0)),
-        float(value) if isinstance(value, int | float) and isfinite(value) else None,
+        float(value) if _is_number(value) else None,
         source,
         _warned(found.get("warnings")),
     )
@@ -88,10 +88,10 @@ def _warned(warnings: object) -> tuple[tuple[str, str], ...]:
 def _interval(parameter: Mapping[str, Any]) -> tuple[float, float] | None:
     for key in ("prediction95", "ci95"):
         ends = parameter.get(key)
-        if (
-            isinstance(ends, list | tuple)
-            and len(ends) == 2
-            and all(isinstance(end, int | float) and isfinite(end) for end in ends)
-        ):
+        if isinstance(ends, list | tuple) and len(ends) == 2 and all(_is_number(end) for end in ends):
             return float(ends[0]), float(ends[1])
     return None
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

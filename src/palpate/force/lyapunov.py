@@ -214,7 +214,7 @@ def _long(matrices: Array) -> Array:
 
 
 @cache
-def _upper(n: int) -> tuple[Array, Array, Array]:
+def _upper(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     rows, columns = np.triu_indices(n)
     return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
 
