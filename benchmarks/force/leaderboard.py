@@ -4,8 +4,8 @@
         [--minutes 3.5] [--runs runs/leaderboard.jsonl]
 
 Every run is kept as it ends: the same command goes on where it stopped, and shows the laws that have all of theirs.
-Noise up to 0.6 N. All with the same lag, limits, noise and approach; by tails, not by medians. An hour is 3600 s of a press
-with 20 N on 7 kN/m; its error counts from the tenth second on.
+Noise up to 0.6 N. All with the same lag, limits, noise and approach; by tails, not by medians. An hour is 3600 s of a
+press with 20 N on 7 kN/m; its error counts from the tenth second on.
 """
 
 from __future__ import annotations
