@@ -112,6 +112,16 @@ def test_evidence_of_a_contact_is_rare_in_the_air_whatever_the_noise():
     assert (rows[:, 1] > 0.999 * gains.seen_cap).all()
 
 
+def test_a_rise_as_slow_as_noise_is_found_before_the_force_asked_for():
+    # 0.2 N in a second: the mean in the air follows it, and what it does not follow counts as noise.
+    gains = gains_of("ur5e", noise=0.15)
+    slow = gains.cautious()._replace(approach=0.0015)
+    rows = pressed(world_of(gains.arm, noise=0.15), surface(130.0), slow, 1e-3, np.full(6000, 20.0), 1)
+    learned = int(np.argmax(rows[:, 1] < gains.seen_cap))
+    assert rows[learned, 0] < 10.0 * 0.15  # `EDGE` of twice the deviation told, and a rest that is one off
+    assert abs(rows[-100:, 0].mean() - 20.0) < 0.3
+
+
 @pytest.mark.parametrize("exponent", [1.5, 2.0])
 def test_a_surface_that_stiffens_is_one_whose_tangent_is_within_the_proof(exponent):
     depth = 20.0 / 5e3

@@ -18,6 +18,9 @@ seconds, to 28 five times as often; a ramp comes to it 5 % later.
 """
 EDGE, LEVEL = 4.0, 3.2
 """Standard deviations above which a reading, and with it the mean over 4 ms, are a contact; from the same."""
+LOUDER = 4.0
+"""Times the variance told that the air may tell: `EDGE` is then at most the 8 deviations that F_d has to have, so that a
+slow rise is found before F_d even if it passed for noise."""
 MEMORY = 1.0
 """Of the force at rest in the air [s]."""
 
@@ -86,6 +89,7 @@ def watched(law, state, starts, force):
     off, drift = force - rest, slow - rest
     span = min(state.ticks * law.tick, 3.0)
     variance = w.variance + law.tick / (0.3 + span) * (min(off * off, 9.0 * w.variance) - w.variance)
+    variance = min(variance, LOUDER * law.noise * law.noise)
     tide = w.tide + law.tick / (1.0 + span) * (min(drift * drift, 9.0 * w.tide) - w.tide)
     return Watch(force, mean, slow, rest, variance, tide, evidence, age, gap)
 
