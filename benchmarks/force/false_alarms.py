@@ -35,7 +35,7 @@ def alarms(control, noise, every, counts):
         if before == AIR and phase != AIR:
             counts[int(state.known.shown)] += 1.0
             believed = 0.0
-        if phase != AIR and believed == 0.0 and state.bound < 0.5 * control.cap:
+        if phase != AIR and believed == 0.0 and state.bound.used < 0.5 * control.cap:
             counts[2] += 1.0
             believed = 1.0
         before = phase
