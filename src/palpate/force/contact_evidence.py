@@ -19,8 +19,8 @@ seconds, to 28 five times as often; a ramp comes to it 5 % later.
 EDGE, LEVEL = 4.0, 3.2
 """Standard deviations above which a reading, and with it the mean over 4 ms, are a contact; from the same."""
 LOUDER = 4.0
-"""Times the variance told that the air may tell: `EDGE` is then at most the 8 deviations that F_d has to have, so that a
-slow rise is found before F_d even if it passed for noise."""
+"""Times the variance told that the air may tell: `EDGE` is then at most the 8 deviations that F_d has to have, so that
+a slow rise is found before F_d even if it passed for noise."""
 MEMORY = 1.0
 """Of the force at rest in the air [s]."""
 
