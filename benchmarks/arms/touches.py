@@ -33,10 +33,10 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("--seeds", type=int, default=3)
     asked.add_argument("--arms", nargs="*", default=names())
-    asked.add_argument("--swing", type=float, default=gains._SWING)
+    asked.add_argument("--swing", type=float, default=gains.SWING)
     asked.add_argument("--markdown", type=Path)
     words = asked.parse_args()
-    gains._SWING = words.swing
+    gains.SWING = words.swing
     lines = ["| arm | " + " | ".join(f"{k:g} N/m" for k in STIFFNESSES) + " |", "|---" * 7 + "|"]
     print(lines[0])
     for arm in words.arms:

@@ -60,11 +60,15 @@ def _entry_compiler(superword: bool) -> type:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import Compiler
 
-    class Superword(JITCodeLibrary):
-        """Code in which LLVM looks for neighbouring operations that one instruction can do."""
+    class Whole(JITCodeLibrary):
+        """Code that takes in what it calls, and what that calls, each once, and is optimised once."""
+
+        def finalize(self) -> None:
+            self._linking_libraries = _with_all_below(self._linking_libraries)
+            super().finalize()
 
         def _optimize_final_module(self) -> None:
-            manager, builder = self._codegen._module_pass_manager(slp_vectorize=True)
+            manager, builder = self._codegen._module_pass_manager(slp_vectorize=superword)
             manager.run(self._final_module, builder)
 
     class Entry(Compiler):
@@ -73,17 +77,35 @@ def _entry_compiler(superword: bool) -> type:
         def __init__(
             self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, *more: Any
         ):
-            if superword:
-                library = Superword(target.codegen(), "kernel")
-                library.enable_object_caching()
+            library = Whole(target.codegen(), "kernel")
+            library.enable_object_caching()
             super().__init__(typing, target, library, args, result, _flags()[1](flags), *more)
 
     return Entry
 
 
-def _inside_compiler() -> type:
+def _with_all_below(libraries: list[Any]) -> list[Any]:
+    """These libraries, and all that those of one function call, directly or not; each once, the callers first.
+
+    LLVM takes such a function in only where something that is there already calls it.
+    """
+    found: dict[Any, None] = {}
+
+    def look(library: Any) -> None:
+        if library not in found:
+            for one in library._linking_libraries if type(library) is _swallowed() else ():
+                look(one)
+            found[library] = None
+
+    for library in libraries:
+        look(library)
+    return list(reversed(found))
+
+
+@functools.cache
+def _swallowed() -> type:
+    from llvmlite.binding import Linkage
     from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler import Compiler
 
     class Unloaded:
         """The code generator, but that it looks for no environment of a function that is nowhere in memory."""
@@ -98,21 +120,28 @@ def _inside_compiler() -> type:
             pass
 
     class Swallowed(JITCodeLibrary):
-        """Code that is linked into other code, and never loaded itself."""
+        """Code of one function, that a kernel takes in and that is never loaded itself."""
 
         @property
         def codegen(self) -> Any:
             return Unloaded(self._codegen)
 
-        def _optimize_final_module(self) -> None:
-            pass
-
-        def _finalize_final_module(self) -> None:
+        def finalize(self) -> None:
+            self._raise_if_finalized()
             self._finalize_dynamic_globals()
-            self._finalized = True
+            for function in self._final_module.functions:
+                if not function.is_declaration and function.linkage == Linkage.external:
+                    function.linkage = "linkonce_odr"  # left out again, once it stands where it is called
+            self._shared_module, self._finalized = self._final_module, True
 
         def get_pointer_to_function(self, name: str) -> int:
             return 0
+
+    return Swallowed
+
+
+def _inside_compiler() -> type:
+    from numba.core.compiler import Compiler
 
     class Inside(Compiler):
         """Numba's compiler, its result such code."""
@@ -120,7 +149,7 @@ def _inside_compiler() -> type:
         def __init__(
             self, typing: Any, target: Any, library: Any, args: Any, result: Any, _: Any, *more: Any
         ):
-            library = library or Swallowed(target.codegen(), "inside")
+            library = library or _swallowed()(target.codegen(), "inside")
             super().__init__(typing, target, library, args, result, _flags()[0], *more)
 
         def define_pipelines(self) -> list[Any]:
@@ -143,6 +172,7 @@ def _short_pipeline() -> Any:
     from numba.core import untyped_passes as untyped
     from numba.core.compiler_machinery import PassManager
 
+    rewritten, single, no_phis, of_arrays = _brief_passes()
     manager = PassManager("inside")
     for one in (
         untyped.TranslateByteCode,
@@ -150,11 +180,11 @@ def _short_pipeline() -> Any:
         untyped.IRProcessing,
         untyped.RewriteSemanticConstants,
         untyped.DeadBranchPrune,
-        untyped.GenericRewrites,
-        untyped.ReconstructSSA,
+        rewritten,
+        single,
         typed.NopythonTypeInference,
-        typed.PreLowerStripPhis,
-        typed.NopythonRewrites,
+        no_phis,
+        of_arrays,
         typed.IRLegalization,
         _native_lowering(),
         typed.NoPythonBackend,
@@ -162,6 +192,62 @@ def _short_pipeline() -> Any:
         manager.add_pass(one, one.__name__)
     manager.finalize()
     return manager
+
+
+@functools.cache
+def _brief_passes() -> tuple[type, type, type, type]:
+    """Numba's rewrites before the types are known, single assignment, no phis, rewrites of arrays.
+
+    Numba computes the lifetimes of all variables after each of them; only those after the last are looked at.
+    """
+    from numba.core import rewrites, types
+    from numba.core import typed_passes as typed
+    from numba.core import untyped_passes as untyped
+    from numba.core.compiler_machinery import register_pass
+    from numba.core.ir_utils import build_definitions
+    from numba.core.ssa import reconstruct_ssa
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class Rewritten(untyped.GenericRewrites):
+        _name = "inside_rewrites"
+
+        def run_pass(self, state: Any) -> bool:
+            blocks = state.func_ir.blocks
+            for kind in rewrites.rewrite_registry.rewrites["before-inference"]:
+                rewrite = kind(state)
+                for key in list(blocks):
+                    while rewrite.match(state.func_ir, blocks[key], state.typemap, state.calltypes):
+                        blocks[key] = rewrite.apply()
+            return True
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class Single(untyped.ReconstructSSA):
+        _name = "inside_ssa"
+
+        def run_pass(self, state: Any) -> bool:
+            state.func_ir = reconstruct_ssa(state.func_ir)
+            self._patch_locals(state)
+            state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+            return True
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class NoPhis(typed.PreLowerStripPhis):
+        _name = "inside_strip_phis"
+
+        def run_pass(self, state: Any) -> bool:
+            state.func_ir = self._strip_phi_nodes(state.func_ir)
+            state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+            return True
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class OfArrays(typed.NopythonRewrites):
+        _name = "inside_array_rewrites"
+
+        def run_pass(self, state: Any) -> bool:
+            arrays = any(isinstance(kind, types.Array) for kind in state.typemap.values())
+            return bool(super().run_pass(state)) if arrays else False
+
+    return Rewritten, Single, NoPhis, OfArrays
 
 
 @functools.cache

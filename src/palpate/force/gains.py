@@ -51,9 +51,9 @@ that the proof asks for.
 _FORGOTTEN = 5.0
 """Decay times of the sensor's low-pass after which an edge counts as forgotten: e^-5 of it, 0.7 %, is left."""
 
-_SWING = 0.5
-"""Share of the swing of a position arm's tip for which nothing is learned after a touch: in its first half the force is more
-than the command's, with a slope that is less, so that a stiff surface would pass for a soft one.
+SWING = 0.5
+"""Share of the swing of a position arm's tip for which nothing is learned after a touch: in its first half the force
+grows at another pace than the command's, so that a stiff surface would pass for a soft one.
 
 Measured by benchmarks/arms/touches.py.
 """
@@ -134,7 +134,7 @@ class Gains(Table):
         low_pass = arm.low_pass
         memory = _FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick
         if isinstance(arm.inner, PositionLoop):
-            memory += _SWING * arm.inner.swing
+            memory += SWING * arm.inner.swing
         E, e0, e1, c = followed(arm)
         numbers: dict[str, Any] = {
             "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,

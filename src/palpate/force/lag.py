@@ -63,7 +63,8 @@ def swinging(arm: Arm, lag: float) -> float:
     of which only the ratio is used.
     """
     inner = arm.inner
-    assert isinstance(inner, PositionLoop) and inner.mass is not None
+    assert isinstance(inner, PositionLoop)
+    assert inner.mass is not None
     own, m = inner.stiffness, inner.mass
     s = 1j * np.geomspace(0.1, 100.0, 20_000) / lag  # half a turn of a delay is at pi/2
     square, rate = inner.squared

@@ -167,7 +167,7 @@ def _sensor(loop: Arm, step: float) -> WristSensor:
     wide[: len(b), : len(b)] = E
     return WristSensor(
         E=Mat3(*(_three(row) for row in wide)), e=_padded(e), c=_padded(c), d=0.0 if len(b) else 1.0,
-        sampling=float(loop.sensor.sampling), noise=float(loop.sensor.noise),
+        step=float(step), sampling=float(loop.sensor.sampling), noise=float(loop.sensor.noise),
         full_scale=float(loop.sensor.full_scale),
     )  # fmt: skip
 
