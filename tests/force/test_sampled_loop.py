@@ -75,6 +75,21 @@ def test_the_lag_of_an_arm_that_is_nothing_but_late_is_its_delay():
     assert lag_of(quick) == pytest.approx(sum_of_lags(quick), rel=0.01)
 
 
+def test_a_tip_that_swings_on_a_position_arm_lengthens_the_lag():
+    """Well above the loop's band, w << w_swing, its gain is 1/(1 - (w/w_swing)^2) with w = pi/(2 theta)."""
+    arm = load_arm("ur5e")
+    own = lag_of(arm)
+    heavier = [
+        lag_of(msgspec.structs.replace(arm, inner=msgspec.structs.replace(arm.inner, mass=m)))
+        for m in (0.01, 1.0, 3.0, 6.0)
+    ]
+    assert heavier[0] == pytest.approx(own, rel=1e-3)
+    assert heavier == sorted(heavier)
+    crossing, swing = pi / 2.0 / own, np.sqrt(arm.series / 1.0)
+    # 1 % : the swing's own damping turns the phase a little further.
+    assert heavier[1] / own == pytest.approx(1.0 / (1.0 - (crossing / swing) ** 2), rel=0.01)
+
+
 def test_arms_that_come_with_it():
     assert {"ur5e", "fr3", "panda", "iiwa14"} <= set(names())
     for name in names():

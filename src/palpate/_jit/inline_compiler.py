@@ -60,15 +60,11 @@ def _entry_compiler(superword: bool) -> type:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import Compiler
 
-    class Whole(JITCodeLibrary):
-        """Code that takes in what it calls, and what that calls, each once, and is optimised once."""
-
-        def finalize(self) -> None:
-            self._linking_libraries = _with_all_below(self._linking_libraries)
-            super().finalize()
+    class Superword(JITCodeLibrary):
+        """Code in which LLVM looks for neighbouring operations that one instruction can do."""
 
         def _optimize_final_module(self) -> None:
-            manager, builder = self._codegen._module_pass_manager(slp_vectorize=superword)
+            manager, builder = self._codegen._module_pass_manager(slp_vectorize=True)
             manager.run(self._final_module, builder)
 
     class Entry(Compiler):
@@ -77,35 +73,17 @@ def _entry_compiler(superword: bool) -> type:
         def __init__(
             self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, *more: Any
         ):
-            library = Whole(target.codegen(), "kernel")
-            library.enable_object_caching()
+            if superword:
+                library = Superword(target.codegen(), "kernel")
+                library.enable_object_caching()
             super().__init__(typing, target, library, args, result, _flags()[1](flags), *more)
 
     return Entry
 
 
-def _with_all_below(libraries: list[Any]) -> list[Any]:
-    """These libraries, and all that those of one function call, directly or not; each once, the callers first.
-
-    LLVM takes such a function in only where something that is there already calls it.
-    """
-    found: dict[Any, None] = {}
-
-    def look(library: Any) -> None:
-        if library not in found:
-            for one in library._linking_libraries if type(library) is _swallowed() else ():
-                look(one)
-            found[library] = None
-
-    for library in libraries:
-        look(library)
-    return list(reversed(found))
-
-
-@functools.cache
-def _swallowed() -> type:
-    from llvmlite.binding import Linkage
+def _inside_compiler() -> type:
     from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import Compiler
 
     class Unloaded:
         """The code generator, but that it looks for no environment of a function that is nowhere in memory."""
@@ -120,28 +98,21 @@ def _swallowed() -> type:
             pass
 
     class Swallowed(JITCodeLibrary):
-        """Code of one function, that a kernel takes in and that is never loaded itself."""
+        """Code that is linked into other code, and never loaded itself."""
 
         @property
         def codegen(self) -> Any:
             return Unloaded(self._codegen)
 
-        def finalize(self) -> None:
-            self._raise_if_finalized()
+        def _optimize_final_module(self) -> None:
+            pass
+
+        def _finalize_final_module(self) -> None:
             self._finalize_dynamic_globals()
-            for function in self._final_module.functions:
-                if not function.is_declaration and function.linkage == Linkage.external:
-                    function.linkage = "linkonce_odr"  # left out again, once it stands where it is called
-            self._shared_module, self._finalized = self._final_module, True
+            self._finalized = True
 
         def get_pointer_to_function(self, name: str) -> int:
             return 0
-
-    return Swallowed
-
-
-def _inside_compiler() -> type:
-    from numba.core.compiler import Compiler
 
     class Inside(Compiler):
         """Numba's compiler, its result such code."""
@@ -149,7 +120,7 @@ def _inside_compiler() -> type:
         def __init__(
             self, typing: Any, target: Any, library: Any, args: Any, result: Any, _: Any, *more: Any
         ):
-            library = library or _swallowed()(target.codegen(), "inside")
+            library = library or Swallowed(target.codegen(), "inside")
             super().__init__(typing, target, library, args, result, _flags()[0], *more)
 
         def define_pipelines(self) -> list[Any]:
