@@ -146,13 +146,14 @@ def body_at(q: Array, motor: Array) -> Body:
 def sensed(sensor, reading, force, time, noise):
     """The sensor after a step that ends at `time` [s]; `noise` are eight standard normal numbers of this tick.
 
-    A sample is of its own instant k/sampling, between two steps: so the lag of the readings is known exactly.
+    A sample is of its own instant k/sampling, between two steps: so the lag of the readings is known exactly. The force
+    of a step is that of its beginning, held over it: a low-pass is half a step late with it, none a whole one.
     """
     z = sensor.E @ reading.z + force * sensor.e
     shown, value, samples = sensor.c @ z + sensor.d * force, reading.value, reading.samples
     due = int(time * sensor.sampling + 1e-9)  # the last sample's number, but for rounding
     if due >= samples:
-        ago = (time - due / sensor.sampling) / sensor.step
+        ago = (time - due / sensor.sampling) / sensor.step - 0.5 * (1.0 + sensor.d)
         exact = shown - ago * (shown - reading.shown) + sensor.noise * noise[due % 8]
         value = min(max(exact, -sensor.full_scale), sensor.full_scale)
         samples = due + 1.0
