@@ -66,10 +66,11 @@ def swinging(arm: Arm, lag: float) -> float:
     assert isinstance(inner, PositionLoop)
     assert inner.mass is not None
     own, m = inner.stiffness, inner.mass
-    s = 1j * np.geomspace(0.1, 100.0, 20_000) / lag  # half a turn of a delay is at pi/2
+    w: NDArray[np.float64] = np.geomspace(0.1, 100.0, 20_000) / lag  # half a turn of a delay is at pi/2
+    s = 1j * w
     square, rate = inner.squared
     late = inner.longest_delay + 0.5 / arm.sensor.sampling + 1.5 * arm.tick
-    rigid = square / (s * s + rate * s + square) * arm.low_pass.at(s.imag) * np.exp(-late * s) / s
+    rigid = square / (s * s + rate * s + square) * arm.low_pass.at(w) * np.exp(-late * s) / s
     damping = 2.0 * STRUCTURE * sqrt(own * m)
     stiffnesses = np.geomspace(1e-3 * own, arm.limits.stiffness, _POINTS)
     felt = [(own + damping * s) * (1.0 + k / own) / (m * s * s + damping * s + own + k) for k in stiffnesses]
