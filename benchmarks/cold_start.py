@@ -19,7 +19,7 @@ wall, cpu = time.perf_counter(), time.process_time()
 bench.run(0.01)
 print(time.perf_counter() - wall, time.process_time() - cpu)
 """
-WHERE = """
+TIMED = """
 import time
 from llvmlite.binding import ffi
 inside, call = [0.0, 0], ffi._lib_fn_wrapper.__call__
@@ -33,12 +33,18 @@ def timed(function, *arguments):
         if not inside[1]:
             inside[0] += time.process_time() - begin
 ffi._lib_fn_wrapper.__call__ = timed
+"""
+"""What counts the processor's seconds in LLVM, into `inside[0]`."""
+WHERE = (
+    TIMED
+    + """
 from palpate.bench import build, load
 bench = build(load("foam-neural"))
 begin = time.process_time()
 bench.run(0.01)
 print(time.process_time() - begin, inside[0])
 """
+)
 TEN_SECONDS = r"""
 import sys, time
 from pathlib import Path

@@ -8,6 +8,10 @@ import os
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from cold_start import TIMED
 
 COLD, WARM = 12.0, 1.0
 """Budgets [s of the processor]."""
@@ -17,6 +21,12 @@ from palpate.press.prepare import Question, prepared, surface_of
 wall, cpu = time.perf_counter(), time.process_time()
 prepared(Question(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
 print(time.perf_counter() - wall, time.process_time() - cpu)
+"""
+WHERE = """
+from palpate.press.prepare import Question, prepared, surface_of
+begin = time.process_time()
+prepared(Question(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
+print(time.process_time() - begin, inside[0])
 """
 BENCH = """
 import time
@@ -49,6 +59,11 @@ def main() -> None:
         ):
             wall, cpu = child(code, cache)
             print(f"{what:28}{wall:7.2f} s{cpu:9.2f} s of the processor; the budget is {budget:g} s")
+    with tempfile.TemporaryDirectory() as another:
+        whole, llvm = child(TIMED + WHERE, another)
+    print(
+        f"of the processor's {whole:.2f} s for the first press, LLVM takes {llvm:.2f} s, Numba and the rest Python's"
+    )
 
 
 if __name__ == "__main__":

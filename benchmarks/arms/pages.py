@@ -4,6 +4,14 @@ import re
 from pathlib import Path
 
 
+def standing(page: Path | None, name: str) -> list[str]:
+    """The lines of a table that stands between the marks of its name; none without a page."""
+    if page is None:
+        return []
+    text = page.read_text(encoding="utf-8").partition(f"<!-- {name}: ")[2].partition("<!-- end of ")[0]
+    return [line for line in text.splitlines() if line.startswith("|")]
+
+
 def put(page: Path | None, name: str, lines: list[str]) -> None:
     """Put a table between the marks of its name; nothing without a page."""
     if page is None:

@@ -38,7 +38,7 @@ def own(name: str) -> Callable[[], float]:
     arm = SerialArm.named(name)
     place = place_of(arm, None, None, gap=-1e-4)
     cell = cell_of(arm, place, KelvinVoigt(5000.0, 50.0, 0.0), loop_of(name, arm.title, "torque", place.mass))
-    start = Touch(touch(UNTOUCHED, 0.0), Reading(ZERO3, 0.0, 0.0), 0.0, 0.0, 0.0)
+    start = Touch(touch(UNTOUCHED, 0.0), Reading(ZERO3, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
     cell = cell._replace(steps=STEPS)
     torque, noise = arm.gravity_torque(place.q), np.zeros(8)
 

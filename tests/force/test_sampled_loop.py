@@ -75,6 +75,20 @@ def test_the_lag_of_an_arm_that_is_nothing_but_late_is_its_delay():
     assert lag_of(quick) == pytest.approx(sum_of_lags(quick), rel=0.01)
 
 
+def test_a_tip_that_swings_on_a_position_arm_lengthens_the_lag():
+    """Well below the swing its gain is 1/(1 - (w/w_swing)^2), and the loop turns its phase at pi/(2 theta) or below."""
+    arm = load_arm("ur5e")
+    own = lag_of(arm)
+
+    def times(mass):
+        return lag_of(msgspec.structs.replace(arm, inner=msgspec.structs.replace(arm.inner, mass=mass))) / own
+
+    assert times(0.01) == pytest.approx(1.0, rel=1e-3)
+    for mass in (1.0, 3.0, 6.0):
+        most = (pi / 2.0 / own) ** 2 * mass / arm.series
+        assert 1.0 / (1.0 - most / 4.0) < times(mass) < 1.0 / (1.0 - most)
+
+
 def test_arms_that_come_with_it():
     assert {"ur5e", "fr3", "panda", "iiwa14"} <= set(names())
     for name in names():

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from palpate import read_log
+from palpate._vector import ZERO3, Mat3
 from palpate.cli import main
 from palpate.errors import InputError
+from palpate.press.cell import Reading, WristSensor, sensed
 from palpate.press.pilots import Cautious
 from palpate.press.plan import Plan
 from palpate.press.prepare import Question, arm_of, prepared, surface_of
@@ -238,6 +240,27 @@ def names_file(name):
     from importlib.resources import files
 
     return files("palpate.robots.serial").joinpath("arms", f"{name}.toml").read_text(encoding="utf-8")
+
+
+def test_a_sample_is_of_its_own_instant():
+    """Of a force that grows evenly the readings are exact, wherever between two steps a sample falls."""
+    step, slope, sampling = 0.5e-3, 100.0, 480.0
+    sensor = WristSensor(Mat3(ZERO3, ZERO3, ZERO3), ZERO3, ZERO3, 1.0, step, sampling, 0.0, 1e3)
+    reading, seen = Reading(ZERO3, 0.0, 0.0, 0.0), []
+    for k in range(1, 400):
+        before = reading.samples
+        reading = sensed(sensor, reading, slope * (k - 1) * step, k * step, np.zeros(8))
+        if reading.samples != before:
+            seen.append((before, reading.value))
+    assert [int(number) for number, _ in seen] == list(range(len(seen)))
+    for number, value in seen[1:]:  # the first is before the force
+        assert value == pytest.approx(slope * number / sampling, abs=1e-9)
+
+
+def test_a_heavy_tip_of_a_position_arm_does_not_deceive_the_law():
+    """Some 6 N over before its swing was in the lag and in the time before anything is learned."""
+    record, _ = asked(arm="iiwa14", mode="position", surface=surface_of("K=1e5,B=50"), seconds=0.6, probe=0.0)
+    assert record["force"].max() < 1.05 * record["force_desired"].max()
 
 
 def test_too_few_joints(tmp_path, capsys):

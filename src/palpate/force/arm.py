@@ -52,6 +52,8 @@ class PositionLoop(Table, tag="position", tag_field="kind", omit_defaults=True):
     """Between sending a command and the arm's loop having it [s]."""
     stiffness: Positive
     """Of the arm itself, between what its encoders see and the surface [N/m]."""
+    mass: Positive | None = None
+    """Of the tip along the normal, which swings on that stiffness [kg]; of a tip without mass when left out."""
     bandwidth_interval: Interval | None = None
     damping_interval: Interval | None = None
     delay_interval: Interval | None = None
@@ -81,6 +83,11 @@ class PositionLoop(Table, tag="position", tag_field="kind", omit_defaults=True):
             return [self.squared]
         own = [2.0 * math.pi * f for f in w]
         return [(a**2, 2.0 * d) for a in own for d in (z[0] * own[0], z[1] * own[1])]
+
+    @property
+    def swing(self) -> float:
+        """Natural period of the tip's mass on the arm's own stiffness, in the air [s]; 0 of a tip without mass."""
+        return 0.0 if self.mass is None else 2.0 * math.pi * math.sqrt(self.mass / self.stiffness)
 
     @property
     def longest_delay(self) -> float:

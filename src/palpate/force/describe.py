@@ -13,7 +13,7 @@ UNCOVERED = (
     "limits of speed and torque",
     "contact lost while the gain changes, or within a tick; loss of contact of a torque arm",
     "a reading taken between ticks: its age is counted in whole ticks",
-    "the arm's own compliance between its encoders and the tip beside damping of the surface",
+    "the arm's own compliance between its encoders and the tip beside damping of the surface; the tip's mass on it",
     "a surface that curves, but by the range of its tangent stiffness",
     "the peak where a surface becomes stiffer under the tip: for a lag the gain is that of the one before",
 )

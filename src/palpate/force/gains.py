@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3
 from palpate.errors import InputError
-from palpate.force.arm import Arm, Positive, Table, TorqueLoop, from_toml, read_small
+from palpate.force.arm import Arm, PositionLoop, Positive, Table, from_toml, read_small
 from palpate.force.lag import lag_of
 from palpate.force.law import Cautious
 from palpate.force.sampled_loop import filter_of
@@ -54,6 +54,13 @@ LONGEST = 2000
 """Ticks of lag that are tuned for: a press is foretold tick by tick, for tens of lags."""
 _FORGOTTEN = 5.0
 """Decay times of the sensor's low-pass after which an edge counts as forgotten: e^-5 of it, 0.7 %, is left."""
+
+SWING = 0.5
+"""Share of the swing of a position arm's tip for which nothing is learned after a touch: in its first half the force
+grows at another pace than the command's, so that a stiff surface would pass for a soft one.
+
+Measured by benchmarks/arms/touches.py.
+"""
 
 
 class Gains(Table):
@@ -134,6 +141,8 @@ class Gains(Table):
         arm = self.arm
         low_pass = arm.low_pass
         memory = _FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick
+        if isinstance(arm.inner, PositionLoop):
+            memory += SWING * arm.inner.swing
         E, e0, e1, c = followed(arm)
         numbers: dict[str, Any] = {
             "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,
@@ -241,9 +250,8 @@ def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: floa
         alpha: gain in units of 1/theta.
     """
     speed = min(arm.limits.speed, _BRISK * alpha * force / (theta * arm.seen(cap)))
-    if isinstance(arm.inner, TorqueLoop):
-        speed = min(speed, _TOUCH * force / float(np.sqrt(cap * arm.inner.mass)))
-    return speed
+    mass = arm.inner.mass
+    return speed if mass is None else min(speed, _TOUCH * force / float(np.sqrt(cap * mass)))
 
 
 def followed(arm: Arm) -> tuple[Mat3, Vec3, Vec3, Vec3]:

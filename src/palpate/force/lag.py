@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop
@@ -15,6 +16,8 @@ from palpate.force.sampled_loop import Law, SampledLoop
 SOFTEST = 1.0
 """From where on stiffnesses are looked at [N/m]; below it a torque arm's loop does not change any more."""
 _POINTS = 40
+STRUCTURE = 0.05
+"""Damping ratio of a drive train's own spring, typical of strain-wave gears."""
 
 
 def ultimate_gain(loop: SampledLoop, stiffness: float, damping: float = 0.0, kept: float = 0.0) -> float:
@@ -47,9 +50,37 @@ def lag_of(arm: Arm) -> float:
     """
     loop = SampledLoop(arm)
     if isinstance(arm.inner, PositionLoop):
-        return pi / 2.0 / min(ultimate_gain(replace(loop, inner=c), arm.series) for c in arm.inner.corners)
+        lag = pi / 2.0 / min(ultimate_gain(replace(loop, inner=c), arm.series) for c in arm.inner.corners)
+        return lag if arm.inner.mass is None else lag * swinging(arm, lag)
     stiffnesses = np.geomspace(SOFTEST, arm.limits.stiffness, _POINTS)
     return pi / 2.0 / min(ultimate_gain(loop, float(k)) for k in stiffnesses)
+
+
+def swinging(arm: Arm, lag: float) -> float:
+    """By what a tip whose mass swings on a position arm's own stiffness lowers the ultimate gain, at least 1.
+
+    From the answer without it to that with it, on the surface where it is lowest; by the loop as it is between ticks,
+    of which only the ratio is used.
+    """
+    inner = arm.inner
+    assert isinstance(inner, PositionLoop)
+    assert inner.mass is not None
+    own, m = inner.stiffness, inner.mass
+    w: NDArray[np.float64] = np.geomspace(0.1, 100.0, 20_000) / lag  # half a turn of a delay is at pi/2
+    s = 1j * w
+    square, rate = inner.squared
+    late = inner.longest_delay + 0.5 / arm.sensor.sampling + 1.5 * arm.tick
+    rigid = square / (s * s + rate * s + square) * arm.low_pass.at(w) * np.exp(-late * s) / s
+    damping = 2.0 * STRUCTURE * sqrt(own * m)
+    stiffnesses = np.geomspace(1e-3 * own, arm.limits.stiffness, _POINTS)
+    felt = [(own + damping * s) * (1.0 + k / own) / (m * s * s + damping * s + own + k) for k in stiffnesses]
+    return max(1.0, *(_largest(rigid * f) / _largest(rigid) for f in felt))
+
+
+def _largest(answer: NDArray[np.complex128]) -> float:
+    """Of an open loop where it turns the phase by half a turn: one over its ultimate gain."""
+    a, b = answer[:-1], answer[1:]
+    return float(np.abs(a[(a.imag * b.imag <= 0.0) & (a.real < 0.0)]).max())
 
 
 def sum_of_lags(arm: Arm) -> float:

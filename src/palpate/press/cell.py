@@ -26,6 +26,7 @@ class WristSensor(NamedTuple):
     Args:
         E, e: the low-pass over a step of the physics: z' = E z + e f.
         c, d: its output c z + d f [N].
+        step: of the physics [s].
         sampling: readings a second [Hz].
         noise: standard deviation of a reading [N].
         full_scale: largest reading [N].
@@ -35,6 +36,7 @@ class WristSensor(NamedTuple):
     e: Vec3
     c: Vec3
     d: float
+    step: float
     sampling: float
     noise: float
     full_scale: float
@@ -45,6 +47,7 @@ class Reading(NamedTuple):
     """State of the sensor."""
 
     z: Vec3
+    shown: float  # what comes out of the low-pass [N]
     value: float  # the last reading [N]
     samples: float  # taken so far
 
@@ -141,14 +144,20 @@ def body_at(q: Array, motor: Array) -> Body:
 
 @law
 def sensed(sensor, reading, force, time, noise):
-    """The sensor after a step that ends at `time` [s]; `noise` are eight standard normal numbers of this tick."""
+    """The sensor after a step that ends at `time` [s]; `noise` are eight standard normal numbers of this tick.
+
+    A sample is of its own instant k/sampling, between two steps: so the lag of the readings is known exactly. The force
+    of a step is that of its beginning, held over it: a low-pass is half a step late with it, none a whole one.
+    """
     z = sensor.E @ reading.z + force * sensor.e
-    value, samples = reading.value, reading.samples
-    shown = sensor.c @ z + sensor.d * force + sensor.noise * noise[int(samples) % 8]
-    if time >= samples / sensor.sampling:
-        value = min(max(shown, -sensor.full_scale), sensor.full_scale)
-        samples += 1.0
-    return Reading(z, value, samples)
+    shown, value, samples = sensor.c @ z + sensor.d * force, reading.value, reading.samples
+    due = int(time * sensor.sampling + 1e-9)  # the last sample's number, but for rounding
+    if due >= samples:
+        ago = (time - due / sensor.sampling) / sensor.step - 0.5 * (1.0 + sensor.d)
+        exact = shown - ago * (shown - reading.shown) + sensor.noise * noise[due % 8]
+        value = min(max(exact, -sensor.full_scale), sensor.full_scale)
+        samples = due + 1.0
+    return Reading(z, shown, value, samples)
 
 
 @law

@@ -41,6 +41,8 @@ def loop_of(name: str, title: str, mode: str, mass: float) -> Arm:
     if isinstance(inner, TorqueLoop):
         damping = 2.0 * _DAMPED * float(np.sqrt(inner.stiffness * mass))
         inner = msgspec.structs.replace(inner, mass=mass, damping=damping)
+    else:
+        inner = msgspec.structs.replace(inner, mass=mass)
     sensor = known.sensor if known is not None else arm.sensor
     return msgspec.structs.replace(arm, title=f"{title}, {mode}s", inner=inner, sensor=sensor)
 

@@ -102,10 +102,10 @@ class ByTorque:
         if name == "proportional-integral":
             return ProportionalIntegral(held, rate, none, _six(integral_gain(_BANDWIDTH)), tick)
         if name == "impedance":
-            mass = _six(self._arm.loop.inner.mass)  # type: ignore[union-attr]
-            damping = 1.4 * float(np.sqrt(_GIVING * self._arm.loop.inner.mass))  # type: ignore[union-attr]
+            inner: Any = self._arm.loop.inner  # of torques, so that it has a mass
+            damping = 1.4 * float(np.sqrt(_GIVING * inner.mass))
             target: Any = Vec6(Vec3(surface + force / _GIVING, self._at.y, self._at.z), ZERO3)
-            return Impedance(mass, _six(damping), _six(_GIVING), target)
+            return Impedance(_six(inner.mass), _six(damping), _six(_GIVING), target)
         raise unknown("controller", name, CONTROLLERS)
 
     def step(self, sense: Sense, desired: float) -> Acted:

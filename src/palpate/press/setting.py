@@ -12,6 +12,7 @@ from palpate._vector import Mat3, Vec3
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop
+from palpate.force.lag import STRUCTURE
 from palpate.force.sampled_loop import filter_of, held
 from palpate.press.cell import NO_TOOL, Cell, HeldTool, WristSensor
 from palpate.robots.serial.inverse import checked_pose
@@ -25,8 +26,6 @@ _STEP = 5e-4
 """Longest step of the physics [s]."""
 _RESOLVED = 0.5
 """Radians of the fastest spring in a step, at most: a quarter of where semi-implicit Euler would diverge."""
-_STRUCTURE = 0.05
-"""Damping ratio of a drive train's own spring, typical of strain-wave gears."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +157,7 @@ def _joint_springs(arm: SerialArm, links: Array, along: Array, stiffness: float)
     """Drive trains as stiff as their motors are strong, the tip along the normal as stiff as the arm is said to be."""
     strength = arm.torque if np.isfinite(arm.torque).all() else np.diag(links)
     spring = strength * stiffness * float(along @ (along / strength))
-    return spring, 2.0 * _STRUCTURE * np.sqrt(spring * np.diag(links))
+    return spring, 2.0 * STRUCTURE * np.sqrt(spring * np.diag(links))
 
 
 def _sensor(loop: Arm, step: float) -> WristSensor:
@@ -168,7 +167,7 @@ def _sensor(loop: Arm, step: float) -> WristSensor:
     wide[: len(b), : len(b)] = E
     return WristSensor(
         E=Mat3(*(_three(row) for row in wide)), e=_padded(e), c=_padded(c), d=0.0 if len(b) else 1.0,
-        sampling=float(loop.sensor.sampling), noise=float(loop.sensor.noise),
+        step=float(step), sampling=float(loop.sensor.sampling), noise=float(loop.sensor.noise),
         full_scale=float(loop.sensor.full_scale),
     )  # fmt: skip
 

@@ -88,7 +88,7 @@ class SimulatedArm:
             sag = arm.gravity_torque(place.q) / cell.spring
         self._sag = sag
         self._body = body_at(place.q, place.q + sag)
-        first = Reading(ZERO3, 0.0, 0.0)
+        first = Reading(ZERO3, 0.0, 0.0, 0.0)
         self._touch = Touch(UNTOUCHED, first, 0.0, 0.0, float(place.normal @ place.pose[:3, 3]) - place.place)
         self._engine: Engine = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
         self._k, self.zero = 0, 0.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from palpate.bench.metrics.summary import WINDOW, force_figures, losses
 from palpate.bench.sequence import CONTACT
@@ -18,6 +19,8 @@ from palpate.press.loops import series_of
 from palpate.press.setting import Place
 from palpate.records import Record
 from palpate.robots.serial.serial_arm import SerialArm
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -70,10 +73,28 @@ class Asked:
     def delay(self, record: Record) -> float:
         """From the sampling of a force to its reading [s]: identification finds the clock of a slower sensor itself.
 
-        Of one about as fast as the ticks it takes each row for fresh: a reading is then half a tick old in the mean.
+        Of one about as fast as the ticks it takes each row for fresh: a reading is then as old as its tick is after
+        the sensor's sample, in the mean.
         """
-        as_fast = sample_clock_of(record["force_sampled"]).period == 1.0
-        return 0.5 * self.gains.arm.tick if as_fast else 0.0
+        return float(self._ages(record).mean())
+
+    def delay_std(self, record: Record) -> float:
+        """Standard deviation of that [s]: ages run from 0 to a tick again and again, and each run is one chance.
+
+        An arm of positions has a lag besides that nobody tells: its drive trains damp.
+        """
+        if self.gains.arm.kind == "position":
+            return self.gains.arm.tick / float(np.sqrt(12.0))
+        ages = self._ages(record)
+        runs = max(int((np.diff(ages) < 0.0).sum()), 1)
+        return float(ages.std() / np.sqrt(runs))
+
+    def _ages(self, record: Record) -> Array:
+        """Of each row's reading [s], where identification takes each for fresh; else 0."""
+        if sample_clock_of(record["force_sampled"]).period != 1.0:
+            return np.zeros(1)
+        t, sampling = record["t"], self.gains.arm.sensor.sampling
+        return np.asarray(t - np.floor(t * sampling + 1e-9) / sampling)
 
 
 def summarise(record: Record, asked: Asked) -> dict[str, Any]:
@@ -129,7 +150,7 @@ def identified(record: Record, asked: Asked) -> dict[str, Any]:
         found, _ = identify_contact(
             log,
             lag=low_pass.lag + asked.delay(record),
-            lag_std=loop.tick / np.sqrt(12.0),
+            lag_std=asked.delay_std(record),
             force_filter=low_pass if low_pass.sections else None,
             series_stiffness=series_of(loop),
         )

@@ -1,0 +1,50 @@
+"""How far the first force goes over at a touch by arms of positions, whose tip swings on the arm's own stiffness.
+
+`--markdown docs/arms.md` puts the table between the marks of that page; `--swing 0` tries another share of a swing for
+which nothing is learned.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from pages import put
+
+from palpate.bench.sequence import CONTACT
+from palpate.force import gains
+from palpate.press.prepare import Question, prepared, surface_of
+from palpate.robots.serial.from_toml import names
+
+STIFFNESSES, DAMPING, FORCE, SECONDS = (5e3, 2e4, 6e4, 1e5, 2e5, 5e5), 50.0, 20.0, 1.0
+
+
+def overshoot(arm: str, stiffness: float, seed: int) -> float:
+    """Of the true force over what was asked for [N]."""
+    surface = surface_of(f"K={stiffness},B={DAMPING}")
+    question = Question(
+        arm=arm, force=FORCE, surface=surface, mode="position", seconds=SECONDS, probe=0.0, seed=seed
+    )
+    record = prepared(question).run()
+    touched = int(np.argmax(record["phase"] == CONTACT))
+    return max(float((record["force"] - FORCE)[touched:].max()), 0.0)
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("--seeds", type=int, default=3)
+    asked.add_argument("--arms", nargs="*", default=names())
+    asked.add_argument("--swing", type=float, default=gains.SWING)
+    asked.add_argument("--markdown", type=Path)
+    words = asked.parse_args()
+    gains.SWING = words.swing
+    lines = ["| arm | " + " | ".join(f"{k:g} N/m" for k in STIFFNESSES) + " |", "|---" * 7 + "|"]
+    print(lines[0])
+    for arm in words.arms:
+        worst = [max(overshoot(arm, k, seed) for seed in range(words.seeds)) for k in STIFFNESSES]
+        lines.append(f"| {arm} | " + " | ".join(f"{w:.2f}" for w in worst) + " |")
+        print(lines[-1], flush=True)
+    put(words.markdown, "touches", lines)
+
+
+if __name__ == "__main__":
+    main()
