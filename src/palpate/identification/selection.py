@@ -79,13 +79,13 @@ class Choice:
 def choose(problem: Problem, options: Options) -> Choice:
     """Answer the plain model, and a richer one if it is asked for or earns its place.
 
-    A richer model earns it by explaining at least half of what the plain one leaves, with everything that it has more
+    A richer model earns it by explaining at least half of what any plainer one leaves, with everything that it has more
     of identified: what a log cannot tell of it never hides what the plain model shows.
     """
     name, tolerance = options.model, options.tolerance
     if name in (None, KELVIN_VOIGT.name, KELVIN_VOIGT_MASS.name):
         plain = answer(problem, KELVIN_VOIGT if name == KELVIN_VOIGT.name else KELVIN_VOIGT_MASS)
-        best, at = plain, problem
+        best, at, told = plain, problem, plain.explained
         tried = [_compared(plain, "")]
         if (
             name is None
@@ -96,7 +96,8 @@ def choose(problem: Problem, options: Options) -> Choice:
             one_sided = problem.with_touches is not None and not lag_open(problem)
             for make in (standard_linear_solid, *([hunt_crossley, quasi_linear] if one_sided else [])):
                 rich, own = _one_sided(make, problem)
-                why = _against(rich, best, tolerance)
+                why = _against(rich, told, tolerance)
+                told = max(told, rich.explained)
                 tried.append(_compared(rich, why))
                 if not why:
                     best, at = rich, own
@@ -116,10 +117,10 @@ def _one_sided(make: Callable[..., Model], problem: Problem) -> tuple[Answer, Pr
     return answer(wider, at_rest_before(make(wider.motion))), wider
 
 
-def _against(rich: Answer, plain: Answer, tolerance: float) -> str:
-    """Why a richer model is not taken; empty if it is."""
-    if (1 - rich.explained) > 0.5 * (1 - plain.explained):
-        return "explains less than half of what the plainer model leaves"
+def _against(rich: Answer, told: float, tolerance: float) -> str:
+    """Why a richer model is not taken; empty if it is. `told` is the share that those before it explain at most."""
+    if (1 - rich.explained) > 0.5 * (1 - told):
+        return "explains less than half of what a plainer model leaves"
     for parameter in rich.fit.model.nonlinear:
         if not parameter.low < rich.fit[parameter.name] < parameter.high:
             return f"its {parameter.name} lies beyond what the log can show"
