@@ -29,8 +29,9 @@ _ALONE = 4.0
 """Degrees of freedom of a single effect's own variance, which nothing repeats."""
 POOLED = ("K", "B", "M", "E")
 """Parameters that mean the same in each log."""
-SHARED = ("lag", "calibration", "series stiffness", "Poisson's ratio", "small strain")
-"""Causes that err alike in all logs of one rig: no number of logs makes them smaller."""
+BY_CHANCE = ("noise", "repetition", "blocks")
+"""Causes that err otherwise in each log. The rest bound what errs alike in all logs of one rig and one motion (the lag, a
+calibration, a force that the model has not): no number of logs makes them smaller."""
 _ALIKE = {"kelvin-voigt-mass": "kelvin-voigt"}
 """Models whose parameters of one name are one quantity."""
 
@@ -256,7 +257,8 @@ class _Given:
         if p.value is None or p.ci95 is None or p.verdict is Verdict.REJECTED:
             return None
         half = (p.ci95[1] - p.ci95[0]) / 2
-        shared = min(float(np.hypot.reduce([p.budget.get(cause, 0.0) for cause in SHARED])), half)
+        alike = [part for cause, part in p.budget.items() if cause not in BY_CHANCE]
+        shared = min(float(np.hypot.reduce([0.0, *alike])), half)
         return cls(p.value, float(np.sqrt(half**2 - shared**2)), shared, (p.unit, meaning))
 
 
