@@ -42,9 +42,9 @@ def identifier_checks(make: Callable[[], Any]) -> list[Check]:
     return [Check(law, make) for law in LAWS]
 
 
-def foam(samples: int) -> tuple[Array, Array]:
+def foam(samples: int, seed: int = 0) -> tuple[Array, Array]:
     """Acceleration, rate and penetration of three tones at 1 kHz, shape (n, 3), and the force of foam [N], (n,)."""
-    random = np.random.default_rng(0)
+    random = np.random.default_rng(seed)
     t = np.arange(samples)[:, None] / 1000.0
     omega, phase = 2 * np.pi * np.array([1.0, 7.0, 23.0]), random.uniform(0.0, 2 * np.pi, 3)
     amplitude = np.array([2e-3, 3e-4, 5e-5])
