@@ -30,8 +30,8 @@ _ALONE = 4.0
 POOLED = ("K", "B", "M", "E")
 """Parameters that mean the same in each log."""
 BY_CHANCE = ("noise", "repetition", "blocks")
-"""Causes that err otherwise in each log. The rest bound what errs alike in all logs of one rig and one motion (the lag, a
-calibration, a force that the model has not): no number of logs makes them smaller."""
+"""Causes that err otherwise in each log. The rest bound what errs alike in all logs of one rig and one motion (the lag,
+a calibration, a force that the model has not): no number of logs makes them smaller."""
 _ALIKE = {"kelvin-voigt-mass": "kelvin-voigt"}
 """Models whose parameters of one name are one quantity."""
 

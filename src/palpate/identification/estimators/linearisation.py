@@ -225,16 +225,19 @@ class Linearisation:
         """What is seen in time knows of a lag that nobody has calibrated what the prior says, no more.
 
         A lag T counts as a damping of -K T, and as a branch that relaxes. Whatever else shifts the force in time moves
-        the lag that a fit finds, and them with it: they count as if it were held anywhere in its prior.
+        the lag that a fit finds, and them with it: they count as if it were held anywhere in its prior. Nothing but a
+        damping passes for a lag of more than a radian of the fastest motion.
         """
         lag = self.names.index(LAG)
-        others = [i for i in range(len(self.names)) if i != lag]
+        rest = [i for i in range(len(self.names)) if i != lag]
         normal = inverse(member.solution.cov)
         slope = np.zeros(len(self.names))
-        slope[others] = inverse(normal[np.ix_(others, others)]) @ normal[others, lag]
-        seen = self.names[: self.own] if self.model.nonlinear else ("B", "M")
-        in_time = np.array([name in seen and name != LAG for name in self.names])
-        by_prior = np.where(in_time, (slope * self.problem.lag.std) ** 2, 0.0)
+        slope[rest] = inverse(normal[np.ix_(rest, rest)]) @ normal[rest, lag]
+        std, band = self.problem.lag.std, self.problem.band
+        in_time = self.names[: self.own] if self.model.nonlinear else ("M",)
+        reach = dict.fromkeys(in_time, min(std, 1 / (2 * np.pi * band)) if np.isfinite(band) else std)
+        reach |= {"B": std, LAG: 0.0}
+        by_prior = (slope * [reach.get(name, 0.0) for name in self.names]) ** 2
         return Spread(np.maximum(found.variance, by_prior), found.freedom)
 
     def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float, float]:
