@@ -143,7 +143,6 @@ def _short_pipeline() -> Any:
     from numba.core import untyped_passes as untyped
     from numba.core.compiler_machinery import PassManager
 
-    rewritten, single, no_phis, of_arrays = _brief_passes()
     manager = PassManager("inside")
     for one in (
         untyped.TranslateByteCode,
@@ -151,11 +150,11 @@ def _short_pipeline() -> Any:
         untyped.IRProcessing,
         untyped.RewriteSemanticConstants,
         untyped.DeadBranchPrune,
-        rewritten,
-        single,
+        untyped.GenericRewrites,
+        untyped.ReconstructSSA,
         typed.NopythonTypeInference,
-        no_phis,
-        of_arrays,
+        typed.PreLowerStripPhis,
+        typed.NopythonRewrites,
         typed.IRLegalization,
         _native_lowering(),
         typed.NoPythonBackend,
@@ -163,62 +162,6 @@ def _short_pipeline() -> Any:
         manager.add_pass(one, one.__name__)
     manager.finalize()
     return manager
-
-
-@functools.cache
-def _brief_passes() -> tuple[type, type, type, type]:
-    """Numba's rewrites before the types are known, single assignment, no phis, rewrites of arrays.
-
-    Numba computes the lifetimes of all variables after each of them; only those after the last are looked at.
-    """
-    from numba.core import rewrites, types
-    from numba.core import typed_passes as typed
-    from numba.core import untyped_passes as untyped
-    from numba.core.compiler_machinery import register_pass
-    from numba.core.ir_utils import build_definitions
-    from numba.core.ssa import reconstruct_ssa
-
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class Rewritten(untyped.GenericRewrites):
-        _name = "inside_rewrites"
-
-        def run_pass(self, state: Any) -> bool:
-            blocks = state.func_ir.blocks
-            for kind in rewrites.rewrite_registry.rewrites["before-inference"]:
-                rewrite = kind(state)
-                for key in list(blocks):
-                    while rewrite.match(state.func_ir, blocks[key], state.typemap, state.calltypes):
-                        blocks[key] = rewrite.apply()
-            return True
-
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class Single(untyped.ReconstructSSA):
-        _name = "inside_ssa"
-
-        def run_pass(self, state: Any) -> bool:
-            state.func_ir = reconstruct_ssa(state.func_ir)
-            self._patch_locals(state)
-            state.func_ir._definitions = build_definitions(state.func_ir.blocks)
-            return True
-
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class NoPhis(typed.PreLowerStripPhis):
-        _name = "inside_strip_phis"
-
-        def run_pass(self, state: Any) -> bool:
-            state.func_ir = self._strip_phi_nodes(state.func_ir)
-            state.func_ir._definitions = build_definitions(state.func_ir.blocks)
-            return True
-
-    @register_pass(mutates_CFG=True, analysis_only=False)
-    class OfArrays(typed.NopythonRewrites):
-        _name = "inside_array_rewrites"
-
-        def run_pass(self, state: Any) -> bool:
-            arrays = any(isinstance(kind, types.Array) for kind in state.typemap.values())
-            return bool(super().run_pass(state)) if arrays else False
-
-    return Rewritten, Single, NoPhis, OfArrays
 
 
 @functools.cache
