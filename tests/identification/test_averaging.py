@@ -98,7 +98,7 @@ def test_an_octave_that_differs_is_seen_by_leaving_it_out(off):
     asked = system(column, stiffer_about(column[:, 0], at, off) + noise)
     levels = level(asked, NOISE**2)
     whole = solve(asked, levels)
-    found = np.sqrt(of_octaves(asked, levels, levels, []).variance[0])
+    found = np.sqrt(of_octaves(whole, asked, levels, levels, []).variance[0])
     pull = abs(whole.theta[0] - 5.0)
     std = np.sqrt(whole.cov[0, 0])
     if off:

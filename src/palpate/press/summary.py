@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.metrics.summary import WINDOW, force_figures, losses
 from palpate.bench.sequence import CONTACT
 from palpate.contact_frame import Payload, identify_contact
@@ -19,8 +19,6 @@ from palpate.press.loops import series_of
 from palpate.press.setting import Place
 from palpate.records import Record
 from palpate.robots.serial.serial_arm import SerialArm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

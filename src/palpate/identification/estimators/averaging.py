@@ -12,14 +12,13 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.by_octave import LARGEST, Solution, System, solve
 
-Array = NDArray[np.float64]
-
 _SIZES = (0.003, 0.03, 0.3, LARGEST)
-"""Deviations of the prior of a force's size, over that of the whole force: it is not there, or of some order of
-magnitude. `make trust` measures the coverage that follows."""
+"""Deviations of the prior of a force's size, over that of the whole force: hardly there, or of some order of magnitude.
+`make trust` measures the coverage that follows."""
 _SINGULAR = 1e-12
 """Share of its columns' size below which a direction is not in the log."""
 _WINDOW = 0.02
@@ -104,18 +103,20 @@ def averaged(parts: list[Member]) -> Solution:
     return Solution(theta, cov, parts[0].solution.noise)
 
 
-def of_octaves(system: System, noise: Array, sensor: Array, forces: list[list[int]]) -> Spread:
+def of_octaves(
+    whole: Solution, system: System, noise: Array, sensor: Array, forces: list[list[int]]
+) -> Spread:
     """What the answer moves by when one octave is left out, beyond what its covariance grows by.
 
     The rest has to tell by itself which other forces are there.
 
     Args:
+        whole: the answer over all members, of all octaves.
         system: of the log.
         noise: variance of a line in each octave, shape (octaves,).
         sensor: the same of the sensors' own noise, no larger.
         forces: places of the columns of each.
     """
-    whole = averaged(members(system, noise, sensor, forces))
     excess = np.zeros(system.size)
     for octave in np.flatnonzero(system.lines > 0):
         use = np.arange(len(system.lines)) != octave

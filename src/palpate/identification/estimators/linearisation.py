@@ -163,7 +163,7 @@ class Linearisation:
         likely = members(*question)
         solution = averaged(likely)
         budget = mean_budget(likely, [self._budget(own, sensor, told) for own in likely], solution.theta)
-        budget["octaves"] = of_octaves(*question)
+        budget["octaves"] = of_octaves(solution, *question)
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}

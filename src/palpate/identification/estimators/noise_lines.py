@@ -8,13 +8,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators.budget import white_level
 from palpate.identification.estimators.by_octave import Solution, System, worth
 from palpate.identification.estimators.octaves import Octaves, Segment, lines_of, longest_of, octaves_of
 from palpate.identification.models import Motion
 from palpate.identification.problem import Problem
-
-Array = NDArray[np.float64]
 
 _SEEN = 10.0
 """Power of a column over that of the position's noise in it, below which an octave is left out: its parameter would be

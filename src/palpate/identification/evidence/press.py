@@ -167,12 +167,21 @@ def slope_in(problem: Problem, segments: list[Segment]) -> Slope | None:
         problem: of the log.
         segments: of its rows.
     """
-    lag = problem.lag
-    found = slope_of(strokes_in(problem, lag.value, segments))
-    later = slope_of(strokes_in(problem, lag.value + lag.std, segments)) if found and lag.std > 0 else None
-    if found is None or later is None:
+    strokes = strokes_in(problem, problem.lag.value, segments)
+    return _slope(strokes, _later(problem, problem.lag.value, segments, strokes))
+
+
+def _later(problem: Problem, lag: float, segments: list[Segment], strokes: list[Stroke]) -> list[Stroke]:
+    """The ways in with the force later by a deviation of the lag's prior; as they are, if the lag is exact."""
+    return strokes_in(problem, lag + problem.lag.std, segments) if problem.lag.std > 0 else strokes
+
+
+def _slope(strokes: list[Stroke], later: list[Stroke]) -> Slope | None:
+    found = slope_of(strokes)
+    other = slope_of(later) if found is not None and later is not strokes else None
+    if found is None or other is None:
         return found
-    by_lag = NORMAL * abs(later.stiffness - found.stiffness)
+    by_lag = NORMAL * abs(other.stiffness - found.stiffness)
     return replace(found, half=float(np.hypot(found.half, by_lag)), budget=found.budget | {"lag": by_lag})
 
 
@@ -292,7 +301,7 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
     if not strokes:
         return None
     loading = max(strokes, key=lambda stroke: len(stroke.depth))
-    later = strokes_in(problem, lag + problem.lag.std, segments) if problem.lag.std > 0 else strokes
+    later = _later(problem, lag, segments, strokes)
     tangent = [t for level in _LEVELS if (t := _tangent(strokes, later, level)) is not None]
     back = way_out(problem, lag, segments)
     return Press(
@@ -300,7 +309,7 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
         _thin(loading.depth, loading.force),
         _thin(*back.curve),
         back.loss,
-        _relaxation(problem, lag, segments, slope_in(problem, segments)),
+        _relaxation(problem, lag, segments, _slope(strokes, later)),
         back.late,
     )
 
