@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from palpate.analysis.constant_modes import moving
 from palpate.analysis.linear_loop import LinearLoop
+from palpate.arrays import Mask
 from palpate.errors import InputError
 
 Array = NDArray[np.floating]
@@ -124,9 +125,7 @@ def _around(inside: list[Array], into: list[Array], turn: Complex, z: Complex) -
     return found
 
 
-def _crossings(
-    level: Array, value: Array, f: Array, where: NDArray[np.bool_] | None = None
-) -> tuple[Array, Array]:
+def _crossings(level: Array, value: Array, f: Array, where: Mask | None = None) -> tuple[Array, Array]:
     """A value, and the frequency, wherever the level goes through zero, by straight lines between two points."""
     through = np.sign(level[1:]) != np.sign(level[:-1])
     if where is not None:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
-
-Array = NDArray[np.float64]
 
 _NEAR = 1e-4
 """Distance from the unit circle within which an eigenvalue of the pencil is taken up and polished."""

@@ -14,12 +14,10 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.force.arm import PositionLoop
 from palpate.force.sampled_loop import Law, SampledLoop
-
-Array = NDArray[np.float64]
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.force.boundary import radius
 from palpate.force.cells import Box, Prover
 from palpate.force.lyapunov import common, common_beside, single
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterator
 from typing import Any, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import law
+from palpate.arrays import Array
 from palpate.force.law import Cautious, CautiousState
 
 
-def flattened(tree: Any) -> NDArray[np.float64]:
+def flattened(tree: Any) -> Array:
     """Every number of nested tuples, in their order, shape (n,)."""
     return np.array(list(_leaves(tree)))
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import kernel, law
 from palpate.errors import InputError
@@ -35,7 +34,6 @@ from palpate.force.stage import LEARNING, LOCKED
 if TYPE_CHECKING:
     from palpate.force.certificate import Certificate
 
-Array = NDArray[np.float64]
 
 PHASES = {AIR: "air", LEARNING: "learning", LOCKED: "locked"}
 FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED, PULLED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0

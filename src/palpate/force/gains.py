@@ -10,17 +10,15 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, Positive, Table, from_toml, read_small
 from palpate.force.lag import lag_of
 from palpate.force.law import Cautious
 from palpate.force.sampled_loop import filter_of
 from palpate.force.sensitivity import relief_of
-
-Array = NDArray[np.float64]
 
 ALPHA = 0.42
 """Of L = alpha e^(-s theta)/(theta s): 0.42 gives a gain margin of pi/(2 alpha) = 3.7.

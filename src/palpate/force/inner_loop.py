@@ -7,13 +7,11 @@ from math import exp, log, pi
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop
 from palpate.force.sampled_loop import held
-
-Array = NDArray[np.float64]
 
 BLOCKS = 8
 """Parts of a log whose scores tell how far each number may be off, whatever the noise's colour."""

@@ -8,6 +8,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop
 from palpate.force.boundary import stable_between
@@ -66,7 +67,7 @@ def swinging(arm: Arm, lag: float) -> float:
     assert isinstance(inner, PositionLoop)
     assert inner.mass is not None
     own, m = inner.stiffness, inner.mass
-    w: NDArray[np.float64] = np.geomspace(0.1, 100.0, 20_000) / lag  # half a turn of a delay is at pi/2
+    w: Array = np.geomspace(0.1, 100.0, 20_000) / lag  # half a turn of a delay is at pi/2
     s = 1j * w
     square, rate = inner.squared
     late = inner.longest_delay + 0.5 / arm.sensor.sampling + 1.5 * arm.tick

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array
 
 _STEPS = 60
 _MARGIN = 1e-9

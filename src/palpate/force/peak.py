@@ -5,13 +5,11 @@ from __future__ import annotations
 from math import exp, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.force.arm import PositionLoop
 from palpate.force.gains import Gains
 from palpate.force.sampled_loop import Law, SampledLoop
-
-Array = NDArray[np.float64]
 
 LAGS = 5.0
 """From the touch until the reading reaches F_d: a worst case is sought for each number of ticks up to these.

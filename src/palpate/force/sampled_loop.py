@@ -7,12 +7,10 @@ from functools import cache, cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.force.arm import Arm, PositionLoop
 from palpate.signals.low_pass import LowPass
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3
+from palpate.arrays import Array
 from palpate.force.arm import Arm, PositionLoop
 from palpate.force.sampled_loop import filter_of, held
 from palpate.force.touching import Surface, World, compiled_touch
-
-Array = NDArray[np.float64]
 
 STEP = {"position": 2e-4, "torque": 5e-5}
 """Of the physics [s]."""

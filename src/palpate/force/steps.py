@@ -8,12 +8,11 @@ from math import inf, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.force.boundary import rank_one
 from palpate.force.gains import Gains
 from palpate.force.lag import ultimate_gain
 from palpate.force.sampled_loop import Law, SampledLoop
-
-Array = NDArray[np.float64]
 
 BAND = 0.05
 """Of F_d, within which a press counts as settled."""

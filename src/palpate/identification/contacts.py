@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
@@ -15,8 +15,6 @@ from palpate.identification.options import NOTHING_SAID, Options
 from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.warning_codes import Code, Warn
-
-Array = NDArray[np.float64]
 
 ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""
@@ -218,7 +216,7 @@ def _clear(force: Array, spans: list[tuple[int, int]], threshold: float, settlin
     return threshold - middle > _CLEAR * 1.4826 * float(np.median(np.abs(free - middle)))
 
 
-def _outside(count: int, spans: list[tuple[int, int]], begin: int) -> NDArray[np.bool_]:
+def _outside(count: int, spans: list[tuple[int, int]], begin: int) -> Mask:
     out = np.ones(count, bool)
     out[:begin] = False
     for first, last in spans:

@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.identification.filters.state_variable import block_means, white_noise
 from palpate.identification.least_squares import Noise, noise_of, quantile
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+Rows = Mask
 
 FLAT = 0.4
 """Slope in the air over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 % of

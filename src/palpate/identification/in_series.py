@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.budget import Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.result import DynamicStiffness, Press, Tangent
-
-Array = NDArray[np.float64]
 
 
 def check(apparent: float, series: float) -> None:

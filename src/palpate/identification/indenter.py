@@ -19,12 +19,10 @@ from dataclasses import dataclass, replace
 from math import atanh, isfinite, pi, sqrt, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Press, Tangent, Verdict
-
-Array = NDArray[np.float64]
 
 ASSUMED = "a half space (deep and wide against the contact), small strain, no adhesion"
 """What the laws rest on, and no press shows."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array
 
 _LONGEST = 20_000  # lags of the autocovariance that are ever looked at
 

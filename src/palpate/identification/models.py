@@ -10,11 +10,10 @@ from math import isqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.identification.filters.position_noise import NOISELESS, PositionNoise
 from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.filters.state_variable import Chain, low_pass_once
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -92,7 +91,7 @@ class Motion:
         return np.ones(len(self.rows))
 
 
-def from_surface(motion: Motion, inside: NDArray[np.bool_], surface: float) -> Motion:
+def from_surface(motion: Motion, inside: Mask, surface: float) -> Motion:
     """The same motion counted from a surface: nothing is pressed before it is met.
 
     Args:

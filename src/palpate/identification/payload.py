@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.filters.position_noise import position_noise
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.free_motion import FreeMotion
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.sampling import Channels
-
-Array = NDArray[np.float64]
 
 _SEEN = 10.0
 """Power of the acceleration over that of the position's noise in it, at least: the mass would be off by a tenth."""

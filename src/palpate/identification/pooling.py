@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Verdict
 from palpate.results import Result
 
-Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 _ROUNDS = 100

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.contacts import Contacts
 from palpate.identification.filters.bandwidth import highest_motion
@@ -24,7 +25,6 @@ from palpate.identification.sampling import Channels
 from palpate.identification.touch import Touch, touching
 from palpate.identification.warning_codes import Code
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 _FEWEST = 30
@@ -141,7 +141,7 @@ class Problem:
         )
 
     @property
-    def in_contact(self) -> NDArray[np.bool_]:
+    def in_contact(self) -> Mask:
         """Samples of the position between the first and the last row of a contact, shape (n,)."""
         found = np.zeros(len(self.motion.position), bool)
         instants = self.motion.instants
@@ -221,10 +221,10 @@ def _fewer(touch: Touch | None) -> Touch | None:
     return Touch(touch.rows[kept], touch.spans[kept], touch.force[kept])
 
 
-def _pieces(count: int) -> NDArray[np.bool_]:
+def _pieces(count: int) -> Mask:
     pieces = -(-count // _PIECE)
     every = -(-pieces // (MOST_ROWS // _PIECE))
-    kept: NDArray[np.bool_] = (np.arange(count) // _PIECE) % every == 0
+    kept: Mask = (np.arange(count) // _PIECE) % every == 0
     return kept
 
 
@@ -321,13 +321,13 @@ def _too_few(count: int, channels: Channels) -> str:
     return f"{text} ({'; '.join(lost)})" if lost else text
 
 
-def _settled(valid: NDArray[np.bool_], memory: int) -> NDArray[np.bool_]:
+def _settled(valid: Mask, memory: int) -> Mask:
     """Where nothing invalid lies within the filter's memory."""
     if valid.all():
         return valid
     bad = np.r_[0, np.cumsum(~valid)]
     index = np.arange(len(valid))
-    settled: NDArray[np.bool_] = bad[index + 1] - bad[np.maximum(index - memory, 0)] == 0
+    settled: Mask = bad[index + 1] - bad[np.maximum(index - memory, 0)] == 0
     return settled
 
 
@@ -363,9 +363,7 @@ def _of_sensor_path(channels: Channels, chain: Chain, contacts: Contacts, option
     return Problem(motion, force[rows], spans, lag, free, touch, approach, origin, contacts)
 
 
-def _path_usable(
-    clock: SampleClock, position: Array, valid: NDArray[np.bool_], path: SensorPath
-) -> NDArray[np.bool_]:
+def _path_usable(clock: SampleClock, position: Array, valid: Mask, path: SensorPath) -> Mask:
     """Samples whose way through the sensor lies within the log, shape (m,)."""
     before, after = path.reach
     far = path.low_pass.lag / path.dt + before
@@ -376,7 +374,7 @@ def _path_usable(
 def _path_rows(
     time: Array,
     path: SensorPath,
-    usable: NDArray[np.bool_],
+    usable: Mask,
     contacts: Contacts,
     between: list[tuple[float, float]],
 ) -> tuple[Rows, Rows]:

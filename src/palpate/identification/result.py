@@ -8,8 +8,8 @@ from math import pi, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.warning_codes import Warn
 from palpate.results import Compared, Result
 from palpate.signals import Estimate
@@ -137,8 +137,8 @@ class Press(Compared):
     """
 
     tangent: tuple[Tangent, ...]
-    loading: NDArray[np.float64]
-    unloading: NDArray[np.float64]
+    loading: Array
+    unloading: Array
     hysteresis_loss: float | None = None
     relaxation: Relaxation | None = None
     late: tuple[float, float] | None = None
@@ -222,13 +222,13 @@ class Traces(Compared):
         position_unit, force_unit: of the log.
     """
 
-    time: NDArray[np.float64]
-    force: NDArray[np.float64]
-    fitted_time: NDArray[np.float64]
-    fitted_position: NDArray[np.float64]
-    fitted_force: NDArray[np.float64]
-    predicted: NDArray[np.float64]
-    columns: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    time: Array
+    force: Array
+    fitted_time: Array
+    fitted_position: Array
+    fitted_force: Array
+    predicted: Array
+    columns: dict[str, Array] = field(default_factory=dict)
     theta: dict[str, float] = field(default_factory=dict)
     prior: dict[str, float] = field(default_factory=dict)
     matched: bool = False

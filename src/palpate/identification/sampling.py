@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.filters.state_variable import block_means
 from palpate.identification.saturation import at_limit
 from palpate.identification.warning_codes import Code, Warn, from_word
 from palpate.records import Record
 from palpate.signals.held import fresh_rows
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _FEWEST = 20
 _LARGEST = 1e30

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
+from palpate.arrays import Array, Mask
+
+Rows = Mask
 
 _FEWEST = 8
 _RUN = 3

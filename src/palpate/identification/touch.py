@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array, Mask
+
 Rows = NDArray[np.intp]
 
 
@@ -40,7 +41,7 @@ def touching(
     spans: Rows,
     begins: Sequence[int],
     margin: int,
-    usable: NDArray[np.bool_],
+    usable: Mask,
     reach: int = 0,
 ) -> Touch | None:
     """The rows in contact and those before each touch; None if no touch is in the log.

@@ -6,17 +6,15 @@ The arm's own laws fill M, h and J, or MuJoCo does; contact, sensor and motors a
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
+from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
 from palpate.robots.serial.chain import Chain, Room, axis_of, chain_motion, room_for
 from palpate.robots.serial.linear import backward, factorise, forward_both, product
 from palpate.robots.serial.spatial import Wrench, cross
-
-Array = NDArray[np.float64]
 
 
 @part

@@ -6,15 +6,13 @@ from copy import copy
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import Bound
 from palpate._vector import Mat3, Vec3
+from palpate.arrays import Array
 from palpate.press.cell import Body, Cell, Touch, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.serial_arm import SerialArm
-
-Array = NDArray[np.float64]
 
 ENGINES = ("own", "mujoco")
 _HELD = 1e9

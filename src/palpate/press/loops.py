@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
 from palpate.force.gains import Gains, approach_speed
 from palpate.force.lag import lag_of
-
-Array = NDArray[np.float64]
 
 MODES = ("torque", "position")
 _TYPICAL = {"torque": "fr3", "position": "ur5e"}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import ZERO3, Vec3, Vec6
+from palpate.arrays import Array
 from palpate.bench.sequence import APPROACH, CONTACT, LOST
 from palpate.controllers import Hybrid, Impedance, ProportionalIntegral, ResolvedAcceleration
 from palpate.controllers.proportional_integral import integral_gain
@@ -18,8 +18,6 @@ from palpate.press.protocol import Command, Sense, Wire
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.signals.types import Task
-
-Array = NDArray[np.float64]
 
 CAUTIOUS = "cautious"
 CONTROLLERS = (CAUTIOUS, "hybrid", "proportional-integral", "impedance")

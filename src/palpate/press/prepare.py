@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.contact_frame import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
@@ -25,8 +25,6 @@ from palpate.press.tool import held_tool, with_tool
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.serial_arm import SerialArm
-
-Array = NDArray[np.float64]
 
 _UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 

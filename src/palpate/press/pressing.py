@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.bench.ending import DIVERGED, DONE, INTERRUPTED, LOST_CONTACT, NO_CONTACT, Ending
 from palpate.bench.sequence import APPROACH, CONTACT, LOST
 from palpate.press.pilots import Acted, Pilot
@@ -17,7 +17,6 @@ from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.records import Record
 
-Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact"}

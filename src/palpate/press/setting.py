@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Mat3, Vec3
+from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop
@@ -17,8 +17,6 @@ from palpate.force.sampled_loop import filter_of, held
 from palpate.press.cell import NO_TOOL, Cell, HeldTool, WristSensor
 from palpate.robots.serial.inverse import checked_pose
 from palpate.robots.serial.serial_arm import SerialArm
-
-Array = NDArray[np.float64]
 
 GAP = 0.003
 """Between tip and surface at the start [m]."""

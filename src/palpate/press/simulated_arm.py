@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import Bound
 from palpate._vector import ZERO3, Mat3, Vec3, Vec6
+from palpate.arrays import Array
 from palpate.bench.given_motion import rest_for
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
@@ -26,8 +26,6 @@ from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import task_room_for
 from palpate.signals.types import Task
-
-Array = NDArray[np.float64]
 
 ENCODER = 1e-7
 """Resolution of a joint's position [rad, m]: a motor's encoder of 19 bits before a gear of 100."""

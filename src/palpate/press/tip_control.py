@@ -2,17 +2,12 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from palpate._jit import kernel, law
 from palpate._vector import Vec3, Vec6
 from palpate.controllers.controller import controller
 from palpate.robots.serial.described import tip_of
 from palpate.robots.serial.task import into, joint_torque, task_model
 from palpate.signals.types import Sense
-
-Array = NDArray[np.float64]
 
 
 @controller

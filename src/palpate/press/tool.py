@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._vector import Vec3
+from palpate.arrays import Array
 from palpate.contact_frame import Payload
 from palpate.contact_frame.weighing.weighed import side_of
 from palpate.press.cell import NO_TOOL, HeldTool
 from palpate.robots.serial.chain import spread_of
 from palpate.robots.serial.serial_arm import SerialArm
-
-Array = NDArray[np.float64]
 
 
 def held_tool(payload: Payload | None) -> HeldTool:

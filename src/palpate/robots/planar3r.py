@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._vector import Mat3, Vec3
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.robots.arm3 import Arm3
-
-Array = NDArray[np.float64]
 
 _THESIS = Arm3()
 

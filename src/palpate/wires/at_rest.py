@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.press.tare import SURE, TARE, check_range
 from palpate.wires.order import Order
 from palpate.wires.protocol import Sense, Wire
-
-Array = NDArray[np.float64]
 
 _FEWEST = 20
 """Readings, at least: they tell the noise's deviation to 1/sqrt(2 n), 16 %, and `_check` wants eight of them."""

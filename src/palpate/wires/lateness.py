@@ -6,9 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 _CLOCKS = 1e-4
 """Rate at which two clocks may run apart [s/s]: twice what quartz does."""

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.wires.at_rest import AtRest
 from palpate.wires.lateness import Lateness
 from palpate.wires.order import Order
-
-Array = NDArray[np.float64]
 
 _BAND = 0.05
 """Of the force, within which a press counts as settled."""

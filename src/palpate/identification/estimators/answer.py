@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget
 from palpate.identification.estimators.fit import Prediction
 from palpate.identification.problem import Problem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Mask
 from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.by_octave import LARGEST, Solution, System, solve
 
@@ -39,7 +38,7 @@ def members(
     noise: Array,
     sensor: Array,
     forces: list[list[int]],
-    use: NDArray[np.bool_] | None = None,
+    use: Mask | None = None,
 ) -> list[Member]:
     """What is likely, the weights adding up to one.
 

@@ -11,12 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators.by_octave import Solution, System, worth
 from palpate.identification.least_squares import inverse
-
-Array = NDArray[np.float64]
 
 HIDDEN_SHARE = 0.5
 """Share of the unexplained amplitude of an octave that may lie along a parameter's own column: of a force in an

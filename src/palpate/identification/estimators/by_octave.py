@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.identification.estimators.octaves import Octaves
 from palpate.identification.least_squares import solved
-
-Array = NDArray[np.float64]
 
 _STEPS = 3
 """Of reweighting. Two are enough for the efficiency of known levels (feasible generalised least squares); until they
@@ -83,7 +81,7 @@ def system_of(octaves: Octaves, names: tuple[str, ...], prior: dict[str, tuple[f
     return System(total, octaves.all_lines, (octaves.products, octaves.lines), mean, weight)
 
 
-def solve(system: System, noise: Array, use: NDArray[np.bool_] | None = None) -> Solution:
+def solve(system: System, noise: Array, use: Mask | None = None) -> Solution:
     """Solve for given noise levels.
 
     Args:

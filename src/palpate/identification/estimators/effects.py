@@ -11,10 +11,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.models import Model, Motion
-
-Array = NDArray[np.float64]
 
 FRICTION = "Fc"
 TOUCH = "touch"

@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array
 
 _LEAST = 0.1
 """Share of the information in any direction that must be left for the noise's to be taken out."""

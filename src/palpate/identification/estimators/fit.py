@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators.lag_uncertainty import bias_corrected, hidden, with_lag
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import Noise, covariance, noise_of, quantile, solve
 from palpate.identification.models import Model, Motion, NonlinearParameter
 from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 30
 _CONVERGED = 1e-6

@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.identification.even_sampling import even_period
 from palpate.identification.filters.bandwidth import choose_cutoff
@@ -27,7 +28,6 @@ from palpate.identification.filters.state_variable import Chain, low_pass_once
 from palpate.identification.least_squares import covariance, noise_of, solve
 from palpate.signals.types import Estimate
 
-Array = NDArray[np.float64]
 Noisy = Literal["position", "force"]
 
 ORDERS = {"kelvin-voigt": (1, 0), "kelvin-voigt-mass": (2, 0), "standard-linear-solid": (2, 1)}

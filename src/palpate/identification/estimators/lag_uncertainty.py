@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators.errors_in_variables import Compensation, compensation, resting
 from palpate.identification.least_squares import Noise, covariance
 from palpate.identification.models import Model, Motion
 from palpate.identification.prior import Lag
-
-Array = NDArray[np.float64]
 
 
 def of_derivatives(model: Model, theta: Array) -> tuple[Array, Array]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.averaging import Member, averaged, mean_budget, members, of_octaves
@@ -25,8 +25,6 @@ from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model
 from palpate.identification.prior import LAG, mass_std
 from palpate.identification.problem import Problem
-
-Array = NDArray[np.float64]
 
 
 def lag_open(problem: Problem) -> bool:
@@ -62,7 +60,7 @@ class Linearisation:
     prior: dict[str, tuple[float, float]]
     segments: list[Segment]
     octaves: Octaves
-    use: NDArray[np.bool_]
+    use: Mask
     noisy: dict[int, Array]
     system: System
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit, fit
@@ -17,8 +17,6 @@ from palpate.identification.options import LEAST_SQUARES
 from palpate.identification.problem import Problem
 from palpate.identification.sampling import Channels
 from palpate.signals.types import Estimate
-
-Array = NDArray[np.float64]
 
 
 def estimated_by(method: str, answer: Answer, problem: Problem, channels: Channels) -> Fit:

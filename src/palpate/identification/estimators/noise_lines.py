@@ -6,9 +6,8 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Mask
 from palpate.identification.estimators.budget import white_level
 from palpate.identification.estimators.by_octave import Solution, System, worth
 from palpate.identification.estimators.octaves import Octaves, Segment, lines_of, longest_of, octaves_of
@@ -60,9 +59,7 @@ def derivative_products(noisy: dict[int, Array]) -> Array:
     return found
 
 
-def seen(
-    motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives: dict[int, int]
-) -> NDArray[np.bool_]:
+def seen(motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives: dict[int, int]) -> Mask:
     """Octaves up to the first in which a column is mostly the position's noise, which pulls its parameter to zero.
 
     Args:
@@ -82,7 +79,7 @@ def sensor_lines(
     problem: Problem,
     segments: list[Segment],
     octaves: Octaves,
-    use: NDArray[np.bool_],
+    use: Mask,
     system: System,
     solution: Solution,
 ) -> tuple[Array, Array]:

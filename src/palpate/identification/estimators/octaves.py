@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array, Mask
 
 SHORTEST = 16
 """Rows of a segment, at least: one block."""
@@ -75,7 +75,7 @@ class Octaves:
         whole: Array = self.lines.sum(axis=0)
         return whole
 
-    def only(self, use: NDArray[np.bool_]) -> Octaves:
+    def only(self, use: Mask) -> Octaves:
         """The same with some octaves alone, shape (octaves,)."""
         return Octaves(self.products * use[None, :, None, None], self.lines * use[None, :], self.frequency)
 

@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.estimators.simulation import (
     COLUMNS,
@@ -26,8 +26,6 @@ from palpate.identification.estimators.simulation import (
 from palpate.identification.even_sampling import even_period
 from palpate.identification.least_squares import covariance, noise_of
 from palpate.signals.types import Estimate
-
-Array = NDArray[np.float64]
 
 LINEAR = ("M", "B", "K", "offset")
 CURVED = ("M", "B", "K", "K2", "K3", "offset")

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Mask
 from palpate.errors import InputError
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.answer import Answer
@@ -109,9 +109,7 @@ def _start(local: Linearisation) -> Linearisation:
     return Linearisation.of(problem, local.model, local.segments, about)
 
 
-def _over_approach(
-    problem: Problem, inside: NDArray[np.bool_], known: Linearisation, found: Solution
-) -> Answer | None:
+def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: Solution) -> Answer | None:
     """Over the approach too: how the force rises from nothing tells most of a press that then rests.
 
     The surface is looked for: what a wrong place of it does is a force that is there at once with the touch.

@@ -11,12 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import kernel, law
+from palpate.arrays import Array
 from palpate.errors import InputError
-
-Array = NDArray[np.float64]
 
 PARAMETERS = ("M", "B", "K", "K2", "K3", "offset", "lag")
 """Of the oscillator, in the order of its sensitivities; `lag` [s] is how much later the force is read."""

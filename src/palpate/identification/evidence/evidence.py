@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification import in_series
 from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.evidence.press import press_of, slope_of, strokes_in
@@ -16,7 +16,6 @@ from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, WorkingPoint
 
-Array = NDArray[np.float64]
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
 
 

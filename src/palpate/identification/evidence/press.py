@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array, Mask
 from palpate.identification.estimators.budget import NORMAL
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.evidence.work import way_out
@@ -15,8 +16,6 @@ from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import Press, Relaxation, Tangent
-
-Array = NDArray[np.float64]
 
 UPPER = 0.4
 """Share of the force above which a way in counts for its stiffness: below, a surface is still being met."""
@@ -144,10 +143,10 @@ def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> 
     return (first, last) if depth[last - 1] - depth[first] >= 0.5 * reach else (begin, top)
 
 
-def _met(stroke: Stroke) -> NDArray[np.bool_]:
+def _met(stroke: Stroke) -> Mask:
     """Rows in which the surface is met."""
     low, high = np.percentile(stroke.force, [2, 98])
-    rows: NDArray[np.bool_] = stroke.force >= low + _MET * (high - low)
+    rows: Mask = stroke.force >= low + _MET * (high - low)
     return rows
 
 

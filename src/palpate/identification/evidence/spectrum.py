@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.pooling import student
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 PERIODS = 4

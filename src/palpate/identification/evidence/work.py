@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
-
-Array = NDArray[np.float64]
 
 _FEWEST = 6
 

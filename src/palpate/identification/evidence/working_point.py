@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.identification.estimators.budget import HIDDEN_SHARE
 from palpate.identification.estimators.octaves import segments_of
@@ -15,8 +14,6 @@ from palpate.identification.in_series import slope_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Parameter, Verdict, WorkingPoint
-
-Array = NDArray[np.float64]
 
 _EXCITED = 0.05
 """Share of the position's variance that makes an octave worth a headline: one part in twenty of the motion."""

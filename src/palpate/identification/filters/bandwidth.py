@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.filters.position_noise import position_noise
 from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.models import Motion
-
-Array = NDArray[np.float64]
 
 FASTEST = 1 / 8
 """Highest cut-off as a share of the readings per second: above it sampling, not filtering, sets the error."""

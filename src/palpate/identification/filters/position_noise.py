@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from palpate.arrays import Array
 
 _FROM = 0.2
 """Share of the sampling rate above which there is no motion."""

@@ -13,11 +13,10 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.filters.position_noise import PositionNoise
 from palpate.signals.low_pass import LowPass
 from palpate.signals.taps import Taps, read, taps
-
-Array = NDArray[np.float64]
 
 DERIVATIVES = 5
 _NEAR = 0.25

@@ -14,9 +14,8 @@ from math import factorial, pi
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.identification.filters.position_noise import PositionNoise
-
-Array = NDArray[np.float64]
 
 ORDER = 5
 _LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak

@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.robots.serial._extra import mujoco, refusals
 from palpate.robots.serial.inertias import check_inertia
-
-Array = NDArray[np.float64]
 
 
 def load_mjcf(path: Path) -> tuple[Any, list[str]]:

@@ -7,10 +7,10 @@ calculated with are values. One compiled version serves every arm.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, cos, sin
+from palpate.arrays import Array
 from palpate.robots.serial.spatial import (
     UNIT3,
     Inertia,
@@ -22,8 +22,6 @@ from palpate.robots.serial.spatial import (
     squares,
     turned_about_z,
 )
-
-Array = NDArray[np.float64]
 
 
 @part

@@ -3,13 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
+from palpate.arrays import Array
 from palpate.robots.serial.chain import Room, Tip, chain_model, jacobian_rate, room_for
-
-Array = NDArray[np.float64]
 
 
 @part

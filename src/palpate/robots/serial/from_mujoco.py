@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.robots.serial._extra import mujoco, refusals
 from palpate.robots.serial._loading import load_mjcf
 from palpate.robots.serial.chain import Chain, spread_of
 from palpate.robots.serial.serial_arm import Scene, SerialArm
-
-Array = NDArray[np.float64]
 
 
 def from_mujoco(model: Any, site: str | None = None) -> SerialArm:

@@ -10,14 +10,13 @@ from typing import Annotated, Any, Literal
 import msgspec
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.robots.serial.chain import Chain, spread_of
 from palpate.robots.serial.inertias import check_inertia
 from palpate.robots.serial.serial_arm import SerialArm
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 NotNegative = Annotated[float, Meta(ge=0)]
 Positive = Annotated[float, Meta(gt=0)]

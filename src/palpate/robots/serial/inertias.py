@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 
-Array = NDArray[np.float64]
 _ROUNDING = 1e-12
 """Of an inertia tensor's eigenvalues, as a share of the largest: some thousand last places of a float."""
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.robots.serial.serial_arm import SerialArm
 
-Array = NDArray[np.float64]
 
 _STARTS = 24
 """Points from which the search begins; the first is where the arm is."""

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.robots.serial.chain import Chain, chain_model, room_for
 from palpate.robots.serial.described import Found, compiled_description, found_for
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,11 @@ of which the second part moves joints to spare and not the tip.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import law, part
 from palpate._vector import Vec3, Vec6
+from palpate.arrays import Array
 from palpate.robots.serial.linear import backward, factorise, forward, product
-
-Array = NDArray[np.float64]
 
 
 @part

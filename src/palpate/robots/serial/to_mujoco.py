@@ -6,13 +6,11 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import Array
 from palpate.robots.serial._extra import mujoco, refusals
 from palpate.robots.serial._loading import compiled
 from palpate.robots.serial.serial_arm import Scene, SerialArm
-
-Array = NDArray[np.float64]
 
 
 def scene_of(arm: SerialArm) -> Scene:
