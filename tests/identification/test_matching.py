@@ -207,6 +207,6 @@ def test_a_tap_too_short_for_the_low_pass_is_refused():
         u = np.clip((t - 1.0) / 0.14, 0, 1)
         return -1e-3 + 3e-3 * np.sin(np.pi * u) ** 2
 
-    with pytest.raises(InputError, match=r"only \d+ samples of the force in contact; at least 30") as caught:
+    with pytest.raises(InputError, match=r"only \d+ usable samples in contact; at least 30") as caught:
         asked(pressed_along(tap, noise=0.1), bonded=False)
     assert "\n" not in str(caught.value)

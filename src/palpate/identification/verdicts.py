@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.fit import Fit, Prediction
+from palpate.identification.estimators.fit import Fit
+from palpate.identification.estimators.prediction import Prediction
 from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.evidence import stiffness_of
 from palpate.identification.prior import LAG, Lag

@@ -9,7 +9,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget
-from palpate.identification.estimators.fit import Prediction
+from palpate.identification.estimators.prediction import Prediction
 from palpate.identification.problem import Problem
 
 

@@ -12,8 +12,9 @@ from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.averaging import Member, averaged, mean_budget, members, of_octaves
 from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.by_octave import Solution, System, system_of
+from palpate.identification.estimators.descent import linearised, slope_of_lag
 from palpate.identification.estimators.effects import FRICTION, effect_columns
-from palpate.identification.estimators.fit import Prediction, fit, linearised, slope_of_lag
+from palpate.identification.estimators.fit import fit
 from palpate.identification.estimators.noise_lines import (
     derivative_products,
     position_lines,
@@ -21,6 +22,7 @@ from palpate.identification.estimators.noise_lines import (
     sensor_lines,
 )
 from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of
+from palpate.identification.estimators.prediction import Prediction
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model
 from palpate.identification.prior import LAG, mass_std

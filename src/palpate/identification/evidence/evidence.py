@@ -9,8 +9,10 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.identification import in_series
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import press_of, slope_of, strokes_in
+from palpate.identification.evidence.press import press_of
+from palpate.identification.evidence.slope import slope_of
 from palpate.identification.evidence.spectrum import dynamic_stiffness
+from palpate.identification.evidence.strokes import strokes_in
 from palpate.identification.evidence.working_point import working_point
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem

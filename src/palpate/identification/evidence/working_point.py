@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.identification.estimators.budget import HIDDEN_SHARE
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import Slope, slope_in, unseen
+from palpate.identification.evidence.slope import Slope, slope_in, unseen
 from palpate.identification.in_series import slope_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem

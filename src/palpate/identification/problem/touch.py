@@ -7,15 +7,12 @@ themselves, with the place of the surface as a parameter, hold before the touch 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
-
-Rows = NDArray[np.intp]
+from palpate.arrays import Array
+from palpate.identification.problem.seen import Rows, Seen
 
 
 @dataclass(frozen=True)
@@ -33,43 +30,30 @@ class Touch:
     force: Array
 
 
-# More than seven arguments: what a touch is told from, each by itself.
-def touching(
-    force: Array,
-    resting: float,
-    rows: Rows,
-    spans: Rows,
-    begins: Sequence[int],
-    margin: int,
-    usable: Mask,
-    reach: int = 0,
-) -> Touch | None:
+def touching(seen: Seen, resting: float, reach: int = 0) -> Touch | None:
     """The rows in contact and those before each touch; None if no touch is in the log.
 
+    As many before as the filter remembers; fewer where the contact before is nearer, none where it is too near.
+
     Args:
-        force: filtered, shape (n,).
-        resting: what it rests at out of contact [N].
-        rows: in contact, settled, shape (m,).
-        spans: number of the contact that each belongs to, shape (m,).
-        begins: first row behind the touch of each contact.
-        margin: of the filter's memory: samples before the touch; fewer where the contact before is nearer, none where
-            it is too near.
-        usable: rows whose filter remembers only valid readings, shape (n,).
-        reach: samples before the touch for each of the contact, if there are so many; those of `margin` at least.
+        seen: the force and the rows in contact, by a front end.
+        resting: what the force rests at out of contact [N].
+        reach: rows before the touch for each of the contact, if there are so many; those of the memory at least.
     """
+    rows, spans, memory = seen.motion.rows, seen.spans, seen.memory
     before, left = [], 0
     edges = np.flatnonzero(np.diff(spans, prepend=-1))
     for number, own in zip(spans[edges], np.split(rows, edges[1:]), strict=True):
-        wanted = max(margin, reach * int(own[-1] - own[0]))
-        first = max(begins[number] - wanted, left + margin, margin)
-        if first < begins[number]:
+        begin, wanted = seen.begins[number], max(memory, reach * int(own[-1] - own[0]))
+        first = max(begin - wanted, left + memory, memory)
+        if first < begin:
             step = int(own[1] - own[0]) if len(own) > 1 else 1
             fresh = np.arange(own[0] - step, first - 1, -step)
-            before += [(row, number) for row in fresh if usable[row]]
+            before += [(row, number) for row in fresh if seen.usable[row]]
         left = int(own[-1])
     if not before:
         return None
     fresh, numbers = np.array(before, dtype=np.intp).T
     every = np.r_[rows, fresh]
     order = np.argsort(every)
-    return Touch(every[order], np.r_[spans, numbers][order], force[every[order]] - resting)
+    return Touch(every[order], np.r_[spans, numbers][order], seen.force[every[order]] - resting)

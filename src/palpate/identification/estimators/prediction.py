@@ -1,0 +1,59 @@
+"""The force that a model with given parameters predicts for a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.identification.models import Model, Motion
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The force that a model predicts for a log.
+
+    Args:
+        model: which.
+        theta: its parameters by name.
+        lag: of the force behind the position [s].
+        force, residuals: predicted, and what it leaves of the measured one, shape (n,).
+        r2, rmse: share of the variance that it explains, and rms of what it leaves.
+    """
+
+    model: Model
+    theta: dict[str, float]
+    lag: float
+    force: Array
+    residuals: Array
+    r2: float
+    rmse: float
+
+    @classmethod
+    def of(
+        cls, model: Model, motion: Motion, force: Array, theta: dict[str, float], lag: float
+    ) -> Prediction:
+        """By a model; an offset that is not among the parameters is that of the mean.
+
+        Args:
+            model: which.
+            motion: the position.
+            force: measured, shape (n,).
+            theta: its parameters.
+            lag: of the force [s].
+        """
+        columns = model.columns(motion, theta, lag)
+        predicted = sum(
+            (theta.get(n, 0.0) * c for n, c in zip(model.linear, columns, strict=True)), np.zeros(len(force))
+        )
+        if "offset" in model.linear and "offset" not in theta:
+            offset = float(np.mean(force - predicted))
+            theta, predicted = {**theta, "offset": offset}, predicted + offset
+        residuals = force - predicted
+        rmse = float(np.sqrt(np.mean(residuals**2)))
+        spread = float(np.mean((force - force.mean()) ** 2))
+        return cls(model, theta, lag, predicted, residuals, 1 - rmse**2 / spread if spread else 0.0, rmse)
+
+    def __getitem__(self, name: str) -> float:
+        return self.theta[name]
