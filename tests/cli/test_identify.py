@@ -151,7 +151,7 @@ def test_the_terminal_begins_with_the_sentence(log, capsys):
     printed = " ".join(capsys.readouterr().out.split())
     assert printed.startswith("The stiffness is ")
     assert (
-        printed.index("what limits it most is")
+        printed.index("its uncertainty is mostly due to")
         < printed.index("working point:")
         < printed.index("value ± 95 %")
     )

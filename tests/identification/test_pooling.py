@@ -147,6 +147,6 @@ def test_what_all_logs_err_by_alike_does_not_average_out():
     logs = [replace(found(100, 10), parameters={"K": alike}) for _ in range(100)]
     own = pool(logs).parameters["K"].parameter
     assert (own.ci95[1] - own.ci95[0]) / 2 == pytest.approx(9.0, rel=0.01)
-    assert next(iter(own.budget)) == "alike in all logs"
+    assert next(iter(own.budget)) == "common to all logs"
     apart = pool([found(100, 10) for _ in range(100)]).parameters["K"].parameter
     assert (apart.ci95[1] - apart.ci95[0]) / 2 < 1.1

@@ -14,7 +14,7 @@ from palpate.identification.sampling import last_digit
 def test_a_jump_of_the_time_that_would_fill_the_memory_is_refused():
     log = pressed()
     late = log["time"] + np.where(np.arange(len(log)) >= 1500, 1e6, 0.0)
-    with pytest.raises(InputError, match="the time leaps by 1e\\+06 s at row 1501"):
+    with pytest.raises(InputError, match="the time jumps by 1e\\+06 s at row 1501"):
         identify(record(late, log["position"], log["force"]))
 
 

@@ -89,7 +89,7 @@ def test_a_mass_fixed_at_none_beside_a_force_filter():
 def test_numbers_out_of_this_world_are_an_error_of_one_line(factor, channel):
     log = pressed()
     columns = {"time": log["time"], "position": log["position"], "force": log["force"]}
-    with pytest.raises(InputError, match=f"the {channel} reaches .* which no sensor reads") as caught:
+    with pytest.raises(InputError, match=f"the {channel} reaches .* beyond any sensor") as caught:
         identify(record(**(columns | {channel: factor * columns[channel]})), lag=0.0)
     assert "\n" not in str(caught.value)
 
@@ -99,13 +99,13 @@ def test_a_log_that_is_little_else_than_a_gap_does_not_fill_the_memory(leap):
     """A clock that is set while it records, or a night between two presses."""
     log = pressed()
     time = log["time"] + leap * (np.arange(len(log)) >= len(log) // 2)
-    with pytest.raises(InputError, match=r"leaps by 1.* s at row 1501.*--start and --end"):
+    with pytest.raises(InputError, match=r"jumps by 1.* s at row 1501.*--start and --end"):
         identify(record(time=time, position=log["position"], force=log["force"]), lag=0.0)
 
 
 def test_a_time_that_is_counted_in_another_unit_does_not_take_for_ever():
     log = pressed()
-    with pytest.raises(InputError, match="rows a second, and no sensor is read so fast"):
+    with pytest.raises(InputError, match="rows a second, faster than any sensor"):
         identify(record(time=1e-6 * log["time"], position=log["position"], force=log["force"]))
 
 

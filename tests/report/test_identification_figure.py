@@ -42,7 +42,7 @@ def test_the_panels_and_what_they_measure(found):
 
 def test_a_log_without_a_way_in_says_so(found):
     bare = replace(found, press=None)
-    assert "no way into the surface" in quantity_of(axes_of(draw(bare, "log"))["Press"])
+    assert "no loading in this log" in quantity_of(axes_of(draw(bare, "log"))["Press"])
 
 
 def test_storage_and_loss_are_those_of_the_octaves(found):

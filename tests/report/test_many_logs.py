@@ -51,11 +51,11 @@ def test_the_sentence_holds_mean_next_press_place_and_cause(rows, pooled):
     text = sentence(rows, pooled)
     assert text.startswith("Over 4 of 5 logs the stiffness is 50")
     for part in (
-        "the next press will be from",
+        "the next press is predicted at",
         "14.8 N to 15.3 N",
         "2 mm deep",
         "1.5 Hz",
-        "what limits it most is",
+        "its uncertainty is mostly due to",
     ):
         assert part in text
     assert own.prediction95[0] < own.parameter.ci95[0]

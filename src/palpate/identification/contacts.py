@@ -140,7 +140,7 @@ def find_contacts(
         spans = _long(_between_losses(channels, sign, (level, top), air, spans, chain), chain)
     if whole and not spans:
         text = (
-            "the probe leaves the surface again and again, and what is between is too short for the filter:"
+            "the probe leaves the surface again and again, and each contact is too short for the filter:"
             " press deeper, move slower or log faster"
         )
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
@@ -179,7 +179,7 @@ def _without_drift(channels: Channels, air: FreeMotion) -> Channels:
     raw = replace(raw, held_force=raw.held_force - air.drift(at))
     warnings, moved = channels.warnings, float(np.ptp(air.levels))
     if moved > air.noise:  # less is not seen in the log
-        text = f"the force in the air differs by {moved:.3g} N from stay to stay there, which is taken out as a drift"
+        text = f"the force in the air differs by {moved:.3g} N from stay to stay there, which is removed as a drift"
         warnings = (*warnings, Warn(Code.FORCE_DRIFTS, text))
     return replace(channels, force=channels.force - air.drift(rows), raw=raw, warnings=warnings)
 
@@ -235,11 +235,13 @@ def _oriented(
     sign, way, level, threshold = levels
     warnings = []
     if sign < 0:
-        text = "the force goes to negative values in contact; its sign was turned round"
+        text = "the force goes to negative values in contact; its sign was reversed"
         warnings.append(Warn(Code.FORCE_SIGN_REVERSED, text))
     signed = options.force_sign in (None, int(sign))
     if not signed:
-        text = "the force counts the other way than --force-sign says: in contact it goes to the other side of its rest"
+        text = (
+            "the sign of the force contradicts --force-sign: in contact it goes to the other side of its rest"
+        )
         warnings.append(Warn(Code.NEGATIVE_STIFFNESS, text))
     inside = ~_outside(len(position), spans, 0)
     out = _outside(len(position), spans, 0)
@@ -251,10 +253,10 @@ def _oriented(
             apart = float(np.corrcoef(position[inside], sign * force[inside])[0, 1])
         way = 1.0 if apart >= 0 else -1.0
     if way < 0:
-        text = "the position falls as the probe goes in; its sign was turned round"
+        text = "the position falls as the probe goes in; its sign was reversed"
         warnings.append(Warn(Code.POSITION_SIGN_REVERSED, text))
     if spans[0][0] == 0:
-        text = "the log begins in contact: where that contact began is not known"
+        text = "the log begins in contact: the depth of that contact is not known"
         warnings.append(Warn(Code.CONTACT_AT_START, text))
     return Contacts(tuple(spans), False, sign, way, level, threshold, tuple(warnings), signed=signed)
 

@@ -24,7 +24,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Press, Tangent, Verdict
 
-ASSUMED = "a half space (deep and wide against the contact), small strain, no adhesion"
+ASSUMED = "a half space (deep and wide compared with the contact), small strain, no adhesion"
 """What the laws rest on, and no press shows."""
 _UNTOLD = (0.75, 1.0)
 """1 - nu^2 of materials that do not thicken when they are pulled: nu from 0.5 to 0."""
@@ -153,12 +153,12 @@ def _modulus(
 def _refused(press: Press | None) -> str | None:
     """Why no slope of the press may be used; None if it may."""
     if press is None or not press.tangent:
-        return "the log shows no way in, of which a slope could be taken"
+        return "the log has no loading whose slope could be estimated"
     flat = next((t for t in press.tangent if t.stiffness <= t.half), None)
     if flat is not None:
         return f"at {flat.force:.3g} N the force does not rise with the depth ({_shown(flat)})"
     if len(press.tangent) < 2:
-        return "the slope is known at one force only, which does not show how it grows"
+        return "the slope is known at one force only; its growth is not"
     if press.tangent[0].force <= 0:
         return "the force of the press is not above zero"
     return None
@@ -211,7 +211,7 @@ def _judged(
     budget = {cause: part for cause, part in parts.items() if part > 1e-3 * half}
     budget = dict(sorted(budget.items(), key=lambda item: -item[1]))
     main = next(iter(budget), "noise")
-    ratio = "Poisson's ratio 0 to 0.5 (none told)" if poisson is None else f"Poisson's ratio {poisson[0]:g}"
+    ratio = "Poisson's ratio 0 to 0.5 (none given)" if poisson is None else f"Poisson's ratio {poisson[0]:g}"
     radius = 1e3 * indenter.contact_radius(depth)
     terms = f"a {indenter}, {ratio}, contact radius about {radius:.2g} mm; assumed: {ASSUMED}"
     low, high = value - half, value + half

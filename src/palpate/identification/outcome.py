@@ -153,7 +153,9 @@ def _doubts(parameters: dict[str, Parameter], problem: Problem, options: Options
         warnings.append(Warn(Code.UNIT_GUESS, text))
     series = options.series_stiffness
     if stiffness is not None and series and stiffness > series / 3:
-        text = f"K = {stiffness:.3g} against {series:.3g} N/m in series with it: K rests on that calibration"
+        text = (
+            f"K = {stiffness:.3g} against {series:.3g} N/m in series with it: K depends on that calibration"
+        )
         warnings.append(Warn(Code.SERIES_COMPLIANCE, text))
     deep = float(np.ptp(problem.motion.position[_samples(problem)]))
     if terms.position_unit == "m" and deep > _DEEPEST:

@@ -42,12 +42,10 @@ class Payload:
     @property
     def text(self) -> str:
         """What it means."""
-        seen = f"in the air the force goes as a mass of {self.mass:.3g} kg (std {self.std:.2g})"
+        seen = f"in the air the force follows a mass of {self.mass:.3g} kg (std {self.std:.2g})"
         if self.mass > 0:
-            return f"{seen}: what moves beyond the force sensor; it is taken out"
-        return (
-            f"{seen}: a tool's inertia was taken out with the wrong sign, or too much of it; it is put back"
-        )
+            return f"{seen}: it moves beyond the force sensor, and its inertia is removed"
+        return f"{seen}: a tool's inertia was compensated with the wrong sign, or too much; it is restored"
 
 
 def payload_of(

@@ -88,7 +88,8 @@ def identify(
     holds = estimated_by(method, choice.answer, choice.problem, channels)
     follows = max(choice.answer.fit.r2, holds.r2) > _FOLLOWS
     if not (contacts.clear or bonded or follows):
-        text = f"the force (rms {choice.answer.unexplained:.3g} N) does not follow the position: nothing seems touched"
+        rms = f"rms {choice.answer.unexplained:.3g} N"
+        text = f"the force ({rms}) does not follow the position: there seems to be no contact"
         return nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
     evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer.hidden)
     if series_stiffness is not None:

@@ -29,8 +29,8 @@ _ALONE = 4.0
 POOLED = ("K", "B", "M", "E")
 """Parameters that mean the same in each log."""
 BY_CHANCE = ("noise", "repetition", "blocks")
-"""Causes that err otherwise in each log. The rest bound what errs alike in all logs of one rig and one motion (the lag,
-a calibration, a force that the model has not): no number of logs makes them smaller."""
+"""Causes whose errors are independent from log to log. The others are errors common to all logs of one rig and one
+motion (the lag, a calibration, a force that the model lacks): no number of logs makes them smaller."""
 _ALIKE = {"kelvin-voigt-mass": "kelvin-voigt"}
 """Models whose parameters of one name are one quantity."""
 
@@ -292,7 +292,7 @@ def _judged(mean: Mean, alike: float, count: int, kind: tuple[str, str], toleran
     parts = {
         "between logs": mean.half * float(np.sqrt(mean.share)),
         "each log": mean.half * float(np.sqrt(1 - mean.share)),
-        "alike in all logs": alike,
+        "common to all logs": alike,
     }
     budget = {cause: part for cause, part in sorted(parts.items(), key=lambda item: -item[1]) if part > 0}
     if share >= 1:

@@ -114,7 +114,9 @@ def channels_of(record: Record) -> Channels:
     _leave_saturated(use_f & use_x, use_f, position, force, warnings)
     rate = min(_rate(time[use_x]), _rate(time[use_f]), 1 / dt)
     if rate < _SLOW:
-        text = f"only {rate:.3g} fresh readings a second: behaviour faster than about {rate / 8:.2g} Hz is not seen"
+        text = (
+            f"only {rate:.3g} fresh readings a second: motion faster than about {rate / 8:.2g} Hz is not seen"
+        )
         text += "; or is the time in ms? then say NAME:ms" if dt >= _LONG_STEP else ""
         warnings.append(Warn(Code.LOW_RATE, text))
     grid = time if even else np.arange(time[0], time[-1] + dt / 2, dt)
@@ -202,7 +204,7 @@ def _check(time: Array, position: Array, force: Array) -> None:
         raise InputError(f"{text}; sort the log or cut it there with --start and --end")
     if _rate(time) > _FASTEST:
         raise InputError(
-            f"there are {_rate(time):.3g} rows a second, and no sensor is read so fast; is the unit of time right?"
+            f"there are {_rate(time):.3g} rows a second, faster than any sensor; is the unit of time right?"
         )
     for name, values in (("position", position), ("force", force)):
         seen = values[np.isfinite(values)]
@@ -211,11 +213,11 @@ def _check(time: Array, position: Array, force: Array) -> None:
         reach = float(np.abs(seen).max())
         if reach > _LARGEST or 0 < reach < 1 / _LARGEST:
             raise InputError(
-                f"the {name} reaches {reach:.3g}, which no sensor reads; is it the right column and unit?"
+                f"the {name} reaches {reach:.3g}, beyond any sensor; is it the right column and unit?"
             )
         if np.ptp(seen) == 0:
             raise InputError(
-                f"the {name} is {seen[0]:.6g} in every row; is it the right column, did anything move?"
+                f"the {name} is {seen[0]:.6g} in every row; is it the right column, and did anything move?"
             )
 
 
@@ -241,7 +243,7 @@ def _check_leaps(time: Array, step: Array, dt: float) -> None:
     if samples > max(_BRIDGED * len(time), _FEW):
         widest = int(np.argmax(step))
         raise InputError(
-            f"the time leaps by {step[widest]:.6g} s at row {widest + 2}, and {len(time)} rows would become"
+            f"the time jumps by {step[widest]:.6g} s at row {widest + 2}, and {len(time)} rows would become"
             f" {samples:.3g} samples; cut the log there with --start and --end"
         )
 

@@ -103,7 +103,7 @@ def choose(problem: Problem, options: Options) -> Choice:
                     best, at = rich, own
         return Choice(best, at, tuple(tried))
     if options.series_stiffness is not None:
-        raise InputError(f"{name} behind a series stiffness is not offered: take --model kelvin-voigt-mass")
+        raise InputError(f"{name} is not available with a series stiffness: use --model kelvin-voigt-mass")
     rich, own = _one_sided(_MAKERS[name], problem)
     return Choice(rich, own, (_compared(rich, "asked for"),))
 
@@ -120,15 +120,15 @@ def _one_sided(make: Callable[..., Model], problem: Problem) -> tuple[Answer, Pr
 def _against(rich: Answer, told: float, tolerance: float) -> str:
     """Why a richer model is not taken; empty if it is. `told` is the share that those before it explain at most."""
     if (1 - rich.explained) > 0.5 * (1 - told):
-        return "explains less than half of what a plainer model leaves"
+        return "explains less than half of a simpler model's residual"
     for parameter in rich.fit.model.nonlinear:
         if not parameter.low < rich.fit[parameter.name] < parameter.high:
-            return f"its {parameter.name} lies beyond what the log can show"
+            return f"its {parameter.name} is outside the range that the log can show"
     for name in ("K", *_ADDED[rich.fit.model.name]):
         value, half = rich[name], rich.half_of(name)
         known = half <= tolerance * abs(value) and (name != "n" or abs(value - 1) > half)
         if value <= 0 or not known:
-            return f"the log does not tell its {name} ({value:.3g} +- {half:.2g})"
+            return f"the log does not show its {name} ({value:.3g} +- {half:.2g})"
     return unrecovered(rich)
 
 

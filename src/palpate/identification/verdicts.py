@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.identification.causes import NOISE, cause_of
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.estimators.prediction import Prediction
@@ -106,7 +107,7 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
         reason = f"the fit gives {_digits(value)} {_shown(unit)}, below zero: no passive surface does that"
         return said(Verdict.REJECTED, " ".join(reason.split()), number=False)
     if half > _NOTHING * max(abs(value), 1e-300):
-        return said(Verdict.NOT_IDENTIFIABLE, f"the log says nothing of it: {_REMEDY['noise']}", number=False)
+        return said(Verdict.NOT_IDENTIFIABLE, f"the log does not show it: {NOISE.remedy}", number=False)
     bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_shown(unit)}".rstrip()
     clear = interval[0] > 0 or interval[1] < 0
     if not choice.explains:
@@ -116,8 +117,8 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
     if half <= terms.tolerance * abs(value) and clear:
         return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}")
     limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
-    main = next(iter(budget), "noise")
-    reason = f"{bounds}; {limit}. Most of it is {main}: {_REMEDY.get(main, _REMEDY['noise'])}"
+    main = cause_of(next(iter(budget), "noise"))
+    reason = f"{bounds}; {limit}. Mostly due to {main.described}: {main.remedy}"
     return said(Verdict.NOT_IDENTIFIABLE, reason, number=clear)
 
 
@@ -127,22 +128,6 @@ def _at(found: Answer, name: str, terms: Terms) -> str:
     if depth is None or name in _SHAPE:
         return ""
     return f", at a penetration of {_digits(depth)} {terms.position_unit}"
-
-
-_REMEDY = {
-    "noise": "press deeper, longer or more often; try palpate excite",
-    "lag": "calibrate the lag of the force and give it with --lag",
-    "other forces": "let the log begin and end in the air, and press more often",
-    "octaves": "the answer differs from octave to octave; excite a wider band (palpate excite)",
-    "repetition": "two parts of the log differ; press more often",
-    "touch": "the touch and the contact give two answers; approach slower, and more often",
-    "strokes": "the ways in and out differ; press slower, or more often",
-    "unexplained": "the model leaves force that is no noise; keep the motion near one working point",
-    "position noise": "measure the position finer, or move further",
-    "tool's inertia": "move faster in the air, or take the tool's inertia out beforehand",
-    "calibration": "calibrate force and position",
-    "series stiffness": "measure the position nearer to the surface",
-}
 
 
 def _agreeing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoint) -> dict[str, Parameter]:
@@ -190,8 +175,8 @@ def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Te
     if lag.known or LAG not in found.names or abs(found[LAG] - lag.value) <= _FAR * lag.std:
         return parameters
     reason = (
-        f"it rests on a lag of {1e3 * found[LAG]:.2g} ms that the fit asks for and no calibration tells:"
-        " calibrate it and give it with --lag"
+        f"it depends on a force lag of {_digits(1e3 * found[LAG], 2)} ms that the fit estimates and no calibration"
+        " confirms: calibrate the lag and give it with --lag"
     )
     refused = {
         name: Parameter(None, None, None, p.unit, Verdict.REJECTED, reason, None, p.budget)
@@ -211,9 +196,7 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
     negative = [name for name in ("B", "M") if name in parameters and "below zero" in parameters[name].reason]
     if len(negative) != 1:
         return parameters
-    reason = (
-        f"{negative[0]} is below zero for sure: a force of the motion is in the log that the model has not"
-    )
+    reason = f"{negative[0]} is certainly below zero: the model lacks a force that depends on the motion"
     touched = ("B", "M", "K") if weighed else ("B", "M")
     return parameters | {
         name: replace(_refused(p, reason), verdict=Verdict.REJECTED)
@@ -222,11 +205,9 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
     }
 
 
-_UNSIGNED = (
-    "the log does not show which way force and position count: let it begin in the air, or give --force-sign"
-)
+_UNSIGNED = "the log does not show the signs of force and position: begin it in the air, or give --force-sign"
 _UNTOUCHED = (
-    "a power of the depth counts from the surface and from no force, and the log never leaves the surface:"
+    "a power law needs depth and force from the touch on, and the log never leaves the surface:"
     " let it begin in the air"
 )
 
@@ -245,20 +226,20 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
         at = found[LAG]
         if abs(at - lag.value) > _FAR * lag.std or at + found.half_of(LAG) < low:
             text = (
-                f"the fit asks for a lag of {1e3 * at:.3g} ms of the force, farther than sensors have:"
-                " something else moves the force in time; what a shift in time is taken for is refused"
+                f"the fit estimates a lag of {_digits(1e3 * at)} ms of the force, longer than sensors have:"
+                " something else delays the force; parameters that such a delay changes are rejected"
             )
             warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
     damping = parameters.get("B")
     if damping is not None and damping.verdict is not Verdict.IDENTIFIED:
         if "below zero" in damping.reason:
-            text = f"B: {damping.reason}; a lag T of the force counts as -K T: calibrate it and give --lag"
+            text = f"B: {damping.reason}; a lag T of the force adds -K T to it: calibrate it and give --lag"
             warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
         elif not lag.known and damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
             reach = 1.96 * lag.std * abs(found["K"]) if "K" in found.names else 0.0
             text = (
-                f"a lag T of the force counts as a damping of -K T, and nobody has calibrated it: B is known to"
-                f" {_digits(reach, 2)} {_shown(damping.unit)} only; give --lag"
+                f"a lag T of the force looks like a damping of -K T, and the lag is not calibrated: B is uncertain by"
+                f" {_digits(reach, 2)} {_shown(damping.unit)}; give --lag"
             )
             warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
     stiffness = parameters.get("K")
@@ -280,7 +261,7 @@ def _remedy(name: str, terms: Terms) -> str:
     if name in ("B", "M") and np.isfinite(terms.band):
         more = "mass needs" if name == "M" else "damping needs"
         return f"the position moved only below {_digits(terms.band, 2)} Hz, {more} faster motion; try palpate excite"
-    return "press deeper, longer or more often; try palpate excite"
+    return NOISE.remedy
 
 
 def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:

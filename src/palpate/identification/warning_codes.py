@@ -22,7 +22,7 @@ class Code(Enum):
         " so K is mostly about the arm. Measure the position nearer to the surface."
     )
     LOW_EXCITATION = "The motion is too slow, too small or too short to show the parameter above the noise."
-    MODEL_REJECTED = "No model offered describes the log: its parts give different answers, say."
+    MODEL_REJECTED = "No model describes the log: its parts give different parameters, for example."
     NONLINEAR_STIFFNESS = (
         "The stiffness changes with the position; K is the slope at the middle of the motion."
     )
@@ -37,36 +37,31 @@ class Code(Enum):
     UNIT_GUESS = (
         "A unit was taken from a column's name, or the stiffness is so unusual that a unit is probably wrong."
     )
-    UNIT_STATED = "A unit was taken from what the file itself states, or differs from it."
-    TIME_DOUBTFUL = (
-        "The time is hardly one in this unit: it counts rows, or its rows come at a rate that no log has."
-    )
-    COLUMNS_SWAPPED = "A column was named for a role that its own name speaks against."
-    LINES_SKIPPED = "Lines of the file that are no rows of its table were left out."
-    FORCE_DRIFTS = "The force in the air changes in the course of the log; the change is taken out."
-    FORCE_SIGN_REVERSED = "The force falls as the probe goes in; it was turned round."
-    POSITION_SIGN_REVERSED = "The position falls as the probe goes in; it was turned round."
-    LOW_RATE = "Rows are so rare that fast behaviour, damping and mass above all, may be missed."
+    UNIT_STATED = "A unit was taken from the file's own statement, or differs from it."
+    TIME_DOUBTFUL = "The time is doubtful in this unit: it counts rows, or its rate is beyond any log's."
+    COLUMNS_SWAPPED = "A column was given a role that its own name contradicts."
+    LINES_SKIPPED = "Lines of the file that are not rows of its table were left out."
+    FORCE_DRIFTS = "The force in the air changes during the log; the change is removed."
+    FORCE_SIGN_REVERSED = "The force falls as the probe goes in; its sign was reversed."
+    POSITION_SIGN_REVERSED = "The position falls as the probe goes in; its sign was reversed."
+    LOW_RATE = "Rows are so rare that fast motion may be missed, and with it damping and mass."
     NO_CONTACT = "The force never leaves its resting level for long enough: there is nothing to identify."
     CONTACT_AT_START = (
         "The log begins in contact: the force without contact is not known, and is estimated as an offset."
     )
-    LOG_CUT_SHORT = "The bag is damaged or was never closed; what is whole of it was read."
+    LOG_CUT_SHORT = "The bag is damaged or was never closed; its intact part was read."
     CLOCKS_DISAGREE = (
-        "The clocks that stamped two topics differ."
-        " What moves them together leaves a lag that nobody has calibrated."
+        "The clocks that stamped two topics differ. Aligning them leaves a lag that is not calibrated."
     )
-    FRAME_GUESS = (
-        "The axes that the wrench is given in were taken from what the messages say; --wrench-frame says it."
-    )
+    FRAME_GUESS = "The frame of the wrench was taken from the messages; --wrench-frame sets it."
     NORMAL_UNCERTAIN = (
-        "The contact's normal was found from the force, and so badly that it matters for the parameters."
+        "The contact's normal was estimated from the force, and its uncertainty matters for the parameters."
     )
     TOOL_INERTIA = (
         "In the air the force follows the acceleration, as a mass beyond the sensor makes it. A negative mass is an"
         " inertia compensated with the wrong sign, or twice. In contact a damping and a lag hide that."
     )
-    PAYLOAD_DOUBTFUL = "What the sensor shows in the air is not what the payload file foretells."
+    PAYLOAD_DOUBTFUL = "The sensor's readings in the air differ from the payload file's prediction."
     NEGATIVE_STIFFNESS = "The force falls as the penetration grows: no passive surface does that."
 
     @property

@@ -27,4 +27,4 @@ def unrecovered(found: Answer) -> str:
     left = float(np.exp(-min(gaps) * found.problem.motion.chain.dt / creep))
     if left <= found.half_of("K1") / branch:
         return ""
-    return f"the surface is touched again before it has come back: {left:.0%} of its branch is left"
+    return f"the surface is touched again before it has recovered: {left:.0%} of its branch is left"

@@ -68,10 +68,10 @@ def working_point(
     stiffness = replace(_judged(value, half, tolerance, unit), budget=_largest(budget, half))
     against = ""
     if not contacts.signed or (contacts.bonded and value < 0 and not options.bonded):
-        against = "which way force and position count is not known (--force-sign)"
+        against = "the signs of force and position are not known (give --force-sign)"
     elif value < 0 and not options.bonded:
         against = (
-            "the force falls as the probe goes in: either the surface gives way, or it moves, and then this is the"
+            "the force falls as the probe goes in: either the surface yields, or it moves, and then this is the"
             " stiffness of what holds the probe"
         )
     if against:

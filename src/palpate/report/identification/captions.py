@@ -18,7 +18,7 @@ _AS_LARGE = 1.3
 
 def untouched(found: Identification, traces: Traces) -> str:
     """Of a log without a contact."""
-    return "The force over the whole log: it leaves its resting level nowhere for long enough."
+    return "The force over the whole log: it never leaves its resting level for long enough."
 
 
 def spectrum(found: Identification, traces: Traces) -> str:
@@ -28,10 +28,10 @@ def spectrum(found: Identification, traces: Traces) -> str:
         return "The contact is too short to tell frequencies apart."
     told = [o.frequency for o, yes in zip(octaves, shown_by(octaves, "storage"), strict=True) if yes]
     if not told:
-        where = "In no octave is it told more narrowly than it is large"
+        where = "No octave shows it with an interval narrower than its value"
     else:
-        where = f"The log tells storage from {plain(told[0], 2)} to {plain(told[-1], 2)} Hz"
-        where = where if len(told) > 1 else f"The log tells storage about {plain(told[0], 2)} Hz"
+        where = f"The log shows the storage from {plain(told[0], 2)} to {plain(told[-1], 2)} Hz"
+        where = where if len(told) > 1 else f"The log shows the storage about {plain(told[0], 2)} Hz"
     return (
         f"Force over position, by octave, whatever the model. {where}. Storage gives the force back, loss turns it into"
         " heat. Flat storage and loss in proportion to frequency are a spring beside a damper; storage that falls with"
@@ -43,9 +43,9 @@ def press(found: Identification, traces: Traces) -> str:
     """Of force over depth."""
     own = found.press
     if own is None:
-        return "The log has no way into the surface that is long enough for a slope."
+        return "The log has no loading long enough for a slope."
     force = units_of(found)[0]
-    told = ["The slope is the stiffness, the width of the loop what is lost. The ring is the working point."]
+    told = ["The slope is the stiffness, the width of the loop the lost work. The ring is the working point."]
     if own.hysteresis_loss is not None:
         told.append(f"{lost(own.hysteresis_loss)}.")
     if own.relaxation is not None:
@@ -80,8 +80,8 @@ def force(found: Identification, traces: Traces) -> str:
 def residual(found: Identification, traces: Traces) -> str:
     """Of the misfit over time."""
     return (
-        "Noise looks the same all along. Waves, steps, or a shape that comes back at every contact are what the model"
-        " cannot follow."
+        "Noise looks the same all along. Waves, steps, or a shape that repeats in every contact are forces that the"
+        " model cannot follow."
     )
 
 
@@ -94,7 +94,7 @@ def noise(found: Identification, traces: Traces) -> str:
     chance = f"p = {p:.2g}" if p >= 1e-4 else "p < 0.0001"
     band = "White noise would stay within the shaded band."
     if p >= DOUBTED:
-        return f"{band} The misfit passes for white ({chance}).{size}"
+        return f"{band} The misfit is consistent with white noise ({chance}).{size}"
     if times is not None and times < _AS_LARGE:
         return f"{band} The misfit is not white ({chance}), but no noise here seems to be.{size}"
     return (

@@ -110,7 +110,7 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
     """Force over depth: the way in and out, its slopes with their bands, the working point."""
     own = found.press
     if own is None:
-        empty(axes, "no way into the surface in this log")
+        empty(axes, "no loading in this log")
         return
     scale, unit = length_of(traces)
     style.panel(

@@ -13,7 +13,6 @@ from palpate.report.identification import captions
 from palpate.report.identification import evidence_panels as evidence
 from palpate.report.identification import fit_panels as fit
 from palpate.report.identification import trust_panels as trust
-from palpate.report.identification.causes import cause, next_step
 from palpate.report.identification.figure import Panel, both_parts, one
 from palpate.report.identification.source import Source, as_json
 from palpate.report.identification.words import (
@@ -107,9 +106,9 @@ def _point(found: Identification) -> dict[str, Any] | None:
         "frequency": frequency,
         "next": interval(point.prediction95, own.unit),
         "reason": printable(own.reason),
-        "limit": f"{cause(limit, point.source)}. {next_step(limit, point.source).capitalize()}.",
+        "limit": f"{limit.described}. {limit.remedy.capitalize()}.",
         "scale": _scale(own, found),
-        "source": {"octave": "the most excited octave", "press": "the slope of the way in"}.get(
+        "source": {"octave": "the most excited octave", "press": "the slope of the loading"}.get(
             point.source, printable(point.source)
         ),
     }

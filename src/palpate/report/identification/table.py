@@ -86,7 +86,7 @@ def _press(found: Identification, console: Console) -> None:
         f"{quantity(t.stiffness, stiffness, t.half)} at {quantity(t.force, force)}" for t in press.tangent
     ]
     if slopes:
-        console.print(Text(f"slope of the way in: {', '.join(slopes)}"))
+        console.print(Text(f"slope of the loading: {', '.join(slopes)}"))
     if press.hysteresis_loss is not None:
         console.print(Text(lost(press.hysteresis_loss)))
     if press.relaxation is not None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from palpate.identification.causes import Cause, cause_of
 from palpate.identification.result import Identification, Parameter, Verdict, WorkingPoint
 from palpate.identification.warning_codes import Code
-from palpate.report.identification.causes import cause, next_step
 from palpate.report.numbers import plain, quantity, quantity_between, with_half
 
 CALLED = {
@@ -31,26 +31,26 @@ ADVICE = {
     Code.LAG_DAMPING_CONFOUNDED: "Give a measured --lag, or press again with a wider band, as a chirp has it.",
     Code.SERIES_COMPLIANCE: "Measure the position nearer to the surface, or calibrate what lies between more closely.",
     Code.LOW_EXCITATION: "Press faster, deeper or more often; for a mass, shake the probe in contact.",
-    Code.MODEL_REJECTED: "Take no number here for a constant of the surface; try a stretch of it (--start, --end).",
+    Code.MODEL_REJECTED: "Use no number here as a constant of the surface; try a part of the log (--start, --end).",
     Code.NONLINEAR_STIFFNESS: "Use K only near the mean position, and K2 and K3 with it elsewhere.",
-    Code.HELD_SAMPLES: "Nothing; a log at the sensor's own rate would be as good.",
-    Code.MISSING_SAMPLES: "Check the log where readings are missing; name other marks of none with --missing.",
+    Code.HELD_SAMPLES: "None; a log at the sensor's own rate would be as good.",
+    Code.MISSING_SAMPLES: "Check the log where readings are missing; give other marks of no reading with --missing.",
     Code.IRREGULAR_TIME: "Log with the sensor's own clock if you can.",
     Code.SATURATED: "Press less, or use a sensor of a larger range.",
     Code.UNIT_GUESS: "Say the units, as in --position position_mm:mm.",
-    Code.FORCE_DRIFTS: "Let the sensor warm up and tare it; it is taken out as far as the log shows it.",
-    Code.TOOL_INERTIA: "Nothing, if the tool moves beyond the sensor; below zero: mend how its inertia is taken out.",
-    Code.FORCE_SIGN_REVERSED: "Nothing, if the column is the right one.",
-    Code.POSITION_SIGN_REVERSED: "Nothing, if the column is the right one.",
+    Code.FORCE_DRIFTS: "Let the sensor warm up and tare it; it is removed as far as the log shows it.",
+    Code.TOOL_INERTIA: "None, if the tool moves beyond the sensor; below zero: correct its compensation.",
+    Code.FORCE_SIGN_REVERSED: "None, if the column is the right one.",
+    Code.POSITION_SIGN_REVERSED: "None, if the column is the right one.",
     Code.LOW_RATE: "Log faster: damping and mass need it first.",
     Code.NO_CONTACT: "Check the column of the force; say --bonded if the probe is fixed to the surface.",
     Code.CONTACT_AT_START: "Begin the log a second before the touch.",
     Code.NEGATIVE_STIFFNESS: "Check the signs and the columns.",
     Code.CLOCKS_DISAGREE: "Stamp both topics with one clock, or measure the lag between them and give --lag.",
-    Code.LOG_CUT_SHORT: "Nothing, if the contacts are whole; else record again and close the bag.",
-    Code.UNIT_STATED: "Nothing, if the file is right; else say the unit, as in --force force_mN:mN.",
+    Code.LOG_CUT_SHORT: "None, if the contacts are whole; else record again and close the bag.",
+    Code.UNIT_STATED: "None, if the file is right; else say the unit, as in --force force_mN:mN.",
     Code.TIME_DOUBTFUL: "Say the unit of the time, as --time t:ms, or give --rate.",
-    Code.LINES_SKIPPED: "Look at these lines; if they are rows, mend them and identify again.",
+    Code.LINES_SKIPPED: "Look at these lines; if they are rows, correct them and identify again.",
     Code.COLUMNS_SWAPPED: "Check --position and --force; exchange them if they are swapped.",
     Code.FRAME_GUESS: "Say it with --wrench-frame.",
     Code.NORMAL_UNCERTAIN: "Give the contact's normal, or press harder along it and slide less.",
@@ -61,7 +61,7 @@ UNTOUCHED = "Nothing is touched in this log"
 
 
 def sentence(found: Identification) -> str:
-    """What is known, where it holds, what limits it, and so what to do next."""
+    """The stiffness, its place, its largest cause of uncertainty, and the next step."""
     if not found.contacts:
         return f"{UNTOUCHED}: {_first_reason(found)}."
     point = found.working_point
@@ -69,21 +69,39 @@ def sentence(found: Identification) -> str:
         return "The log shows no stiffness: no stretch in contact is long enough; log longer or press deeper."
     own, where = point.stiffness, place_of(found, point)
     limit = limited_by(found)
+    by_model = _known_by_model(found)
+    if by_model is not None:
+        return (
+            by_model if own.value is None else f"{by_model} Without a model it is {formatted(own)} {where}."
+        )
     if own.value is None or own.ci95 is None or own.ci95[0] <= 0 <= own.ci95[1]:
         lost = _loss(found, point)
         start = f"{lost}, but no stiffness" if lost else "The log shows no stiffness"
-        return f"{start} {where} ({own.reason}); {next_step(limit, point.source)}."
+        return f"{start} {where} ({own.reason}); {limit.remedy}."
     if own.ci95[1] < 0 and own.verdict is not Verdict.IDENTIFIED:
         number = quantity(-own.value, own.unit, (own.ci95[1] - own.ci95[0]) / 2)
         return (
-            f"The force falls by {number} as the probe goes in, {where}: either the surface gives way, or it moves, and"
-            " then this is the stiffness of what holds the probe."
+            f"The force falls by {number} as the probe goes in, {where}: either the surface yields, or it moves, and"
+            " then this is the stiffness of the probe's own support."
         )
     only = "" if own.verdict is Verdict.IDENTIFIED else f", known to {_share(own)} only,"
-    return (
-        f"The stiffness is {formatted(own)}{only} {where}; what limits it most is {cause(limit, point.source)}:"
-        f" {next_step(limit, point.source)}."
-    )
+    return f"The stiffness is {formatted(own)}{only} {where}; {_mostly(limit)}."
+
+
+def _known_by_model(found: Identification) -> str | None:
+    """The stiffness of a model of one constant stiffness, where the working point is known less well."""
+    K, point = found.parameters.get("K"), found.working_point
+    constant = found.model in ("kelvin-voigt", "kelvin-voigt-mass")
+    if K is None or point is None or not constant or K.verdict is not Verdict.IDENTIFIED:
+        return None
+    if point.stiffness.verdict is Verdict.IDENTIFIED:
+        return None
+    limit = cause_of(next(iter(K.budget), None))
+    return f"By the model {found.model} the stiffness is {formatted(K)}; {_mostly(limit)}."
+
+
+def _mostly(limit: Cause) -> str:
+    return f"its uncertainty is mostly due to {limit.described}: {limit.remedy}"
 
 
 def _loss(found: Identification, point: WorkingPoint) -> str:
@@ -121,14 +139,15 @@ def units_of(found: Identification) -> tuple[str, str]:
 def lost(share: float) -> str:
     """What becomes of the work of a press, by the share of it that does not come back."""
     if share < 0:
-        return f"{-100 * share:.2g} % more work comes back than went in, as of a force that is read late"
+        return f"{-100 * share:.2g} % more work comes back than was put in: the force is probably read late"
     return f"{100 * share:.2g} % of the work put in does not come back"
 
 
-def limited_by(found: Identification) -> str | None:
-    """Largest cause of the working point's interval; None if nobody has told one."""
+def limited_by(found: Identification) -> Cause:
+    """Largest cause of the working point's interval."""
     point = found.working_point
-    return next(iter(point.stiffness.budget), None) if point is not None else None
+    assert point is not None
+    return cause_of(next(iter(point.stiffness.budget), None), point.source)
 
 
 def model_line(found: Identification) -> str:
@@ -168,7 +187,7 @@ def lag_of(found: Identification) -> str:
     if lag is None:
         return "no lag known"
     value = with_half(1e3 * lag.value, 1e3 * lag.bound) if lag.bound else plain(1e3 * lag.value, 3)
-    who = {"told": "as told", "measured": "as this log shows", "prior": "assumed, as sensors have it"}
+    who = {"told": "as told", "measured": "measured in this log", "prior": "assumed, typical of sensors"}
     return f"force late by {value} ms ({who.get(lag.kind, lag.kind)})"
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from palpate.identification.causes import cause_of
 from palpate.identification.pooling import Pooled, PooledPoint
-from palpate.report.identification.causes import cause, next_step
 from palpate.report.identification.words import formatted, interval, units_of
 from palpate.report.many.rows import LogRow
 from palpate.report.numbers import plain, quantity
 
 
 def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
-    """What is known, where it holds, where the next press falls, what limits it, and so what to do next."""
+    """The pooled stiffness, the prediction of the next press, its place, its largest cause, and the next step."""
     point = pooled.working_point
     if point is None:
         return f"None of {len(rows)} logs shows a stiffness at a working point."
@@ -20,12 +20,12 @@ def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
     where = place(rows, point)
     if own.value is None:
         return f"The {len(rows)} logs show no stiffness together {where}: {own.reason}."
-    limit = next(iter(own.budget), None)
+    limit = cause_of(next(iter(own.budget), None))
     after = point.stiffness.prediction95
-    again = f", the next press will be from {interval(after, own.unit)} (95 %)" if after else ""
+    again = f", the next press is predicted at {interval(after, own.unit)} (95 %)" if after else ""
     return (
         f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {formatted(own)}{again}, {where};"
-        f" what limits it most is {cause(limit)}: {next_step(limit)}."
+        f" its uncertainty is mostly due to {limit.described}: {limit.remedy}."
     )
 
 
