@@ -1,4 +1,4 @@
-"""What palpate raises when something from outside is wrong."""
+"""Errors that palpate raises for wrong input."""
 
 from __future__ import annotations
 

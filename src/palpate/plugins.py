@@ -27,7 +27,7 @@ _FOLDERS: dict[Path, None] = {}
 """Where the files lie that named plug-ins in this process; modules are the process' own, and so are these."""
 _IMPORTING = threading.RLock()
 _STAMPS: dict[str, str] = {}
-"""What the sources of each module were when it was imported."""
+"""Sources of each module when it was imported."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Plugin:
     stamp: str
 
     def value(self) -> Any:
-        """What the name stands for.
+        """The object of that name.
 
         Raises:
             InputError: it cannot be imported here, or has other sources here.

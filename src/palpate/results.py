@@ -1,4 +1,4 @@
-"""What a result can do for who holds it: compare, read, draw, write a page. How it looks, the rooms above know."""
+"""Methods of all results: compare, print, draw, write a page. The rooms above define the looks."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Result(Compared):
         return f"<{type(self).__name__}: {self._looks().line(self)}>"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows; nothing in it runs, whatever the names in a log are."""
+        """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
         return str(self._looks().html(self))
 
     def plot(self, path: str | Path | None = None) -> Any:

@@ -159,7 +159,7 @@ def test_newton_has_both_shapes_and_says_where_its_damper_works(tmp_path):
 
 @pytest.mark.long
 def test_newton_pressed(tmp_path):
-    """Single precision, and the way in alone."""
+    """Single precision, and the loading alone."""
     pytest.importorskip("newton")
     made = prepare(contact_from(scenes.found(), "f"), Request("newton"), tmp_path / "out.py")
     (tmp_path / "out.py").write_text(made.text)

@@ -11,10 +11,10 @@ from identification.problems import problem
 from identification.synthetic_contacts import pressed, record
 from palpate.identification import Verdict, identify
 from palpate.identification.estimators.octaves import segments_of
+from palpate.identification.evidence.loadings import Loading
 from palpate.identification.evidence.press import press_of
 from palpate.identification.evidence.slope import slope_of
 from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness
-from palpate.identification.evidence.strokes import Stroke
 from palpate.identification.evidence.working_point import working_point
 from palpate.identification.filters.state_variable import low_pass_once
 from palpate.identification.options import Options
@@ -186,7 +186,7 @@ def test_of_a_power_law_the_tangent_grows_with_the_force():
 
 @pytest.mark.parametrize("loss", [0.1, 0.5])
 def test_the_work_that_does_not_come_back(loss):
-    """On the way out, every depth has a force that is smaller by one share."""
+    """On the unloading, every depth has a force that is smaller by one share."""
     time, x = press_path(2.0)
     out = np.arange(len(x)) > np.argmax(x)
     found = press(time, x, 5000 * np.maximum(x, 0) * np.where(out, 1 - loss, 1.0))
@@ -274,14 +274,14 @@ def test_the_press_is_the_headline_where_no_octave_is_known_well():
 
 
 def in_steps(k, b, tau=0.1, rest=1.0):
-    """Three advances that die out, 1 mm each, on a spring and a damper: the last one, and the whole way in."""
+    """Three advances that die out, 1 mm each, on a spring and a damper: the last one, and the whole loading."""
     t = np.arange(0.0, 3 * (5 * tau + rest), DT)
     since = np.mod(t, 5 * tau + rest)
     depth = 1e-3 * (t // (5 * tau + rest) + 1 - np.exp(-since / tau))
     speed = 1e-3 / tau * np.exp(-since / tau)
     columns = depth, speed, k * depth + b * speed, t
     last = (depth > 2e-3) & (since < 5 * tau)
-    return Stroke(*(own[last] for own in columns), Stroke(*columns))
+    return Loading(*(own[last] for own in columns), Loading(*columns))
 
 
 @pytest.mark.parametrize("damping", [0.0, 40.0])
@@ -298,7 +298,7 @@ def test_the_slope_is_of_the_last_rise():
     """A shell that snaps through at a third of its force: its peak is not the upper part, however noisy it is."""
     depth = np.linspace(0.0, 3e-3, 3000)
     force = np.interp(depth, [0, 1e-3, 2e-3, 3e-3], [0.0, 4.2, 2.0, 10.0])
-    slope = slope_of([Stroke(depth, np.full(3000, 1e-3), force, np.arange(3000) * DT)])
+    slope = slope_of([Loading(depth, np.full(3000, 1e-3), force, np.arange(3000) * DT)])
     assert slope.stiffness == pytest.approx(8000.0, rel=1e-6)
     assert slope.force == pytest.approx(7.0, abs=0.1)
     assert slope.depth == pytest.approx(2.625e-3, abs=2e-5)

@@ -102,7 +102,7 @@ def test_a_press_that_shows_no_slope_gives_no_modulus(press):
 
 @pytest.mark.parametrize("shape", ["sphere", "cone"])
 def test_a_press_of_a_simulated_surface(shape):
-    """From a log: the way in of an elastic half space, with noise."""
+    """From a log: the loading of an elastic half space, with noise."""
     indenter, law = SHAPES[shape]
     time = np.arange(6000) / 1000
     x = press_path(time, 0.06)

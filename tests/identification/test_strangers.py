@@ -70,7 +70,7 @@ def test_the_stiffness_of_what_holds_the_probe_is_not_called_the_surfaces():
 
 @pytest.mark.parametrize("tone", [0.0, 0.03, 0.06])
 def test_mains_in_the_force_are_no_tool(tone):
-    """At 49 rows a second, 50 Hz are 1 Hz, about as slow as the way in."""
+    """At 49 rows a second, 50 Hz are 1 Hz, about as slow as the loading."""
     t = np.arange(0, 14, 1 / 49)
     x = -8e-3 + 11.4e-3 * (risen(t, 1, 1.2) - risen(t, 12.5, 1.0))
     x = x + np.where((t > 3) & (t < 12), 0.6e-3 * np.sin(2 * np.pi * 2.5 * t), 0.0)

@@ -15,7 +15,7 @@ PRIVATE = {
     "sized": "any_size", "still": "equilibrium", "telling": "describe", "timebase": "sampling",
     "told": "described, notes",
     "trees": "flatten", "unbroken": "interrupts", "undone": "bias_correction",
-    "unloading": "payload, free_motion", "watching": "replay, change_detection", "watchman": "stop condition",
+    "watching": "replay, change_detection", "watchman": "stop condition",
     "worlds": "conditions",
 }  # fmt: skip
 """A private word, and the field's for it (CONVENTIONS.md)."""

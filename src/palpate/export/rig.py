@@ -133,7 +133,7 @@ def press(rig: Rig, stiffness: float, force: float, *, inward: bool = False) -> 
         rig: at the touch.
         stiffness: that is expected [N/m].
         force: mean [N].
-        inward: fit the ways in alone.
+        inward: fit the loadings alone.
 
     Returns:
         What was measured; None if there was no contact, or the simulation did not stay finite.

@@ -38,7 +38,7 @@ _OVERSAMPLED = 16.0
 
 @dataclass(frozen=True)
 class Contacts:
-    """What was found.
+    """The contacts of a log.
 
     Args:
         spans: first and past-the-last sample of each contact, in filtered samples.

@@ -44,7 +44,7 @@ _BENDS = 3
 
 @dataclass(frozen=True)
 class Drift:
-    """What the force drifts by while nothing is touched, and what it may drift by in between.
+    """Drift of the force in free motion, and its uncertainty in between.
 
     Args:
         times: of the stays in the air [s], shape (s,), two at least.

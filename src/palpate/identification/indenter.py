@@ -25,7 +25,7 @@ from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Press, Tangent, Verdict
 
 ASSUMED = "a half space (deep and wide compared with the contact), small strain, no adhesion"
-"""What the laws rest on, and no press shows."""
+"""Assumptions of the laws, which no press can check."""
 _UNTOLD = (0.75, 1.0)
 """1 - nu^2 of materials that do not thicken when they are pulled: nu from 0.5 to 0."""
 
@@ -136,7 +136,7 @@ def _modulus(
     weight = own**-2 / (own**-2).sum()
     depth, reduced = float(p * np.mean(force / slope)), float(weight @ by_force)
     parts = {
-        "tangent": float(weight @ own),  # the slopes are of one way in: their errors do not average out
+        "tangent": float(weight @ own),  # the slopes are of one loading: their errors do not average out
         "the indenter's law": float(np.maximum(abs(by_force - reduced) - own, 0.0).max()),
         "surface position": float(abs(_by_depth(press, slope, force, p, c, reduced) - reduced).max()),
     }

@@ -14,7 +14,7 @@ _LONGEST = 20_000  # lags of the autocovariance that are ever looked at
 
 @dataclass(frozen=True)
 class Noise:
-    """What the residuals say about the noise.
+    """The noise, as estimated from the residuals.
 
     Args:
         autocovariance: of the residuals, tapered, shape (n_lags,).

@@ -1,4 +1,4 @@
-"""What a caller says about a log, checked once."""
+"""Options of a caller about a log, checked once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user gets: an Identification of all that the stages have found."""
+"""From the results of all stages to an Identification."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def nothing(
 
 
 def _plain_options(options: Options) -> dict[str, object]:
-    """What was told, and the two that always matter; a lag of 0 and "not bonded" are told too."""
+    """The given options, and two that are always listed; a lag of 0 and "not bonded" are given too."""
     told = {
         own.name: getattr(options, own.name)
         for own in fields(options)
@@ -137,7 +137,7 @@ def _late(press: Press | None, problem: Problem, warnings: tuple[Warn, ...]) -> 
     if late is None or known or late[0] <= 1.96 * problem.lag.std:
         return []
     text = (
-        f"the ways out give back more work than the ways in took, which no passive surface does: the force is read"
+        f"unloading returns more work than loading took, which no passive surface does: the force is read"
         f" after the position by {problem.lag.value + late[0]:.2g} s or more (± {late[1]:.2g}); calibrate the lag"
     )
     return [Warn(Code.FORCE_LAGS_POSITION, text)]

@@ -41,7 +41,7 @@ class Payload:
 
     @property
     def text(self) -> str:
-        """What it means."""
+        """Its meaning, as a sentence."""
         seen = f"in the air the force follows a mass of {self.mass:.3g} kg (std {self.std:.2g})"
         if self.mass > 0:
             return f"{seen}: it moves beyond the force sensor, and its inertia is removed"

@@ -159,7 +159,7 @@ class PooledPoint:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Pooled(Result, shown_by="palpate.report.many.in_python"):
-    """What many logs say together.
+    """Estimates pooled over many logs.
 
     Args:
         parameters: by name.

@@ -1,4 +1,4 @@
-"""What is known of a contact before its log is read: the lag of the force, and perhaps the mass."""
+"""Priors of a contact: the lag of the force, and perhaps the mass."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def mass_std(mass: tuple[float, float]) -> float:
 
 
 def prior_of(lag: Lag, noise: float, free_lag: bool) -> Prior:
-    """What is known of the mass, and of the lag where the log is asked for it, against noise of this deviation [N]."""
+    """The prior of the mass, and of the lag where the log estimates it, against noise of this deviation [N]."""
     known = {}
     if lag.mass is not None:
         known["M"] = (lag.mass[0], noise / mass_std(lag.mass))

@@ -1,4 +1,4 @@
-"""What an identification says."""
+"""The result of an identification."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class DynamicStiffness:
 
 @dataclass(frozen=True)
 class Relaxation:
-    """What a hold shows.
+    """Relaxation of the force in a hold.
 
     Args:
         share: of the force at the begin of the hold that is gone at its end.
@@ -111,7 +111,7 @@ class Relaxation:
 
 @dataclass(frozen=True)
 class Tangent:
-    """Slope of force over depth on the way in at one force.
+    """Slope of force over depth in loading, at one force.
 
     Args:
         force: [N].
@@ -128,9 +128,9 @@ class Press(Compared):
     """Force over depth.
 
     Args:
-        tangent: on the way in, by force.
-        loading, unloading: depth [m] and force [N] on the way in and out, shape (2, n); empty if it is not there.
-        hysteresis_loss: share of the work put in that does not come back; None without a way out.
+        tangent: in loading, by force.
+        loading, unloading: depth [m] and force [N] in loading and unloading, shape (2, n); empty if it is not there.
+        hysteresis_loss: share of the work put in that does not come back; None without an unloading.
         relaxation: None without a hold.
         late: by how much the force is read after the position by the work that comes back beyond what went in, and its
             half-width [s]; None if no more comes back.
@@ -164,7 +164,7 @@ class WorkingPoint:
     """The stiffness that the log shows, whatever the model, and what it belongs to.
 
     Args:
-        stiffness: storage of an octave, or slope of the way in.
+        stiffness: storage of an octave, or slope of the loading.
         force_N, depth_m: mean in contact.
         frequency_Hz: middle of the octave; of a press, one over four times its rise.
         source: octave or press.
@@ -208,7 +208,7 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class Traces(Compared):
-    """What the figure shows: filtered signals of the whole log, shape (n,), and the fit in contact, shape (m,).
+    """Data of the figure: filtered signals of the whole log, shape (n,), and the fit in contact, shape (m,).
 
     Args:
         time, force: of the whole log [s], [N].
@@ -254,7 +254,7 @@ class LagFound:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Result, shown_by="palpate.report.identification.in_python"):
-    """What was touched: the model, its parameters with verdicts, and what to know about them.
+    """The contact's model, its parameters with verdicts, and warnings.
 
     Args:
         model: name of the contact model that the parameters belong to.

@@ -32,7 +32,7 @@ _IN_TIME = ("B", "M", "K1", "tau")
 
 @dataclass(frozen=True)
 class Terms:
-    """What a verdict is passed on, besides the answer.
+    """Inputs of a verdict besides the answer.
 
     Args:
         tolerance: largest half-width of an identified parameter's interval, as a share of its value.
@@ -257,7 +257,7 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
 
 
 def _remedy(name: str, terms: Terms) -> str:
-    """What would show a parameter."""
+    """The measurement that would show a parameter."""
     if name in ("B", "M") and np.isfinite(terms.band):
         more = "mass needs" if name == "M" else "damping needs"
         return f"the position moved only below {_digits(terms.band, 2)} Hz, {more} faster motion; try palpate excite"

@@ -1,4 +1,4 @@
-"""What block sums tell: the fit, how far it may be off whatever the cause, and whether the model holds.
+"""Estimates from block sums: the fit, its uncertainty by all causes, and a test of the model.
 
 - Noise of the position pulls least squares towards zero. Its part of the information is taken out (Soderstrom,
   Errors-in-Variables Methods in System Identification, 2018, ch. 7); the interval holds how well it is known.
@@ -172,7 +172,7 @@ def _jackknife(moves: Array) -> Array:
 def _against_a_richer(
     A: Array, b: Array, shares: tuple[Array, Array], prior: Array, theta: Array, short: Array
 ) -> Array:
-    """What a model with the extra regressors moves theta by, beyond what noise makes of it (Hausman, 1978), shape (4,).
+    """Change of theta by the extra regressors, beyond the effect of noise (Hausman, 1978), shape (4,).
 
     Noise lets the two differ by 1.96 of the deviation that the jackknife gives their difference.
     """

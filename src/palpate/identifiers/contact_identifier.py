@@ -31,13 +31,13 @@ _VAGUE = np.array([10.0, 1e4, 1e6, 1e3])
 
 
 class Estimator(Protocol):
-    """What takes the regressors: any estimator of `palpate.identifiers`."""
+    """An estimator that takes the regressors: any of `palpate.identifiers`."""
 
     def update(self, regressor: ArrayLike, force: float) -> None:
         """Take one sample in."""
 
     def estimate(self) -> Estimate:
-        """What is known so far."""
+        """The present estimate."""
 
 
 class ContactIdentifier:
@@ -176,7 +176,7 @@ class ContactIdentifier:
 
     @property
     def _lag_error(self) -> float:
-        """What is not known of the lag, the phase of the sensor's clock included: a standard deviation [s]."""
+        """Standard deviation of the lag, with the phase of the sensor's clock [s]."""
         s, clock = self._state, self._state[contact_stream.AT_CLOCK : contact_stream.AT_POSITIONS]
         if not s[contact_stream.PERIOD]:
             return self.lag_std

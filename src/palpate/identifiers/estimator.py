@@ -1,4 +1,4 @@
-"""What all estimators on a stream share: a flat state, one compiled update, and the checks in front of it."""
+"""Base of the estimators on a stream: a flat state, one compiled update, and the input checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an estimator forgets before each sample: a part each, which stretches a root of the covariance.
+"""Forgetting policies of an estimator: parts that stretch a root of the covariance before each sample.
 
 `forget(S, phi, floor)` returns S stretched, and whether the sample counts at all; `floor` is the inverse of the
 initial variances. `keep` is what is left after one sample of the weight of those before it.
@@ -20,7 +20,7 @@ class Forgetting(Protocol):
 
     @property
     def keep(self) -> float:
-        """What is left after one sample of the weight of those before it."""
+        """Weight of the earlier samples after one more, relative."""
 
     def forget(self, S: Any, phi: Any, floor: Any) -> tuple[Any, bool]:
         """S stretched, and whether the sample counts."""

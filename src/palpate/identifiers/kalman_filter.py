@@ -37,7 +37,7 @@ _GUESS = 30.0
 
 @part
 class Noise(NamedTuple):
-    """What is known of the force's noise: its variance [N^2], or 0 where it is to be estimated."""
+    """Noise of the force: its variance [N^2], or 0 where it is to be estimated."""
 
     variance: float
 

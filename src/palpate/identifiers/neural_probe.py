@@ -24,7 +24,7 @@ _HUGE = 1e300  # a sample beyond it, or not a number, is no sample
 
 @dataclass(frozen=True)
 class Probed:
-    """What a network answers to a probe: no measurement, and without a covariance.
+    """A network's answer to a probe: no measurement, and without a covariance.
 
     Args:
         stiffness, damping, mass: K [N/m], B [N s/m], M [kg] as the differences of its answers give them.

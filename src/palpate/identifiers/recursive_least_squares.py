@@ -28,7 +28,7 @@ from palpate.signals.types import Estimate
 
 
 class LeastSquaresEstimator(Streaming):
-    """What is known of theta by least squares, however it came about: the front of the state as `flat` has it."""
+    """A least-squares estimate of theta: the front of the state as `flat` has it."""
 
     @property
     def covariance(self) -> Array:

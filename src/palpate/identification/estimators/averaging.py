@@ -40,7 +40,7 @@ def members(
     forces: list[list[int]],
     use: Mask | None = None,
 ) -> list[Member]:
-    """What is likely, the weights adding up to one.
+    """Hypotheses and their weights, which add up to one.
 
     What is left beyond the sensor's noise is not chance, so that it counts as that much less evidence (a likelihood
     raised to a power: Miller and Dunson, 2019).
@@ -105,7 +105,7 @@ def averaged(parts: list[Member]) -> Solution:
 def of_octaves(
     whole: Solution, system: System, noise: Array, sensor: Array, forces: list[list[int]]
 ) -> Spread:
-    """What the answer moves by when one octave is left out, beyond what its covariance grows by.
+    """Change of the answer when one octave is left out, beyond the growth of its covariance.
 
     The rest has to tell by itself which other forces are there.
 

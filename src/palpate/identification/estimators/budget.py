@@ -88,7 +88,7 @@ def _freedom(system: System, solution: Solution) -> Array:
 
 
 def of_position_noise(system: System, solution: Solution, noise: Array) -> Spread:
-    """What noise of the position pulls the answer by, (A - N)^-1 N theta, and what it only pretends to tell.
+    """Bias by noise of the position, (A - N)^-1 N theta, and its apparent information.
 
     A are the normal equations, N what the noise adds to them (errors in variables: Fuller, 1987, ch. 1). Where the
     columns tell two parameters apart by little more than their noise, as K from M at one frequency, nothing is told:
@@ -138,7 +138,7 @@ def of_stretches(system: System, solution: Solution) -> Spread:
 
 
 def _scaling(normal: Array, cov: Array) -> Array:
-    """What the pull of a stretch of such a normal matrix is scaled with: the inverse root of I - H, shape (p, p)."""
+    """Scale of a stretch's influence with such a normal matrix: the inverse root of I - H, shape (p, p)."""
     size = np.sqrt(np.maximum(np.diag(cov), 1e-300))
     own = normal * np.outer(size, size)
     value, vector = np.linalg.eigh(own)
@@ -167,7 +167,7 @@ def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Sp
 
 
 def of_unexplained(system: System, solution: Solution, sensor: Array, told: Array) -> Spread:
-    """What a force hidden along the parameters' columns may do, as large as what is seen beyond the sensor's noise.
+    """Possible effect of a force hidden along the parameters' columns, as large as the residual beyond the noise.
 
     Seen is what chance would show in one of twenty logs at most, in any of their octaves: a level that n lines tell has
     a relative deviation of 1/sqrt(n).

@@ -24,7 +24,7 @@ _DOUBT = 0.3
 
 @dataclass(frozen=True)
 class Compensation:
-    """What noise of the position did to a least-squares answer.
+    """Effect of noise of the position on a least-squares answer.
 
     Args:
         step: to add to the answer, shape (p,).

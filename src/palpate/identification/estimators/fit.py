@@ -57,7 +57,7 @@ class Fit:
 
     @property
     def t(self) -> float:
-        """What a standard deviation is multiplied with for a 95 % interval."""
+        """Student's factor of a standard deviation for a 95 % interval."""
         return quantile(self.noise.effective, len(self.names))
 
     def score(self, effective: float) -> float:

@@ -71,7 +71,7 @@ class _Round:
 
     @cached_property
     def residuals(self) -> Array:
-        """What the simulated course misses, shape (m,)."""
+        """Error of the simulated motion, shape (m,)."""
         missed: Array = self.target - self.regressors @ self.theta
         return missed
 

@@ -24,7 +24,7 @@ def of_derivatives(model: Model, theta: Array) -> tuple[Array, Array]:
 def bias_corrected(
     model: Model, motion: Motion, jacobian: Array, theta: Array, level: float, lag: Lag, std: Array | None
 ) -> Compensation:
-    """What the position's noise did to the answer; to the lag it did nothing if the log is not asked for it.
+    """Bias of the estimate by the position's noise; none of the lag if the log does not estimate it.
 
     Where no sensor's way and no encoder's counts are known, the noise is only known to be no larger: nothing is taken
     out then, and all that it may have done is open.

@@ -222,7 +222,7 @@ class Linearisation:
         )
 
     def _by_prior_of_lag(self, member: Member, found: Spread) -> Spread:
-        """What is seen in time knows of a lag that nobody has calibrated what the prior says, no more.
+        """Parameters seen in time get the prior's uncertainty of an uncalibrated lag, no less.
 
         A lag T counts as a damping of -K T, and as a branch that relaxes. Whatever else shifts the force in time moves
         the lag that a fit finds, and them with it: they count as if it were held anywhere in its prior. Nothing but a
@@ -241,7 +241,7 @@ class Linearisation:
         return Spread(np.maximum(found.variance, by_prior), found.freedom)
 
     def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float, float]:
-        """What the model explains of the force in contact, noise left aside.
+        """Share of the force in contact that the model explains, without noise.
 
         Returns:
             Share of the variance that the model's own columns account for; rms of what they leave [N]; share of the

@@ -1,4 +1,4 @@
-"""What the noise of both channels leaves in a line of each octave, the position's by derivative."""
+"""Noise of both channels in a spectral line of each octave, the position's by derivative."""
 
 from __future__ import annotations
 

@@ -164,7 +164,7 @@ def lines_of(power: Callable[[Array], Array], dt: float, longest: int, count: in
 
 @lru_cache(maxsize=64)
 def _window(length: int, numbers: tuple[float, ...]) -> Array:
-    """What a line sees of each frequency, the mean of all lines of a block, shape (length + 1,)."""
+    """Response of a spectral line to each frequency, the mean of all lines of a block, shape (length + 1,)."""
     spectra = np.abs(np.fft.rfft(_seen(length, numbers), 2 * length, axis=0)) ** 2
     found: Array = spectra.mean(axis=1) / (2 * length)
     found[1:-1] *= 2

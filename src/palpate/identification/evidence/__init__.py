@@ -1,4 +1,4 @@
-"""What a log shows before any model: dynamic stiffness, the press, the stiffness at the working point."""
+"""Evidence without a model: dynamic stiffness, the press, the stiffness at the working point."""
 
 from palpate.identification.evidence.evidence import evidence_of, stiffness_of
 

@@ -9,10 +9,10 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.identification import in_series
 from palpate.identification.estimators.octaves import segments_of
+from palpate.identification.evidence.loadings import loadings_in
 from palpate.identification.evidence.press import press_of
 from palpate.identification.evidence.slope import slope_of
 from palpate.identification.evidence.spectrum import dynamic_stiffness
-from palpate.identification.evidence.strokes import strokes_in
 from palpate.identification.evidence.working_point import working_point
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
@@ -46,7 +46,7 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
-    """What another force at the same rows would show for the stiffness at a working point [N/m]; None if nothing.
+    """Stiffness at a working point by another force at the same rows [N/m]; None if it shows none.
 
     Args:
         problem: of the log.
@@ -56,7 +56,7 @@ def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float |
     problem = replace(problem, force=force)
     segments = segments_of(problem.motion.rows, problem.spans)
     if point.source == "press":
-        slope = slope_of(strokes_in(problem, problem.lag.value, segments))
+        slope = slope_of(loadings_in(problem, problem.lag.value, segments))
         return None if slope is None else slope.stiffness
     spectrum = dynamic_stiffness(problem, segments, problem.lag.value, problem.lag.std)
     near = [own for own in spectrum if abs(np.log2(own.frequency / point.frequency_Hz)) < 0.5]

@@ -1,4 +1,4 @@
-"""The press: force over depth on the way in and out, its tangents, the work that is lost, and what a hold relaxes."""
+"""The press: force over depth in loading and unloading, its tangents, the lost work, and the relaxation of a hold."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from palpate.arrays import Array
 from palpate.identification.estimators.budget import NORMAL
 from palpate.identification.estimators.octaves import Segment
+from palpate.identification.evidence.loadings import FEWEST, Loading, loadings_in, of_speed, read_later
 from palpate.identification.evidence.relaxation import relaxation
 from palpate.identification.evidence.slope import apart, line, slope_between
-from palpate.identification.evidence.strokes import FEWEST, Stroke, of_speed, read_later, strokes_in
-from palpate.identification.evidence.work import way_out
+from palpate.identification.evidence.work import unloading_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import Press, Tangent
@@ -26,55 +26,55 @@ _SHOWN = 400
 
 
 def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | None:
-    """The press of a log; None without a way in."""
-    strokes = strokes_in(problem, lag, segments)
-    if not strokes:
+    """The press of a log; None without a loading."""
+    loadings = loadings_in(problem, lag, segments)
+    if not loadings:
         return None
-    loading = max(strokes, key=lambda stroke: len(stroke.depth))
-    later = read_later(problem, lag, segments, strokes)
-    tangent = [t for level in _LEVELS if (t := _tangent(strokes, later, level)) is not None]
-    back = way_out(problem, lag, segments)
+    loading = max(loadings, key=lambda loading: len(loading.depth))
+    later = read_later(problem, lag, segments, loadings)
+    tangent = [t for level in _LEVELS if (t := _tangent(loadings, later, level)) is not None]
+    back = unloading_of(problem, lag, segments)
     return Press(
         tuple(t for t in tangent if t.half < abs(t.stiffness)),
         _thin(loading.depth, loading.force),
         _thin(*back.curve),
         back.loss,
-        relaxation(problem, lag, segments, slope_between(strokes, later)),
+        relaxation(problem, lag, segments, slope_between(loadings, later)),
         back.late,
     )
 
 
-def _tangent(strokes: list[Stroke], later: list[Stroke], level: float) -> Tangent | None:
-    """Slope of the ways in about a share of the force; with it what it moves by if the force is later than assumed.
+def _tangent(loadings: list[Loading], later: list[Loading], level: float) -> Tangent | None:
+    """Slope of the loadings about a share of the force; with it what it moves by if the force is later than assumed.
 
     Args:
-        strokes: the ways in.
+        loadings: the loadings.
         later: the same, the force later by a deviation of the lag's prior.
         level: the share.
     """
-    found, other = _tangent_of(strokes, level), _tangent_of(later, level)
+    found, other = _tangent_of(loadings, level), _tangent_of(later, level)
     if found is None or other is None:
         return None
     by_lag = NORMAL * (other.stiffness - found.stiffness)
     return replace(found, half=float(np.hypot(found.half, by_lag)))
 
 
-def _tangent_of(strokes: list[Stroke], level: float) -> Tangent | None:
+def _tangent_of(loadings: list[Loading], level: float) -> Tangent | None:
     slopes, variances, forces, by_speed, by_filter = [], [], [], [], []
-    for stroke in strokes:
-        loss = of_speed(stroke)
-        low, high = np.percentile(stroke.force, [2, 98])
-        rows = _about(stroke.force, low, high, level)
-        if len(rows) < FEWEST or np.ptp(stroke.depth[rows]) <= 0:
+    for loading in loadings:
+        loss = of_speed(loading)
+        low, high = np.percentile(loading.force, [2, 98])
+        rows = _about(loading.force, low, high, level)
+        if len(rows) < FEWEST or np.ptp(loading.depth[rows]) <= 0:
             continue
-        slope, variance, _ = line(stroke.depth[rows], stroke.force[rows])
-        at_rest, *_ = line(stroke.depth[rows], stroke.force[rows] - loss * stroke.speed[rows])
+        slope, variance, _ = line(loading.depth[rows], loading.force[rows])
+        at_rest, *_ = line(loading.depth[rows], loading.force[rows] - loss * loading.speed[rows])
         slopes.append((slope + at_rest) / 2)
         variances.append(variance)
         by_speed.append((slope - at_rest) / 2)
         forces.append(float(low + level * (high - low)))
-        if stroke.read is not None:
-            depth, force = stroke.read
+        if loading.read is not None:
+            depth, force = loading.read
             by_filter.append(apart(depth, force, _about(force, low, high, level), slope, variance))
     if not slopes:
         return None

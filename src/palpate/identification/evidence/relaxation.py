@@ -1,4 +1,4 @@
-"""What a force loses while the probe is held."""
+"""Relaxation of the force while the probe is held."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment
+from palpate.identification.evidence.loadings import FEWEST, STILL
 from palpate.identification.evidence.slope import Slope
-from palpate.identification.evidence.strokes import FEWEST, STILL
 from palpate.identification.least_squares import noise_of
 from palpate.identification.problem import Problem
 from palpate.identification.result import Relaxation
@@ -16,7 +16,7 @@ from palpate.identification.result import Relaxation
 def relaxation(
     problem: Problem, lag: float, segments: list[Segment], slope: Slope | None
 ) -> Relaxation | None:
-    """Of the longest hold after a way in, what the position gives back by its slope left aside."""
+    """Of the longest hold after a loading, what the position gives back by its slope left aside."""
     depth = problem.motion.moved(0, lag)
     speed, force, time = problem.motion.moved(1, lag), problem.force, problem.time
     still = np.abs(speed) < STILL * float(np.percentile(np.abs(speed), 98))
@@ -35,7 +35,7 @@ def relaxation(
 
 
 def _relaxed(force: Array, doubt: float, time: Array) -> Relaxation | None:
-    """What a force loses in a hold, as one that only falls; None if that is within its noise and doubt.
+    """Relaxation of a force in a hold, as a monotone fall; None if that is within its noise and uncertainty.
 
     Args:
         force: less what the position gives back meanwhile, shape (n,) [N].

@@ -1,4 +1,4 @@
-"""The slope of the ways in: of the upper part of the force, at rest, and what contradicts it."""
+"""The slope of the loadings: of the upper part of the force, at rest, and what contradicts it."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 from palpate.arrays import Array
 from palpate.identification.estimators.budget import NORMAL
 from palpate.identification.estimators.octaves import Segment
-from palpate.identification.evidence.strokes import FEWEST, LINE, Stroke, read_later, strokes_in
+from palpate.identification.evidence.loadings import FEWEST, LINE, Loading, loadings_in, read_later
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 
 _UPPER = 0.4
-"""Share of the force above which a way in counts for its stiffness: below, a surface is still being met."""
+"""Share of the force above which a loading counts for its stiffness: below, a surface is still being met."""
 
 
 @dataclass(frozen=True)
 class Slope:
-    """Slope of the upper part of all ways in.
+    """Slope of the upper part of all loadings.
 
     Args:
         stiffness, half: [N/m].
-        rise: mean duration of a way in [s].
-        each: slope of each way in [N/m].
+        rise: mean duration of a loading [s].
+        each: slope of each loading [N/m].
         budget: half-width by cause [N/m]; their squares add up.
         force, depth: where it is, the means of the upper part [N], [m].
     """
@@ -41,53 +41,53 @@ class Slope:
 
 
 def slope_in(problem: Problem, segments: list[Segment]) -> Slope | None:
-    """The slope of a log's ways in; with it what it moves by if the force is later than assumed.
+    """The slope of a log's loadings; with it what it moves by if the force is later than assumed.
 
     Args:
         problem: of the log.
         segments: of its rows.
     """
-    strokes = strokes_in(problem, problem.lag.value, segments)
-    return slope_between(strokes, read_later(problem, problem.lag.value, segments, strokes))
+    loadings = loadings_in(problem, problem.lag.value, segments)
+    return slope_between(loadings, read_later(problem, problem.lag.value, segments, loadings))
 
 
-def slope_between(strokes: list[Stroke], later: list[Stroke]) -> Slope | None:
-    """The slope of some ways in; its interval reaches that of the same with the force later.
+def slope_between(loadings: list[Loading], later: list[Loading]) -> Slope | None:
+    """The slope of some loadings; its interval reaches that of the same with the force later.
 
     Args:
-        strokes: the ways in.
+        loadings: the loadings.
         later: the same with the force later, or the same list if the lag is exact.
     """
-    found = slope_of(strokes)
-    other = slope_of(later) if found is not None and later is not strokes else None
+    found = slope_of(loadings)
+    other = slope_of(later) if found is not None and later is not loadings else None
     if found is None or other is None:
         return found
     by_lag = NORMAL * abs(other.stiffness - found.stiffness)
     return replace(found, half=float(np.hypot(found.half, by_lag)), budget=found.budget | {"lag": by_lag})
 
 
-def slope_of(strokes: list[Stroke]) -> Slope | None:
-    """Slope in the upper part of the force; None without a way in that rises.
+def slope_of(loadings: list[Loading]) -> Slope | None:
+    """Slope in the upper part of the force; None without a loading that rises.
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
-    the interval reaches both. Beyond them it has the scatter of each way in, the change of the slope over the range,
-    what it differs by from the slope of the channels as they were read, and the variance between ways in (a random
+    the interval reaches both. Beyond them it has the scatter of each loading, the change of the slope over the range,
+    what it differs by from the slope of the channels as they were read, and the variance between loadings (a random
     effect, Student's t).
     """
     slopes, variances, rises, changes, speeds, filters, levels = [], [], [], [], [], [], []
-    for stroke in strokes:
-        rows = _upper(stroke.force)
-        if len(rows) < FEWEST or np.ptp(stroke.depth[rows]) <= 0:
+    for loading in loadings:
+        rows = _upper(loading.force)
+        if len(rows) < FEWEST or np.ptp(loading.depth[rows]) <= 0:
             continue
-        slope, variance, change = line(stroke.depth[rows], stroke.force[rows])
-        at_rest = _at_rest(stroke.whole or stroke)
+        slope, variance, change = line(loading.depth[rows], loading.force[rows])
+        at_rest = _at_rest(loading.whole or loading)
         slopes.append((slope + at_rest) / 2)
         variances.append(variance)
         changes.append(change)
         speeds.append(abs(slope - at_rest) / 2)
-        filters.append(_by_filter(stroke, slope, variance))
-        rises.append(float(stroke.time[-1] - stroke.time[0]))
-        levels.append((stroke.force[rows].mean(), stroke.depth[rows].mean()))
+        filters.append(_by_filter(loading, slope, variance))
+        rises.append(float(loading.time[-1] - loading.time[0]))
+        levels.append((loading.force[rows].mean(), loading.depth[rows].mean()))
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
@@ -104,20 +104,20 @@ def slope_of(strokes: list[Stroke]) -> Slope | None:
 
 
 def _upper(force: Array) -> NDArray[np.intp]:
-    """Rows of a way in after the last that was below the share: a force may fall before it rises for good."""
+    """Rows of a loading after the last that was below the share: a force may fall before it rises for good."""
     low, high = np.percentile(force, [2, 98])
     below = np.flatnonzero(force <= low + _UPPER * (high - low))
     return np.arange(int(below[-1]) + 1 if len(below) else 0, len(force))
 
 
-def _by_filter(stroke: Stroke, slope: float, variance: float) -> float:
-    """By how much a slope contradicts that of the same way in before any filter [N/m]: beyond their 95 % interval.
+def _by_filter(loading: Loading, slope: float, variance: float) -> float:
+    """By how much a slope contradicts that of the same loading before any filter [N/m]: beyond their 95 % interval.
 
-    All of it, if the way in has too few readings for a slope of its own: its shape is then the filter's.
+    All of it, if the loading has too few readings for a slope of its own: its shape is then the filter's.
     """
-    if stroke.read is None:
+    if loading.read is None:
         return 0.0
-    depth, force = stroke.read
+    depth, force = loading.read
     if len(depth) < LINE:
         return abs(slope)
     return apart(depth, force, _upper(force), slope, variance)
@@ -162,15 +162,15 @@ def line(x: Array, f: Array) -> tuple[float, float, float]:
     return float(theta[1] / reach), float(variance[1] / reach**2), curve / reach
 
 
-def _at_rest(stroke: Stroke) -> float:
+def _at_rest(loading: Loading) -> float:
     """Slope of the upper part less what the force has of the speed.
 
-    Of the whole way in: within one advance that dies out the speed is the depth over again, and only rests between
+    Of the whole loading: within one advance that dies out the speed is the depth over again, and only rests between
     advances tell the two apart.
     """
-    rows = _upper(stroke.force)
-    columns = np.column_stack([np.ones(len(rows)), stroke.depth[rows], stroke.speed[rows]])
+    rows = _upper(loading.force)
+    columns = np.column_stack([np.ones(len(rows)), loading.depth[rows], loading.speed[rows]])
     size = np.sqrt((columns**2).sum(axis=0))
     size[size == 0] = 1.0
-    theta, *_ = np.linalg.lstsq(columns / size, stroke.force[rows], rcond=1e-3)
+    theta, *_ = np.linalg.lstsq(columns / size, loading.force[rows], rcond=1e-3)
     return float(theta[1] / size[1])

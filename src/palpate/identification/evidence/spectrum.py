@@ -109,7 +109,7 @@ def dynamic_stiffness(
 
 
 def _rounded(problem: Problem, position: Array, lag: float) -> list[Array]:
-    """What an encoder adds to this motion, once for each phase of its counts, behind the same filter, shape (m,) each.
+    """Error of an encoder in this motion, once for each phase of its counts, behind the same filter, shape (m,) each.
 
     A coarse encoder's error goes with the motion: of a sine of a few counts it is part of the sine (the describing
     function of a uniform quantiser), of two places that are held a part of their distance, and no noise. The motion is

@@ -1,4 +1,4 @@
-"""The work of a press: what comes back on the way out, and how late a force is that gives back more than it took."""
+"""The work of a press: its return in unloading, and the lateness of a force that returns more than it took."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _FEWEST = 6
 
 
 @dataclass(frozen=True)
-class WayOut:
-    """What the ways out show.
+class Unloading:
+    """Results of the unloadings.
 
     Args:
         curve: depth [m] and force [N] on that of the deepest contact, shape (2, n); empty if there is none.
-        loss: share of the work put into it that does not come back; None without a way out.
+        loss: share of the work put into it that does not come back; None without a unloading.
         late: by how much the force is read after the position, if it gives back more work than it took, and the
             half-width of that [s]; None if it does not, or if the contacts do not agree on it.
     """
@@ -30,8 +30,8 @@ class WayOut:
     late: tuple[float, float] | None
 
 
-def way_out(problem: Problem, lag: float, segments: list[Segment]) -> WayOut:
-    """The ways out of a log.
+def unloading_of(problem: Problem, lag: float, segments: list[Segment]) -> Unloading:
+    """The unloadings of a log.
 
     Args:
         problem: of the log.
@@ -44,16 +44,16 @@ def way_out(problem: Problem, lag: float, segments: list[Segment]) -> WayOut:
     own = slice(s.first, s.last)
     turn = _turn(depth[own])
     if turn is None:
-        return WayOut(np.empty((2, 0)), None, None)
+        return Unloading(np.empty((2, 0)), None, None)
     rows = [slice(s.first, s.last) for s in segments if _turn(depth[s.first : s.last]) is not None]
     late = _late([(depth[r], speed[r], force[r], time[r]) for r in rows])
     x, f = depth[own], force[own]
     into, back = _works(x, f)
-    return WayOut(np.stack([x[turn:], f[turn:]]), 1 - back / into if into > 0 else None, late)
+    return Unloading(np.stack([x[turn:], f[turn:]]), 1 - back / into if into > 0 else None, late)
 
 
 def _turn(x: Array) -> int | None:
-    """The deepest row of a contact that is left by at least half of the way in; None of another."""
+    """The deepest row of a contact that is left by at least half of the loading; None of another."""
     top = int(np.argmax(x))
     left = len(x) - top >= _FEWEST and x[top] - x[-1] >= 0.5 * (x[top] - x[0])
     return top if top >= _FEWEST and left else None
@@ -80,8 +80,8 @@ def _works(x: Array, f: Array) -> tuple[float, float]:
 def _late(contacts: list[tuple[Array, Array, Array, Array]]) -> tuple[float, float] | None:
     """Lateness of the force by the work that it gives back beyond what it took.
 
-    A force that is read T late does T times the integral of F' x' less work on the way in and out; no passive surface
-    gives back more than it takes.
+    A force that is read T late does less work in loading and unloading, by T times the integral of F' x'; no passive
+    surface gives back more than it takes.
 
     Args:
         contacts: depth, speed, force and time of each, shape (n,).

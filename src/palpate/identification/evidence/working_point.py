@@ -113,7 +113,7 @@ def _octave(spectrum: Sequence[DynamicStiffness], tolerance: float) -> DynamicSt
 
 
 def _again(slope: Slope) -> tuple[float, float] | None:
-    """Where the slope of the next way in falls: t(n - 2) sqrt(between + own)."""
+    """Where the slope of the next loading falls: t(n - 2) sqrt(between + own)."""
     n = len(slope.each)
     if n < 3:
         return None

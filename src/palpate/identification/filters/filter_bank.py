@@ -33,7 +33,7 @@ class FilterBank:
         self.numerators, self.denominator = ss2tf(*discrete)
 
     def memory(self, count: int) -> Array:
-        """What the outputs may still show of the time before the first sample: columns of shape (count, order).
+        """Response of the outputs to the time before the first sample: columns of shape (count, order).
 
         They span it from the sample `order` on.
         """

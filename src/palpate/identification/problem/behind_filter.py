@@ -21,7 +21,7 @@ _LONG = 0.05
 
 
 def behind_filter(channels: Channels, chain: Chain, contacts: Contacts, options: Options) -> Seen:
-    """What the chain shows; a known low-pass of the force is given to the position too.
+    """Both channels behind the chain; a known low-pass of the force is applied to the position too.
 
     Raises:
         InputError: too few rows in contact.

@@ -34,7 +34,7 @@ def shown(low_pass: LowPass, dt: float) -> bool:
 def behind_sensor(
     channels: Channels, low_pass: LowPass, chain: Chain, contacts: Contacts, options: Options
 ) -> Seen:
-    """What the sensor shows.
+    """Both channels as the sensor samples them.
 
     Raises:
         InputError: too few samples in contact.

@@ -1,4 +1,4 @@
-"""What is fitted: position and force behind one and the same front end, at the rows in contact."""
+"""The regression problem: position and force behind the same front end, at the rows in contact."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PIECE = 1 << 14
 
 @dataclass(frozen=True)
 class Problem:
-    """What the models are fitted to.
+    """Data that the models are fitted to.
 
     Args:
         motion: the position, at the rows in contact.
@@ -66,7 +66,7 @@ class Problem:
 
     @property
     def resting(self) -> float:
-        """What the force was counted from: out of contact, for rows that hold the touches [N]."""
+        """Zero of the force: its mean out of contact, for rows that hold the touches [N]."""
         return self.contacts.resting if self.counted else 0.0
 
     @property

@@ -25,7 +25,7 @@ _FEWEST = 30
 
 @dataclass(frozen=True)
 class Seen:
-    """What a front end shows.
+    """Both channels behind a front end.
 
     Args:
         motion: the position, counted from the surface into it, at the rows in contact.

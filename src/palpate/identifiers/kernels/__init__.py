@@ -1,1 +1,1 @@
-"""What the estimators run on: laws and parts that are compiled, on flat arrays."""
+"""Kernels of the estimators: compiled laws and parts on flat arrays."""

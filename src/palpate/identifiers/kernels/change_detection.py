@@ -36,7 +36,7 @@ _ENOUGH = 2
 
 @part
 class Watch(NamedTuple):
-    """What an estimator that starts again is asked to do.
+    """Settings of the change detection.
 
     Args:
         forgetting: a policy of `forgetting`, between changes.

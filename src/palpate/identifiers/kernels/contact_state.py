@@ -19,7 +19,7 @@ from palpate.identifiers.kernels.square_root import measured
 ALARM = log(1e6)
 """Once in a million samples: at 480 Hz, in 35 minutes."""
 MOST = ALARM / 3
-"""What one sample can say: a single outlier is neither a touch nor the end of one."""
+"""Largest evidence of one sample: a single outlier is neither a touch nor the end of one."""
 SOFTEST = 0.25
 """Share of the stiffness so far that a surface must keep, to be told from free space."""
 TOLD = 3.0

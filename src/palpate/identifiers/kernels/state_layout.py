@@ -1,4 +1,4 @@
-"""What is known of n parameters, as one flat array of numbers that a kernel changes in place.
+"""The state of an estimator of n parameters, as one flat array that a kernel changes in place.
 
 In this order: theta, root, left, passed, heard, white, added, six statistics, floor, even. See `ErrorCovariance`; floor
 is the inverse of each initial variance, even that of their sum, n times.

@@ -1,4 +1,4 @@
-"""What to see on the figures of an identification, with the numbers of the log at hand."""
+"""Captions of an identification's figures, with the log's own numbers."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def _silent(axes: Axes, frequency: Array, told: Mask) -> None:
 
 
 def press(axes: Axes, found: Identification, traces: Traces) -> None:
-    """Force over depth: the way in and out, its slopes with their bands, the working point."""
+    """Force over depth: loading and unloading, its slopes with their bands, the working point."""
     own = found.press
     if own is None:
         empty(axes, "no loading in this log")
@@ -120,9 +120,9 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
     )
     x, f = own.loading
     _band_of(axes, own, scale)
-    axes.plot(scale * x, f, color=style.INK, lw=1.6, label="way in")
+    axes.plot(scale * x, f, color=style.INK, lw=1.6, label="loading")
     if own.unloading.shape[1]:
-        axes.plot(scale * own.unloading[0], own.unloading[1], color=style.MEASURED, lw=1.6, label="way out")
+        axes.plot(scale * own.unloading[0], own.unloading[1], color=style.MEASURED, lw=1.6, label="unloading")
     point = found.working_point
     if point is not None:
         _ring(axes, scale * point.depth_m, point.force_N)
@@ -138,7 +138,7 @@ def _touches(found: Identification) -> bool:
 
 
 def _band_of(axes: Axes, own: Press, scale: float) -> None:
-    """The slopes, each over the part of the way in that it is of."""
+    """The slopes, each over the part of the loading that it is of."""
     reach = float(np.ptp(own.loading[0])) / (2.5 * max(len(own.tangent), 1))
     low, high = float(own.loading[1].min()), float(own.loading[1].max())
     for i, tangent in enumerate(own.tangent):
@@ -153,7 +153,7 @@ def _band_of(axes: Axes, own: Press, scale: float) -> None:
 
 
 def _depth_at(own: Press, tangent: Tangent) -> float:
-    """Depth at which the way in passes a slope's force [m]."""
+    """Depth at which the loading passes a slope's force [m]."""
     x, f = own.loading
     return float(x[int(np.argmin(np.abs(f - tangent.force)))])
 
@@ -179,6 +179,6 @@ def _value(found: Identification, name: str) -> float | None:
 
 
 def scaled_unit(unit: str, values: Array) -> tuple[float, str]:
-    """What an axis counts in: kN/m where that is shorter."""
+    """Unit of an axis: kN/m where that is shorter."""
     large = unit == "N/m" and float(np.abs(values).max()) >= _KILO
     return (1e3, "kN/m") if large else (1.0, unit)

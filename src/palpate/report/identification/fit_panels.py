@@ -34,7 +34,7 @@ def force(axes: Axes, found: Identification, traces: Traces) -> None:
 
 
 def residual(axes: Axes, found: Identification, traces: Traces) -> None:
-    """What the model leaves of the force, over time."""
+    """Residual of the force over time."""
     style.panel(axes, labelled("misfit", traces.force_unit), "time [s]")
     contacts(axes, found)
     left = traces.fitted_force - traces.predicted
@@ -67,7 +67,7 @@ def labelled(name: str, unit: str) -> str:
 
 
 def length_of(traces: Traces) -> tuple[float, str]:
-    """What an axis of depth counts in."""
+    """Unit of an axis of depth."""
     return (1e3, "mm") if traces.position_unit == "m" else (1.0, traces.position_unit)
 
 

@@ -28,7 +28,7 @@ def line(found: Identification) -> str:
 
 
 def text(found: Identification) -> str:
-    """What `palpate identify` prints."""
+    """The output of `palpate identify`."""
     return printed(lambda console: show(found, NAME, console))
 
 

@@ -115,7 +115,7 @@ def _point(found: Identification) -> dict[str, Any] | None:
 
 
 def _scale(p: Parameter, found: Identification) -> str:
-    """What a scale that is off would do, if nobody has told the calibration."""
+    """Effect of a wrong scale, if the calibration is not given."""
     if p.value is None or found.options.get("calibration"):
         return ""
     share = quantity(abs(p.value) / 100, p.unit, digits=2)
@@ -192,7 +192,7 @@ def _row(name: str, half: float, longest: float, p: Parameter, *, assumed: bool)
 
 
 def _evidence(found: Identification) -> list[dict[str, str]]:
-    """What the log shows before any model."""
+    """The evidence without a model."""
     if found.traces is None or not found.contacts:
         return []
     return [

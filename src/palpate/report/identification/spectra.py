@@ -1,4 +1,4 @@
-"""What a model leaves of the force by frequency, and whether that is noise."""
+"""Residual of a model by frequency, and a test whether it is noise."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def _periodogram(values: Array, dt: float) -> tuple[NDArray[Any], Array]:
 
 
 def white(left: Spectrum, cutoff: float, level: float = 0.95) -> tuple[Array, Array, Array]:
-    """What white noise of the same power would show behind the filter chain: density, and the band it stays in.
+    """White noise of the same power behind the filter chain: density, and its 95 % band.
 
     Args:
         left: spectrum of the residuals.

@@ -1,4 +1,4 @@
-"""What an identification says, in words: the sentence first, then what each number is and what limits it."""
+"""An identification in words: the sentence, then each number and its limits."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ ADVICE = {
     Code.FRAME_GUESS: "Say it with --wrench-frame.",
     Code.NORMAL_UNCERTAIN: "Give the contact's normal, or press harder along it and slide less.",
 }
-"""What to do about a warning."""
+"""The remedy of a warning."""
 
 UNTOUCHED = "Nothing is touched in this log"
 
@@ -137,7 +137,7 @@ def units_of(found: Identification) -> tuple[str, str]:
 
 
 def lost(share: float) -> str:
-    """What becomes of the work of a press, by the share of it that does not come back."""
+    """A sentence about the lost share of the work of a press."""
     if share < 0:
         return f"{-100 * share:.2g} % more work comes back than was put in: the force is probably read late"
     return f"{100 * share:.2g} % of the work put in does not come back"
@@ -151,7 +151,7 @@ def limited_by(found: Identification) -> Cause:
 
 
 def model_line(found: Identification) -> str:
-    """What the model's parameters are worth, in one line."""
+    """The verdicts of the model's parameters, in one line."""
     if not found.contacts or not found.n:
         return ""
     start = "No model describes this log. " if Code.MODEL_REJECTED.word in found.codes else ""
@@ -211,7 +211,7 @@ def interval(ends: tuple[float, float] | None, unit: str) -> str:
 
 
 def advice(code: Code) -> str:
-    """What to do about a warning; what it means, where nobody has written that down."""
+    """The remedy of a warning; its meaning, if it has none."""
     return ADVICE.get(code, code.value)
 
 

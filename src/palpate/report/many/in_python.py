@@ -29,7 +29,7 @@ def line(pooled: Pooled) -> str:
 
 
 def text(pooled: Pooled) -> str:
-    """What `palpate identify` prints of many logs."""
+    """The output of `palpate identify` for many logs."""
     return printed(lambda console: show(_rows(pooled), pooled, console))
 
 

@@ -1,4 +1,4 @@
-"""What many logs give: a row each, and what they say together."""
+"""Results of many logs: a row each, and the pooled one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What many logs say together, in a sentence."""
+"""The pooled result of many logs, in a sentence."""
 
 from __future__ import annotations
 

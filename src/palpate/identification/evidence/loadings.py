@@ -1,4 +1,4 @@
-"""The ways in of a log: what of each contact is an advance, before and behind the filter."""
+"""The loadings of a log: what of each contact is an advance, before and behind the filter."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MET = 0.15
 """Share of the force above which its bend over the depth is looked for: the lowest that a slope is taken of."""
 
 _FULL = 0.95
-"""Share of the force at which a way in is over: what is left of it is rounding off."""
+"""Share of the force at which a loading is over: what is left of it is rounding off."""
 
 FEWEST = 6
 
@@ -27,25 +27,25 @@ STILL = 0.02
 
 
 @dataclass(frozen=True)
-class Stroke:
-    """One way in: depth [m], speed [m/s], force [N] and time [s], shape (n,).
+class Loading:
+    """One loading: depth [m], speed [m/s], force [N] and time [s], shape (n,).
 
     Args:
-        whole: the same with the rests before it, if the way in was made in steps.
-        read: depth and force as they were read, with an advance of their own, shape (2, k): behind a filter a way in is
-            as long as the filter at least.
+        whole: the same with the rests before it, if the loading was made in steps.
+        read: depth and force as they were read, with an advance of their own, shape (2, k): behind a filter a loading
+            is at least as long as the filter.
     """
 
     depth: Array
     speed: Array
     force: Array
     time: Array
-    whole: Stroke | None = None
+    whole: Loading | None = None
     read: Array | None = None
 
 
-def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[Stroke]:
-    """The way in of each contact: up to its deepest row or nearly its peak force, at least half of the range of all.
+def loadings_in(problem: Problem, lag: float, segments: list[Segment]) -> list[Loading]:
+    """The loading of each contact: up to its deepest row or nearly its peak force, at least half of the range of all.
 
     What comes after the peak force is a hold: the probe creeps on under a constant force, or the force relaxes.
     """
@@ -66,23 +66,25 @@ def strokes_in(problem: Problem, lag: float, segments: list[Segment]) -> list[St
         if top - begin >= FEWEST:
             advance = slice(*_one_way(depth, channels[1], begin, top, reach))
             x, v, f, t = channels
-            whole = Stroke(x[begin:top], v[begin:top], f[begin:top], t[begin:top])
-            stroke = Stroke(x[advance], v[advance], f[advance], t[advance], whole)
-            found.append(replace(_sharpened(stroke, motion.chain), read=_as_read(problem, lag, stroke)))
+            whole = Loading(x[begin:top], v[begin:top], f[begin:top], t[begin:top])
+            loading = Loading(x[advance], v[advance], f[advance], t[advance], whole)
+            found.append(replace(_sharpened(loading, motion.chain), read=_as_read(problem, lag, loading)))
     return found
 
 
-def read_later(problem: Problem, lag: float, segments: list[Segment], strokes: list[Stroke]) -> list[Stroke]:
-    """The ways in with the force later by a deviation of the lag's prior; as they are, if the lag is exact."""
-    return strokes_in(problem, lag + problem.lag.std, segments) if problem.lag.std > 0 else strokes
+def read_later(
+    problem: Problem, lag: float, segments: list[Segment], loadings: list[Loading]
+) -> list[Loading]:
+    """The loadings with the force later by a deviation of the lag's prior; as they are, if the lag is exact."""
+    return loadings_in(problem, lag + problem.lag.std, segments) if problem.lag.std > 0 else loadings
 
 
-def _as_read(problem: Problem, lag: float, stroke: Stroke) -> Array | None:
-    """Depth [m] and force [N] of the same way in before any filter, shape (2, k); None where they are not known."""
+def _as_read(problem: Problem, lag: float, loading: Loading) -> Array | None:
+    """Depth [m] and force [N] of the same loading before any filter, shape (2, k); None where they are not known."""
     chain, force = problem.motion.chain, problem.read
     if force is None or not isinstance(chain, Chain):
         return None
-    first, last = (int(np.clip(t / chain.dt, 0, len(force) - 1)) for t in stroke.time[[0, -1]])
+    first, last = (int(np.clip(t / chain.dt, 0, len(force) - 1)) for t in loading.time[[0, -1]])
     at = np.arange(first, last + 1) - lag / chain.dt
     depth: Array = np.interp(at, np.arange(len(force), dtype=np.float64), problem.motion.position)
     top = int(np.argmax(depth)) + 1
@@ -93,18 +95,18 @@ def _as_read(problem: Problem, lag: float, stroke: Stroke) -> Array | None:
     return np.stack([depth, force[first : last + 1]])[:, begin:top]
 
 
-def _sharpened(stroke: Stroke, chain: object) -> Stroke:
+def _sharpened(loading: Loading, chain: object) -> Loading:
     """The same without what the filter adds to a curve.
 
     The mean of a square is the square of the mean and the variance: behind a filter a force of bend c over the depth is
     larger by c times the way within the filter's memory squared, to the second order of that.
     """
     if not isinstance(chain, Chain):
-        return stroke
-    way = (chain.delay / ORDER**0.5 * stroke.speed) ** 2
-    u = stroke.depth - stroke.depth[_met(stroke)].mean()
-    bend = _last(np.column_stack([np.ones(len(u)), u, u**2 + way]), stroke, 1e-6)
-    return replace(stroke, force=stroke.force - bend * way)
+        return loading
+    way = (chain.delay / ORDER**0.5 * loading.speed) ** 2
+    u = loading.depth - loading.depth[_met(loading)].mean()
+    bend = _last(np.column_stack([np.ones(len(u)), u, u**2 + way]), loading, 1e-6)
+    return replace(loading, force=loading.force - bend * way)
 
 
 def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> tuple[int, int]:
@@ -120,23 +122,23 @@ def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> 
     return (first, last) if depth[last - 1] - depth[first] >= 0.5 * reach else (begin, top)
 
 
-def _met(stroke: Stroke) -> Mask:
+def _met(loading: Loading) -> Mask:
     """Rows in which the surface is met."""
-    low, high = np.percentile(stroke.force, [2, 98])
-    rows: Mask = stroke.force >= low + _MET * (high - low)
+    low, high = np.percentile(loading.force, [2, 98])
+    rows: Mask = loading.force >= low + _MET * (high - low)
     return rows
 
 
-def _last(columns: Array, stroke: Stroke, least: float) -> float:
+def _last(columns: Array, loading: Loading, least: float) -> float:
     """Coefficient of the last column in the force where the surface is met; 0 for directions below a share."""
-    own = columns[_met(stroke)]
+    own = columns[_met(loading)]
     size = np.sqrt((own**2).sum(axis=0))
     size[size == 0] = 1.0
-    theta, *_ = np.linalg.lstsq(own / size, stroke.force[_met(stroke)], rcond=least)
+    theta, *_ = np.linalg.lstsq(own / size, loading.force[_met(loading)], rcond=least)
     return float(theta[-1] / size[-1])
 
 
-def of_speed(stroke: Stroke) -> float:
-    """What the force has of the speed over a whole way in, beside a spring that may curve [N s/m]."""
-    u = stroke.depth - stroke.depth[_met(stroke)].mean()
-    return _last(np.column_stack([np.ones(len(u)), u, u**2, stroke.speed]), stroke, 1e-3)
+def of_speed(loading: Loading) -> float:
+    """Dependence of the force on the speed over a whole loading, beside a spring that may curve [N s/m]."""
+    u = loading.depth - loading.depth[_met(loading)].mean()
+    return _last(np.column_stack([np.ones(len(u)), u, u**2, loading.speed]), loading, 1e-3)
