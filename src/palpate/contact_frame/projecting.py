@@ -156,7 +156,7 @@ def _doubts(
     freed: Unloaded, signals: Signals, frame: ContactFrame, inertia: tuple[float, float] | None
 ) -> list[dict[str, Any]]:
     """What the free rows say against the tool as it is compensated, or was weighed."""
-    from scipy.stats import chi
+    from scipy.special import chdtri
 
     notes = []
     if wrong_sign(inertia):
@@ -167,7 +167,7 @@ def _doubts(
         return notes
     own = load_of(signals.force[free], signals.rotations[free], weighs=True)
     off = float(np.linalg.norm(own.weight - np.array(frame.payload.weight)))
-    if own.separable and off > float(chi.isf(CHANCE, 3)) * float(
+    if own.separable and off > float(chdtri(3, CHANCE)) ** 0.5 * float(
         np.hypot(own.weight_std, frame.payload.weight_std)
     ):
         text = (

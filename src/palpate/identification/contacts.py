@@ -15,6 +15,7 @@ from palpate.identification.options import NOTHING_SAID, Options
 from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.warning_codes import Code, Warn
+from palpate.signals.spectral import detrended
 
 ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""
@@ -200,10 +201,8 @@ def _never_left(channels: Channels, force: Array, position: Array, options: Opti
 
 def _correlation(force: Array, position: Array, dt: float) -> float:
     """Of block means over a hundredth of the log, without their slow trend."""
-    from scipy.signal import detrend
-
     width = max(len(force) // _BLOCKS, 1)
-    f, x = (detrend(block_means(values, width)) for values in (force, position))
+    f, x = (detrended(block_means(values, width)) for values in (force, position))
     size = float(np.sqrt((f @ f) * (x @ x)))
     return float(f @ x) / size if size > 0 else 0.0
 

@@ -52,9 +52,9 @@ def free_inertia(time: Array, force: Array, place: Array, free: Rows) -> tuple[f
 
 def wrong_sign(inertia: tuple[float, float] | None) -> bool:
     """Whether a force follows the acceleration against the sense in which a tool's mass makes it."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return inertia is not None and inertia[0] < -float(t.isf(CHANCE, BLOCKS - 1)) * inertia[1]
+    return inertia is not None and inertia[0] < -float(stdtrit(BLOCKS - 1, 1 - CHANCE)) * inertia[1]
 
 
 def wrong_sign_of(inertia: tuple[float, float]) -> str:

@@ -104,10 +104,10 @@ def _another_frame(
 
 def _better(own: float, other: float, rows: int) -> bool:
     """By Fisher's test of two mean squares of that many rows."""
-    from scipy.stats import f
+    from scipy.special import fdtri
 
     dof = rows - 9
-    return dof > 0 and own > max(other, 1e-12) * float(f.isf(CHANCE, dof, dof))
+    return dof > 0 and own > max(other, 1e-12) * float(fdtri(dof, dof, 1 - CHANCE))
 
 
 def noise_of(force: Array, first: NDArray[np.intp]) -> float:
@@ -118,10 +118,10 @@ def noise_of(force: Array, first: NDArray[np.intp]) -> float:
 
 def _by_noise(force: Array, poses: Poses) -> float:
     """The largest mean square of the orientations' means that white noise of the readings leaves by chance [N^2]."""
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     rows = 3 * len(poses.count)
-    share = float(chi2.isf(CHANCE, rows)) / rows
+    share = float(chdtri(rows, CHANCE)) / rows
     return noise_of(force, poses.first) ** 2 * len(poses.count) / poses.count.sum() * share
 
 
@@ -190,7 +190,7 @@ def _in_axes(poses: Poses, turn: Array) -> Poses:
 
 def _touched(time: Array, poses: Poses, means: Array) -> list[dict[str, Any]]:
     """A stretch whose force the others do not foretell."""
-    from scipy.stats import f
+    from scipy.special import fdtri
 
     size = np.sum(means**2, axis=1)
     worst = int(np.argmax(size))
@@ -198,7 +198,7 @@ def _touched(time: Array, poses: Poses, means: Array) -> list[dict[str, Any]]:
     if len(others) < 3 or not others.sum() > 0:
         return []
     ratio = float(size[worst] / others.mean())
-    if ratio < float(f.isf(CHANCE / len(size), 3, 3 * len(others))):
+    if ratio < float(fdtri(3, 3 * len(others), 1 - CHANCE / len(size))):
         return []
     ends = np.r_[poses.first, len(time)]
     begin, end = time[ends[worst]], time[ends[worst + 1] - 1]

@@ -127,14 +127,14 @@ class Fitted:
 
     def jackknifed(self, replicas: Array, value: Array, unit: str) -> Estimated:
         """A number with its interval, from its replicas, shape (g,) or (g, 3)."""
-        from scipy.stats import t
+        from scipy.special import stdtrit
 
         g = len(replicas)
         if np.isfinite(replicas).all() and g > 1:
             std = np.sqrt((g - 1) / g * np.sum((replicas - replicas.mean(axis=0)) ** 2, axis=0))
         else:
             std = np.full(replicas.shape[1:], np.inf)
-        half = np.full(np.shape(std), np.inf) if self.dof <= 0 else std * float(t.ppf(0.975, self.dof))
+        half = np.full(np.shape(std), np.inf) if self.dof <= 0 else std * float(stdtrit(self.dof, 0.975))
         return Estimated(np.asarray(value), np.asarray(std), np.asarray(half), unit)
 
     @property

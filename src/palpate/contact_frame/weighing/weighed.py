@@ -246,7 +246,7 @@ def _centre(signals: Signals, there: Mask, time: Array, poses: Poses, fitted: Fi
 
 def _inertia(signals: Signals, fit: PoseFit, frame: ContactFrame) -> dict[str, Estimated]:
     """The mass by which the force follows the acceleration, if the tool is shaken."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     side = side_of(fit.fitted.whole[:3])
     if side is None:
@@ -261,7 +261,7 @@ def _inertia(signals: Signals, fit: PoseFit, frame: ContactFrame) -> dict[str, E
     value, std = found
     return {
         "inertia": Estimated(
-            np.array(value), np.array(std), np.array(float(t.isf(0.025, BLOCKS - 1)) * std), "kg"
+            np.array(value), np.array(std), np.array(float(stdtrit(BLOCKS - 1, 0.975)) * std), "kg"
         )
     }
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.models import Model, Motion
+from palpate.signals.spectral import detrended, quadrature
 
 FRICTION = "Fc"
 TOUCH = "touch"
@@ -65,11 +66,7 @@ def _in_quadrature(x: Array, segments: list[Segment]) -> Array:
     Foam, rubber and friction lose so; over one frequency it is no other than damping (structural damping, Myklestad
     1952), and only a loss that grows with the frequency is a B.
     """
-    from scipy.fft import next_fast_len
-    from scipy.signal import detrend, hilbert
-
     found = np.zeros(len(x))
     for s in segments:
-        own = detrend(x[s.first : s.last])
-        found[s.first : s.last] = np.imag(hilbert(own, next_fast_len(2 * len(own))))[: len(own)]
+        found[s.first : s.last] = quadrature(detrended(x[s.first : s.last]))
     return found

@@ -8,6 +8,7 @@ from palpate.arrays import Array
 from palpate.identification.filters.position_noise import position_noise
 from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.models import Motion
+from palpate.signals.spectral import periodogram
 
 FASTEST = 1 / 8
 """Highest cut-off as a share of the readings per second: above it sampling, not filtering, sets the error."""
@@ -17,7 +18,7 @@ _CONTACTS = 32
 _FEWEST_SEGMENT = 64
 _APART = 3.0
 _MOST = 0.99
-_TAPER = ("tukey", 0.1)
+_TAPER = 0.1
 
 
 def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> float:
@@ -88,11 +89,8 @@ def highest_motion(motion: Motion) -> float:
 
 def _energy(position: Array) -> tuple[Array, Array]:
     """Of the speed in a stretch by frequency [1/sample], where it stands above the noise; both of shape (l,)."""
-    from scipy.fft import next_fast_len
-    from scipy.signal import periodogram
-
     speed = np.diff(position)
-    frequency, power = periodogram(speed, window=_TAPER, nfft=next_fast_len(len(speed), real=True))
+    frequency, power = periodogram(speed, _TAPER)
     noise = position_noise([position])
     floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
     return frequency, np.where(power > _ABOVE_FLOOR * floor, power, 0.0) * len(speed) / len(frequency)

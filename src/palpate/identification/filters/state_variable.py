@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.identification.filters.position_noise import PositionNoise
+from palpate.signals.spectral import convolved
 
 ORDER = 5
 _LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak
@@ -93,7 +94,7 @@ class Chain:
         np.subtract(signal, level, out=padded[reach:-reach])
         padded[:reach], padded[-reach:] = padded[reach], padded[-reach - 1]
         start = reach - first
-        full = _convolve(padded, taps)
+        full = convolved(padded, taps)
         return full[start : start + len(signal)] + (level if derivative == 0 else 0.0)
 
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
@@ -176,23 +177,15 @@ def _erlang_cdf(order: int, tau: Array) -> Array:
     return 1.0 - total * np.exp(-tau)
 
 
-def _convolve(signal: Array, taps: Array) -> Array:
-    from scipy.signal import oaconvolve
-
-    if len(taps) <= 256:
-        return np.convolve(signal, taps)
-    found: Array = oaconvolve(signal, taps)
-    return found
-
-
 def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
     """One lag 1/(1 + s T), exact for straight lines between the samples, starting from rest at 0. Shape (n,)."""
-    from scipy.signal import lfilter
+    from scipy.linalg import solve_banded
 
     decay = np.exp(-dt / time_constant)
     b1 = 1 - time_constant / dt * (1 - decay)
     b0 = time_constant / dt * (1 - decay) - decay
-    found: Array = lfilter([b1, b0], [1.0, -decay], signal)
+    driven = b1 * signal + b0 * np.r_[0.0, signal[:-1]]
+    found: Array = solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven)
     return found
 
 

@@ -133,12 +133,12 @@ def _ranked(
 
 def mean(values: Sequence[float]) -> Mean:
     """The mean of some values with its interval."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     n = len(values)
     if n == 0:
         return Mean(math.nan, None)
-    half = float(t.ppf(0.5 + LEVEL / 2, n - 1) * np.std(values, ddof=1) / math.sqrt(n)) if n > 1 else None
+    half = float(stdtrit(n - 1, 0.5 + LEVEL / 2) * np.std(values, ddof=1) / math.sqrt(n)) if n > 1 else None
     return Mean(float(np.mean(values)), half)
 
 

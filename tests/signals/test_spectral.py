@@ -1,0 +1,43 @@
+"""Detrending, convolution, quadrature and periodogram against those of `scipy.signal`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+from scipy.fft import next_fast_len
+
+from palpate.signals.spectral import convolved, detrended, periodogram, quadrature
+
+LENGTHS = (3, 16, 101, 4097)
+"""Even, odd, below and above the length of a direct convolution."""
+
+
+@pytest.fixture(params=LENGTHS)
+def values(request):
+    return np.random.default_rng(request.param).standard_normal(request.param) + 3.0
+
+
+def test_a_line_is_taken_away(values):
+    assert np.allclose(detrended(values), signal.detrend(values), rtol=0, atol=1e-12)
+    assert not detrended(np.array([5.0])).any()
+
+
+@pytest.mark.parametrize("taps", [1, 256, 257, 3000])
+def test_a_convolution_is_the_same_direct_or_by_lines(values, taps):
+    response = np.random.default_rng(taps).standard_normal(taps)
+    expected = signal.convolve(values, response, method="direct")
+    assert np.allclose(convolved(values, response), expected, rtol=0, atol=1e-9)
+
+
+def test_every_frequency_is_a_quarter_of_a_period_later(values):
+    expected = np.imag(signal.hilbert(values, next_fast_len(2 * len(values))))[: len(values)]
+    assert np.allclose(quadrature(values), expected, rtol=0, atol=1e-12)
+
+
+def test_power_by_frequency(values):
+    size = next_fast_len(len(values), real=True)
+    frequency, power = signal.periodogram(values, window=("tukey", 0.1), nfft=size)
+    found = periodogram(values, 0.1)
+    assert np.allclose(found[0], frequency, rtol=0, atol=1e-15)
+    assert np.allclose(found[1], power, rtol=1e-9, atol=1e-12)
