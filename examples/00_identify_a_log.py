@@ -1,4 +1,4 @@
-"""From a log to numbers with verdicts: what `palpate identify` does, from Python."""
+"""From a log to numbers with verdicts: `palpate identify` from Python."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The thesis' arm on arrays: where the tip is, what the motors must give, how hard the arm can press."""
+"""The thesis' arm on arrays: pose of the tip, torques of the motors, largest force."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Change one number of an experiment and run it: how far does the force overshoot on a stiffer wall?"""
+"""Change one number of an experiment and run it: how large is the overshoot on a stiffer wall?"""
 
 import msgspec
 

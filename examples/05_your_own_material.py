@@ -1,7 +1,7 @@
-"""A material of your own on the bench: a cushion that grows stiffer the deeper it is pressed.
+"""Your own material on the bench: a cushion whose stiffness grows with penetration.
 
-A part is a NamedTuple of numbers with methods of plain arithmetic. It runs as it stands, and compiled, which takes
-some ten seconds: once and for all for a part in a module that you import, at each run for one in a script like this.
+A part is a NamedTuple of numbers with methods of plain arithmetic. It runs in plain Python and compiled. The
+compilation takes some ten seconds: once for a part in an imported module, at each run for a part in a script like this.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""A controller of your own on the bench, stepped in plain Python first, then compiled.
+"""Your own controller on the bench, stepped in plain Python first, then compiled.
 
 A controller is a NamedTuple of gains with `start()`, its state before the first tick, and
 `step(state, sense, task, model)`, which returns the joint torques and the next state.

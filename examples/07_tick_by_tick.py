@@ -1,4 +1,4 @@
-"""The loop one tick at a time in plain Python: look at any state, change what you like, go on."""
+"""The loop one tick at a time in plain Python: read any state, change it, continue."""
 
 import numpy as np
 

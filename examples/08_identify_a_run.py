@@ -1,6 +1,6 @@
-"""A run of the bench through the identification for logs: does it find what it cannot know?
+"""A run of the bench as a log: does the identification find the parameters that only the simulation knows?
 
-The identification gets what a real log would hold, measured position and force; the truth stays behind.
+The identification gets the signals of a real log, measured position and force, and not the truth.
 """
 
 import palpate

@@ -1,8 +1,8 @@
-"""Design a force that shows stiffness, damping and mass, press with it, and see whether it told what was foretold.
+"""Design a force that identifies stiffness, damping and mass, press with it, and check the predicted uncertainty.
 
-The surface is known here, so that the answer can be judged. For one that is not, give ranges: the design serves all
-of a range. `palpate excite` does the same from the command line. The touch itself, which a design leaves out of
-account, tells something of its own about K.
+The surface is known here, so that the result can be checked. For an unknown surface, give ranges: the design is valid
+for all of a range. `palpate excite` does the same from the command line. The touch itself, which a design neglects,
+gives additional information about K.
 """
 
 import palpate

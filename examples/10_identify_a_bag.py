@@ -1,8 +1,8 @@
 """From a robot's bag to K, B, M: a press is written as an MCAP bag, and identified as wrench and pose.
 
-The arm comes down with its tool tilted, presses foam, and leaves. Its wrist shows the reaction in the sensor's axes,
-with the tool's weight and a bias of its own; its pose is that of the flange, 12 cm behind the point that touches. The
-identification is told the axes and the lever arm; it finds the normal, the sign, and what the sensor shows in the air.
+The arm approaches with a tilted tool, presses foam, and retracts. Its wrist sensor measures the reaction in the
+sensor's axes, with the tool's weight and a bias; its pose is that of the flange, 12 cm behind the contact point. The
+axes and the lever arm are given; the identification finds the normal, the sign, the weight and the bias.
 """
 
 from pathlib import Path

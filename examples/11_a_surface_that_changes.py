@@ -1,7 +1,7 @@
-"""On line, at 1 kHz: a tip on a given path presses a soft surface that becomes nine times as stiff under way.
+"""On line, at 1 kHz: a tip on a given path presses a surface whose stiffness grows ninefold during the press.
 
-Position and force go in as a control loop has them; `ContactIdentifier` reads the position as the force sensor sees the
-force, and `RestartingLeastSquares` notices that the surface is another, and when it became one.
+The inputs are position and force, tick by tick. `ContactIdentifier` filters the position by the force sensor's own
+low-pass. `RestartingLeastSquares` detects the change of the surface and dates it.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""A study from Python: a grid over two numbers, five seeds each, and what its table says."""
+"""A study from Python: a grid over two numbers, five seeds each, and its table."""
 
 import polars
 

@@ -1,7 +1,7 @@
-"""Ask the linear model whether a force loop is stable, how near it is to not being so, and on which surfaces.
+"""The linear model of a force loop: is it stable, with which margins, and on which surfaces?
 
-The model is the bench's own tick, differentiated where the arm presses at rest: all three joints, the sensor's lag, its
-480 samples a second under a loop of 1000. Friction is left out; with it (friction=True) what would swing may stick.
+The model is the derivative of the bench's own tick about a press at rest: three joints, the sensor's lag, sampling at
+480 Hz under a loop of 1 kHz. Friction is left out; with it (friction=True) an oscillation may turn into sticking.
 """
 
 from palpate.analysis import linearise, margins, stable_intervals, stable_stiffness

@@ -1,7 +1,7 @@
-"""A UR cell from its log to gains to pressing: a look, a cautious press, the surface, better gains, a press with them.
+"""A UR cell, from its log to gains to a press: dry run, cautious press, identification, better gains, second press.
 
-The arm is a simulated one that speaks as a UR's controller does, so that ur-rtde itself moves it; with a real one only
-the address is another, and `--yes` is left out, so that it asks. Each line is a command as it can be typed.
+The arm is simulated and speaks the protocol of a UR controller, so that ur-rtde itself moves it. For a real arm, change
+the address and omit `--yes`, so that the command asks for confirmation. Each line is a command that can be typed.
 """
 
 import contextlib

@@ -1,7 +1,7 @@
-"""From a log to a scene of MuJoCo whose foam is the foam that was touched: identify, export, press it there.
+"""From a log to a MuJoCo scene with the identified foam: identify, export, press it there.
 
-Each line is a command as it can be typed. The damping is not identifiable from this log as it stands; with the lag of
-its force told (7.6 ms, calibrated) it is.
+Each line is a command that can be typed. The damping is not identifiable from this log alone; with the calibrated lag
+of its force (7.6 ms) it is.
 """
 
 import contextlib

@@ -1,8 +1,8 @@
-"""A Franka is pressed with by libfranka at 1 kHz, and what it touched is identified.
+"""A Franka presses under libfranka at 1 kHz, and its surface is identified.
 
-The arm is a simulated one behind franky-sim's server, which speaks libfranka's protocol; with a real one only the
-address is another. The lag of such a loop is some 17 ms: what this machine is late by is said at the end, and ends the
-press if it is more.
+The arm is simulated by franky-sim's server, which speaks libfranka's protocol. For a real arm, change the
+address. The lag of such a loop is some 17 ms. The measured lateness of this machine is printed at the end; the press is
+stopped if it exceeds that lag.
 """
 
 import shlex

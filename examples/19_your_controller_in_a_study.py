@@ -1,7 +1,7 @@
-"""A controller and a metric of your own in a study: which law is better, on the same random surfaces?
+"""Your own controller and metric in a study: which law is better, on the same random surfaces?
 
-`student.py` lies beside this file. In a study's TOML file the same names stand, and `palpate study mine.toml` finds the
-module beside it.
+`student.py` is in the same folder. A study's TOML file uses the same names, and `palpate study mine.toml` finds the
+module beside that file.
 """
 
 from student import Damped

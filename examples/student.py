@@ -1,4 +1,4 @@
-"""A controller, a metric and nothing else: what a student brings to a study (19_your_controller_in_a_study.py)."""
+"""A controller and a metric: a student's part of a study (19_your_controller_in_a_study.py)."""
 
 from typing import NamedTuple
 

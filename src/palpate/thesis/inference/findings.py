@@ -33,9 +33,9 @@ def present(result: Result, folder: Path, command: str) -> None:
     whole = page(
         title="The thesis' laboratory, inferred",
         about=(
-            f"{len(sentences())} sentences tell what the thesis' own laboratory showed. Searched are the "
-            f"{len(UNKNOWNS)} unknowns under which most of them are true at once; a sentence is taken to be wrong "
-            f"about its own laboratory with a probability of {100 * WRONG:g} %. No threshold of a claim is changed."
+            f"{len(sentences())} sentences report results of the thesis' own laboratory. The search looks for values "
+            f"of {len(UNKNOWNS)} unknowns under which most of them are true at once. It assumes that a sentence is "
+            f"wrong about its own laboratory with a probability of {100 * WRONG:g} %. The thresholds are unchanged."
         ),
         notes=notes,
         tables=[*found, *tables.details(result)],
@@ -62,11 +62,11 @@ def _rows(table: Table) -> str:
 
 def _cross_validated(result: Result) -> str:
     there, here = result.cross_validation
-    follows = "It could take its place." if result.better else "The bench stays the default."
+    follows = "It could replace the bench." if result.better else "The bench stays the default."
     return (
-        f"On the half that was held out, {there} sentences are true only in the laboratory inferred from the other "
-        f"half, {here} only on the hand-chosen bench; were it no better, chance would make it look as good with a "
-        f"probability of {result.by_chance:.2g}. {follows} The largest set of sentences found true at once has "
+        f"On the validation half, {there} sentences are true only in the laboratory inferred from the other "
+        f"half, {here} only on the hand-chosen bench. If the two were equally good, a result as good as this would "
+        f"have a probability of {result.by_chance:.2g}. {follows} The largest set of sentences true at once has "
         f"{result.largest.count(sentences())} of {len(sentences())}; {len(result.table.true)} laboratories were tried. "
         f"{_never(len(result.never))}"
     )
@@ -74,18 +74,18 @@ def _cross_validated(result: Result) -> str:
 
 def _never(count: int) -> str:
     if not count:
-        return "Each sentence that was searched for is true in some of them."
+        return "Each sentence of the search is true in some of them."
     return f"{count} {'sentence is' if count == 1 else 'sentences are'} true in none of them."
 
 
 def _worth(sample: Sample) -> str:
     own, visited = worth(sample), len(np.unique(sample.visited, axis=0))
     return (
-        f"The posterior is {len(sample.points)} particles, which visited {visited} laboratories; they come from "
-        f"{sample.stages[-1].ancestors} points of the prior. The mean of an unknown is known as from "
-        f"{np.median(own):.0f} independent laboratories (median of the unknowns; {own.min():.0f} to {own.max():.0f}). "
-        "The fewer there are, the more a narrow range tells where the search went, and the less what the thesis tells; "
-        "more --particles are surer."
+        f"The posterior has {len(sample.points)} particles, which visited {visited} laboratories and descend from "
+        f"{sample.stages[-1].ancestors} points of the prior. The effective number of independent laboratories for the "
+        f"mean of an unknown is {np.median(own):.0f} (median of the unknowns; {own.min():.0f} to {own.max():.0f}). "
+        "If it is small, a narrow posterior may reflect the path of the search and not the thesis; more --particles "
+        "increase it."
     )
 
 

@@ -17,7 +17,7 @@ from palpate.thesis.laboratory.unknowns import UNKNOWNS, Unknown
 
 
 def found(result: Result) -> list[Table]:
-    """What is told first, on the page and in the document."""
+    """Tables of the page and of the document."""
     return [
         _counts(result),
         _predictive(result),
@@ -30,7 +30,7 @@ def found(result: Result) -> list[Table]:
 
 
 def details(result: Result) -> list[Table]:
-    """What only the page has."""
+    """Tables of the page alone."""
     return [_sentences(result), _ranges()]
 
 
@@ -39,7 +39,7 @@ def _counts(result: Result) -> Table:
         [name, *(f"{one.count(of)} of {len(of)}" for of in halves().values())]
         for name, one in laboratories(result).items()
     ]
-    head = ("laboratory", "true in the half that calibrates", "in the half held out", "in all")
+    head = ("laboratory", "true in the calibration half", "in the validation half", "in all")
     return Table("Sentences that are true, over ten seeds", head, rows)
 
 
@@ -48,9 +48,9 @@ def _predictive(result: Result) -> Table:
         [one.name, str(one.laboratories), one.calibration.in_words(), one.validation.in_words()]
         for one in result.predictive
     ]
-    head = ("laboratories", "how many", "in the half that calibrates", "in the half held out")
+    head = ("laboratories", "number", "in the calibration half", "in the validation half")
     return Table(
-        "Share of the sentences that holds in one run: mean ± spread from laboratory to laboratory",
+        "Share of the sentences that are true in one run: mean ± spread between laboratories",
         head,
         rows,
     )
@@ -62,8 +62,8 @@ def posterior(result: Result) -> Table:
         [m.unknown.name.replace("_", " "), _prior(m.unknown), m.in_words(), m.verdict]
         for m in marginals(result.posterior.visited)
     ]
-    head = ("unknown", "prior", "posterior: middle (5 to 95 %)", "the thesis tells it?")
-    return Table("What the thesis tells of its laboratory", head, rows)
+    head = ("unknown", "prior", "posterior: median (5 to 95 %)", "does the thesis tell it?")
+    return Table("Posterior of the unknowns of the laboratory", head, rows)
 
 
 def _prior(unknown: Unknown) -> str:
@@ -80,9 +80,9 @@ def _searches(result: Result) -> Table:
         *(
             "by",
             "particles",
-            "laboratories they visited",
+            "laboratories visited",
             "ancestors in the prior",
-            "worth: median of the unknowns (least)",
+            "effective number: median of the unknowns (least)",
         ),
         *("temperatures", "moves accepted at the last", "fewest misses", "most"),
     )
@@ -100,7 +100,9 @@ def _sizes(sample: Sample) -> Sequence[str]:
 def _largest(result: Result) -> Table:
     rows = [[s.figure, s.id] for s in sentences() if result.largest.true(s)]
     return Table(
-        f"The largest set found true at once: {len(rows)} of {len(sentences())}", ("figure", "sentence"), rows
+        f"The largest set of sentences true at once: {len(rows)} of {len(sentences())}",
+        ("figure", "sentence"),
+        rows,
     )
 
 
@@ -113,7 +115,7 @@ def _never(result: Result) -> list[Table]:
 def _together(result: Result) -> list[Table]:
     rows = [_together_row(c) for c in result.contradictions]
     head = (
-        *("sentences", "laboratories that know all", "true by themselves (of three: each two)"),
+        *("sentences", "laboratories that judged all", "true separately (of three: each two)"),
         *("expected together", "bred for them", "verdict", "shortest reason"),
     )
     return [Table("Sentences that were never true together", head, rows)] if rows else []
@@ -133,8 +135,8 @@ def _sentences(result: Result) -> Table:
         share = f"{alone[s.id].true} of {alone[s.id].tried}" if s.id in alone else "not searched"
         marks = [_mark(one, s) for one in laboratories(result).values()]
         rows.append([s.id, s.figure, "calibration" if s.calibrates else "validation", *marks, share])
-    head = ("sentence", "figure", "half", *laboratories(result), "laboratories tried that made it true")
-    return Table("Sentence by sentence: seeds of ten for which it holds", head, rows)
+    head = ("sentence", "figure", "half", *laboratories(result), "laboratories tried in which it is true")
+    return Table("Each sentence: seeds of ten for which it is true", head, rows)
 
 
 def _mark(one: Judged, sentence: Sentence) -> str:
@@ -143,4 +145,4 @@ def _mark(one: Judged, sentence: Sentence) -> str:
 
 def _ranges() -> Table:
     rows = [[unknown.name.replace("_", " "), unknown.reason] for unknown in UNKNOWNS]
-    return Table("Why these unknowns, and these ranges", ("unknown", "reason"), rows)
+    return Table("Reasons for the unknowns and their ranges", ("unknown", "reason"), rows)
