@@ -146,7 +146,7 @@ def _row(slices: list[Told]) -> str:
 
 def killing(found: Found) -> tuple[list[str], list[str]]:
     """A row for each kind of violence, and what went wrong."""
-    rows, defects = ["| what | times | what was found afterwards |", "|---|---|---|"], []
+    rows, defects = ["| event | times | outcome |", "|---|---|---|"], []
     for kind in KINDS:
         own = {name: told for name, told in found.killed.items() if name.rpartition(" ")[0] == kind}
         told = sum(own.values(), Counter[str]())
