@@ -1,4 +1,4 @@
-"""The one JSON object that a command prints with `--json`: what it found, and how it was asked."""
+"""The one JSON object that a command prints with `--json`: the result and the command."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _WRITTEN = {"out", "report", "figure", "figures", "experiment", "save_options"}
 
 
 def print_answer(found: Mapping[str, Any]) -> None:
-    """Print what was found as one JSON object, and with it what a reader needs to ask again.
+    """Print the result as one JSON object, with everything needed to repeat the command.
 
-    That is the `command`, palpate's `version`, the `options` that were given, and the `files` that were read with their
-    SHA-256. What was found keeps its own keys of these names; docs/json.md has the keys of each command.
+    That is the `command`, palpate's `version`, the given `options`, and the input `files` with their SHA-256. Keys of
+    these names in the result are kept; docs/json.md has the keys of each command.
     """
     from palpate import __version__
 
@@ -28,7 +28,7 @@ def print_answer(found: Mapping[str, Any]) -> None:
 
 
 def given() -> dict[str, Any]:
-    """All options that were given and are not what they would be anyway, by their names in the help."""
+    """All given options that differ from their defaults, by their names in the help."""
     words = list(EXPANDED.get())
     bound = program(*words[:1]).parse_args(words, print_error=False, exit_on_error=False)[1]
     found: dict[str, Any] = {}
@@ -50,7 +50,7 @@ def _files(options: Mapping[str, Any]) -> list[dict[str, str]]:
 
 
 def _paths(value: Any) -> Iterator[Path]:
-    """What may be a file: a path, or a name with an ending, as that of an arm's or an experiment's own file."""
+    """Possible input files: a path, or a name with an ending, as of an arm's or an experiment's own file."""
     for one in value if isinstance(value, tuple | list) else (value,):
         if isinstance(one, Path) or (isinstance(one, str) and Path(one).suffix and "\0" not in one):
             yield Path(one)

@@ -1,4 +1,4 @@
-"""The edge of the program: every way that a command can end becomes an exit code."""
+"""The edge of the program: every end of a command becomes an exit code."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ INTERRUPTED = 130  # 128 + SIGINT, as a shell reports it
 READER_GONE = 141  # 128 + SIGPIPE
 
 _DANGEROUS = {"--force", "--replace", "--yes"}
-"""Flags that remove what stands there, or let an arm or a long run begin without a question."""
+"""Flags that remove results, or start an arm or a long run without a question."""
 _REMEDIES = {
     errno.ENOSPC: "free some space, or choose another place",
     errno.EDQUOT: "free some space, or choose another place",
@@ -31,17 +31,17 @@ _REMEDIES = {
     errno.EPERM: "check its permissions, or choose another place",
     errno.EROFS: "choose another place",
     errno.ENOENT: "check the path",
-    errno.ENOTDIR: "check the path: a part of it is a file",
+    errno.ENOTDIR: "check the path: one of its folders is a file",
     errno.EISDIR: "name a file, not a folder",
     errno.EEXIST: "choose another name",
 }
 
 
 def guarded(command: Callable[[], Any]) -> int:
-    """Run a command and return its exit code; whatever it raises is said on standard error.
+    """Run a command and return its exit code; exceptions are reported on standard error.
 
-    What the user can mend is one line: what is wrong, where, and what to do about it.
-    A defect of palpate keeps its traceback, because that is what a report of it needs.
+    An error that the user can correct is one line: the fault, the place, and the remedy.
+    A defect of palpate keeps its traceback, for the report.
     """
     try:
         code = command()
@@ -52,7 +52,7 @@ def guarded(command: Callable[[], Any]) -> int:
 
 
 def _settled(code: int) -> int:
-    """The code, with nothing left in the streams that Python would try to write, and fail to, at exit."""
+    """The code, after the streams are flushed, so that Python's own flush at exit cannot fail."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):
             _streams.flush(stream)
@@ -81,7 +81,7 @@ def _code_of(error: BaseException) -> int:
         case _:
             with suppress(OSError):
                 traceback.print_exception(error)
-            return _say("this is a defect of palpate, please report the lines above", DEFECT)
+            return _say("this is a defect of palpate; please report the lines above", DEFECT)
 
 
 def _say(text: str, code: int) -> int:
@@ -92,9 +92,9 @@ def _say(text: str, code: int) -> int:
 
 
 def _without_danger(error: CycloptsError) -> str:
-    """What is wrong, without the guess that a flag was meant which removes results or skips a question.
+    """The error, without a suggestion of a flag that removes results or skips a question.
 
-    A slip of the finger shall not be answered with what to type to lose something.
+    A typing error must not suggest a destructive flag.
     """
     text = str(error)
     guess = re.search(r" ?Did you mean \"?(--[\w-]+)\"?\??", text)
@@ -104,7 +104,7 @@ def _without_danger(error: CycloptsError) -> str:
 
 
 def _takes_value(error: CycloptsError, flag: str) -> bool:
-    """Whether the option of a command is no flag: --force of identify is a column."""
+    """Whether an option takes a value: --force of identify is a column."""
     from palpate.cli._program import program
 
     chain = error.command_chain or ()

@@ -1,4 +1,4 @@
-"""What `palpate identify --json` printed, read back from a file."""
+"""The output of `palpate identify --json`, read from a file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from palpate.errors import InputError
 from palpate.files import read_bytes
 
 _LARGEST = 1 << 26
-"""Bytes that are read: what identify prints of a thousand contacts is a hundredth of it."""
+"""Largest size in bytes: the output for a thousand contacts is a hundredth of it."""
 
 
 def read_found(path: Path) -> dict[str, Any]:
@@ -22,9 +22,9 @@ def read_found(path: Path) -> dict[str, Any]:
     from json import JSONDecodeError, loads
 
     try:
-        value = loads(read_bytes(path, _LARGEST, "not what palpate identify prints"))
+        value = loads(read_bytes(path, _LARGEST, "not the output of palpate identify"))
     except (JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not JSON: {error}; give what palpate identify --json printed") from None
+        raise InputError(f"{path}: not JSON: {error}; give the output of palpate identify --json") from None
     if not isinstance(value, dict):
-        raise InputError(f"{path}: not what palpate identify --json prints")
+        raise InputError(f"{path}: not the output of palpate identify --json")
     return value

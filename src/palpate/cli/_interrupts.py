@@ -1,4 +1,4 @@
-"""Ctrl-C is never lost: where Python or a library would swallow it, it comes again a moment later."""
+"""Ctrl-C is never lost: if Python or a library swallows it, it is raised again a moment later."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from types import FrameType
 from typing import Any
 
 _AGAIN = 0.05
-"""After how long it comes again [s]."""
+"""Delay until it is raised again [s]."""
 
 
 def keep() -> None:
     """Let no Ctrl-C of this process be swallowed.
 
-    An import that is broken off halfway makes of it an error of its own, and a finaliser that it falls into is passed
-    over with a note: in both it is put off.
+    An interrupted import turns it into another error, and an interrupted finaliser ignores it with a note: in both
+    cases it is raised later.
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _raise_or_put_off)
@@ -35,9 +35,9 @@ def keep() -> None:
 
 @contextmanager
 def noticed() -> Iterator[Callable[[], bool]]:
-    """Within the block a Ctrl-C raises nothing; what is yielded tells whether one came.
+    """Within the block a Ctrl-C raises nothing; the yielded function returns whether one came.
 
-    For work whose results are worth more than an early end, and that asks now and then.
+    For work whose results must not be lost, and which checks the flag regularly.
     """
     came = threading.Event()
     if threading.current_thread() is not threading.main_thread():  # no signal gets here

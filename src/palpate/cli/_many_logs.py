@@ -32,12 +32,12 @@ def many(
     json: bool,
     dpi: int | None = None,
 ) -> int:
-    """Identify many logs, print a row each and what they say together.
+    """Identify many logs, and print a row for each and the pooled result.
 
-    A log that fails is a row that says why, and the others go on. An interruption keeps what was done.
+    A log that fails is a row with the reason, and the others continue. An interruption keeps the finished logs.
 
     Returns:
-        0 if there is a number to read; 1 if there is none; 130 if it was interrupted.
+        0 if a number is identified; 1 if none is; 130 if it was interrupted.
 
     Raises:
         InputError: no log could be read; nothing is printed or written then.
@@ -84,7 +84,7 @@ def _row(log: Path, asked: OneLog) -> LogRow:
 
 
 def _light(found: Identification) -> Identification:
-    """Without the samples, of which a row needs none: a thousand logs fit into memory."""
+    """Without the samples, which a row does not need: a thousand logs fit into memory."""
     import numpy as np
 
     traces, none = found.traces, np.empty(0)

@@ -1,4 +1,4 @@
-"""A log identified as the command line asks for it."""
+"""A log, identified with the options of the command line."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LOG, _FRAME, _ARM, _INDENTER = LogOptions(), FrameOptions(), ArmOptions(), Inde
 
 
 class Fitted(Protocol):
-    """What is asked of the identification itself."""
+    """Options of the identification itself."""
 
     @property
     def tolerance(self) -> float:
@@ -37,14 +37,14 @@ class Fitted(Protocol):
 
 
 def answered(found: Identification) -> bool:
-    """Whether there is a number to read: at the working point, or of a parameter."""
+    """Whether a number is identified: at the working point, or a parameter."""
     point = [found.working_point.stiffness] if found.working_point else []
     return any(p.value is not None for p in (*point, *found.parameters.values()))
 
 
 @dataclass(frozen=True)
 class OneLog:
-    """What is asked, the same of each log."""
+    """Options that are common to all logs."""
 
     fitted: Fitted
     source: LogOptions = _LOG
@@ -53,7 +53,7 @@ class OneLog:
     pressed_by: IndenterOptions = _INDENTER
 
     def identified(self, log: Path) -> tuple[Identification, Source]:
-        """Read a log and find what it touched, and say where that is from.
+        """Read and identify a log; the result names its file.
 
         Raises:
             InputError: the log or an option is wrong, in one line.
@@ -62,7 +62,7 @@ class OneLog:
         return found, source
 
     def identified_along(self, log: Path) -> tuple[Identification, Record, Source]:
-        """The same, with the force and the position along the normal that it is of."""
+        """The same, with the force and the position along the normal."""
         from palpate.contact_frame import described, identify_contact
         from palpate.report.identification.source import Source, sha256_of
 
@@ -73,7 +73,7 @@ class OneLog:
         if "force_x" not in record.columns:
             if self.frame.of_space:
                 raise InputError(
-                    "--wrench-frame, --tcp, --normal and their like are of a wrench and a pose; this log has one axis"
+                    "--wrench-frame, --tcp, --normal and the like need a wrench and a pose; this log has one axis"
                 )
             frame, known = None, known | {"force_sign": self.frame.sign}
         between = self._between(known, samples)
@@ -94,7 +94,7 @@ class OneLog:
         )
 
     def _between(self, known: dict[str, Any], samples: bool) -> Arm:
-        """The arm; of a press on a wall, with the stiffness that it shows."""
+        """The arm; with the stiffness from a press on a wall, if one is given."""
         from palpate.contact_frame import identify_contact, robot_stiffness
 
         between, wall = self.arm.arm(), self.arm.robot_stiffness_from
@@ -110,7 +110,7 @@ class OneLog:
 
     @property
     def options(self) -> dict[str, Any]:
-        """What was said about logs, frame, arm and indenter, as plain values."""
+        """The options of logs, frame, arm and indenter, as plain values."""
         return {
             own.name: _plain(value)
             for part in (self.source, self.frame, self.arm, self.pressed_by)

@@ -21,17 +21,17 @@ _WORD = "press"
 
 
 def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *, json: bool) -> int:
-    """Press with a real arm, or only look at it.
+    """Press with a real arm, or only read it.
 
     Returns:
-        0 if it pressed for as long as was asked, 1 if not.
+        0 if it pressed for the requested time, 1 if not.
 
     Raises:
-        InputError: whatever is wrong before the arm moves.
+        InputError: a fault found before the arm moves.
     """
     task, most = task_of(asked, options, limits)
     if json and not (options.yes or options.dry_run):
-        raise InputError("--json asks nothing, so it needs --yes or --dry-run")
+        raise InputError("--json cannot ask for confirmation; add --yes or --dry-run")
     if options.record is not None and options.record.exists():
         raise InputError(f"{options.record} exists; choose another place for --record")
     from palpate.force import ForceLoop
@@ -63,7 +63,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
 
 
 def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
-    """What the record says of the press, as plain values."""
+    """The press, as plain values for the record."""
     task = order.task
     return {
         "command": command(),
@@ -111,11 +111,11 @@ def _ask(yes: bool) -> None:
         return
     if not sys.stdin.isatty():
         raise InputError(
-            "the arm would move, and nobody can be asked here; look with --dry-run first, then add --yes"
+            "the arm would move, and there is no terminal to ask for confirmation; use --dry-run first, then add --yes"
         )
     say(f"the arm will move; type {_WORD} to go on")
     if sys.stdin.readline().strip() != _WORD:
-        raise InputError("nothing was moved, as nobody said so")
+        raise InputError("not confirmed; nothing was moved")
 
 
 def _looked(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:

@@ -1,4 +1,4 @@
-"""The program and its commands, each imported only when it is asked for."""
+"""The program and its commands, each imported only when it is used."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from palpate.cli._help import PhraseFormatter
 TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
 """The words after the program's name, as they were typed."""
 EXPANDED: ContextVar[tuple[str, ...]] = ContextVar("EXPANDED", default=())
-"""The same, with what an options file or a preset adds to them."""
+"""The same, with the options of an options file or a preset."""
 
 # In the order of the help. Each is a function of its own name in the module of its own name,
 # and returns its exit code. The line is repeated here so that the help imports none of them.
 COMMANDS = {
-    "identify": "Find what a robot touched, from a log: stiffness, damping, mass.",
-    "payload": "Weigh a tool by a log of free motion: mass, centre, the sensor's bias.",
-    "topics": "List what a log holds: topics, variables, columns.",
-    "excite": "Design a force that shows what a surface is, and predict how well.",
+    "identify": "Identify the touched surface from a log: stiffness, damping, mass.",
+    "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
+    "topics": "List the signals of a log: topics, variables, columns.",
+    "excite": "Design a force that identifies a surface, and predict the uncertainty.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
-    "export": "Write what was identified as the contact of a simulator's scene.",
+    "export": "Write an identified surface as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
-    "press": "Press with the force asked for: any serial arm in simulation, or a real one over its wire.",
+    "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
-    "live": "Show an arm that presses, or a log, in a page of the browser.",
+    "live": "Show a pressing arm, or a log, in the browser.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "checks": "Check a controller, surface or identifier of your own.",
     "thesis": "Measure every figure and every claim of the thesis again.",
     "laboratory": "Infer the thesis' laboratory from its own sentences; resumable.",
-    "speed": "Measure what one tick of the closed loop costs here.",
-    "completion": "Print what makes a shell complete commands, options and files.",
+    "speed": "Measure the time of one tick of the closed loop on this machine.",
+    "completion": "Print a shell's completion script for commands, options and files.",
 }
 
 
@@ -51,7 +51,7 @@ def _version() -> str:
 
 
 def _described(own: str) -> str:
-    """What a command's docstring says before its parameters, each paragraph on one line for the terminal to wrap."""
+    """A command's docstring before its parameters, each paragraph on one line for the terminal to wrap."""
     text = getdoc(getattr(import_module(f"palpate.cli.{own}"), own)) or ""
     said = re.split(r"\n(?:Parameters\n-|Args:\n|Returns:\n)", text)[0]
     return "\n\n".join(" ".join(part.split()) for part in said.split("\n\n")).strip()
@@ -61,11 +61,11 @@ def program(asked: str = "") -> App:
     """The whole command line; errors are raised, not printed, and results are returned.
 
     Args:
-        asked: the command that was typed, whose help is its docstring, examples and all.
+        asked: the typed command, whose help is its docstring with the examples.
     """
     app = App(
         name="palpate",
-        help="Identify what a robot touches, and press on it with exactly the force asked for.",
+        help="Identify the surface that a robot touches, and press on it with exactly the desired force.",
         version=_version,
         help_format="plaintext",
         help_formatter=PhraseFormatter(),

@@ -1,4 +1,4 @@
-"""How far a command is: a bar on a terminal; elsewhere a line now and then of what takes long, or nothing."""
+"""Progress of a command: a bar on a terminal; elsewhere occasional lines for long work."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 COMPILING = "compiling the loop: some ten seconds, once after installation"
-"""What the user is told when a loop has to be compiled first."""
+"""Message while a loop is compiled."""
 _EVERY = 60.0
 """Between two lines where there is no terminal [s]."""
 
 
 class Counted(Protocol):
-    """Told what is under way, and how much of how much of it is done."""
+    """Receives the name of the work, the finished pieces, and their total."""
 
     def __call__(self, what: str, done: int, of: int, /) -> None:
         """After each piece."""
@@ -26,7 +26,7 @@ class Counted(Protocol):
 
 
 def bar(screen: Console, *columns: Any, **options: Any) -> Progress:
-    """A bar that goes when it is done; none where nobody watches it, as it would leave an empty line there."""
+    """A bar that disappears when done; none without a terminal, where it would leave an empty line."""
     from rich.progress import BarColumn, Progress, TextColumn
 
     first = TextColumn("{task.description}", markup=False), BarColumn()
@@ -39,10 +39,10 @@ def bar(screen: Console, *columns: Any, **options: Any) -> Progress:
 def simulated(
     screen: Console, interrupted: Callable[[], bool], start: str = "starting"
 ) -> Iterator[Callable[[float, str], None]]:
-    """Shows how far a simulation is: its time [s] and phase.
+    """Shows the progress of a simulation: its time [s] and phase.
 
     Raises:
-        KeyboardInterrupt: it was interrupted; there the run ends, and keeps what there is of it.
+        KeyboardInterrupt: it was interrupted; the run ends there and keeps the simulated part.
     """
     from rich.progress import TextColumn
 
@@ -79,7 +79,7 @@ def counted(screen: Console) -> Iterator[Counted]:
 
 
 class _Lines:
-    """A line each minute, with what is left by the pace so far."""
+    """A line each minute, with the remaining time by the pace so far."""
 
     def __init__(self, screen: Console, what: str, of: int):
         self._screen, self._what, self._of = screen, what, of

@@ -1,4 +1,4 @@
-"""Standard output and standard error, whatever they are: closed, full, or of a few letters."""
+"""Standard output and standard error, even if closed, full, or with a limited encoding."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _ERRORS = "palpate"
 def prepare() -> None:
     """Make the streams of this process ready for any text.
 
-    A stream that was closed before the program began is opened to nowhere: otherwise the next file that is opened
-    would be taken for it. A letter that the encoding does not have is written in plain letters.
+    A stream that was closed before the program began is opened to the null device: otherwise the next opened file
+    would take its descriptor. A letter that the encoding lacks is escaped.
     """
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a home that cannot be written is no trouble
     codecs.register_error(_ERRORS, _plainly)
@@ -32,7 +32,7 @@ def prepare() -> None:
 
 
 def flush(stream: TextIO) -> None:
-    """Write out what is buffered; where that fails, drop it, so that nothing is left to fail at exit.
+    """Write the buffers; if that fails, drop them, so that nothing fails at exit.
 
     Raises:
         OSError: the stream is full, or its reader has gone.
@@ -45,7 +45,7 @@ def flush(stream: TextIO) -> None:
 
 
 def drop(stream: TextIO) -> None:
-    """Send to nowhere what is buffered and what still comes."""
+    """Discard the buffers and all later output."""
     with suppress(OSError):  # a stream without a file has nobody else to fail
         _to_nowhere(stream.fileno())
     with suppress(OSError):

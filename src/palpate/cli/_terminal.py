@@ -1,4 +1,4 @@
-"""The one place of output: whatever a command prints goes through here, and obeys nothing that is in it.
+"""The one place of output: every printed text passes here, and its control characters are made harmless.
 
 A name from a log or a path may hold escape sequences, or brackets that rich would take for markup.
 """
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from palpate.report.page import Table
 
 STYLE = "yellow"
-"""Of what a reader must not miss."""
+"""Style of warnings."""
 
 
 def print_lines(*lines: str) -> None:
@@ -56,7 +56,7 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def head(console: Console, title: str, rest: str) -> None:
-    """A title and what belongs to it, on one line."""
+    """A title and its details, on one line."""
     from rich.text import Text
 
     console.print(Text.assemble((title, "bold"), rest))
@@ -67,8 +67,8 @@ def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> No
 
     Args:
         console: where to.
-        table: what.
-        styles: of the rows' last cells, if they are to be told apart.
+        table: its contents.
+        styles: of the rows' last cells, to distinguish them.
     """
     from rich import box
     from rich.table import Table as RichTable
@@ -89,7 +89,7 @@ def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> No
 
 
 def show_answer(title: str, rest: str, tables: Iterable[Table], notes: Iterable[str]) -> Console:
-    """A title with what belongs to it, tables, and what a reader must not miss; the console, for what follows."""
+    """Print a title with its details, tables and warnings; returns the console for further output."""
     screen = console()
     head(screen, title, rest)
     for table in tables:
@@ -100,5 +100,5 @@ def show_answer(title: str, rest: str, tables: Iterable[Table], notes: Iterable[
 
 
 def place(console: Console, what: str, where: object) -> None:
-    """Where something was written, unbroken, so that it can be copied."""
+    """Path of a written file, not wrapped, so that it can be copied."""
     console.print(f"{what} {where}", soft_wrap=True)

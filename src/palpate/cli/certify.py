@@ -19,26 +19,26 @@ if TYPE_CHECKING:
     from palpate.force.certificate import Verdict
 
 
-@Parameter(name="*", group=Group("What is to be proved", sort_key=1))
+@Parameter(name="*", group=Group("Scope of the proof", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class ProofOptions:
-    """Of which surfaces, gains and delays.
+    """Surfaces, gains and delays of the proof.
 
     Parameters
     ----------
     stiffness
-        Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of what is stable if not
-        given.
+        Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of the stability limit if
+        not given.
     damping_time
         Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0).
     jitter
-        Ticks by which the age of a reading may change from tick to tick while the law adapts.
+        Largest change of a reading's age from tick to tick while the law adapts, in ticks.
     margin
-        Factor that the gains may grow by.
+        Factor by which the gains may grow.
     held_only
         Leave out the proof of the adapting law.
     loop_from
-        A log of commanded and measured position in free motion: the proof is of the inner loop that it shows.
+        A log of commanded and measured position in free motion: the proof uses the inner loop identified from it.
     """
 
     stiffness: Annotated[str | None, SIGNED] = None
@@ -97,13 +97,13 @@ def certify(
 
     palpate certify gains.toml --check certificate.json
 
-    A check needs no solver: it takes norms of matrices. With gains beside it, it also refuses a certificate of another
-    arm, rate or law. Exit code 1 says that something could not be proved, or that the certificate does not hold.
+    A check needs no solver: it takes norms of matrices. With gains given, it also refuses a certificate of another
+    arm, rate or law. Exit code 1: a part could not be proved, or the certificate does not hold.
 
     Parameters
     ----------
     gains
-        What palpate tune wrote.
+        The file of palpate tune.
     check
         A certificate to check.
     """
@@ -112,7 +112,7 @@ def certify(
     if check is not None:
         return _checked(check, gains, output.json)
     if gains is None:
-        raise InputError("certify what? Give the gains that palpate tune wrote, or --check CERTIFICATE")
+        raise InputError("nothing to certify; give the gains file of palpate tune, or --check CERTIFICATE")
     output.check_new(output.out, ending=".json")
     proof.check()
     return _made(gains, proof, columns or ColumnOptions(), output)

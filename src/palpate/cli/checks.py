@@ -1,4 +1,4 @@
-"""`palpate checks`: the laws that every part obeys, run on one of the user's."""
+"""`palpate checks`: the conformance suite, run on a part of the user."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from palpate.errors import InputError
 
 
 def checks(name: str | None = None, /, *, output: JsonOption | None = None) -> int:
-    """Run the conformance suite of palpate's own parts on a controller, surface or identifier of yours.
+    """Run palpate's conformance suite on your own controller, surface or identifier.
 
     palpate checks student:Damped
 
     Parameters
     ----------
     name
-        Your part, module:Class, or an experiment's TOML file that names some. The module is looked for among the
+        Your part, module:Class, or an experiment's TOML file that names some. The module is searched among the
         installed ones, beside the file and in the current folder; naming it imports it.
     """
     if name is None:
-        raise InputError("check what? Give module:Class, as in student:Damped, or an experiment's TOML file")
+        raise InputError(
+            "nothing to check; give module:Class, as in student:Damped, or an experiment's TOML file"
+        )
     from palpate.checks.check import outcomes
     from palpate.checks.of_plugin import checks_of
 
@@ -40,5 +42,5 @@ def checks(name: str | None = None, /, *, output: JsonOption | None = None) -> i
         rows = [(one.sentence, one.failed or "holds") for one in some]
         show_table(screen, Table(subject, ("", ""), rows), ["red" if one.failed else "green" for one in some])
     total = sum(map(len, found.values()))
-    screen.print(f"{failed} of {total} checks failed" if failed else f"all {total} checks hold")
+    screen.print(f"{failed} of {total} checks failed" if failed else f"all {total} checks pass")
     return 1 if failed else 0

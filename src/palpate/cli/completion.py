@@ -1,4 +1,4 @@
-"""`palpate completion`: what makes a shell complete palpate's commands, options and files."""
+"""`palpate completion`: a shell's completion script for palpate's commands, options and files."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _MORE = {
     # In the place of a command stands no file.
     "fish": ("complete -c palpate -n __fish_use_subcommand -f",),
 }
-"""What a shell needs beside the script that is generated, lines at its end."""
+"""Lines at the end of the generated script, by shell."""
 
 
 def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
-    """Print what makes a shell complete commands, options and files.
+    """Print a shell's completion script for commands, options and files.
 
-    Once, then in each new shell:
+    Run one of these once; each new shell loads it:
 
     palpate completion bash > ~/.local/share/bash-completion/completions/palpate
 
@@ -28,7 +28,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
 
     palpate completion fish > ~/.config/fish/completions/palpate.fish
 
-    The folder has to be there; zsh looks into ~/.zfunc if fpath+=(~/.zfunc) stands before compinit in ~/.zshrc.
+    The folder has to exist; zsh searches ~/.zfunc if fpath+=(~/.zfunc) comes before compinit in ~/.zshrc.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`palpate excite`: which force to ask for, so that a surface shows what it is."""
+"""`palpate excite`: a desired force that identifies a surface."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The surfaces", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SurfaceOptions:
-    """What may be touched.
+    """Range of the surfaces.
 
     Parameters
     ----------
     stiffness
-        Of the surfaces it shall serve, N/m; one value for a surface that is known.
+        Of the surfaces, N/m; one value if it is known.
     damping
         Of the surfaces, N s/m.
     mass
-        Of the surfaces, kg; left out, they have none that matters.
+        Of the surfaces, kg; without it they have none.
     """
 
     stiffness: Annotated[str, SIGNED]
@@ -72,7 +72,7 @@ class BudgetOptions:
     force_rate
         Fastest change of the desired force, N/s.
     drive
-        How far the desired force may depart from its mean, N, if more than the force on the surface may.
+        Largest departure of the desired force from its mean, N, if it may exceed that of the force on the surface.
     """
 
     force: Annotated[str, SIGNED]
@@ -108,15 +108,15 @@ class GoalOptions:
     precision
         Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%.
     duration
-        Of the excitation, s; the shortest that suffices if not given.
+        Of the excitation, s; the shortest sufficient one if not given.
     longest
-        That it may last, s.
+        Longest duration, s.
     settle
-        Before the part that counts, s.
+        Initial time that does not count, s.
     kind
         multisine or chirp.
     criterion
-        What a multisine makes small: the worst parameter, or D, A or E as the theory of experiments has them.
+        Optimality of a multisine: worst (the worst parameter), or D, A or E as in optimal experiment design.
     """
 
     precision: Annotated[str, SIGNED] = "10%"
@@ -130,18 +130,18 @@ class GoalOptions:
 @Parameter(name="*", group=Group("The sensors", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class SensorOptions:
-    """What measures force and position.
+    """Sensors of force and position.
 
     Parameters
     ----------
     noise
         Standard deviation of one reading of the force sensor, N.
     sampling
-        Independent readings of the force sensor a second.
+        Independent readings of the force sensor per second.
     force_filter
         Low-pass before the sampling, as butterworth3:120, or none.
     rate
-        Rows a second of the log, and of --out.
+        Rows per second of the log, and of --out.
     position_step
         Quantisation of the position, m.
     lag_std
@@ -184,9 +184,9 @@ class LoopOptions:
     Parameters
     ----------
     loop_bandwidth
-        Of the robot's force control, Hz, if that is all that is known of it.
+        Of the robot's force control, Hz, if nothing else is known of it.
     tip_mass
-        Effective mass of the robot at its tip, kg; of the bench's arm if not given, as all that follows.
+        Effective mass of the robot at its tip, kg; this and the following default to the bench's arm.
     tip_friction
         Dry friction as felt at the tip, N.
     gain
@@ -216,7 +216,7 @@ class LoopOptions:
             return HybridLoop(**told)
         if told:
             raise InputError(
-                "--loop-bandwidth stands for the whole robot; leave out --tip-mass, --tip-friction, --gain, "
+                "--loop-bandwidth models the whole robot; leave out --tip-mass, --tip-friction, --gain, "
                 "--integral"
             )
         return KnownBandwidth(in_si("--loop-bandwidth", self.loop_bandwidth, "frequency"))
@@ -225,7 +225,7 @@ class LoopOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(PictureOptions, FileOptions):
-    """Where results go.
+    """Files to write.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ class OutputOptions(PictureOptions, FileOptions):
     experiment
         Where to write an experiment for palpate run, a TOML file.
     replace
-        Replace what stands at --out and --experiment.
+        Replace the files at --out and --experiment.
     figure
         Where to write the figure, a PNG; excite.png in the current folder if not given.
     """
@@ -245,7 +245,7 @@ class OutputOptions(PictureOptions, FileOptions):
     figure: Path | None = None
 
     def check_all(self) -> None:
-        """Finds every place wrong before any work is done."""
+        """Check every path before any work is done."""
         from palpate.report.excitation.files import check_ending
 
         if self.out is not None:
@@ -264,13 +264,13 @@ def excite(
     robot: LoopOptions | None = None,
     output: OutputOptions | None = None,
 ) -> int:
-    """Design a force that shows what a surface is, and say how well, before the robot moves.
+    """Design a force that identifies a surface, and predict the uncertainty before the robot moves.
 
     Numbers are SI, or carry their unit after a colon; a range is LOW:HIGH or LOW:HIGH:UNIT:
 
     palpate excite --stiffness 3:8:N/mm --damping 50:300 --mass 0.1:0.3 --force 15 --peak 20 --precision K=5%,B=5%,M=25%
 
-    Exit code 1 says that the precision cannot be had within the limits; what would help is printed.
+    Exit code 1: the precision cannot be reached within the limits; the remedies are printed.
     """
     from palpate.excitation import Problem
     from palpate.excitation.quantities import shares

@@ -1,4 +1,4 @@
-"""`palpate export`: what was identified, as the contact of a simulator's scene."""
+"""`palpate export`: an identified surface as the contact of a simulator's scene."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The scene", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SceneOptions:
-    """Where the contact goes.
+    """The scene and its contact.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ class SceneOptions:
     model
         The scene: MJCF for mujoco, SDF or URDF for drake.
     geom
-        The surface: a geom of MJCF, a collision of SDF or URDF; without a scene, what to call it.
+        The surface: a geom of MJCF, a collision of SDF or URDF; without a scene, its name.
     probe
-        What presses on it, likewise; all that can touch it if not given.
+        The probe, likewise; every geom that can touch the surface if not given.
     """
 
     to: Literal["mujoco", "drake", "newton", "mjcf-spring"]
@@ -44,7 +44,7 @@ class SceneOptions:
     probe: str | None = None
 
 
-@Parameter(name="*", group=Group("What was not identified", sort_key=2))
+@Parameter(name="*", group=Group("Given parameters", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class GivenOptions:
     """Numbers in place of identified ones.
@@ -52,11 +52,11 @@ class GivenOptions:
     Parameters
     ----------
     damping
-        B in N s/m, where none was identified, or instead of it; 0 for a pure spring.
+        B in N s/m, if it was not identified, or to override it; 0 for a pure spring.
     mass
         M in kg of the plate of mjcf-spring, likewise.
     working_point
-        Take the stiffness at the working point in place of the model's K: of a surface that no linear model explains.
+        Use the stiffness at the working point instead of the model's K, for a surface that no linear model explains.
     """
 
     damping: Annotated[float | None, SIGNED] = None
@@ -67,15 +67,15 @@ class GivenOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(FileOptions):
-    """Where results go.
+    """Files to write.
 
     Parameters
     ----------
     out
-        The file; beside the scene, called SCENE-GEOM, if not given. A comment in it, and FILE.json beside it, tell
-        intervals and assumptions.
+        The file; SCENE-GEOM beside the scene if not given. A comment in it, and FILE.json beside it, list intervals
+        and assumptions.
     replace
-        Replace what an earlier export wrote there.
+        Replace an earlier export.
     check
         Press the contact in the simulator, and state the error in K and B; exit code 1 if one is above 0.1 %.
     """
@@ -93,18 +93,18 @@ def export(
     given: GivenOptions | None = None,
     output: OutputOptions | None = None,
 ) -> int:
-    """Write what was identified as the contact of a simulator's scene, and press it there.
+    """Write an identified surface as the contact of a simulator's scene, and press it there.
 
     palpate identify press.csv --time time_s --position position_mm:mm --force force_N:N --json > found.json
 
     palpate export found.json --to mujoco --model scene.xml --geom foam --check
 
-    The scene's own file is not changed: what is written includes it (MuJoCo) or is a copy (Drake).
+    The scene's own file is not changed: the new file includes it (MuJoCo) or is a copy (Drake).
 
     Parameters
     ----------
     found
-        What palpate identify --json printed.
+        The output of palpate identify --json.
     """
     from palpate.export import Request, contact_from, prepare
 
@@ -137,7 +137,7 @@ def _check_places(places: tuple[Path, ...], output: OutputOptions, model: Path |
 
 
 def _written(exported: Exported, out: Path, wanted: bool) -> list[Checked]:
-    """Write the file and press what is in it; what the engine refuses is not left behind."""
+    """Write the file and press its contact; a file that the engine refuses is removed."""
     from palpate import __version__
     from palpate.export import check
 

@@ -1,4 +1,4 @@
-"""`palpate identify`: what did the robot touch, by a log of it, or by many?"""
+"""`palpate identify`: K, B and M of the touched surface, from one log or from many."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The model", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class ModelOptions:
-    """What is fitted, and the prior of it.
+    """The model, the lag, and the priors.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ class ModelOptions:
         kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic; chosen if
         not given.
     lag
-        How much later the force is read than the position, SECONDS or SECONDS:STD, if it is calibrated.
+        Calibrated lag of the force behind the position, SECONDS or SECONDS:STD.
     force_filter
-        What the force went through before it was sampled, as butterworth3:120 (order and Hz), joined by +; or none.
+        Low-pass of the force before sampling, as butterworth3:120 (order and Hz), joined by +; or none.
     mass
         Prior of the mass, in kg, VALUE or VALUE:STD.
     tolerance
@@ -47,11 +47,11 @@ class ModelOptions:
     calibration
         Relative standard deviation of the scales of force and position together, as 0.01.
     bonded
-        The probe is fixed to the surface, or is not; found out if neither is said.
+        Whether the probe is fixed to the surface; detected if not given.
     cutoff
-        Of the filters that all channels pass through, in Hz; chosen if not given.
+        Cut-off of the filters of all channels, in Hz; chosen if not given.
     method
-        least-squares; or instrumental-variables or output-error, if noise of the position would pull it.
+        least-squares; or instrumental-variables or output-error, if noise of the position would bias it.
     """
 
     model: str | None = None
@@ -65,7 +65,7 @@ class ModelOptions:
     method: str = "least-squares"
 
     def known(self, log: Path, options: LogOptions) -> dict[str, Any]:
-        """The keywords of `palpate.identify`; a run of palpate's own says itself what measured it."""
+        """The keywords of `palpate.identify`; the record of a run states its own instruments."""
         from palpate.logs.own_runs import is_run, measured_by
 
         known: dict[str, Any] = measured_by(log) if options.plain and is_run(log) else {}
@@ -85,7 +85,7 @@ class ModelOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(PictureOptions):
-    """Where results go.
+    """Files to write.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class OutputOptions(PictureOptions):
     dpi: int | None = None
 
     def png(self, name: str) -> Path | None:
-        """Where the figure goes; found wrong before any work is done."""
+        """Path of the figure, checked before any work is done."""
         from palpate.report.style import FORMATS, check_dpi
 
         check_dpi(self.dpi)
@@ -123,15 +123,15 @@ def identify(
 
     palpate identify press.csv --time time_s --position position_mm:mm --force force_mN:mN
 
-    A bag with one wrench and one pose needs no names; palpate topics LOG lists what a log holds:
+    A bag with one wrench and one pose needs no names; palpate topics LOG lists the signals of a log:
 
     palpate identify press.mcap --wrench-frame tool --tcp 0,0,120:mm
 
-    Several logs, or a folder of them, are pooled: one table, the mean, and where the next press will fall:
+    Several logs, or a folder of them, are pooled: one table, the mean, and an interval for the next press:
 
     palpate identify presses/ --time time_s --position position_mm:mm --force force_mN:mN
 
-    What is said of a cell can be kept, and said again by one word:
+    Options of a cell can be saved and loaded again:
 
     palpate identify press.csv --preset ur-rtde --tcp 0,0,120:mm --save-options my-cell.toml
 

@@ -28,7 +28,7 @@ def _within(least: int, most: int) -> Parameter:
 @Parameter(name="*", group=Group("The search", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
-    """How much is tried.
+    """Size of the search.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class SearchOptions:
     seed
         Of everything drawn.
     half
-        Search by the calibration half alone, in a third of the time; what it finds is looked at by all.
+        Search by the calibration half alone, in a third of the time; the result is judged by all.
     """
 
     particles: Annotated[int, _within(8, 100_000)] = 128
@@ -59,15 +59,15 @@ class SearchOptions:
 @Parameter(name="*", group=Group("Who tries", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class RunnerOptions:
-    """Where laboratories are tried.
+    """Cores or a cluster for the search.
 
     Parameters
     ----------
     cores
-        That try laboratories side by side; all when left out.
+        That try laboratories in parallel; all when left out.
     scheduler
-        Address of a Dask scheduler whose workers try them, tcp://HOST:PORT. What they send back may run anything
-        here: name only a cluster that is trusted as this machine is.
+        Address of a Dask scheduler whose workers try them, tcp://HOST:PORT. Their answers can execute code here:
+        name only a cluster that you trust as this machine.
     """
 
     cores: Annotated[int | None, _within(1, 1024)] = None
@@ -77,13 +77,13 @@ class RunnerOptions:
 @Parameter(name="*", group=Group("What is written", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class InferredOptions(FolderOptions):
-    """Where results go.
+    """Files to write.
 
     Parameters
     ----------
     out
-        Folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there is gone
-        on with.
+        Folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there is
+        resumed.
     """
 
     out: Path = Path("runs/laboratory")
@@ -95,7 +95,7 @@ def laboratory(
     who: RunnerOptions | None = None,
     output: InferredOptions | None = None,
 ) -> int:
-    """Infer what the thesis does not tell of its laboratory: once from half of its figures, once from all.
+    """Infer the unstated parameters of the thesis' laboratory: once from half of its figures, once from all.
 
     palpate laboratory --particles 32 --half --out runs/laboratory
     """
@@ -112,7 +112,7 @@ def laboratory(
             inference = Inference(out, settings, runner, command, threads, search.half, told)
             result = inference.run(force=output.force)
     except KeyboardInterrupt:
-        say(f"interrupted; what is tried is saved in {out}, and the same command goes on from there")
+        say(f"interrupted; the tried laboratories are saved in {out}; the same command resumes")
         return 130
     _show(result, out, {"seed": search.seed, **numbers(result, command)} if output.json else None)
     return 0

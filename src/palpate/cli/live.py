@@ -1,4 +1,4 @@
-"""`palpate live`: a page in the browser, of an arm that presses or of a log that is played again."""
+"""`palpate live`: a page in the browser with a pressing arm, or a replayed log."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ class ShownOptions:
     Parameters
     ----------
     run
-        An experiment to simulate at real time (palpate run --list), or a TOML file of one's own; foam-hybrid if
-        nothing is named.
+        An experiment to simulate in real time (palpate run --list), or your own TOML file; foam-hybrid if nothing is
+        named.
     arm_
-        An arm to simulate in space with the cautious law: ur5e, fr3, panda, iiwa14, or a file as for palpate press.
+        An arm to simulate in 3D with the cautious law: ur5e, fr3, panda, iiwa14, or a file as for palpate press.
     log
-        A log to play again, its columns named as for palpate identify.
+        A log to replay, its columns named as for palpate identify.
     record
         A record of a run, or a bag (MCAP) with one wrench and one pose, which need no names.
     seed
         Of a simulation's noise.
     whole_approach
-        Begin at the very start of the search for the surface, not shortly before the touch.
+        Begin at the start of the approach, not shortly before the touch.
     """
 
     run: str | None = None
@@ -63,25 +63,25 @@ class ShownOptions:
         given = (("--run", self.run), ("--arm", self.arm_), ("--log", self.log), ("--record", self.record))
         named = [name for name, value in given if value is not None]
         if len(named) > 1:
-            raise InputError(f"{' and '.join(named)} are different things to show; give one of them")
+            raise InputError(f"{' and '.join(named)} exclude each other; give one of them")
         return self.log or self.record
 
 
-@Parameter(name="*", group=Group("How it is served", sort_key=7))
+@Parameter(name="*", group=Group("Server", sort_key=7))
 @dataclass(frozen=True, kw_only=True)
 class ServedOptions:
-    """Where a browser and other viewers connect to.
+    """Ports for the browser and other viewers.
 
     Parameters
     ----------
     port
-        To serve the page on; a free one is found if not given, or 0.
+        Port of the page; a free one if not given, or 0.
     open_
         Open the page in the browser.
     foxglove
         Serve Foxglove, Lichtblick and PlotJuggler too.
     foxglove_port
-        Where those connect to.
+        Port of those viewers.
     """
 
     port: Annotated[int, SIGNED] = 0
@@ -99,7 +99,7 @@ def live(
     arm: ArmOptions | None = None,
     fitted: ModelOptions | None = None,
 ) -> int:
-    """Show an arm that presses, or a log, in a page of the browser; Ctrl-C ends it.
+    """Show a pressing arm, or a log, in the browser; Ctrl-C ends it.
 
     palpate live
 
@@ -111,8 +111,8 @@ def live(
 
     palpate live --log press.csv --time time_s --position position_mm:mm --force force_mN:mN
 
-    The first line printed is the page's address. It is for this machine alone, works without a network, and is
-    secret: nobody is answered who does not know it.
+    The first line printed is the page's address. It works on this machine only and without a network. It holds a
+    secret token: requests without it are refused.
     """
     shown, at = shown or ShownOptions(), at or ServedOptions()
     path = shown.file()
@@ -126,7 +126,7 @@ def live(
         fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
     )
     if shown.record is not None and not asked.source.plain:
-        raise InputError("a record names its own columns; give --log FILE with --time, --position, --force")
+        raise InputError("a record states its own columns; use --log FILE with --time, --position, --force")
     return _serve(_replay(path, asked, shown.whole_approach), at)
 
 
@@ -180,7 +180,7 @@ def _serve(shown: Source, at: ServedOptions) -> int:
 
 @contextmanager
 def _stability(shown: Source) -> Iterator[tuple[Any, Any, list[Any]]]:
-    """What is known of the loop's stability, beside a simulation; a log has no loop."""
+    """Stability of the loop of a simulation; a log has no loop."""
     from palpate.live.stability import Stability
 
     tell: list[Any] = []

@@ -1,4 +1,4 @@
-"""`palpate payload`: what hangs on the force sensor, and what does the sensor show of itself?"""
+"""`palpate payload`: mass and centre of the tool on the force sensor, and the sensor's bias and drift."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(ReportOption, FileOptions):
-    """Where results go.
+    """Files to write.
 
     Parameters
     ----------
@@ -47,20 +47,20 @@ def payload(
 ) -> int:
     """Weigh a tool by a log of free motion: mass, centre, the sensor's bias and drift.
 
-    Rest in six orientations or more, a second each, 30 degrees and more from each other, and come back to the first;
-    log wrench and pose:
+    Log wrench and pose. Rest in at least six orientations, a second each, at least 30 degrees apart, and return to the
+    first:
 
     palpate payload turning.mcap --wrench-frame tool --out tool.toml
 
     palpate identify press.mcap --wrench-frame tool --payload tool.toml
 
-    Shake the tool at the end of the log, and it is told too whether the driver takes off the tool's inertia. Exit
-    code 1 says that the poses do not tell the mass, and how to move.
+    Shake the tool at the end of the log: this shows whether the driver subtracts the tool's inertia. Exit code 1: the
+    poses do not determine the mass; the output says how to move.
 
     Parameters
     ----------
     log
-        A log of wrench and pose, as palpate identify takes it.
+        A log of wrench and pose, as for palpate identify.
     tolerance
         Largest half-width of the mass' 95 % interval, as a share of its value.
     """
@@ -76,7 +76,7 @@ def payload(
     record = read(log, source or LogOptions(), samples=False)
     if "force_x" not in record.columns:
         raise InputError(
-            f"{log}: a tool is weighed by a wrench and a pose in three dimensions; name them with --wrench and --pose"
+            f"{log}: weighing a tool needs a wrench and a pose in three dimensions; name them with --wrench and --pose"
         )
     found = weigh(record, (frame or FrameOptions()).frame() or ContactFrame(), tolerance)
     written = []

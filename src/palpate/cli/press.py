@@ -1,4 +1,4 @@
-"""`palpate press`: an arm presses with the force asked for, a simulated one or a real one over its wire."""
+"""`palpate press`: a simulated arm, or a real one over its wire, presses with a desired force."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ def press(
     cell: CellOptions | None = None,
     json: Annotated[bool, FLAG] = False,
 ) -> int:
-    """Press on a surface with the force asked for: with a simulated arm, or with a real one over its wire.
+    """Press on a surface with a desired force: with a simulated arm, or with a real one over its wire.
 
-    A simulated arm approaches, touches, presses, lowers the force now and then, and what it touched is identified from
-    what its encoders and its force sensor measured:
+    A simulated arm approaches, touches, presses and lowers the force three times. The surface is identified from the
+    readings of its encoders and its force sensor:
 
     palpate press --arm fr3 --force 20:N --surface K=5000,B=50 --out runs/press
 
-    A real arm is first looked at, and it is said what would be done; --dry-run moves nothing:
+    For a real arm, --dry-run reads the arm, prints the planned motion and moves nothing:
 
     palpate press --dry-run --wire rtde:192.168.0.10 --gains gains.toml --force 20:N --normal 0,0,-1 --force-limit 40:N
     --speed-limit 50:mm/s --travel-limit 10:mm --time-limit 20:s --save-options my-cell.toml
 
-    The same without --dry-run moves it, after it has asked; options that were saved need not be typed again:
+    The same without --dry-run moves it after a confirmation; saved options need not be typed again:
 
     palpate press --wire rtde:192.168.0.10 --force 20:N --options my-cell.toml --record first
 
-    Keep a hand on the emergency stop: nothing of this was tried on hardware. The arm stops at each limit, on lost or
-    late readings, and on Ctrl-C. Exit code 1 says that the press ended before it was done.
+    Keep a hand on the emergency stop: none of this was tested on hardware. The arm stops at each limit, on lost or
+    late readings, and on Ctrl-C. Exit code 1: the press ended early.
 
     Parameters
     ----------
     json
-        Print one JSON object and nothing else; of a real arm it needs --yes or --dry-run.
+        Print one JSON object and nothing else; for a real arm it needs --yes or --dry-run.
     """
     asked, simulated = asked or AskOptions(), simulated or SimulatedOptions()
     wire, limits, cell = wire or WireOptions(), limits or LimitOptions(), cell or CellOptions()
@@ -64,10 +64,10 @@ def press(
         return 0
     if wire.wire is None:
         for part in (wire, limits):
-            only(part, "a real arm, and no --wire leads to one; add --wire")
+            only(part, "a real arm, and --wire is missing; add --wire")
         code = _simulated(asked, simulated, json)
     else:
-        only(simulated, "a simulated arm, and --wire leads to a real one; leave out --wire")
+        only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
         from palpate.cli._press_wire import press_over
 
         code = press_over(asked, wire, limits, json=json)
@@ -82,7 +82,7 @@ def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> in
     question, folder = simulated.question(asked), simulated.folder
     with noticed() as interrupted, fresh_folder(folder, force=simulated.replace) as fresh:
         pressing = prepared(question)
-        start = "starting (the first time it compiles, which takes some seconds)"
+        start = "starting (the first run compiles, which takes some seconds)"
         with _progress.simulated(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)
         summary = _written(record, pressing, fresh)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=DRAWN)
 @dataclass(frozen=True, kw_only=True)
 class DrawnOptions(FigureOptions):
-    """How figures are written, and a film.
+    """Figures and a film.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def run(
 
     palpate run foam-hybrid --seed 1 --out runs/foam
 
-    The folder holds record.parquet, summary.json, figures and report.html; it is runs/NAME-SEED if not named.
+    The folder holds record.parquet, summary.json, figures and report.html; the default is runs/NAME-SEED.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def run(
 
 @dataclass(frozen=True)
 class _Ran:
-    """What a run came to, what was identified of it, and why it could not be drawn, if it could not."""
+    """Results of a run, its identification, and the reason if it could not be drawn."""
 
     title: str
     summary: dict[str, Any]
@@ -132,9 +132,7 @@ def _run(
             if len(record):
                 _draw(record, fresh, summary, found, source, drawn)
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
-            undrawn = (
-                f"there was not enough room to draw it ({printable(str(error)) or type(error).__name__})"
-            )
+            undrawn = f"not enough memory or disk space to draw it ({printable(str(error)) or type(error).__name__})"
     return _Ran(experiment.title, summary, found, undrawn, record)
 
 
@@ -168,7 +166,7 @@ def _draw(
 
 
 def _identified(record: Path) -> tuple[Identification | None, str]:
-    """What `palpate identify` says of the record, or why it says nothing."""
+    """The identification of the record by `palpate identify`, or the reason for its absence."""
     from palpate.cli._one_log import OneLog
     from palpate.cli.identify import ModelOptions
 

@@ -1,4 +1,4 @@
-"""`palpate speed`: what one tick of the closed loop costs on this machine."""
+"""`palpate speed`: time of one tick of the closed loop on this machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palpate.cli.options.written import WRITTEN
 
 
 def speed(*, json: Annotated[bool, Parameter(negative="", group=WRITTEN)] = False) -> int:
-    """Measure what one tick of the closed loop costs here: sense, think, act, and the physics in between.
+    """Measure the time of one tick of the closed loop: sensors, estimators, controller and physics.
 
     palpate speed --json
 

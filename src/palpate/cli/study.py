@@ -1,4 +1,4 @@
-"""`palpate study`: many runs of the bench, to one table and a page."""
+"""`palpate study`: many runs of the bench, one table and a page."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("A cluster", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class ClusterOptions:
-    """Where the runs go, if not to the cores of this machine.
+    """A cluster for the runs, in place of this machine's cores.
 
     Parameters
     ----------
     scheduler
-        Address of a Dask scheduler whose workers do the runs, tcp://HOST:PORT or tls://HOST:PORT. What they send
-        back may run anything here: name only a cluster that is trusted as this machine is.
+        Address of a Dask scheduler whose workers do the runs, tcp://HOST:PORT or tls://HOST:PORT. Their answers can
+        execute code here: name only a cluster that you trust as this machine.
     tls_ca
         Certificate of the authority that signed those of the cluster, a PEM file, for tls://.
     tls_cert
@@ -80,15 +80,15 @@ def study(
 
     palpate study learning-rate --out runs/learning-rate
 
-    The folder holds results.parquet, report.html and the journal of runs; it is runs/study-NAME if not named. An
-    unfinished study there is gone on with.
+    The folder holds results.parquet, report.html and the journal of runs; the default is runs/study-NAME. An
+    unfinished study there is resumed.
 
     Parameters
     ----------
     name
         A study (see --list), or a TOML file of your own (see --print).
     yes
-        Begin a study that takes very long without asking.
+        Do not ask for confirmation before a very long study.
     """
     known, output = known or KnownOptions(), output or FolderOptions()
     from palpate.studies.definition import study as studies
@@ -103,7 +103,7 @@ def study(
     try:
         found = _done(name, source, folder, where or ClusterOptions(), yes, output.force)
     except KeyboardInterrupt:
-        kept = f"what is done is saved in {folder}, and the same command goes on from there"
+        kept = f"the finished runs are saved in {folder}; the same command resumes"
         say(f"interrupted; {kept}")
         return 130
     _show(found, folder, output.json)
@@ -111,7 +111,7 @@ def study(
 
 
 def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
-    """Runs what is not done, and writes table, page and summary."""
+    """Do the missing runs, and write table, page and summary."""
     from palpate.studies.definition.part_check import check_parts_of
     from palpate.studies.definition.plan import plan
     from palpate.studies.definition.study import parse
@@ -134,7 +134,7 @@ def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool
 
 
 def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
-    """Asks whether to begin what takes very long on the cores here; of a cluster only the number of runs is known."""
+    """Ask for confirmation of a very long study; for a cluster only the number of runs is known."""
     from palpate.studies.running.cost import MANY, seconds_a_run, too_much
 
     if not here and len(plan) < MANY:
@@ -147,7 +147,7 @@ def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
     from rich.prompt import Confirm
 
     if not Confirm.ask(f"{warning}. Begin?", console=screen, default=False):
-        raise InputError("not begun; make the study smaller: fewer points, fewer seeds")
+        raise InputError("not started; make the study smaller: fewer points, fewer seeds")
 
 
 @contextmanager

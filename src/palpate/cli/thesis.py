@@ -53,17 +53,17 @@ def thesis(
     figure
         The number of one figure, "6.11", or the name of one explanation; all of them when left out.
     laboratory
-        "bench", chosen by hand; "inferred" from the thesis; or a TOML file as `palpate laboratory` writes. In any but
-        the first, only the figures that tell what the thesis' own laboratory showed.
+        "bench", chosen by hand; "inferred" from the thesis; or a TOML file as `palpate laboratory` writes. In the
+        latter two, only the figures of the thesis' own experiments are measured.
     seeds
         Noise seeds for every measured claim.
     list_
         List figures and explanations and stop.
     out
         Folder for claims.json, index.html and the figures; runs/thesis or runs/thesis-FIGURE when left out. An
-        unfinished measurement there is gone on with.
+        unfinished measurement there is resumed.
     force
-        Replace the measurement that stands there already.
+        Replace an existing measurement.
     """
     from palpate.thesis.figure import studies
     from palpate.thesis.laboratory.files import named
@@ -88,13 +88,13 @@ def thesis(
         written = Written(command, drawn.endings, drawn.dpi)
         _measure(chosen, folder, Runs(range(seeds), laboratory=lab), written, force)
     except KeyboardInterrupt:
-        say(f"interrupted; what is measured is saved in {folder}, and the same command goes on from there")
+        say(f"interrupted; the measured claims are saved in {folder}; the same command resumes")
         return 130
     return 0
 
 
 def _chosen(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[Study]:
-    """The figures that are measured: all, or one; in another laboratory those that it was inferred from."""
+    """The figures to measure: all, or one; in another laboratory those that it was inferred from."""
     from palpate.thesis.figure import studies, study
     from palpate.thesis.inference.sentences import sentences
 
@@ -122,7 +122,7 @@ def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, written: Written
             progress.update(task, completed=chosen.index(one), description=f"{one.NUMBER}  {one.TITLE}")
 
         def resumed(done: int) -> None:
-            screen.print(f"going on in {folder}: {done} of {len(chosen)} are measured already")
+            screen.print(f"resuming in {folder}: {done} of {len(chosen)} are measured already")
 
         runs = replace(runs, waiting=partial(screen.print, COMPILING))
         done = measure(chosen, runs, folder, written=written, force=force, started=started, resumed=resumed)

@@ -1,4 +1,4 @@
-"""`palpate topics`: what does a log hold, and how is it named?"""
+"""`palpate topics`: the signals of a log and their names."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from palpate.logs.listing import Entry, Listing
 
 
-_HOW = Group("How it is read", sort_key=1)
+_HOW = Group("Reading", sort_key=1)
 
 
 def topics(
@@ -29,7 +29,7 @@ def topics(
     max_seconds: Annotated[float, Parameter(group=_HOW)] = 600.0,
     json: Annotated[bool, Parameter(negative=(), group=WRITTEN)] = False,
 ) -> int:
-    """List what a log holds, and propose how to identify it.
+    """List the signals of a log, and propose a command to identify it.
 
     palpate topics press.mcap
 
@@ -38,11 +38,11 @@ def topics(
     log
         Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP.
     delimiter
-        Between two cells of a text log; found if not given.
+        Between two cells of a text log; detected if not given.
     max_size
-        Of what the log unpacks to, in GB; a larger one is refused.
+        Largest unpacked size, in GB; a larger log is refused.
     max_seconds
-        To read it.
+        Longest time to read it.
     json
         Print one JSON object and nothing else.
     """
@@ -62,7 +62,7 @@ def topics(
 
 
 def _table(log: Path, found: Listing) -> list[str]:
-    """A line an entry, as wide as it is, so that it may be searched by other programs."""
+    """One line for each entry, never wrapped, so that other programs can search it."""
     begin = _begin(found.entries)
     rows = [("name", "type", "count", "rate", "first", "last", "what")]
     for entry in found.entries:
@@ -83,13 +83,13 @@ def _table(log: Path, found: Listing) -> list[str]:
 
 
 def _proposed(found: Listing, command: str | None) -> list[str]:
-    """The command that the log asks for, and what of it is guessed."""
+    """The proposed command, and its guessed parts."""
     guesses = [f"  {guess}" for guess in found.proposal.guesses]
     if command is None:
         return ["", "no command is proposed:", *guesses]
     return [
         "",
-        "to identify it:" if not guesses else "to identify it (a guess, see below):",
+        "to identify it:" if not guesses else "to identify it (guessed parts are listed below):",
         f"  {command}",
         *guesses,
     ]
@@ -101,7 +101,7 @@ _UNIX = 1e8
 
 
 def _begin(entries: list[Entry]) -> float:
-    """What to count from: the first time of all where times are dates [s since 1970], else 0."""
+    """Origin of the times: the first one if they are dates [s since 1970], else 0."""
     first = min((entry.first for entry in entries if entry.first is not None), default=0.0)
     return first if first > _UNIX else 0.0
 

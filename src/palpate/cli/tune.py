@@ -1,4 +1,4 @@
-"""`palpate tune`: gains for a force loop, what they will do, and where they are proved stable."""
+"""`palpate tune`: gains for a force loop, their predicted performance, and the proof of their stability."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def tune(
     output: OutputOptions | None = None,
     page: ReportOption | None = None,
 ) -> int:
-    """Tune a force loop for an arm, and prove where it is stable.
+    """Tune a force loop for an arm, and prove on which surfaces it is stable.
 
-    From what palpate identify --json printed, straight from a log, or from a range of stiffness alone:
+    From the output of palpate identify --json, from a log, or from a range of stiffness:
 
     palpate tune found.json --arm ur5e --force 20 --out gains.toml
 
@@ -52,13 +52,13 @@ def tune(
 
     palpate tune found.json --arm ur5e --force 20 --loop-from sweep.csv --time t --command target_x --position actual_x
 
-    The gains are for palpate.force.ForceLoop, which adapts to any surface below the cap. Exit code 1 says that
-    nothing could be proved.
+    The gains are for palpate.force.ForceLoop, which adapts to any surface below the cap. Exit code 1: nothing could be
+    proved.
 
     Parameters
     ----------
     found
-        What palpate identify --json printed, as a .json file; or a log.
+        The output of palpate identify --json, as a .json file; or a log.
     """
     one_thread()
     surface, columns = surface or SurfaceOptions(), columns or ColumnOptions()
@@ -93,7 +93,7 @@ def _known(
     if found is None:
         if stiffness is None:
             raise InputError(
-                "tune for what? Give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"
+                "the surface is missing; give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"
             )
         low, high = spread("--stiffness", stiffness, "stiffness")
         return Known((low, high))
@@ -111,7 +111,7 @@ def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str
     record = read(log, source, samples=False)
     if "force" not in record.columns or "position" not in record.columns:
         raise InputError(
-            f"{log}: tune takes a log of one axis; run palpate identify --json on it and give that"
+            f"{log}: tune takes a log of one axis; run palpate identify --json on it and give its output"
         )
     known: dict[str, Any] = measured_by(log) if source.plain and is_run(log) else {}
     found, _ = identify_contact(record, None, PayloadOptions(payload=payload).arm(), **known)

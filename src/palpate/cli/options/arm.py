@@ -1,4 +1,4 @@
-"""Options that say how an arm's wrench and pose stand to each other, and what lies between sensors and surface."""
+"""Options of an arm: frames of its wrench and pose, and the mass and stiffness between sensors and surface."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ class FrameOptions:
     wrench_frame
         Axes of the wrench: the arm's base, the tool (those of the pose), or a sensor turned against the tool.
     sensor_rpy
-        How the sensor is turned against the tool: roll,pitch,yaw in degrees, or with :rad.
+        Rotation of the sensor against the tool: roll,pitch,yaw in degrees, or with :rad.
     tcp
-        The point that touches, in the tool's axes from the pose's origin: x,y,z in m, or with :mm.
+        The contact point, in the tool's axes from the pose's origin: x,y,z in m, or with :mm.
     wrench_at
-        The point that the torque is about, likewise; the pose's origin if not given.
+        The reference point of the torque, likewise; the pose's origin if not given.
     force_sign
-        +1 or action: the force is what the tool exerts, and grows as it presses; -1 or reaction: what the surface
-        exerts on the tool. Found if not given.
+        +1 or action: the force acts from the tool on the surface, and grows with penetration; -1 or reaction: from the
+        surface on the tool. Detected if not given.
     normal
-        Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Found from the force if not given.
+        Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Estimated from the force if not given.
     gravity_compensated
-        The tool's weight is already taken off the wrench.
+        The tool's weight is already subtracted from the wrench.
     free
-        BEGIN,END in seconds of a stretch in which nothing is touched; found if not given.
+        BEGIN,END in seconds of an interval of free motion; detected if not given.
     """
 
     wrench_frame: Literal["base", "tool", "sensor"] | None = None
@@ -53,18 +53,18 @@ class FrameOptions:
 
     @property
     def sign(self) -> int | None:
-        """1 if the force grows as the tool presses, -1 if it falls; None if nothing was said."""
+        """1 if the force grows with penetration, -1 if it falls; None if not given."""
         if self.force_sign is None:
             return None
         return -1 if self.force_sign in {"reaction", "-1"} else 1
 
     @property
     def of_space(self) -> bool:
-        """Whether anything was said that only a wrench and a pose have."""
+        """Whether an option was given that needs a wrench and a pose."""
         return replace(self, force_sign=None) != FrameOptions()
 
     def frame(self, hung: Payload | None = None) -> ContactFrame | None:
-        """The contact frame; None if nothing was said."""
+        """The contact frame; None if not given."""
         from palpate.contact_frame import ContactFrame
 
         if self == FrameOptions() and hung is None:
@@ -94,20 +94,20 @@ class FrameOptions:
 @Parameter(name="*", group=Group("The arm", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class ArmOptions:
-    """What lies between the sensors and the surface.
+    """Mass and stiffness between the sensors and the surface.
 
     Parameters
     ----------
     tool_mass
-        Mass between force sensor and surface in kg, VALUE or VALUE:STD; it is taken out of M.
+        Mass between force sensor and surface in kg, VALUE or VALUE:STD; it is subtracted from M.
     robot_stiffness
-        What gives way between the position sensor and the surface, N/m or N/m:STD; it is taken out of K.
+        Stiffness between position sensor and surface, N/m or N/m:STD; its compliance is subtracted from that of K.
     robot_stiffness_from
-        A log of a press on a rigid wall, with the same columns or topics: all that gives way in it is the arm.
+        A log of a press on a rigid wall, with the same columns or topics: only the arm deflects in it.
     payload
-        What palpate payload wrote of the tool on the sensor: its weight, and the mass to take out of M.
+        File of palpate payload: the tool's weight, and the mass to subtract from M.
     position_from
-        joints: the position is made from encoders in the joints, and does not show the arm give way; tip: it is not.
+        joints: the position comes from joint encoders and does not contain the arm's deflection; tip: it does.
     """
 
     tool_mass: str | None = None
@@ -117,13 +117,13 @@ class ArmOptions:
     position_from: Literal["joints", "tip"] | None = None
 
     def weighed(self) -> Payload | None:
-        """What hangs on the sensor, if it was weighed."""
+        """The payload on the sensor, if it was weighed."""
         from palpate.contact_frame import load_payload
 
         return None if self.payload is None else load_payload(self.payload)
 
     def arm(self) -> Arm:
-        """The arm as far as it was said; a press on a wall is another log."""
+        """The arm as given; a press on a wall is another log."""
         from palpate.contact_frame import Arm
 
         if self.robot_stiffness is not None and self.robot_stiffness_from is not None:

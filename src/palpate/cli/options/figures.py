@@ -1,4 +1,4 @@
-"""How the figures of a folder of results are written: options of every command that writes one."""
+"""Options of the figures of a folder of results, for every command that writes one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class FigureOptions:
     Parameters
     ----------
     figures
-        As what they are written: png, svg, pdf; may be given again.
+        Format: png, svg, pdf; may be repeated.
     dpi
         Of a PNG; 110 if not given.
     """
@@ -34,7 +34,7 @@ class FigureOptions:
         return tuple(f".{kind.lower().lstrip('.')}" for kind in self.figures)
 
     def check(self) -> None:
-        """Finds a figure that cannot be written before any work is done."""
+        """Check that the figures can be written, before any work is done."""
         from palpate.report.style import FORMATS, check_dpi
 
         check_dpi(self.dpi)

@@ -23,14 +23,14 @@ def _whole_number(_: Any, tokens: Sequence[Token]) -> int:
 
 
 WHOLE = Parameter(converter=_whole_number)
-"""A seed; the conversion of cyclopts would round 1.5 without a word."""
+"""A seed; the conversion of cyclopts would silently round 1.5."""
 
 
 def in_si(option: str, text: str, kind: str) -> float:
     """`NUMBER` or `NUMBER:UNIT` in SI.
 
     Raises:
-        InputError: no number, or no unit of this kind.
+        InputError: not a number, or not a unit of this kind.
     """
     from palpate.excitation.quantities import quantity
 

@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The arm", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class ArmOptions:
-    """What presses.
+    """The arm.
 
     Parameters
     ----------
     arm
         ur5e, fr3, panda, iiwa14, thesis, or a TOML file.
     loop_from
-        A log of commanded and measured position in free motion, from which the arm's inner loop and delay are taken.
+        A log of commanded and measured position in free motion: it identifies the arm's inner loop and delay.
     """
 
     arm: str
     loop_from: Path | None = None
 
     def named(self, columns: ColumnOptions) -> tuple[Arm, InnerLoop | None]:
-        """The arm, and what the log said of its inner loop."""
+        """The arm, and notes on the identification of its inner loop."""
         from palpate.force import load_arm
 
         one = load_arm(self.arm)
@@ -49,16 +49,16 @@ class ArmOptions:
 @Parameter(name="*", group=Group("The surface", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class SurfaceOptions:
-    """What is known of the surface without a log.
+    """Prior of the surface, without a log.
 
     Parameters
     ----------
     stiffness
         Range of its stiffness, LOW:HIGH in N/m or LOW:HIGH:UNIT.
     stiffness_cap
-        Stiffest surface that there may be, N/m.
+        Largest possible stiffness, N/m.
     surface_speed
-        Of a surface that moves by itself, m/s.
+        Speed of a moving surface, m/s.
     """
 
     stiffness: Annotated[str | None, SIGNED] = None
@@ -74,12 +74,12 @@ class SurfaceOptions:
 @Parameter(name="*", group=Group("The press", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class PressOptions:
-    """What is asked for.
+    """Desired force and its limit.
 
     Parameters
     ----------
     force
-        Desired force, the smallest that will be asked for, N.
+        Smallest desired force, N.
     peak
         Highest force allowed at the touch, N.
     """
@@ -98,7 +98,7 @@ class PressOptions:
         return in_si_if_given("--peak", self.peak, "force")
 
 
-@Parameter(name="*", group=Group("What is in the logs", sort_key=4))
+@Parameter(name="*", group=Group("Signals of the logs", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class ColumnOptions:
     """Columns of a log of a press, and of the one that --loop-from names.
@@ -116,7 +116,7 @@ class ColumnOptions:
     command
         Column of the commanded position in the log of --loop-from, as target_mm:mm.
     payload
-        Of a log of a press: what palpate payload wrote of the tool on the sensor, whose mass is taken out of M.
+        For a log of a press: the file of palpate payload, whose mass is subtracted from M.
     """
 
     time: str | None = None
@@ -128,14 +128,14 @@ class ColumnOptions:
 
     @property
     def of_press(self) -> LogOptions:
-        """As `palpate identify` takes them."""
+        """The columns, as for `palpate identify`."""
         return LogOptions(time=self.time, rate=self.rate, position=self.position, force=self.log_force)
 
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(FileOptions):
-    """Where results go.
+    """Files to write.
 
     Parameters
     ----------
@@ -147,12 +147,12 @@ class OutputOptions(FileOptions):
 
 
 def one_thread() -> None:
-    """A proof is made of many small matrices: NumPy's threads would cost ten times what they bring."""
+    """Limit NumPy to one thread: for the many small matrices of a proof its threads cost ten times their gain."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def inner_loop(log: Path, columns: ColumnOptions) -> InnerLoop:
-    """The inner loop that a log of commanded and measured position shows.
+    """The inner loop identified from a log of commanded and measured position.
 
     Raises:
         InputError: the log or its columns are wrong, or it does not excite the loop.

@@ -24,7 +24,7 @@ _QUANTITIES = {"sphere": ("length", "m"), "punch": ("length", "m"), "cone": ("an
 @Parameter(name="*", group=Group("Young's modulus", sort_key=5))
 @dataclass(frozen=True, kw_only=True)
 class IndenterOptions:
-    """What pressed, if its shape is known.
+    """Shape of the indenter, if it is known.
 
     Parameters
     ----------
@@ -32,18 +32,18 @@ class IndenterOptions:
         sphere:RADIUS, punch:RADIUS (flat, round) or cone:HALF_ANGLE (from its axis), as sphere:5:mm or cone:70:deg; m
         and deg if no unit is given. It adds Young's modulus E.
     poisson
-        Poisson's ratio of the material, VALUE or VALUE:STD; anything from 0 to 0.5 if not given.
+        Poisson's ratio of the material, VALUE or VALUE:STD; unknown from 0 to 0.5 if not given.
     """
 
     indenter: str | None = None
     poisson: Annotated[str | None, SIGNED] = None
 
     def check(self) -> None:
-        """Refuse what is wrong before any work is done."""
+        """Check the options before any work is done."""
         from palpate.identification.indenter import check_poisson
 
         if self.poisson is not None and self.indenter is None:
-            raise InputError("--poisson is of a press by a known shape: name it with --indenter")
+            raise InputError("--poisson needs a known shape of the indenter; add --indenter")
         check_poisson(with_std("poisson", self.poisson, "0.45:0.05"))
         self._shape()
 

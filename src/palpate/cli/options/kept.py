@@ -1,4 +1,4 @@
-"""Options of a cell, kept in a TOML file: read before a command's own words, which win over it."""
+"""Options of a cell, saved in a TOML file; the command line overrides them."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ _LARGEST = 1 << 16
 @Parameter(name="*", group=Group("Options from a file", sort_key=7))
 @dataclass(frozen=True, kw_only=True)
 class CellOptions:
-    """Options that are kept.
+    """Saved options.
 
     Parameters
     ----------
     options
-        A TOML file of options of palpate identify, as wrench-frame = "tool"; what is typed wins over it.
+        A TOML file of options of palpate identify, as wrench-frame = "tool"; the command line overrides it.
     preset
-        ur-rtde, franka or ros2: how these name their columns or topics, units and frames; --options wins over it.
+        ur-rtde, franka or ros2: the columns or topics, units and frames of these drivers; --options overrides it.
     save_options
-        Where to write what was said of log, frame, arm and model, for --options.
+        Where to write the options of log, frame, arm and model, for --options.
     """
 
     options: Path | None = None
@@ -54,16 +54,16 @@ class CellOptions:
     save_options: Path | None = None
 
     def check(self) -> None:
-        """Refuse a place before any work is done."""
+        """Check the path before any work is done."""
         if self.save_options is not None:
             check_place(self.save_options, "--save-options", ending=".toml")
 
     def save(self, parts: Iterable[Any], command: str = "") -> None:
-        """Write what was said, if that was asked.
+        """Write the options, if requested.
 
         Args:
             parts: dataclasses of options.
-            command: whose options they are: what is of one call of it is not kept.
+            command: whose options they are; options of a single call are not saved.
         """
         if self.save_options is not None:
             once = _NEVER | _TYPED.get(command, set())
@@ -72,7 +72,7 @@ class CellOptions:
 
 
 def options_given(parts: Iterable[Any]) -> dict[str, Any]:
-    """What is not left at its default, by the option's name."""
+    """Options that differ from their defaults, by name."""
     return {
         field.name.replace("_", "-"): value
         for part in parts
@@ -82,15 +82,15 @@ def options_given(parts: Iterable[Any]) -> dict[str, Any]:
 
 
 def presets() -> list[str]:
-    """Names of those that come with palpate."""
+    """Names of the presets that come with palpate."""
     return sorted(f.name.removesuffix(".toml") for f in files("palpate.cli").joinpath("presets").iterdir())
 
 
 def expanded(argv: Sequence[str], app: App) -> list[str]:
-    """The words of a command with its options file and preset written out behind them.
+    """The words of a command, followed by those of its options file and preset.
 
     Raises:
-        InputError: no such file or preset, a key that is no option, a value that is none.
+        InputError: no such file or preset, an unknown option, an invalid value.
     """
     words = list(argv)
     given = {name: _value_of(words, flag) for flag, name in _SAID.items()}
@@ -127,7 +127,7 @@ def _flags(app: App, command: str) -> dict[str, tuple[str, ...]]:
 
 
 def _value_of(words: Sequence[str], flag: str) -> str | None:
-    """The value of a flag; None where it does not stand, or has none."""
+    """The value of a flag; None if it is absent, or has none."""
     for i, word in enumerate(words):
         if word.startswith(f"{flag}="):
             return word.partition("=")[2]

@@ -1,4 +1,4 @@
-"""What `run` and `study` share: a TOML file named on the command line, which may only be listed or printed."""
+"""Options that `run` and `study` share: a TOML file named on the command line, to run, list or print."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("What there is", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class KnownOptions:
-    """To look, and to run nothing.
+    """List or print, without a run.
 
     Parameters
     ----------
     list_
-        List what can be named and stop.
+        List the known names and stop.
     print_
-        Print the file of the one named, to copy and edit, and stop.
+        Print the named file, to copy and edit, and stop.
     """
 
     list_: Annotated[bool, FLAG, Parameter(name="--list")] = False
@@ -39,14 +39,14 @@ class KnownOptions:
 @Parameter(name="*", group=Group("What is written", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class FolderOptions:
-    """Where results go.
+    """Files to write.
 
     Parameters
     ----------
     out
-        Folder for results; when left out, one in runs/ with the name of what is run.
+        Folder for results; when left out, one in runs/ with the name of the run.
     force
-        Replace the results that stand there already.
+        Replace existing results.
     json
         Print the summary as JSON and nothing else.
     """
@@ -57,21 +57,21 @@ class FolderOptions:
 
 
 def listed(files: TomlFiles, title: Callable[[str], str]) -> None:
-    """Prints the names of all that come with palpate, each with its title."""
+    """Print the names that come with palpate, each with its title."""
     width = 2 + max(map(len, files.names()))
     for name in files.names():
         print_lines(f"{name:<{width}}{title(name)}")
 
 
 def source_of(files: TomlFiles, name: str | None, verb: str, printed: bool) -> str | None:
-    """The text of the file named; None if it was only to be printed, and has been.
+    """The text of the named file; None if it was only printed.
 
     Raises:
-        InputError: no name, or none that there is.
+        InputError: no name, or an unknown one.
     """
     if name is None:
         raise InputError(
-            f"{verb} what? Name {files.article} {files.kind} (palpate {verb} --list shows them) or a TOML file"
+            f"nothing to {verb}; name {files.article} {files.kind} (palpate {verb} --list shows them) or a TOML file"
         )
     source = files.source(name)
     if not printed:

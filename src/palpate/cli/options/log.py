@@ -1,4 +1,4 @@
-"""Options that say what is in a log, and how it becomes a record."""
+"""Options that name the signals of a log and how they are read."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GB = 2.0
 """What a log may unpack to [GB]; the default of `palpate.logs.limits`."""
 
 
-@Parameter(name="*", group=Group("What is in the log", sort_key=1))
+@Parameter(name="*", group=Group("Signals of the log", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class LogOptions:
     """Columns or topics of a log, and which rows of it.
@@ -34,28 +34,29 @@ class LogOptions:
     rate
         Rows per second, for a log without a column of time.
     position
-        Column of the position, in m if no unit is given; 1 takes the numbers as they stand. TOPIC.FIELD of a bag.
+        Column of the position, in m if no unit is given; the unit 1 does not convert. TOPIC.FIELD of a bag.
     force
-        Column of the force, in N if no unit is given; g is what a scale shows. TOPIC.FIELD of a bag.
+        Column of the force, in N if no unit is given; g is the reading of a scale. TOPIC.FIELD of a bag.
     wrench
         Topic of the wrench in a bag, if it is not the only one; or columns fx,fy,fz or fx,fy,fz,tx,ty,tz.
     pose
         Topic of the pose in a bag, if it is not the only one; or columns x,y,z or x,y,z,qx,qy,qz,qw.
     rotation
-        How the pose's columns write the orientation: quaternion (qx,qy,qz,qw), quaternion-wxyz, rotation-vector
-        (rx,ry,rz as UR does), rpy (roll,pitch,yaw about fixed axes), matrix (by rows) or matrix-by-columns.
+        Representation of the orientation in the pose's columns: quaternion (qx,qy,qz,qw), quaternion-wxyz,
+        rotation-vector (rx,ry,rz as UR does), rpy (roll,pitch,yaw about fixed axes), matrix (by rows) or
+        matrix-by-columns.
     start
-        Leave out what is before, in seconds from the first row.
+        Leave out the rows before, in seconds from the first row.
     end
-        Leave out what is after, in seconds from the first row.
+        Leave out the rows after, in seconds from the first row.
     missing
-        A value that means "no reading", as -1; may be given again. A plain one is found by itself.
+        A value that means "no reading", as -1; may be repeated. Common ones are detected.
     delimiter
-        Between two cells of a text log; found if not given.
+        Between two cells of a text log; detected if not given.
     max_size
-        Of what the log unpacks to, in GB; a larger one is refused.
+        Largest unpacked size, in GB; a larger log is refused.
     max_seconds
-        To read the log; one that takes longer is refused.
+        Longest time to read the log; a log that takes longer is refused.
     """
 
     time: str | None = None
@@ -84,8 +85,8 @@ def read(log: Path, options: LogOptions, *, samples: bool) -> Record:
 
     Args:
         log: the file.
-        options: what to take of it.
-        samples: leave the force's readings where they are, for a fit of the sensor's own samples.
+        options: its signals and rows.
+        samples: keep the force's readings at their own times, for a fit of the sensor's own samples.
 
     Raises:
         InputError: the file or an option is wrong.
@@ -119,7 +120,7 @@ def _of_bag(log: Path, options: LogOptions, cut: dict[str, Any], samples: bool) 
 
     one = _one_axis(options)
     if options.time or options.rate:
-        raise InputError(f"the messages of {log} carry their own time; leave --time and --rate out")
+        raise InputError(f"the messages of {log} have their own times; leave out --time and --rate")
     if one is None:
         return read_wrench_and_pose(
             log, options.wrench, options.pose, options.rotation, held="force_x" if samples else None, **cut
@@ -165,12 +166,12 @@ def _of_table(log: Path, options: LogOptions, cut: dict[str, Any]) -> Record:
 
 
 def _saved(names: Sequence[str], there: Sequence[str]) -> str:
-    """Those of a record's own columns that are there."""
+    """The record's own columns that exist."""
     return ",".join(name for name in names if name in there)
 
 
 def _one_axis(options: LogOptions) -> dict[str, Any] | None:
-    """Force and position of one axis, if these are what was named.
+    """Force and position of one axis, if these were named.
 
     Raises:
         InputError: they are mixed with wrench and pose, or one of them is missing.

@@ -1,4 +1,4 @@
-"""Options of `palpate press`, in groups: what is asked of any arm, of a simulated one, of a real one."""
+"""Options of `palpate press`, in groups: for any arm, for a simulated one, for a real one."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The press", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class AskOptions:
-    """What is asked of any arm.
+    """The press, of any arm.
 
     Parameters
     ----------
     force
         Desired force, N, or with a unit as 20:N.
     seconds
-        For how long to press, from the touch on.
+        Duration of the press from the touch on.
     gains
-        Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are made if left
+        Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are tuned if left
         out.
     normal
         Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated arm
         presses where its tip points at home if left out.
     probe
-        Share of the force by which it is lowered three times, so that the surface shows what it is: a force that stays
-        tells palpate identify little. 0.2 of a simulated arm, 0 of a real one if left out.
+        Share of the force by which it is lowered three times, to identify the surface: a constant force contains
+        little information for palpate identify. If left out, 0.2 for a simulated arm, 0 for a real one.
     payload
-        What palpate payload wrote of the tool; its mass is taken out of M. A simulated arm carries that tool, and its
-        sensor shows what that one did; of a real arm the sensor in the air is compared with it.
+        File of palpate payload; the tool's mass is subtracted from M. A simulated arm carries that tool with its
+        sensor's bias; for a real arm the sensor's reading in free motion is compared with it.
     """
 
     force: Annotated[str | None, SIGNED] = None
@@ -53,7 +53,7 @@ class AskOptions:
 
     @property
     def tool(self) -> Payload | None:
-        """The tool that was weighed; None if none was said."""
+        """The weighed tool; None if not given."""
         from palpate.contact_frame import load_payload
 
         return None if self.payload is None else load_payload(self.payload)
@@ -62,40 +62,40 @@ class AskOptions:
     def desired(self) -> float:
         """F_d [N]."""
         if self.force is None:
-            raise InputError("how hard? Say --force, as 20:N")
+            raise InputError("the desired force is missing; add --force, as 20:N")
         force = in_si("--force", self.force, "force")
         if not force > 0.0:
-            raise InputError(f"--force must be above 0 N (it presses), got {force:g} N")
+            raise InputError(f"--force must be above 0 N (pressing is positive), got {force:g} N")
         return force
 
 
 @Parameter(name="*", group=Group("A simulated arm", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class SimulatedOptions:
-    """The arm that is simulated, what it touches, and where the results go.
+    """The simulated arm, its surface, and the results.
 
     Parameters
     ----------
     arm
         ur5e, fr3, panda, iiwa14, or a file: .toml, .xml (MJCF), .urdf.
     surface
-        What is touched: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass.
+        The surface: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass.
     site
-        The tip, of a file: a site or a body of MJCF, a link of URDF.
+        The tip in the file: a site or a body of MJCF, a link of URDF.
     mode
-        torque or position: how the arm is driven; its own way when left out.
+        torque or position: the arm's input; its usual one when left out.
     physics
         own or mujoco (extra: arms).
     controller
-        cautious (with gains for any surface), or of torques: hybrid, proportional-integral, impedance.
+        cautious (with gains for any surface), or a torque law: hybrid, proportional-integral, impedance.
     at
-        Point of the surface in the base's axes, x,y,z or x,y,z:mm; before the tip at home when left out.
+        Point of the surface in the base's axes, x,y,z or x,y,z:mm; in front of the tip at home when left out.
     seed
         Of the noise; the same seed gives the same numbers.
     out
         Folder for record.parquet, summary.json, figures, film and report.html; runs/press-ARM-SEED when left out.
     replace
-        Replace the results that stand at --out.
+        Replace the results at --out.
     """
 
     arm: str | None = None
@@ -110,12 +110,12 @@ class SimulatedOptions:
     replace: Annotated[bool, FLAG] = False
 
     def question(self, asked: AskOptions) -> Question:
-        """What is to be simulated."""
+        """The press to simulate."""
         from palpate.press.prepare import Question, surface_of
 
         if self.arm is None or self.surface is None:
             raise InputError(
-                "press with what, on what? Give --arm and --surface for a simulated arm, or --wire for a real one"
+                "no arm is named; give --arm and --surface for a simulated arm, or --wire for a real one"
             )
         return Question(
             arm=self.arm, force=asked.desired, surface=surface_of(self.surface), site=self.site, mode=self.mode,
@@ -126,7 +126,7 @@ class SimulatedOptions:
 
     @property
     def folder(self) -> Path:
-        """Where the results go."""
+        """Folder of the results."""
         return (
             self.out
             if self.out is not None
@@ -137,7 +137,7 @@ class SimulatedOptions:
 @Parameter(name="*", group=Group("A real arm, over its wire", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class WireOptions:
-    """The wire, and how carefully.
+    """The wire, and its safeguards.
 
     Parameters
     ----------
@@ -146,19 +146,19 @@ class WireOptions:
         ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=action, as one word.
         There is no default.
     dry_run
-        Read the arm, say what would be done, and end: nothing moves.
+        Read the arm, print the planned motion, and end: nothing moves.
     yes
-        Do not ask; for scripts.
+        Do not ask for confirmation; for scripts.
     record
-        Folder for everything that was read and commanded; palpate identify takes its record.parquet.
+        Folder for all readings and commands; palpate identify reads its record.parquet.
     certificate
-        What palpate certify wrote; without it the lateness is measured, and nothing is proved.
+        File of palpate certify; without it the lateness is measured, and nothing is proved.
     retreat
-        Way back afterwards.
+        Distance of the retreat.
     ordinary_priority
-        Ask the system for no real-time priority.
+        Do not request real-time priority from the system.
     recover
-        Make the record of a press that was killed, from the folder of its --record, and end.
+        Build the record of a press that was killed, from the folder of its --record, and end.
     """
 
     wire: str | None = None
@@ -171,21 +171,21 @@ class WireOptions:
     recover: Path | None = None
 
 
-@Parameter(name="*", group=Group("Limits at which a real arm stops; none has a default", sort_key=4))
+@Parameter(name="*", group=Group("Limits at which a real arm stops; they have no default", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class LimitOptions:
-    """What ends a press over a wire.
+    """Limits that end a press over a wire.
 
     Parameters
     ----------
     force_limit
         Force of any axis, as 40:N.
     speed_limit
-        Speed that is never commanded, and at whose double the arm stops, as 20:mm/s.
+        Largest commanded speed, as 20:mm/s; at twice this speed the arm stops.
     travel_limit
-        Way from the start, as 10:mm.
+        Distance from the start, as 10:mm.
     time_limit
-        Of all, as 20:s.
+        Total duration, as 20:s.
     """
 
     force_limit: Annotated[str | None, SIGNED] = None
@@ -195,21 +195,21 @@ class LimitOptions:
 
 
 def only(part: SimulatedOptions | WireOptions | LimitOptions, of: str) -> None:
-    """Refuse what was said of the other kind of arm.
+    """Refuse options of the other kind of arm.
 
     Raises:
-        InputError: something was; it is named.
+        InputError: one was given; it is named.
     """
     given = next(iter(options_given((part,))), None)
     if given is not None:
-        raise InputError(f"--{given} is of {of}, or leave out --{given}")
+        raise InputError(f"--{given} is for {of}, or leave out --{given}")
 
 
 def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple[Task, Limits]:
-    """What was asked of a real arm; the direction and every limit have to be said.
+    """The task of a real arm; the direction and every limit have to be given.
 
     Raises:
-        InputError: one was not, or is none.
+        InputError: one is missing or invalid.
     """
     from palpate.wires import Limits, Task
 

@@ -1,4 +1,4 @@
-"""Numbers that are written together on the command line: VALUE:STD, and x,y,z with a unit."""
+"""Compound numbers of the command line: VALUE:STD, and x,y,z with a unit."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def vector(option: str, text: str | None, quantity: str) -> tuple[float, float, 
     Args:
         option: its name.
         text: what was given.
-        quantity: that the unit must be of; `number` for a direction.
+        quantity: of the unit; `number` for a direction.
     """
     if text is None:
         return None

@@ -1,4 +1,4 @@
-"""Options of what a command writes, and how a place is found wrong before any work is done."""
+"""Options of the files that a command writes, and the check of their paths before any work is done."""
 
 # No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
 from dataclasses import dataclass
@@ -36,13 +36,13 @@ class ReportOption:
     Parameters
     ----------
     report
-        Where to write a page with everything, an HTML file.
+        Where to write a page with all results, an HTML file.
     """
 
     report: Path | None = None
 
     def page(self) -> Path | None:
-        """Where the page goes; found wrong before any work is done."""
+        """Path of the page, checked before any work is done."""
         if self.report is not None:
             check_place(self.report, "--report", ending=".html")
         return self.report
@@ -58,14 +58,14 @@ class FileOptions(JsonOption):
     out
         Where to write the result.
     replace
-        Replace what stands at --out.
+        Replace the file at --out.
     """
 
     out: Path | None = None
     replace: Annotated[bool, FLAG] = False
 
     def check_new(self, path: Path | None, option: str = "--out", ending: str = "") -> None:
-        """Refuses a place before any work is done; a file that stands there too, unless it is to be replaced.
+        """Check a path before any work is done; an existing file is refused unless it is to be replaced.
 
         Raises:
             InputError: in one line.
@@ -95,7 +95,7 @@ class PictureOptions(ReportOption, JsonOption):
     json: Annotated[bool, FLAG] = False
 
     def picture(self, default: str, endings: tuple[str, ...] = (".png",)) -> Path | None:
-        """Where the figure goes; found wrong before any work is done."""
+        """Path of the figure, checked before any work is done."""
         if self.no_figure or (self.figure is None and self.json):
             return None
         path = self.figure or Path(default)
