@@ -111,8 +111,8 @@ WORDS = {
     "a pose for a wrench": (["--wrench", "/pose"], "which palpate does not know as a wrench"),
     "force alone": (["--force", "/ft.wrench.force.z"], "--force needs its --position"),
     "both kinds": (["--force", "/ft.wrench.force.z", "--pose", "/pose"], "not of both"),
-    "a time": (["--time", "t"], "carry their own time"),
-    "a rate": (["--rate", "100"], "carry their own time"),
+    "a time": (["--time", "t"], "have their own times"),
+    "a rate": (["--rate", "100"], "have their own times"),
     "field": (["--force", "/ft.force.z", "--position", "/pose.pose.position.z"], "unknown field 'force.z'"),
     "a joint": (
         ["--force", "/joint_states.effort.arm", "--position", "/joint_states.position.lift"],

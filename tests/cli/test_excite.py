@@ -193,7 +193,7 @@ BAD = [
     (("--position-step", "-1"), "position_step"),
     (("--lag-std", "-1"), "lag_std"),
     (("--loop-bandwidth", "0"), "above 0 Hz"),
-    (("--loop-bandwidth", "10", "--gain", "1"), "stands for the whole robot"),
+    (("--loop-bandwidth", "10", "--gain", "1"), "models the whole robot"),
     (("--tip-mass", "-1"), "tip_mass"),
     (("--gain", "50"), "lower its gain"),
     (("--out", "excite.mat"), ".csv or .parquet"),

@@ -280,7 +280,7 @@ WRONG = {
     "size is none": ([*OWN, "--indenter", "sphere:5e:mm"], "needs a number as its size"),
     "no radius": ([*OWN, "--indenter", "punch:0:mm"], "radius of a punch must be more than 0"),
     "flat cone": ([*OWN, "--indenter", "cone:95:deg"], "under 90 deg"),
-    "poisson alone": ([*OWN, "--poisson", "0.3"], "name it with --indenter"),
+    "poisson alone": ([*OWN, "--poisson", "0.3"], "add --indenter"),
     "poisson": (
         [*OWN, "--indenter", "cone:70", "--poisson", "0.7"],
         r"Poisson's ratio must be in \(-1, 0.5\]",

@@ -134,7 +134,7 @@ def test_ctrl_c_saves_and_says_how_to_go_on(folder, tmp_path):
     assert process.returncode == 130
     assert output == ""
     assert errors.count("\n") == 1
-    assert f"what is done is saved in {out}, and the same command goes on from there" in errors
+    assert f"the finished runs are saved in {out}; the same command resumes" in errors
     done = (out / "runs.jsonl").read_bytes().count(b"\n") - 1
     assert 20 <= done < 240
 
@@ -203,7 +203,7 @@ def test_experiments_are_found_beside_the_study(tmp_path, capsys, monkeypatch):
 def test_what_is_wrong_is_told_in_a_line(capsys, tmp_path):
     assert "unknown study 'learning-rat'; did you mean 'learning-rate'?" in refused(capsys, "learning-rat")
     assert "no such file" in refused(capsys, "mine.toml")
-    assert "study what?" in refused(capsys)
+    assert "no study is named" in refused(capsys)
     (tmp_path / "bad.toml").write_text(text('"controller.kii" = [1.0]', fixed=NEAR))
     assert refused(capsys, "bad.toml").startswith("palpate: bad.toml: unknown parameter 'controller.kii'")
     (tmp_path / "good.toml").write_text(SMALL)

@@ -139,7 +139,7 @@ def test_straight_from_a_log(capsys, root):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("--arm", "ur5e", "--force", "20"), "for what"),
+        (("--arm", "ur5e", "--force", "20"), "the surface is missing"),
         (("--stiffness", "1e4:1e2", "--arm", "ur5e", "--force", "20"), "interval"),
         (("--stiffness", "0:1e4", "--arm", "ur5e", "--force", "20"), "above 0"),
         (("--stiffness", "-5:1e4", "--arm", "ur5e", "--force", "20"), "above 0"),
@@ -200,7 +200,7 @@ def test_a_bad_identification_is_one_line(capsys, elsewhere, text, says):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ((), "certify what"),
+        ((), "nothing to certify"),
         (("gains.toml", "--jitter", "-1"), "jitter"),
         (("gains.toml", "--margin", "0.5"), "margin"),
         (("gains.toml", "--stiffness", "5:1"), "lower end"),

@@ -130,7 +130,7 @@ def test_a_port_in_use(capsys, record):
         (["--arm", "absent.toml"], "absent.toml"),
         (["--log", "absent.csv"], "absent.csv"),
         (["--record", "absent.parquet"], "absent.parquet"),
-        (["--record", "r.parquet", "--time", "t"], "a record names its own columns"),
+        (["--record", "r.parquet", "--time", "t"], "a record states its own columns"),
         (["--port", "-1"], "--port must be from 0 to 65535"),
         (["--port", "many"], "port"),
         (["--seed", "-1"], "seed"),

@@ -417,8 +417,8 @@ def test_the_program_says_that_it_goes_on(tmp_path, capsys, monkeypatch):
     assert main(["thesis", "--out", str(tmp_path / "t")]) == 130
     told = capsys.readouterr().err
     assert told.count("\n") == 1
-    assert "is saved in" in told
-    assert "the same command goes on from there" in told
+    assert "are saved in" in told
+    assert "the same command resumes" in told
     toys[1] = toy("1.2", done)
     assert main(["thesis", "--out", str(tmp_path / "t")]) == 0
     assert "1 of 2 are measured already" in " ".join(capsys.readouterr().out.split())

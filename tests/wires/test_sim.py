@@ -80,7 +80,7 @@ def test_nothing_moves_where_nobody_can_be_asked(folder, here, capsys, monkeypat
     with arm(folder) as (_, address), relayed(address, lambda *_: None) as relay:
         words = ["press", "--wire", relay.address, "--gains", folder / "gains.toml", *WORDS]
         monkeypatch.setattr(sys, "stdin", io.StringIO())
-        assert "nobody can be asked" in refused_after_plan(capsys, *words)
+        assert "no terminal to ask" in refused_after_plan(capsys, *words)
         assert not relay.commands
 
 
@@ -312,7 +312,7 @@ def test_an_untared_sensor_is_refused(folder, here, capsys):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ((), "no --wire leads to one"),
+        ((), "--wire is missing"),
         (
             ("--wire", "x", "--gains", "G", *WORDS[:-1], "--surface", "K=5000"),
             "--surface is of a simulated arm",

@@ -154,7 +154,7 @@ def identify(
     cell.save((source, frame, arm, fitted, pressed_by))
     if not logs:
         raise InputError(
-            "identify what? Name a log, several, or a folder of them (see: palpate identify --help)"
+            "no log is named; name a log, several, or a folder of them (see: palpate identify --help)"
         )
     if len(logs) == 1 and not is_folder_of_logs(logs[0]):
         return _one(logs[0], asked, output)
