@@ -181,7 +181,7 @@ def test_a_type_that_nobody_defines(tmp_path, capsys):
         tmp_path,
         capsys,
         ["identify", "other", *words],
-        "my_msgs/msg/Grip, is not defined in the bag, and is not guessed",
+        "my_msgs/msg/Grip, is not defined in the bag, and its layout is not guessed",
     )
     assert main(["topics", "other"]) == 0
     assert "unknown type" in capsys.readouterr().out

@@ -254,7 +254,7 @@ def test_topics_of_a_bag_that_was_cut(tmp_path, capsys):
     file = storage(press_bag_path(tmp_path))
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     assert main(["topics", str(file)]) == 0
-    assert "messages are whole" in capsys.readouterr().out
+    assert "complete messages" in capsys.readouterr().out
 
 
 def test_columns_of_a_table(root, capsys):

@@ -150,7 +150,7 @@ def test_on_a_full_disk_what_is_done_is_kept(folder, many, tmp_path):
     process = started(folder / "many.toml", "--out", out, preexec_fn=little_room, env=quiet)
     output, errors = process.communicate(timeout=120)
     assert (process.returncode, output, errors.count("\n")) == (2, "", 1), errors
-    assert "runs are saved: free some space, and the same command goes on from there" in errors
+    assert "runs are saved: free some space, and the same command resumes" in errors
     journal = (out / "runs.jsonl").read_bytes()
     assert journal.endswith(b"\n")
     assert 10 < journal.count(b"\n") < 40

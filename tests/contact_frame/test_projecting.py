@@ -172,7 +172,7 @@ def test_axes_that_nobody_names_are_not_guessed():
 
 WRONG = {
     "sensor without turn": ({"wrench_frame": "sensor"}, "needs --sensor-rpy"),
-    "turn without sensor": ({"wrench_frame": "tool", "sensor_rpy": (0.0, 0.0, 1.0)}, "only that one"),
+    "turn without sensor": ({"wrench_frame": "tool", "sensor_rpy": (0.0, 0.0, 1.0)}, "no other frame"),
     "no length": ({"normal": (0.0, 0.0, 0.0)}, "must have a length"),
     "backwards": ({"free": (2.0, 1.0)}, "must end after it begins"),
 }

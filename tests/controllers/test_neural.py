@@ -186,7 +186,7 @@ def test_a_rate_too_large_ends_the_run_and_says_why(quick):
     fast = replaced(quick, controller=replaced(quick.controller, learning_rate=0.1))
     record = build(fast).run(20.0, seed=1)
     assert record.meta["end"] == "diverged"
-    assert "learns no more; lower the learning rate, 0.1" in record.meta["why"]
+    assert "no longer learns; lower the learning rate, 0.1" in record.meta["why"]
     watched = build(replaced(fast, run=replaced(fast.run, losses=0))).run(5.0, seed=1)
     assert watched.meta["end"] == "done"
 

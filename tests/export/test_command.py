@@ -78,7 +78,7 @@ def test_a_check_that_fails_is_exit_code_1(capsys, elsewhere):
     [
         ({"K": "rejected"}, (), "K is rejected (the log does not show it), and is not exported"),
         ({"K": "not identifiable"}, (), "take it with --working-point"),
-        ({"B": "not identifiable"}, (), "say one with --damping"),
+        ({"B": "not identifiable"}, (), "give one with --damping"),
     ],
 )
 def test_what_is_not_identified_is_refused_with_the_reason(capsys, elsewhere, verdicts, words, said):
@@ -171,7 +171,7 @@ def test_several_collisions_ask_which_presses(capsys, elsewhere):
     more += "<radius>.01</radius></sphere></geometry></collision></link></model>"
     text = (elsewhere / "scene.sdf").read_text()
     (elsewhere / "scene.sdf").write_text(text.replace("</model>", more))
-    assert "--probe what presses on the surface: m::probe::tip, m::hand::palm" in refused(capsys, *TO_DRAKE)
+    assert "the probe with --probe: m::probe::tip, m::hand::palm" in refused(capsys, *TO_DRAKE)
 
 
 def test_what_stands_there_is_kept_unless_it_is_ours_and_replace_is_said(capsys, elsewhere):

@@ -124,8 +124,8 @@ def test_a_port_in_use(capsys, record):
     ("words", "told"),
     [
         (["--run", "foam-hybird"], "did you mean 'foam-hybrid'"),
-        (["--run", "foam-hybrid", "--log", "x.csv"], "--run and --log are different things"),
-        (["--arm", "fr3", "--run", "foam-hybrid"], "--run and --arm are different things"),
+        (["--run", "foam-hybrid", "--log", "x.csv"], "--run and --log exclude each other"),
+        (["--arm", "fr3", "--run", "foam-hybrid"], "--run and --arm exclude each other"),
         (["--arm", "fr33"], "did you mean 'fr3'"),
         (["--arm", "absent.toml"], "absent.toml"),
         (["--log", "absent.csv"], "absent.csv"),

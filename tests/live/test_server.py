@@ -183,7 +183,7 @@ def test_what_is_no_request_is_refused_and_the_stream_goes_on(message):
         one = client().until(lambda c: len(c.rows))
         one.send(message)
         one.until(lambda c: "refused" in c.kinds)
-        assert "no request" in one.refused
+        assert "unknown request" in one.refused
         had = len(one.rows)
         one.until(lambda c: len(c.rows) > had)
         assert player.failure is None

@@ -169,8 +169,8 @@ WRONG = {
     "place": ({"force": "/joints.effort.7"}, r"unknown field 'effort\.7'"),
     "unit": ({"force": "/ft.wrench.force.z:mm"}, "unit of length; force needs one of force"),
     "one twice": ({"force": "/pose.pose.position.z"}, "force and position cannot be the same column"),
-    "time": ({"force": "/ft.wrench.force.z", "time": "/ft.header.stamp"}, "leave --time out"),
-    "rate": ({"force": "/ft.wrench.force.z", "rate": 100.0}, "leave --rate out"),
+    "time": ({"force": "/ft.wrench.force.z", "time": "/ft.header.stamp"}, "leave out --time"),
+    "rate": ({"force": "/ft.wrench.force.z", "rate": 100.0}, "leave out --rate"),
     "missing": ({"force": "/ft.wrench.force.z", "missing": ["NA"]}, "--missing needs numbers"),
 }
 

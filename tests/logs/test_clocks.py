@@ -55,7 +55,7 @@ def test_a_clock_that_drifts():
 def test_a_slow_way_is_doubted_and_not_mended():
     """50 ms may be a wireless link or a clock; the stamps are right in the first case, so they stay."""
     clocks = on_one_clock([stream("/a"), stream("/b", delay=0.05, seed=1)])
-    assert "a clock, or a slow way to the recorder" in clocks.warning
+    assert "a clock error, or slow transport to the recorder" in clocks.warning
     np.testing.assert_array_equal(clocks.streams[1].time, TIME)
 
 
@@ -69,7 +69,7 @@ def test_a_message_that_came_before_it_was_stamped_tells_the_clock():
 def test_without_stamps_the_recorder_s_time_is_taken_for_all(stamps):
     bare = Stream("/b", TIME + 0.001, stamps, np.zeros((2000, 1)))
     clocks = on_one_clock([stream("/a", jitter=0.0), bare])
-    assert "/b carries no stamps of its own" in clocks.said
+    assert "/b has no stamps" in clocks.said
     for one in clocks.streams:
         np.testing.assert_allclose(one.time, TIME + 0.001)
 

@@ -39,7 +39,7 @@ def test_what_is_whole_is_read(bag, tmp_path, share):
     np.testing.assert_array_equal(values, FORCE[: len(values), [2, 1]])
     (said,) = found.troubles
     assert "is cut short or was never closed" in said
-    assert f"{sum(topic.count for topic in found.topics.values())} messages are whole and are read" in said
+    assert f"{sum(topic.count for topic in found.topics.values())} complete messages are read" in said
 
 
 @pytest.mark.parametrize("kind", ["bag1", "mcap"])

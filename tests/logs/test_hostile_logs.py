@@ -197,7 +197,7 @@ def test_instruments_of_ours_that_are_spoiled(tmp_path, instruments):
     path = tmp_path / "r.parquet"
     about = f'{{"units": {{"t": "s"}}, "meta": {{"instruments": {instruments}}}}}'
     polars.DataFrame({"t": T}).write_parquet(path, metadata={"palpate": about})
-    with pytest.raises(InputError, match="its instruments is spoiled"):
+    with pytest.raises(InputError, match="of the instruments is damaged"):
         measured_by(path)
 
 

@@ -160,7 +160,7 @@ def test_a_row_of_units_is_taken_where_none_is_given(tmp_path):
     right(read_log(saved(tmp_path, text), **COLUMNS))
     other = read_log(saved(tmp_path, text), time="t", position="x:m", force="f")
     np.testing.assert_allclose(other["position"], X, atol=1e-6)
-    assert any("as you say, but the row of units says mm" in note["text"] for note in other.meta["notes"])
+    assert any("as given, but the row of units says mm" in note["text"] for note in other.meta["notes"])
 
 
 @pytest.mark.parametrize(

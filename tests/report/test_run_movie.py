@@ -51,5 +51,5 @@ def test_what_is_no_film_is_refused(record, tmp_path):
     with pytest.raises(InputError, match="palpate did not write it"):
         movie.write_movie(record, tmp_path / "mine.gif")
     none = Record({n: c[:1] for n, c in record.columns.items()}, record.units, record.meta)
-    with pytest.raises(InputError, match="nothing to film"):
+    with pytest.raises(InputError, match="no film"):
         movie.write_movie(none, Path(tmp_path / "none.gif"))

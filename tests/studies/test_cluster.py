@@ -79,7 +79,7 @@ def test_a_cluster_that_goes_away_loses_nothing(cluster, tmp_path, here, monkeyp
     with pytest.raises(InputError, match="went away") as gone:
         Work(planned(source), source, folder, runner, leave).done()
     runner.close()
-    assert "the same command goes on from there" in str(gone.value)
+    assert "the same command resumes" in str(gone.value)
     Work(planned(source), source, folder, Local()).done()
     assert (folder / "results.parquet").read_bytes() == here
 

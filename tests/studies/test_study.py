@@ -72,9 +72,9 @@ BAD = {
     "logarithm of zero": (text('"controller.ki" = { log = [0.0, 2.0], points = 2 }'), "above 0"),
     "not a number": (text('"controller.ki" = { range = [nan, 2.0], points = 2 }'), "must be finite"),
     "random without samples": (text('"controller.ki" = { range = [1.0, 2.0], random = true }'), "samples"),
-    "samples without random": (text(LOG, head="samples = 8"), "no parameter is random"),
+    "samples without random": (text(LOG, head="samples = 8"), "there are none; leave it out"),
     "no seeds": (text(LOG, head="seeds = []"), "seeds is empty"),
-    "not a list": (text('"controller.ki" = 3.0'), "what does not vary stands in [fixed]"),
+    "not a list": (text('"controller.ki" = 3.0'), "constants belong to [fixed]"),
     "no value is good": (
         text('"controller.ki" = [-1.0, -2.0]'),
         "ki in [controller] must be a number at least 0",
@@ -128,7 +128,7 @@ BAD = {
     ),
     "search for a seed": (
         text("seed = [1, 2]", head='best = { least = "force_rms" }', tail="[search]\ntrials = 3"),
-        "a seed is not searched for",
+        "a seed cannot be searched",
     ),
     "shares what is not there": (
         text(LOG, tail='[against.PI]\nshares = ["surfac"]'),

@@ -315,7 +315,7 @@ def test_an_untared_sensor_is_refused(folder, here, capsys):
         ((), "--wire is missing"),
         (
             ("--wire", "x", "--gains", "G", *WORDS[:-1], "--surface", "K=5000"),
-            "--surface is of a simulated arm",
+            "--surface is for a simulated arm",
         ),
         (("--wire", "sim:127.0.0.1:9"), "--gains, --force, --normal, --force-limit"),
         (("--wire", "x", "--gains", "G", *WORDS[:-1], "--normal", "0,0,0"), "must have a length"),

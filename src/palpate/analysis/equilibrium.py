@@ -103,5 +103,5 @@ def penetration(surface: Any, force: float) -> float:
             return float(nearer)
         depth = nearer
     raise InputError(
-        f"the surface holds no force of {force:g} N at any depth; a linear model needs a state of rest"
+        f"the surface holds no force of {force:g} N at any depth; a linear model needs an equilibrium"
     )

@@ -55,7 +55,7 @@ def linearise(
     at = at_rest(motion, period)
     if at is None:
         raise InputError(
-            f"the loop finds no state of rest in contact near the desired pose and {wanted:g} N: nothing to linearise"
+            f"the loop has no equilibrium in contact near the desired pose and {wanted:g} N: nothing to linearise"
         )
     row = _row(motion, at)
     pose, torque = (np.array([row[name] for name in names]) for names in (POSE, TORQUE))

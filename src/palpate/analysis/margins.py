@@ -50,7 +50,7 @@ def margins(loop: LinearLoop) -> Margins:
         InputError: a loop that is unstable as it is, and has no margins.
     """
     if not loop.stable:
-        raise InputError("the loop is unstable as it is: it has no margins; lower a gain until it is stable")
+        raise InputError("the loop is unstable and has no margins; lower a gain until it is stable")
     f = np.geomspace(LOWEST, 0.5 / loop.tick, POINTS, endpoint=False)
     L = loop_gain(loop, f)
     gains, at = _crossings(L.imag, -1.0 / L.real, f, where=L.real < 0.0)

@@ -163,7 +163,7 @@ class Bench:
             except KeyboardInterrupt:  # wherever in a round it comes
                 end = Ending(INTERRUPTED, f"interrupted at {done * self.loop.tick:.3f} s")
         if end is None and simulation.contact is None:
-            end = Ending(NO_CONTACT, "no surface was felt")
+            end = Ending(NO_CONTACT, "no contact was detected")
         return chunks, end or Ending(DONE, "as asked for")
 
 

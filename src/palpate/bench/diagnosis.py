@@ -54,7 +54,7 @@ def diagnosed(loop: Loop, state: LoopState) -> PartError:
     changed = [name for name in state._fields if _kinds(getattr(state, name)) != _kinds(getattr(after, name))]
     if changed:
         return PartError(
-            f"the state of the {changed[0]} changes its types from one tick to the next; start as it goes on"
+            f"the state of the {changed[0]} changes its types from one tick to the next; start with the types of step"
         )
     return PartError(
         uncompilable(loop, state)
@@ -80,7 +80,7 @@ def uncompilable(loop: Loop, state: LoopState) -> str:
         if kept != numba.typeof(one.arguments[0]):
             return (
                 f"{told} returns a state of another type than start: {kept}, not {numba.typeof(one.arguments[0])}; "
-                "let every way through it return the same"
+                "return the same type in every branch"
             )
     return ""
 
@@ -120,7 +120,7 @@ def _wrong(call: Call, value: Any) -> str:
     if call.keeps is not None:
         kept = value if call.keeps < 0 else value[call.keeps]
         if _kinds(kept) != _kinds(call.arguments[0]):
-            return "returns a state of another type than start; start as it goes on"
+            return "returns a state of another type than start; start with the types of step"
     return ""
 
 

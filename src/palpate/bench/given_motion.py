@@ -238,6 +238,6 @@ def rest_for(surface: Any, force: float, rate: float) -> float:
         bound *= 2.0
         if abs(bound) > DEEPEST:
             raise InputError(
-                f"no depth of the new surface bears the {force:g} N of the old one; change the surface"
+                f"no depth of the new surface carries the {force:g} N of the old one; change the surface"
             )
     return float(brentq(short, 0.0, bound, xtol=1e-18, rtol=1e-15))

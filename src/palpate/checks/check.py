@@ -52,7 +52,7 @@ def outcomes(checks: Iterable[Check]) -> Iterator[Outcome]:
         try:
             one()
         except AssertionError as error:
-            yield Outcome(one.sentence, " ".join(str(error).split()) or "it is not so")
+            yield Outcome(one.sentence, " ".join(str(error).split()) or "it fails")
         except Exception as error:  # noqa: BLE001 - whatever the user's own code raises
             yield Outcome(one.sentence, reason(error))
         else:

@@ -74,7 +74,7 @@ def a_step_keeps_nothing_on_the_part(controller: Any) -> None:
     again, _ = ticks(controller)
     require(
         np.array_equal(first, again),
-        "the same ticks give other torques the second time; keep all in the state",
+        "repeated ticks give different torques; keep all memory in the state",
     )
 
 

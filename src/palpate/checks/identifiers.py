@@ -95,7 +95,7 @@ def it_finds_the_foam(make: Callable[[], Any]) -> None:
     K = float(np.asarray(fed(make(), phi, force).estimate().theta)[2])
     require(
         abs(K - TRUTH[2]) <= 0.25 * TRUTH[2],
-        f"after 2 s on a foam of {TRUTH[2]:g} N/m it says K = {K:.5g} N/m",
+        f"after 2 s on a foam of {TRUTH[2]:g} N/m it estimates K = {K:.5g} N/m",
     )
 
 
@@ -109,8 +109,11 @@ def many_updates_are_updates_one_by_one(make: Callable[[], Any]) -> None:
     mixed.update_many(phi[:100].tolist(), force[:100].tolist())
     mixed.update(list(phi[100]), force[100])
     mixed.update_many(np.asfortranarray(phi[101:]), force[101:])
-    require(_same(answers(many), answers(one)), "update_many is not many updates")
-    require(_same(answers(mixed), answers(one)), "update and update_many in turns are not many updates")
+    require(_same(answers(many), answers(one)), "update_many differs from repeated updates")
+    require(
+        _same(answers(mixed), answers(one)),
+        "alternating update and update_many differs from repeated updates",
+    )
 
 
 def a_regressor_may_be_any_sequence_of_numbers(make: Callable[[], Any]) -> None:
@@ -126,7 +129,7 @@ def a_regressor_may_be_any_sequence_of_numbers(make: Callable[[], Any]) -> None:
     ):
         require(
             _same(answers(fed(make(), [row], [4.0])), answers(plain)),
-            f"a regressor {kind} counts otherwise",
+            f"a regressor {kind} gives another result",
         )
 
 
@@ -134,7 +137,7 @@ def the_same_samples_give_the_same_estimate(make: Callable[[], Any]) -> None:
     """It has no memory outside itself, and draws no random number of its own."""
     phi, force = foam(200)
     first, second = fed(make(), phi, force), fed(make(), phi, force)
-    require(_same(answers(first), answers(second)), "two of a kind differ after the same samples")
+    require(_same(answers(first), answers(second)), "two instances differ after the same samples")
 
 
 def a_bad_sample_is_refused_and_changes_nothing(make: Callable[[], Any]) -> None:
@@ -152,9 +155,9 @@ def refuses(make: Callable[[], Any], kind: str, sample: tuple[Any, Any]) -> None
     except (ValueError, TypeError):
         pass
     else:
-        raise AssertionError(f"a sample that is {kind}, {sample}, is taken; raise a ValueError")
+        raise AssertionError(f"a sample that is {kind}, {sample}, is accepted; raise a ValueError")
     same = _same(answers(fed(bad, phi[60:], force[60:])), answers(fed(good, phi[60:], force[60:])))
-    require(same, f"a sample that is {kind} leaves something behind")
+    require(same, f"a sample that is {kind} changes the state")
 
 
 def a_copy_goes_its_own_way_and_a_pickle_goes_on(make: Callable[[], Any]) -> None:
@@ -164,10 +167,10 @@ def a_copy_goes_its_own_way_and_a_pickle_goes_on(make: Callable[[], Any]) -> Non
     copied, thawed = copy.deepcopy(identifier), pickle.loads(pickle.dumps(identifier))  # noqa: S301 - its own
     before = answers(identifier)
     fed(copied, phi[100:], force[100:])
-    require(_same(answers(identifier), before), "what a copy learns, the original knows")
+    require(_same(answers(identifier), before), "an update of a copy changes the original")
     require(
         _same(answers(fed(thawed, phi[100:], force[100:])), answers(copied)),
-        "a pickle does not go on alike",
+        "a pickled copy continues differently",
     )
 
 

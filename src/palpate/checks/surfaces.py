@@ -115,8 +115,8 @@ def never_gains_when_free(surface: Any, start: SurfaceState, dt: float, slack: f
     recover(surface, start, dt, out)
     states = [start, *(SurfaceState(s, v, z, 0.0) for s, v, z in out)]
     energy = np.array([surface.stored(one) for one in states])
-    require(np.isfinite(energy).all(), "let go of, its energy is not finite")
-    require(np.all(np.diff(energy) <= slack * energy[0] + 1e-30), "let go of, it gains energy")
+    require(np.isfinite(energy).all(), "released, its energy is not finite")
+    require(np.all(np.diff(energy) <= slack * energy[0] + 1e-30), "released, it gains energy")
 
 
 def never_pulls(surface: Any, tip_mass: float, speed: float, pushes: Sequence[float]) -> None:
@@ -129,7 +129,7 @@ def never_pulls(surface: Any, tip_mass: float, speed: float, pushes: Sequence[fl
     require(np.all(force >= 0.0), f"it pulls with {-force.min():.3g} N")
     # The loop's own integration is first order: its error is a part of the energy that went through.
     through = 0.5 * tip_mass * np.max(out[:, 1] ** 2) + np.max(np.abs(given))
-    require(np.all(given >= -0.02 * through), f"it gives {-given.min():.3g} J that it was not given")
+    require(np.all(given >= -0.02 * through), f"it gives {-given.min():.3g} J more than it received")
 
 
 def it_is_passive(surface: Any) -> None:
@@ -157,12 +157,10 @@ def a_thrown_tip_comes_back_slower(surface: Any) -> None:
     for speed in (0.01, 0.2):
         out = np.empty((20000, 4))
         press(surface, 1.0, -1e-6, speed, np.zeros(20000), DT, out)
-        require(np.isfinite(out).all(), "thrown at it, a tip's numbers are not finite")
-        require(np.max(out[:, 2]) > 0.0, "a tip that is thrown at it feels no force")
-        require(out[-1, 1] < 0.0 and out[-1, 0] < 0.0, "a tip that is thrown at it does not come back")
-        require(
-            abs(out[-1, 1]) <= speed * (1 + 2e-3), f"a tip comes back at {-out[-1, 1]:.4g} m/s of {speed}"
-        )
+        require(np.isfinite(out).all(), "after an impact, the tip's motion is not finite")
+        require(np.max(out[:, 2]) > 0.0, "an impacting tip feels no force")
+        require(out[-1, 1] < 0.0 and out[-1, 0] < 0.0, "an impacting tip does not rebound")
+        require(abs(out[-1, 1]) <= speed * (1 + 2e-3), f"a tip rebounds at {-out[-1, 1]:.4g} m/s of {speed}")
 
 
 def no_step_is_too_long_when_it_is_free(surface: Any) -> None:
@@ -170,8 +168,8 @@ def no_step_is_too_long_when_it_is_free(surface: Any) -> None:
     for dt in (1e-3, 1.0, 1e3):
         out = np.empty((200, 3))
         recover(surface, SurfaceState(1e-3, 0.0, 0.0, 0.0), dt, out)
-        require(np.all(np.isfinite(out)), f"let go of, it is not finite after steps of {dt:g} s")
-        require(np.max(np.abs(out[:, 0])) <= 1e-3 * (1 + 1e-9), f"let go of, it grows in steps of {dt:g} s")
+        require(np.all(np.isfinite(out)), f"released, it is not finite after steps of {dt:g} s")
+        require(np.max(np.abs(out[:, 0])) <= 1e-3 * (1 + 1e-9), f"released, it grows in steps of {dt:g} s")
 
 
 def it_stays_at_rest_untouched(surface: Any) -> None:
@@ -179,7 +177,7 @@ def it_stays_at_rest_untouched(surface: Any) -> None:
     state = surface.start()
     for _ in range(5):
         state = surface.free(state, DT)
-    require(tuple(state) == (0.0, 0.0, 0.0, 0.0), f"untouched, it moves to {tuple(state)}")
+    require(tuple(state) == (0.0, 0.0, 0.0, 0.0), f"without contact, it moves to {tuple(state)}")
 
 
 def compiled_it_is_as_in_plain_python(surface: Any) -> None:

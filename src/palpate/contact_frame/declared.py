@@ -49,16 +49,14 @@ class ContactFrame:
 
     def __post_init__(self) -> None:
         if (self.wrench_frame == "sensor") != (self.sensor_rpy is not None):
-            raise InputError(
-                "a wrench in the sensor's axes needs --sensor-rpy, and only that one has a use for it"
-            )
+            raise InputError("a wrench in the sensor's axes needs --sensor-rpy, and no other frame takes it")
         if self.normal is not None and not np.linalg.norm(self.normal) > 0:
             raise InputError(
                 "the normal must have a length, got 0,0,0; it points into the surface, as 0,0,-1"
             )
         if self.free is not None and not self.free[0] < self.free[1]:
             raise InputError(
-                f"the free stretch must end after it begins, got {self.free[0]:g} to {self.free[1]:g} s"
+                f"the interval of free motion must end after it begins, got {self.free[0]:g} to {self.free[1]:g} s"
             )
         if self.payload is not None:
             self._check_axes(self.payload)

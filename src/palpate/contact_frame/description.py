@@ -20,9 +20,7 @@ def described(meta: Mapping[str, Any]) -> list[str]:
     lines = list(meta.get("facts", ()))
     about = meta.get("contact_frame")
     if about and about.get("untouched"):
-        lines.append(
-            "nothing is touched: no normal, and no side that the force is of, is taken from this log"
-        )
+        lines.append("free motion only: this log gives no normal and no sign of the force")
     elif about:
         lines += [_wrench(about), _normal(about), _load(about), *_lever(about)]
     return lines + _arm(meta.get("arm") or {})
@@ -30,8 +28,8 @@ def described(meta: Mapping[str, Any]) -> list[str]:
 
 def _wrench(about: Mapping[str, Any]) -> str:
     side = {
-        "action": "what the tool exerts on the surface",
-        "reaction": "what the surface exerts on the tool",
+        "action": "from the tool on the surface",
+        "reaction": "from the surface on the tool",
     }
     sign = side[about["force_sign"]] + ("" if about["force_sign_said"] else " (found)")
     axes = (
@@ -64,7 +62,7 @@ def _load(about: Mapping[str, Any]) -> str:
             f"tool's weight {weight:.3g} N (std {std:.2g} N) by the payload file; bias {_listed(about['bias_N'])} N"
             f"{'' if about['free_rows'] else ' by the same, as the log has no free motion'}"
         )
-    mass = f"--tool-mass {weight / GRAVITY:.3g}:{std / GRAVITY:.1g} would take its inertia out of M"
+    mass = f"--tool-mass {weight / GRAVITY:.3g}:{std / GRAVITY:.1g} would subtract its inertia from M"
     return f"tool's weight {weight:.3g} N (std {std:.2g} N; {mass}); bias {_listed(about['bias_N'])} N"
 
 

@@ -79,7 +79,7 @@ def _noted(record: Record, inertia: tuple[float, float]) -> Record:
 
 def _untouched(found: Identification) -> Identification:
     """Where the force has no direction, what was fitted along one of them is chance."""
-    reason = "the force has no direction, so nothing seems to be touched"
+    reason = "the force has no direction, so there seems to be no contact"
     refused = {
         name: Parameter(None, None, None, p.unit, Verdict.NOT_IDENTIFIABLE, reason)
         for name, p in found.parameters.items()

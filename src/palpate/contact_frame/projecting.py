@@ -92,7 +92,7 @@ def _oriented(
     turned = Normal(-normal.direction, normal.std, normal.found)
     if normal.found:
         return sign, turned, []
-    text = "the normal given points out of the surface; it was turned round"
+    text = "the given normal points out of the surface; it was reversed"
     return sign, turned, [{"code": "position-sign-reversed", "text": text}]
 
 
@@ -120,7 +120,7 @@ def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) 
     if signals.guess:
         notes.append({"code": "frame-guess", "text": f"{signals.guess}; say --wrench-frame if it is not so"})
     if not normal.shown:
-        text = "the force changes in all directions alike, so it shows no normal: is anything touched?"
+        text = "the force changes equally in all directions, so the normal is unknown: is there contact?"
         notes.append({"code": "normal-uncertain", "text": text})
     elif spread > MATTERS:
         text = (

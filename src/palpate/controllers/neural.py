@@ -107,8 +107,8 @@ class Neural(NamedTuple):
         if 1.0 - share * share >= STUCK:
             return ""
         return (
-            f"the network's force output is saturated at {net.amplitude[0]:g} N and learns no more; lower the learning "
-            f"rate, {net.learning_rate:g}"
+            f"the network's force output is saturated at {net.amplitude[0]:g} N and no longer learns; lower the "
+            f"learning rate, {net.learning_rate:g}"
         )
 
 

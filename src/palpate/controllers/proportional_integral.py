@@ -67,7 +67,7 @@ class ProportionalIntegralController(ControllerTable, tag="proportional-integral
     def made(self, tick: float, wall: float) -> ProportionalIntegral:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         if self.ki is not None and self.bandwidth is not None:
-            raise InputError("ki and bandwidth in [controller] say the same thing; leave one out")
+            raise InputError("ki and bandwidth in [controller] set the same gain; leave one out")
         wanted = 5.0 if self.ki is None else float(self.ki)
         ki = wanted if self.bandwidth is None else integral_gain(self.bandwidth, self.kf)
         return ProportionalIntegral(alike(self.kp), alike(self.kv), alike(self.kf), alike(ki), tick)

@@ -71,7 +71,7 @@ class Problem:
 
     def _check_precision(self) -> None:
         if not self.precision:
-            raise InputError(f"ask for the precision of at least one of {', '.join(self.surfaces.names)}")
+            raise InputError(f"give the precision of at least one of {', '.join(self.surfaces.names)}")
         for name, asked in self.precision.items():
             if name not in self.surfaces.names:
                 raise unknown("parameter", name, self.surfaces.names)

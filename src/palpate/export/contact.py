@@ -95,7 +95,7 @@ def contact_from(
     own = found.get("pooled") if "logs" in found else found
     parameters = own.get("parameters") if isinstance(own, Mapping) else None
     if not isinstance(own, Mapping) or not isinstance(parameters, Mapping):
-        raise InputError(f"{source}: not what palpate identify --json prints; give that")
+        raise InputError(f"{source}: not the output of palpate identify --json; give that output")
     model = str(own.get("model") or "kelvin-voigt" if "logs" in found else own.get("model"))
     point = own.get("working_point")
     K = _stiffness(parameters, point, model, source, working_point)
@@ -104,7 +104,7 @@ def contact_from(
     return Contact(K, B, M, _force(point), model, source, _assumed(parameters, point, model, working_point))
 
 
-_GIVE_DAMPING = "say one with --damping (0 for a pure spring), or excite more (palpate excite)"
+_GIVE_DAMPING = "give one with --damping (0 for a pure spring), or excite more (palpate excite)"
 
 
 def _given(name: str, value: float | None, unit: str) -> Quantity | None:
@@ -180,9 +180,7 @@ def _assumed(parameters: Mapping[str, Any], point: object, model: str, at_point:
     lines = ["the force is K x + B v of the penetration x, and never pulls"]
     force = _force(point)
     if force is not None:
-        lines.append(
-            f"K was measured at a mean force of {force:.3g} N; far from it the surface may be another"
-        )
+        lines.append(f"K was measured at a mean force of {force:.3g} N; far from it the stiffness may differ")
     if at_point:
         frequency = _number(point.get("frequency_Hz")) if isinstance(point, Mapping) else None
         at = f", at {frequency:.3g} Hz" if frequency else ""

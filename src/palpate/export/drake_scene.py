@@ -179,14 +179,12 @@ def probe_of(scene: Scene, surface: Collision, name: str | None) -> Collision | 
     if name is not None:
         found = scene.collision(name)
         if found is surface:
-            raise InputError(
-                f"{scene.path}: {name!r} is the surface itself; name what presses on it with --probe"
-            )
+            raise InputError(f"{scene.path}: {name!r} is the surface itself; name the probe with --probe")
         return found
     others = [own for own in scene.collisions if own is not surface and own.path[:-1] != surface.path[:-1]]
     if len(others) > 1:
         named = ", ".join("::".join(own.path) for own in others)
-        raise InputError(f"{scene.path}: say with --probe what presses on the surface: {named}")
+        raise InputError(f"{scene.path}: name the probe with --probe: {named}")
     return others[0] if others else None
 
 
@@ -198,7 +196,7 @@ def notes(probe: bool) -> tuple[str, ...]:
     """
     known = f"a point stiffness of {RIGID:g} N/m and a relaxation time of 0"
     other = (
-        f"what presses has {known}; anything else that touches the surface needs them too"
+        f"the probe has {known}; any other body that touches the surface needs them too"
         if probe
         else f"what presses needs {known}: Drake's defaults would add to the surface's"
     )

@@ -16,7 +16,7 @@ from palpate.text import printable
 TARGETS = ("mujoco", "drake", "newton", "mjcf-spring")
 TOLERANCE = 1e-3
 """Largest error of K and of B, as shares, of a check that is passed."""
-_LOST = "it did not stay in contact, or not finite: is the time step too long?"
+_LOST = "it lost contact, or diverged: is the time step too long?"
 _DEPTH = 1e-3
 """Of a press whose force the identification does not tell [m]."""
 

@@ -167,7 +167,7 @@ def _notes(pair: Pair, round_one: bool) -> Iterator[str]:
             f"{pair.probe!r} could not be brought to the surface by its joints: one point of contact is assumed for it"
         )
     elif pair.points > 1:
-        yield f"{pair.probe!r} touches with {pair.points} points, which share K and B: right while all of them touch"
+        yield f"{pair.probe!r} touches with {pair.points} points, which share K and B: correct while all of them touch"
     elif not round_one:
         yield f"{pair.probe!r} touched with one point, which has all of K and B: each more would add as much"
 

@@ -14,14 +14,14 @@ _SOLVERS = (
 )
 NOTES = (
     _SOLVERS,
-    "the damper works going in only: coming out, Newton's force is K x",
+    "the damper acts in loading only: in unloading, Newton's force is K x",
     "both shapes must have these numbers: Newton takes the mean of the two",
 )
 
 _TEXT = '''"""Contact of a surface for Newton: call apply(builder, surface, probe) before builder.finalize()."""
 
 KE = {stiffness:.17g}  # N/m
-KD = {damping:.17g}  # N s/m, going in only
+KD = {damping:.17g}  # N s/m, in loading only
 
 
 def apply(builder, *shapes):

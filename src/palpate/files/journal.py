@@ -41,7 +41,7 @@ class Journal:
         except OSError as error:
             _cut(self.path, before)
             raise InputError(
-                f"{self.path}: {error.strerror}; {saved}free some space, and the same command goes on from there"
+                f"{self.path}: {error.strerror}; {saved}free some space, and the same command resumes"
             ) from error
 
     def _append(self, line: bytes) -> None:

@@ -156,7 +156,7 @@
     const number = byId("number"), text = K == null ? "" : `${figure(K, 4)} ${figure(half, 2)}`;
     if (number.dataset.text !== text) {
       number.dataset.text = text;
-      number.replaceChildren(...(K == null ? [make("span", { class: "quiet" }, "not known yet")] : [figure(K, 4), make("i", {}, ` ± ${figure(half, 2)}`), make("small", {}, " N/m")]));
+      number.replaceChildren(...(K == null ? [make("span", { class: "quiet" }, "not estimated yet")] : [figure(K, 4), make("i", {}, ` ± ${figure(half, 2)}`), make("small", {}, " N/m")]));
     }
     const stable = told && told.stiffness, values = [K, K && K - half > 0 ? K - half : null, K && K + half, truth, ...(stable || [])].filter((v) => v > 0);
     if (!values.length) return;
@@ -189,8 +189,8 @@
     strips.forEach((one) => { one.marks = state.happened; });
     const over = state.ended.startsWith("done");
     alerts.replaceChildren(
-      ...(away ? [alert("", "The program is gone.", away)] : []),
-      ...(state.ended ? [alert(over ? "" : "fail", over ? "The end." : "✕ Stopped.", `${state.ended.replace(/^done: /, "")}. Reset, or go on, to begin again.`)] : []),
+      ...(away ? [alert("", "The program has ended.", away)] : []),
+      ...(state.ended ? [alert(over ? "" : "fail", over ? "The end." : "✕ Stopped.", `${state.ended.replace(/^done: /, "")}. Reset, or continue, to start again.`)] : []),
       ...(state.warning ? [alert("", "At its limit:", state.warning)] : []),
       ...(state.said ? [alert("", "Not done:", state.said)] : []));
     fresh = true;
@@ -217,7 +217,7 @@
       else if (told.kind === "refused" && live.state) { live.state.said = told.why; stand(); }
     });
     socket.addEventListener("close", () => {
-      away = "The page looks for it again, and goes on when it is back."; stand(); fresh = true;
+      away = "The page tries to reconnect, and continues when the program is back."; stand(); fresh = true;
       setTimeout(connect, wait); wait = Math.min(5000, 2 * wait);
     });
   };

@@ -42,7 +42,10 @@ def of_log(title: str, found: Identification, along: Record) -> Replay:
         about=f"{len(along)} rows; the estimate is that of the whole log",
         kind="replay",
         rate=0.0,
-        notes=("The log has no joint angles, so no arm is drawn: force over position in its place.", *notes),
+        notes=(
+            "The log has no joint angles, so the page plots force over position instead of an arm.",
+            *notes,
+        ),
         identified=identified(found),
         position="position",
         units={"depth": "mm" if metre else units["position"], "measured": units["force"]},

@@ -46,7 +46,7 @@ def of_run(path: Path, found: Identification, *, whole: bool = False) -> Replay:
     record = read_log(path)
     lacking = sorted(set(ROW) - set(record.columns))
     if lacking:
-        raise InputError(f"{path} lacks the columns {', '.join(lacking[:5])} of a run; play it with --log")
+        raise InputError(f"{path} lacks the columns {', '.join(lacking[:5])} of a run; show it with --log")
     columns = {name: np.asarray(record[own]) for name, own in _PLAIN.items()}
     columns["depth"] = 1e3 * record["penetration"]
     columns["wall"] = record["x"] - record["penetration"]

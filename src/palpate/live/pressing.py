@@ -224,9 +224,7 @@ class PressingArm:
     def _warning(self, saturated: Array) -> str:
         if saturated.any():
             joints = " and ".join(self._arm.names[i] for i in np.flatnonzero(saturated))
-            return (
-                f"{printable(joints)} gives all the torque it may, and the force asked for is out of reach."
-            )
+            return f"{printable(joints)} is at its torque limit; the desired force is out of reach."
         return self._pilot.loop.trouble
 
     def _note(self, phase: float) -> None:
@@ -241,7 +239,7 @@ class PressingArm:
         """Why it goes no further, if it does not."""
         q, now = row[AT["q1"] : AT["q1"] + self._arm.joints], row[AT["t"]]
         if not np.isfinite(row[[AT["force"], AT["depth"]]]).all() or not np.isfinite(q).all():
-            self.state.ended = f"{DIVERGED}: the arm's motion is no finite number"
+            self.state.ended = f"{DIVERGED}: the arm's motion is not finite"
             return
         beyond = np.flatnonzero((q < self._arm.lower) | (q > self._arm.upper))
         if len(beyond):

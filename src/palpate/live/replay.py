@@ -59,7 +59,7 @@ class Replay:
     def __init__(self, view: View, signals: Signals, first: float | None = None):
         t = signals.columns["t"]
         if len(t) < FEWEST:
-            raise InputError(f"there is nothing to play: {len(t)} rows")
+            raise InputError(f"there is nothing to show: {len(t)} rows")
         if not (np.diff(t) > 0).all():
             raise InputError(
                 "the times of the log do not grow from row to row; mend the log, or name its clock"
@@ -107,7 +107,7 @@ class Replay:
         Raises:
             InputError: always.
         """
-        raise InputError("a log that is played again has nothing to change")
+        raise InputError("a replayed log has nothing to change")
 
     def seek(self, time: float) -> None:
         """To a moment; the seconds before it come at once, so that there is something to see.

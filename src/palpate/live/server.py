@@ -159,24 +159,24 @@ class _Server:
         """Answers whatever is no reader of the stream; nobody without the token, nor by another name of this host."""
         hosts = asked.headers.get_all("Host")
         if len(hosts) != 1 or not _OWN_HOST.match(hosts[0]):
-            return connection.respond(HTTPStatus.FORBIDDEN, "this page is for this machine alone\n")
+            return connection.respond(HTTPStatus.FORBIDDEN, "this page is for this machine only\n")
         token, _, rest = asked.path.removeprefix("/").partition("/")
         if not secrets.compare_digest(token.encode(), self._token.encode()):
             return connection.respond(
                 HTTPStatus.FORBIDDEN,
-                "this address lacks its token; take the whole one that palpate printed\n",
+                "this address lacks its token; use the full address that palpate printed\n",
             )
         origin = asked.headers.get("Origin")
         if rest == "stream":
             if origin is not None and origin != f"http://{hosts[0]}":
-                return connection.respond(HTTPStatus.FORBIDDEN, "another page may not read this\n")
+                return connection.respond(HTTPStatus.FORBIDDEN, "other pages may not read this\n")
             if len(self._readers) >= READERS:
                 return connection.respond(
                     HTTPStatus.SERVICE_UNAVAILABLE, f"{READERS} pages are open already\n"
                 )
             return None
         if rest:
-            return connection.respond(HTTPStatus.NOT_FOUND, "there is only the page\n")
+            return connection.respond(HTTPStatus.NOT_FOUND, "there is only the one page\n")
         response = connection.respond(HTTPStatus.OK, "")
         del response.headers["Content-Type"], response.headers["Content-Length"]
         response.headers.update({**PAGE_HEADERS, "Content-Length": str(len(self._page))})
@@ -201,10 +201,10 @@ class _Server:
         try:
             request = msgspec.json.decode(message, type=Request)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
-            await connection.send(_text("refused", why=f"no request that is known: {error}"))
+            await connection.send(_text("refused", why=f"unknown request: {error}"))
             return
         if not self._player.ask(request):
-            await connection.send(_text("refused", why="too much is asked for at once"))
+            await connection.send(_text("refused", why="the request is too large"))
 
     async def _send_news(self, connection: ServerConnection, news: asyncio.Event) -> None:
         """Sends what is new; a reader that takes it slowly finds older rows gone, for nothing waits in memory."""

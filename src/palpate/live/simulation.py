@@ -246,9 +246,7 @@ def _at_limit(out: Array) -> str:
     motors = [str(i + 1) for i in np.flatnonzero(share > 0.5)]
     if not motors:
         return ""
-    return (
-        f"motor {' and '.join(motors)} gives all the torque it may, and the force asked for is out of reach."
-    )
+    return f"motor {' and '.join(motors)} is at its torque limit; the desired force is out of reach."
 
 
 def _truth(experiment: Experiment) -> tuple[float, float]:
@@ -266,7 +264,7 @@ def _notes(experiment: Experiment) -> tuple[str, ...]:
             "The estimate takes the surface for a spring and a damper, which this one is not: there is no true K and B."
         )
     if not hasattr(experiment.controller, "kf"):
-        notes.append("This controller has no force gain to turn.")
+        notes.append("This controller has no force gain to change.")
     return tuple(notes)
 
 

@@ -70,7 +70,11 @@ class Stability:
     def ask(self, asked: Asked) -> None:
         """Has it worked out for these numbers; what was asked before is forgotten."""
         self._wanted = msgspec.json.encode(asked) + b"\n"
-        self.latest = {"stiffness": None, "proved": False, "text": "Working out where this loop is stable …"}
+        self.latest = {
+            "stiffness": None,
+            "proved": False,
+            "text": "Computing the stable surfaces of this loop …",
+        }
         self._news.set()
 
     def close(self) -> None:
@@ -126,7 +130,7 @@ def answers(asked: Asked) -> Iterator[Answer]:
         else:
             yield from _linear(asked.experiment)
     except PalpateError as error:
-        yield {"stiffness": None, "proved": False, "text": f"Nothing is known of its stability: {error}."}
+        yield {"stiffness": None, "proved": False, "text": f"Its stability is unknown: {error}."}
 
 
 def _as_arm(experiment: Experiment, table: CautiousController) -> OfArm:
@@ -146,19 +150,19 @@ def _of_arm(asked: OfArm) -> Iterator[Answer]:
     own = margins(gains, gains.seen_cap)
     said = f"On the stiffest surface {_margins(own.gain, own.phase, own.delay)}."
     nothing: Answer = {"stiffness": None, "proved": False, "label": ""}
-    yield nothing | {"text": f"Proving where it is stable … {said}", "more": True}
+    yield nothing | {"text": f"Proving on which surfaces it is stable … {said}", "more": True}
     held = next((claim for claim in _proof(_encoded(gains), False) if claim.kind == "held"), None)
     if held is None:
         yield nothing | {"text": f"Nothing could be proved. {said}"}
         return
     covered = _covers(held, gains, asked.stiffness, asked.damping)
-    told = f"Proved stable with its gain held: K + B/θ from {_span(held, gains)}, {_damped(held)}."
+    told = f"Proved stable with a fixed gain: K + B/θ from {_span(held, gains)}, {_damped(held)}."
     if not covered:
-        told += " Of the surface as it now is, that proof says nothing."
+        told += " The proof does not cover the present surface."
     answer: Answer = {
         "stiffness": list(_ends(held, gains)),
         "proved": covered,
-        "label": "proved stable" if covered else "proved stable of others",
+        "label": "proved stable" if covered else "proved stable for others",
     }
     yield answer | {"text": f"{told} {said}", "more": True}
     adapting = [claim for claim in _proof(_encoded(gains), True) if claim.kind == "adapting"]
@@ -228,19 +232,19 @@ def _linear(experiment: Experiment) -> Iterator[Answer]:
     try:
         known["stiffness"] = list(stable_stiffness(experiment))
     except InputError:
-        said += "; with this gain it is so on every surface from 100 N/m to 3 MN/m"
+        said += "; with this gain the answer is the same on every surface from 100 N/m to 3 MN/m"
     yield known | {"text": f"{said}."}
 
 
 def _margins(gain: float, phase: float, delay: float) -> str:
     parts = []
     if isfinite(gain):
-        parts.append(f"the gain may grow {plain(gain, 2)} times")
+        parts.append(f"the gain may grow by a factor of {plain(gain, 2)}")
     if isfinite(delay):
-        parts.append(f"the force may come {quantity(delay, 's', digits=2)} later")
+        parts.append(f"the force may lag {quantity(delay, 's', digits=2)} more")
     if isfinite(phase):
         parts.append(f"the phase margin is {phase:.0f}°")
-    return ", ".join(parts) or "no gain and no delay would make it unstable"
+    return ", ".join(parts) or "no gain and no delay makes it unstable"
 
 
 def main() -> None:

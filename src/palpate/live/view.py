@@ -42,7 +42,7 @@ STRIDE = 0.005
 
 LONGEST = 3600.0
 """Of a simulation [s]; then it stands still."""
-OVER = f"done: an hour of simulated time ({LONGEST:.0f} s) is over; reset to begin again"
+OVER = f"done: an hour of simulated time ({LONGEST:.0f} s) is over; reset to start again"
 LEAD = 1.5
 """Before the first touch, from where it begins [s]: the long search for the surface is passed over."""
 

@@ -71,7 +71,7 @@ def align(streams: Sequence[Timed], missing: Sequence[float] = (), held: str | N
         if rate <= _SIMILAR * rates[fastest]:
             text = f"{stream.topic} has {rate:.4g} readings a second, {cleaned[fastest].topic} {rates[fastest]:.4g}"
             notes.append(
-                {"code": "missing-samples", "text": f"{text}: the rows between two readings are bridged"}
+                {"code": "missing-samples", "text": f"{text}: the rows between two readings are interpolated"}
             )
     return table
 
@@ -84,7 +84,7 @@ def _sorted(stream: Timed, missing: Sequence[float], notes: list[dict[str, Any]]
     there = np.isfinite(values).all(axis=1)
     lost, twice = int((~there).sum()), len(stream.time) - len(time)
     if lost:
-        text = f"{lost} of {len(time)} messages of {stream.topic} hold no reading; they are bridged"
+        text = f"{lost} of {len(time)} messages of {stream.topic} hold no reading; they are interpolated"
         notes.append({"code": "missing-samples", "text": text})
     if twice:
         text = f"{twice} messages of {stream.topic} repeat the time of another; the first of each is kept"

@@ -29,7 +29,7 @@ def from_bag(
         InputError: whatever is wrong with the bag or with these arguments.
     """
     if "time" in columns:
-        raise InputError(f"the messages of {bag.path} carry their own time; leave --time out")
+        raise InputError(f"the messages of {bag.path} have their own times; leave out --time")
     fields = {role: _field(role, spec, bag) for role, spec in columns.items()}
     check_apart(fields, {role: ".".join(field) for role, field in fields.items()}, bag.path)
     wanted: dict[str, list[str]] = {}

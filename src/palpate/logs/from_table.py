@@ -96,16 +96,14 @@ def _symbol(
     if stated.unit is not None:
         check_quantity(role, name, stated.unit)
         if stated.where:
-            text = f"{name!r} is taken in {stated.unit}, by {stated.where}; say {name}:UNIT if that is wrong"
+            text = f"{name!r} is taken in {stated.unit}, by {stated.where}; give {name}:UNIT if that is wrong"
             notes.append({"code": "unit-stated", "text": text})
         return stated.unit
     guess, why = unit_in_name(own, quantity(role)), "its name"
     if guess is None and epoch:
         guess, why = epoch, "its values, which then are dates"
     if guess and unit(guess).factor != 1.0:
-        text = (
-            f"no unit was given for {own!r}: {guess} is taken from {why}; say {name}:{guess} or what is right"
-        )
+        text = f"no unit was given for {own!r}: {guess} is taken from {why}; give {name}:{guess} or the right unit"
         notes.append({"code": "unit-guess", "text": text})
         return guess
     other = _other_unit(role, own)
@@ -118,7 +116,7 @@ def _symbol(
 def _contradicted(name: str, symbol: str, stated: Stated, notes: list[dict[str, Any]]) -> None:
     """Say that a unit is another than the file states."""
     if stated.unit and stated.where and unit(symbol) != unit(stated.unit):
-        text = f"{name!r} is taken in {symbol} as you say, but {stated.where} says {stated.unit}"
+        text = f"{name!r} is taken in {symbol} as given, but {stated.where} says {stated.unit}"
         notes.append({"code": "unit-stated", "text": text})
 
 
@@ -139,10 +137,13 @@ def _missing(role: str, values: Array, name: str, given: bool) -> list[dict[str,
     count = int(np.isnan(values).sum())
     if count:
         share = f"{count} of {len(values)} rows ({count / len(values):.1%}) of {name!r}"
-        why = f"hold {sentinel:g}, taken as no reading" if sentinel is not None else "hold no reading"
+        why = f"hold {sentinel:g}, treated as no reading" if sentinel is not None else "hold no reading"
         row = int(np.flatnonzero(np.isnan(values))[0]) + 1
         notes.append(
-            {"code": "missing-samples", "text": f"{share} {why} (the first is row {row}); they are bridged"}
+            {
+                "code": "missing-samples",
+                "text": f"{share} {why} (the first is row {row}); they are interpolated",
+            }
         )
     if count == len(values):
         raise InputError(f"column {name!r} ({role}) holds no reading at all")
@@ -181,6 +182,6 @@ def _rate(table: Columns, rate: float | None, loaded: Loaded) -> float:
     if not (np.isfinite(rate) and rate > 0):
         raise InputError(f"the rate must be above 0 rows a second, got {rate:g}")
     if table.rate is not None and not np.isclose(rate, table.rate, rtol=1e-3):
-        text = f"rows are taken at {rate:g} a second as you say, but the file states {table.rate:g}"
+        text = f"rows are taken at {rate:g} per second as given, but the file states {table.rate:g}"
         loaded.notes.append({"code": "time-doubtful", "text": text})
     return rate

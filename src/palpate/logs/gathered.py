@@ -34,7 +34,7 @@ def gathered(paths: Sequence[Path]) -> tuple[Path, ...]:
     seen: dict[Path, Path] = {}
     for path in found:
         if path.resolve() in seen:
-            raise InputError(f"{path} is named twice; a log counts once, leave one of them out")
+            raise InputError(f"{path} is named twice; a log counts once, leave one out")
         seen[path.resolve()] = path
     return tuple(found)
 
@@ -52,7 +52,7 @@ def _of_folder(folder: Path) -> list[Path]:
     ]
     if not logs:
         raise InputError(
-            f"{folder} is a folder and no ROS 2 bag, and holds no log; logs are told by their endings: "
+            f"{folder} is a folder and no ROS 2 bag, and holds no log; logs are recognised by their endings: "
             f"{', '.join(sorted(ENDINGS))}"
         )
     return logs

@@ -56,7 +56,7 @@ class Budget:
         if self._spent + size > self.limits.size:
             raise LimitError(
                 f"{self.path} holds more than {self.limits.size / GB:.4g} GB unpacked, the limit for a log;"
-                " if it is meant to be so large, raise the limit with --max-size GB"
+                " if this size is intended, raise the limit with --max-size GB"
             )
 
     def take(self, size: float) -> None:

@@ -31,11 +31,13 @@ def read_run(path: Path, **options: Any) -> Record:
     record = read_log(path, **(options | RUN))
     about = stored_about(path)
     if about is not None and "wire" in about.meta:
-        fact = "a press over a wire: force and position along its direction, the force less what it was in the air"
+        fact = (
+            "a press over a wire: force and position along its direction, the force relative to free motion"
+        )
         wire = about.meta["wire"]
         meta = {**record.meta, "facts": [fact], "position_from": "joints", **_tool(path, wire)}
         return Record(record.columns, record.units, meta)
-    fact = f"a run's record: {RUN['position']} and {RUN['force']}, measured as the record itself says"
+    fact = f"a run's record: {RUN['position']} and {RUN['force']}, with the record's own instruments"
     # Without a tool the bench's force is that on the surface itself.
     tool = {} if about is None else _tool(path, about.meta)
     return Record(record.columns, record.units, {**record.meta, **(tool or _NO_TOOL), "facts": [fact]})
@@ -48,7 +50,7 @@ def _tool(path: Path, known: Any) -> dict[str, Any]:
     try:
         return {name: msgspec.convert(known[name], kind) for name, kind in _TOOL.items() if name in known}
     except msgspec.ValidationError as error:
-        raise InputError(f"{path}: what it says of its tool is spoiled ({error}); press again") from None
+        raise InputError(f"{path}: its metadata of the tool is damaged ({error}); press again") from None
 
 
 def measured_by(path: Path) -> dict[str, Any]:
@@ -64,7 +66,7 @@ def measured_by(path: Path) -> dict[str, Any]:
         found = msgspec.convert(instruments, _Instruments)
     except msgspec.ValidationError as error:
         raise InputError(
-            f"{path}: what it says of its instruments is spoiled ({error}); run it again"
+            f"{path}: its metadata of the instruments is damaged ({error}); run it again"
         ) from None
     if found.force is None or found.force.filter == "unknown":
         return {}

@@ -153,10 +153,10 @@ def _timing(table: Columns, seen: Sequence[Seen], guesses: list[str]) -> tuple[l
     if clock is None and table.rate is not None:
         return [], None
     if clock is None:
-        guesses.append(f"the log does not tell its rate: --rate {_RATE} is a mere example")
+        guesses.append(f"the log does not state its rate: --rate {_RATE} is only an example")
         return ["--rate", f"{_RATE}"], None
     if not clock.named_time:
-        guesses.append(f"{clock.name!r} is taken for the time, as it goes on in even steps")
+        guesses.append(f"{clock.name!r} is used as the time: it has even steps")
     call = _call(table, clock)
     symbol = clock.unit or unit_in_name(clock.name, "time")
     if symbol is None and not clock.clock:
@@ -164,7 +164,7 @@ def _timing(table: Columns, seen: Sequence[Seen], guesses: list[str]) -> tuple[l
         symbol = epoch_unit(float(clock.values[0]), clock.step) or counted
         if symbol != "s":
             guesses.append(
-                f"the time is taken in {symbol}: it would be {1 / clock.step:.3g} rows a second in s"
+                f"the time is assumed to be in {symbol}: it would be {1 / clock.step:.3g} rows a second in s"
             )
     return ["--time", call if symbol in {None, "s"} else f"{call}:{symbol}"], clock
 
@@ -179,7 +179,7 @@ def _pair(seen: Sequence[Seen], guesses: list[str]) -> tuple[Seen, Seen] | None:
         if len(forces) > 1 or len(places) > 1:
             left = [own.name for own in (*forces[1:], *places[1:])]
             others = ", ".join(left[:8])
-            text = f"{position.name!r} and {force.name!r} are taken; {others} would do by name as well"
+            text = f"{position.name!r} and {force.name!r} are used; the names of {others} fit too"
             guesses.append(text)
         return position, force
     known = position or force
@@ -189,7 +189,7 @@ def _pair(seen: Sequence[Seen], guesses: list[str]) -> tuple[Seen, Seen] | None:
         )
         if other is None:
             return None
-        guesses.append(f"{other.name!r} is taken as the column that moves most as {known.name!r} does")
+        guesses.append(f"{other.name!r} is used: of all columns it correlates most with {known.name!r}")
         return (known, other) if position else (other, known)
     pairs = [(a, b) for i, a in enumerate(seen[:40]) for b in seen[i + 1 : 40]]
     if not pairs:

@@ -71,7 +71,7 @@ def read_log(
     kind = kind_of(path)
     if kind.is_bag:
         if rate is not None:
-            raise InputError(f"the messages of {path} carry their own time; leave --rate out")
+            raise InputError(f"the messages of {path} have their own times; leave out --rate")
         with Bag(path, kind, limits) as bag:
             loaded = from_bag(bag, columns, missing, held)
     else:
@@ -121,5 +121,5 @@ def _cut(arrays: dict[str, Array], start: float | None, end: float | None, path:
         bounds = [
             f"--{name} {value:g}" for name, value in (("start", start), ("end", end)) if value is not None
         ]
-        raise InputError(f"no row of {path} is left by {' and '.join(bounds)}; the log spans {span}")
+        raise InputError(f"no row of {path} remains after {' and '.join(bounds)}; the log spans {span}")
     return {name: values[keep] for name, values in arrays.items()}

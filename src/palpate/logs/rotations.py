@@ -120,9 +120,9 @@ def _check_rotations(matrices: Array) -> None:
     if len(bad):
         row = int(bad[0])
         why = (
-            f"its rows are off being of length 1 and square to each other by {off[row]:.2g}"
+            f"its rows are not orthonormal: they are off by {off[row]:.2g}"
             if off[row] > _OFF
-            else "it turns a right hand into a left one"
+            else "it is a reflection, with determinant -1"
         )
         raise InputError(
             f"row {row + 1} of the pose's matrix is no rotation: {why}; are the columns in the order of --rotation?"

@@ -57,7 +57,7 @@ def on_one_clock(streams: Sequence[Stream]) -> Clocks:
     """
     bare = [stream.topic for stream in streams if not _stamped(stream)]
     if bare:
-        said = f"timed by when the recorder got each message ({', '.join(bare)} carries no stamps of its own)"
+        said = f"timed by the receipt at the recorder ({', '.join(bare)} has no stamps)"
         return _overlapping(Clocks([_timed(s, s.received) for s in streams], said))
     lines = [_delay(stream) for stream in streams]
     warning, astray = _disagreement(streams, lines)
@@ -123,9 +123,9 @@ def _disagreement(streams: Sequence[Stream], delays: Sequence[_Delay]) -> tuple[
     if gone > _AGREE:
         found += f" and drift by {1e6 * drift:.3g} microseconds a second"
     if offset > _TRANSPORT or gone > _AGREE or early.offset < _BEFORE:
-        moved = "both are moved to the recorder's clock, which leaves what each was on its way as a lag"
+        moved = "both are moved to the recorder's clock; the transport times remain as a lag"
         return f"{found}: the clocks disagree; {moved}", True
-    return f"{found}: a clock, or a slow way to the recorder; the stamps are taken as they are", False
+    return f"{found}: a clock error, or slow transport to the recorder; the stamps are used unchanged", False
 
 
 def _timed(stream: Stream, time: Array) -> Timed:

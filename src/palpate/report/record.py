@@ -76,9 +76,7 @@ def draw(record: Record) -> Figure:
     clock = _clock(record)
     names = [name for name in record.columns if name != clock and np.isfinite(record[name]).any()][:_DRAWN]
     if not names:
-        raise InputError(
-            "this record holds no column with numbers besides its time; there is nothing to draw"
-        )
+        raise InputError("this record has no numeric column besides its time; there is nothing to draw")
     time = record[clock] if clock else np.arange(len(record), dtype=float)
     with style.inked():
         figure, axes = style.figure(rows=len(names), height=1.6)

@@ -24,13 +24,13 @@ def check(e: Experiment) -> None:
         )
     if e.approach.release >= e.approach.switch:
         raise InputError(
-            f"release in [approach] must be below switch ({e.approach.switch:g} N), or contact is lost as soon as "
-            f"it is made; got {e.approach.release:g}"
+            f"release in [approach] must be below switch ({e.approach.switch:g} N), or contact is lost at the "
+            f"moment of the switch; got {e.approach.release:g}"
         )
     if e.force_sensor.full_scale <= e.approach.switch:
         raise InputError(
             f"full_scale in [force_sensor] must be above switch in [approach] ({e.approach.switch:g} N), or the "
-            f"switch is never felt; got {e.force_sensor.full_scale:g}"
+            f"switch is never reached; got {e.force_sensor.full_scale:g}"
         )
 
 

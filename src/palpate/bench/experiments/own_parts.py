@@ -88,7 +88,7 @@ class OwnTable(Table, frozen=True):
             return self.part(**values)
         except Exception as error:
             raise InputError(
-                f"{self.plugin.name} refuses what stands in [{self.role.key}]: {reason(error)}"
+                f"{self.plugin.name} refuses the values of [{self.role.key}]: {reason(error)}"
             ) from error
 
     def __reduce__(self) -> Any:

@@ -50,11 +50,11 @@ def _off(column: str, scale: float) -> Callable[[Look], Value]:
 
 
 CONTACT_METRICS = (
-    Metric("contact_at", "s", "when the surface is first felt", lambda look: look.summary["contact_at_s"]),
+    Metric("contact_at", "s", "time of the first contact", lambda look: look.summary["contact_at_s"]),
     Metric(
         "contacts_lost",
         "1",
-        "how often contact is lost",
+        "number of losses of contact",
         lambda look: float(losses(look.record)),
         better="least",
     ),

@@ -36,8 +36,11 @@ def settled_rms(look: Look) -> Value:
 
 def _of_force(key: str) -> Metric:
     unit, text = {
-        "settling_s": ("s", "time from the switch until the force stays within 5 % of the first one desired"),
-        "overshoot_N": ("N", "by how much the force exceeds the first one desired, before the next"),
+        "settling_s": (
+            "s",
+            "time from the switch until the force stays within 5 % of its first desired value",
+        ),
+        "overshoot_N": ("N", "overshoot of the force over its first desired value, before the next"),
     }[key]
     name = key.rpartition("_")[0]
 
@@ -104,15 +107,15 @@ FOLLOWING = (
     Metric(
         "settles",
         "1",
-        "whether the force comes to stay within 5 % of the first one desired",
+        "whether the force settles within 5 % of its first desired value",
         _settles,
         ("no", "yes"),
     ),
-    Metric("overshoot_share", "1", "overshoot as a share of the first force desired", _overshoot_share),
+    Metric("overshoot_share", "1", "overshoot as a share of the first desired force", _overshoot_share),
     Metric(
         "integral_gain",
         "1/s",
-        "slope of the controller's gathered force command over the integral of the force error",
+        "slope of the controller's integrated force command over the integral of the force error",
         _bandwidth,
     ),
 )

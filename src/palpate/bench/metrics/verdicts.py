@@ -94,7 +94,7 @@ CLAIMS = (
     Metric(
         "outcome",
         "1",
-        "follows; slow: still off where an interval ends; rings: not off there, but shaking",
+        "follows; slow: still an error at the end of an interval; rings: no error there, but oscillation",
         outcome,
         OUTCOMES,
     ),
@@ -109,7 +109,7 @@ CLAIMS = (
     Metric(
         "adaptation_time",
         "s",
-        "from the first contact on until no interval between steps ends more than 10 % off any more",
+        "time from the first contact until every interval between steps ends within 10 %",
         adaptation_time,
         better="least",
     ),
@@ -124,7 +124,7 @@ CLAIMS = (
         Metric(
             f"{parameter}_negative_{front}",
             "1",
-            f"whether {parameter} comes out negative, {front} signals",
+            f"whether {parameter} is negative, {front} signals",
             _negative(front, parameter),
             YES_OR_NO,
         )

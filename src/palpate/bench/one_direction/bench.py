@@ -90,7 +90,7 @@ class OneDirectionBench:
         longest = round(duration / tick)
         touch = self._touch(longest, seed, waiting)
         if touch is None:
-            return self._record(np.zeros((0, 5)), np.zeros(0), seed, NO_CONTACT, "no surface was felt")
+            return self._record(np.zeros((0, 5)), np.zeros(0), seed, NO_CONTACT, "no contact was detected")
         n = longest if press is None else min(longest, touch + round(press / tick))
         if progress is not None:
             progress(touch * tick, "approach")

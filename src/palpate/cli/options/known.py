@@ -71,7 +71,7 @@ def source_of(files: TomlFiles, name: str | None, verb: str, printed: bool) -> s
     """
     if name is None:
         raise InputError(
-            f"no {files.kind} is named; name {files.article} {files.kind} (palpate {verb} --list lists them) or a TOML file"
+            f"no {files.kind} is named; name one (palpate {verb} --list lists them) or a TOML file"
         )
     source = files.source(name)
     if not printed:

@@ -134,8 +134,8 @@ class Bag:
             raise InputError(f"{self.path}: no message came on {name}; name another topic")
         if not topic.known:
             raise InputError(
-                f"{self.path}: the type of {name}, {topic.kind}, is not defined in the bag, and is not guessed at;"
-                " record it as a type of geometry_msgs or sensor_msgs, or into an MCAP file, which holds definitions"
+                f"{self.path}: the type of {name}, {topic.kind}, is not defined in the bag, and its layout is not "
+                "guessed; record it as a type of geometry_msgs or sensor_msgs, or into an MCAP file, which holds definitions"
             )
         return topic
 
@@ -158,7 +158,7 @@ class Bag:
         rows = self._rows(wanted)
         for name, own in rows.items():
             if not own.received:
-                raise InputError(f"{self.path}: no message on {name} is whole; record or copy it again")
+                raise InputError(f"{self.path}: no message on {name} is complete; record or copy it again")
         origin = min(min(own.received) for own in rows.values())
         streams = {name: own.stream(name, origin) for name, own in rows.items()}
         for name, paths in wanted.items():

@@ -48,7 +48,7 @@ class Storage:
         self.spans: dict[int, tuple[int, int]] = {}
         trouble = self._look()
         if not self.counts and not (self.end.finished and self.channels):
-            trouble = trouble or "nothing in it is whole"
+            trouble = trouble or "it has no complete message"
             raise InputError(f"{path} cannot be read as {kind.value} ({trouble}); record or copy it again")
 
     def _look(self) -> str:
@@ -102,11 +102,9 @@ class Storage:
         if self.end.finished:
             return None
         if self.end.share == 0:
-            return (
-                f"{self.path} has lost the end of its index; all {self.count} messages are there and are read"
-            )
+            return f"{self.path} has a truncated index; all {self.count} messages are there and are read"
         lost = "what came after" if self.end.share is None else f"{self.end.share:.1%} of the file"
-        whole = f"{self.count} messages are whole and are read"
+        whole = f"{self.count} complete messages are read"
         return f"{self.path} is cut short or was never closed: {whole}, {lost} is lost"
 
 

@@ -71,7 +71,7 @@ def find_layout(path: Path, lines: Sequence[Line], delimiter: str | None = None)
     if block is None:
         if delimiter is not None:
             told = _NAMES.get(delimiter, repr(delimiter))
-            raise InputError(f"{path} holds no rows of numbers parted by {told}; is the delimiter right?")
+            raise InputError(f"{path} holds no rows of numbers separated by {told}; is the delimiter right?")
         if len(plain) == 1 and len(_PARTINGS[0].split(plain[0].text)) > 1:
             raise InputError(f"{path} holds a header and no rows; give a log with a row for each sample")
         raise InputError(f"{path} holds no rows of numbers in columns; give a log with a row for each sample")

@@ -84,7 +84,7 @@ class Text:
         text = ""
         if len(self.names) == 1:
             text = (
-                f" (only one column was found, parted by {self.layout.delimiter_name}; is the"
+                f" (only one column was found, separated by {self.layout.delimiter_name}; is the"
                 " delimiter right, and does the table begin in the first line?)"
             )
         whole = next((own for own in self.names if own.startswith(f"{name}:")), None)

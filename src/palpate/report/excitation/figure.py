@@ -110,4 +110,4 @@ def _precision(axis: Axes, found: Design) -> None:
     for which in "xy":
         style.logarithmic(axis, which)
     axis.set(xlabel="seconds of it", ylabel="95 % half-width [%]")
-    style.legend(axis, title="widest on any surface; dashed: asked", title_fontsize=8.5)
+    style.legend(axis, title="worst surface; dashed: requested", title_fontsize=8.5)

@@ -37,7 +37,7 @@ def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
         "excitation.html",
         _PACKAGE,
         room="excite",
-        title="A force to ask for",
+        title="A desired force",
         sentence=_sentence(found),
         about=f"{told[0].upper()}{told[1:]}.",
         feasible=found.feasible,
@@ -56,11 +56,10 @@ def _sentence(found: Design) -> str:
     asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     lasts = quantity(found.seconds, "s", digits=3)
     if found.feasible:
-        return (
-            f"In {lasts} this force shows every surface of the range as precisely as asked: {asked} (95 %)."
-        )
+        return f"In {lasts} this force identifies every surface of the range to the requested precision: {asked} (95 %)."
     worst = reached(found.made.worst(found.seconds), found)
-    return f"No force within these limits shows every surface as precisely as asked, {asked} (95 %): at best {worst}."
+    limits = "No force within these limits identifies every surface to the requested precision"
+    return f"{limits}, {asked} (95 %): at best {worst}."
 
 
 def _cards(found: Design) -> list[dict[str, str]]:
@@ -85,7 +84,7 @@ def _cards(found: Design) -> list[dict[str, str]]:
     _, force = found.force()
     low = min(one.force[0] for one in found.predictions)
     high = max(one.force[1] for one in found.predictions)
-    settles = f" after {quantity(found.settle, 's', digits=2)} to settle" if found.settle else ""
+    settles = f" after {quantity(found.settle, 's', digits=2)} of settling" if found.settle else ""
     cards.append(
         {"name": "Duration", "number": quantity(found.seconds, "s", digits=3), "why": f"of pressing{settles}"}
     )

@@ -43,7 +43,7 @@ def describe_wave(found: Design) -> str:
         how = "logarithmic" if wave.logarithmic else "linear"
         kind = f"{how} chirp, {wave.low:.4g} to {wave.high:.4g} Hz"
     _, force = found.force()
-    lasts = f"{found.seconds:g} s" + (f" after {found.settle:g} s to settle" if found.settle else "")
+    lasts = f"{found.seconds:g} s" + (f" after {found.settle:g} s of settling" if found.settle else "")
     return f"{kind}: {force.min():.1f} to {force.max():.1f} N about {budget.mean:g} N, {lasts}"
 
 
@@ -84,7 +84,7 @@ def _verdict(found: Design) -> str:
     asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     if found.feasible:
         return f"every surface to within {asked} (95 %): yes, predicted {reached(worst, found)}"
-    return f"every surface to within {asked} (95 %): no; the best is {reached(worst, found)}. What would change that:"
+    return f"every surface to within {asked} (95 %): no; the best is {reached(worst, found)}. Remedies:"
 
 
 def reached(widths: dict[str, float], found: Design) -> str:

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 _NAMES = {
     "mass": "mass",
     "centre": "centre of mass, tool's axes",
-    "weight": "weight as shown, base's axes",
+    "weight": "weight, base's axes",
     "bias": "bias of the force, tool's axes",
     "drift": "drift of the bias",
     "torque_bias": "bias of the torque, tool's axes",
-    "inertia": "mass that follows the acceleration",
+    "inertia": "inertial mass",
 }
 
 
@@ -39,7 +39,7 @@ def table(found: Weighed) -> Table:
 def sentence(found: Weighed) -> str:
     """The answer in one sentence."""
     if found.payload is None:
-        return "The poses do not tell the tool's mass: " + "; ".join(found.lacking) + "."
+        return "The poses do not determine the tool's mass: " + "; ".join(found.lacking) + "."
     mass = found.parameters["mass"]
     return f"The tool weighs {float(mass.value):.4g} +- {float(mass.half):.2g} kg (95 %, {found.poses} orientations)."
 
@@ -48,14 +48,14 @@ def page(found: Weighed, title: str) -> str:
     """The page as HTML."""
     return render(
         "page.html",
-        title=f"What hangs on the sensor, by {title}",
+        title=f"Payload of the sensor, from {title}",
         about=sentence(found),
         notes=[note["text"] for note in found.notes] + found.lacking,
         tables=[table(found)],
         figures=[
             {
                 "source": embedded(svg(draw(found)), "image/svg+xml"),
-                "caption": "The force in each orientation: measured (dots) and of tool and bias (rings)",
+                "caption": "The force in each orientation: measured (dots) and predicted from tool and bias (rings)",
             }
         ],
         source="" if found.payload is None else found.payload.to_toml(),

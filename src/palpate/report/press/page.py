@@ -33,8 +33,8 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     write_text(folder / "film.svg", moving)
     first = {
         "source": embedded(moving.encode(), "image/svg+xml"),
-        "caption": "The press in real time, from a little before the touch. The tip is drawn so large that its way is "
-        "seen; the arm is to scale.",
+        "caption": "The press in real time, from shortly before the touch. The tip's motion is enlarged; the arm is to "
+        "scale.",
     }
     loop = summary["loop"]
     about = (
@@ -156,8 +156,8 @@ def _force(record: Record, asked: Asked) -> tuple[Figure, str]:
     depth.set(xlabel="time [s]", ylabel="depth [mm]")
     style.legend(depth)
     caption = (
-        "Force and depth of the tip. Where encoders sit before elastic drive trains, they see more than the surface's "
-        "own deformation."
+        "Force and depth of the tip. Encoders in front of elastic joints measure the joints' deflection besides the "
+        "surface's."
     )
     return drawing, caption
 

@@ -47,23 +47,23 @@ def drawings(record: Record) -> Iterator[Drawing]:
     """All figures that a run has, in the order to be read."""
     yield Drawing(
         "approach",
-        "The whole run. Steps of the desired position while the arm looks for the surface; friction makes the tip "
-        "follow late. Shaded: force control, and where contact was lost.",
+        "The whole run. The desired position moves in steps until contact; friction delays the tip. Shaded: force "
+        "control, and loss of contact.",
         _approach,
     )
     if (record["phase"] == CONTACT).any():
         yield Drawing(
             "force",
-            "Contact force. The true force is what the simulated surface feels; the controller sees the measured one.",
+            "Contact force. The true force acts on the simulated surface; the controller receives the measured one.",
             _force,
         )
         yield Drawing(
             "identification",
-            "Recursive least squares, fed in three ways. Shaded: 95 % interval of the matched one. The first moments, "
-            "where the estimates come from far away, are cut off.",
+            "Recursive least squares with three kinds of signals. Shaded: 95 % interval of the matched one. The "
+            "initial transient of the estimates is cut off.",
             _identification,
         )
-    yield Drawing("torque", "Torque as applied. Dashed: the limit, where the torque comes near it.", _torque)
+    yield Drawing("torque", "Applied torque. Dashed: the limit, if the torque comes near it.", _torque)
 
 
 def draw(

@@ -41,7 +41,7 @@ def write_movie(record: Record, path: Path) -> Path:
     """
     check_movie(path)
     if len(record) < 2:
-        raise InputError("there is nothing to film: the run ended at once")
+        raise InputError("there is no film: the run ended at its start")
     rows, pace = chosen(record)
     frames = [frame.convert("P", palette=1, colors=64) for frame in _frames(record, rows, pace)]
     with whole(path) as draft:

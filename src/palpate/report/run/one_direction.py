@@ -87,8 +87,8 @@ def _world(record: Record) -> tuple[tuple[str, str], ...]:
     loop, truth = record.meta["loop"], record.meta["truth"]
     return (
         ("arm", f"{loop['arm']} ({loop['kind']}s at {loop['rate_hz']:g} Hz)"),
-        ("whole lag, as the law was told", f"{1e3 * loop['theta_s']:.3g} ms"),
-        ("stiffest surface, as it was told", quantity(loop["cap"], "N/m", digits=4)),
+        ("lag of the loop, as given to the law", f"{1e3 * loop['theta_s']:.3g} ms"),
+        ("stiffest surface, as given to the law", quantity(loop["cap"], "N/m", digits=4)),
         ("approach", f"{1e3 * loop['approach_m_s']:.3g} mm/s"),
         ("stiffness of the surface", quantity(truth["K"]["value"], "N/m", digits=4)),
         ("its damping", quantity(truth["B"]["value"], "N s/m", digits=4)),
@@ -117,7 +117,10 @@ def _bound(record: Record) -> Figure:
     style.panel(axis, "stiffness [N/m]", "time since the touch [s]")
     axis.plot(since, record["bound"][shown], color=style.K, linewidth=1.6, label="K_u, the law's upper bound")
     axis.plot(
-        since, _true_stiffness(record)[shown], **style.KNOWN, label="truth, as the measured position feels it"
+        since,
+        _true_stiffness(record)[shown],
+        **style.KNOWN,
+        label="truth, with respect to the measured position",
     )
     axis.set_yscale("log")
     style.legend(axis)
@@ -137,7 +140,7 @@ DRAWN = (
     (
         "force",
         _force,
-        "Force on the surface, and the speed that the law commands; times count from the touch.",
+        "Force on the surface, and the commanded speed; times count from the touch.",
     ),
     (
         "bound",

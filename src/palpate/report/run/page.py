@@ -147,7 +147,7 @@ def _stiffness(content: Content) -> dict[str, str]:
 
 def _identified_by(content: Content) -> str:
     if content.found is None:
-        return f"palpate identify says nothing of this record: {printable(content.why)}."
+        return f"palpate identify gives no answer for this record: {printable(content.why)}."
     return (
         f"By palpate identify of record.parquet, as the model {content.found.model}; on the bench the truth is known. "
         "The charts are of an estimator on line, which assumes a spring, a damper and a mass."

@@ -32,14 +32,14 @@ def force_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     return [
         ("contact at", f"{summary['contact_at_s']:.3f} s"),
         ("desired at the end", f"{f['desired_N']:.2f} N"),
-        ("error, mean of the last second", f"{f['error_N']:+.3f} N"),
+        ("error, mean over the last second", f"{f['error_N']:+.3f} N"),
         ("standard deviation in it", f"{f['std_N']:.3f} N"),
         ("error since contact, RMS", f"{f['rms_error_N']:.3f} N"),
         ("settling to 5 %", settling),
         ("overshoot", NONE if f["overshoot_N"] is None else f"{f['overshoot_N']:.2f} N"),
         ("noise of the measured force", f"{f['measured_std_N']:.3f} N"),
         ("tip off in y", f"{tip['y_error_mm']:+.2f} mm"),
-        ("tip off in angle", f"{tip['phi_error_deg']:+.2f}°"),
+        ("angular error of the tip", f"{tip['phi_error_deg']:+.2f}°"),
     ]
 
 
@@ -57,9 +57,7 @@ def surface_table(summary: dict[str, Any], found: Identification) -> Table:
                 quantity(known, truth[name]["unit"], digits=4) if known is not None else NONE,
             )
         )
-    return Table(
-        f"What it touched, by palpate identify: {found.model}", ("", "95 %", "verdict", "truth"), rows
-    )
+    return Table(f"Surface, by palpate identify: {found.model}", ("", "95 %", "verdict", "truth"), rows)
 
 
 def thesis_table(summary: dict[str, Any]) -> Table:

@@ -8,7 +8,7 @@ from palpate.report.numbers import plain
 
 _FAILED = ("lost contact", "diverged")
 _ADVICE = {
-    "no contact": "Move the wall, or give the run more time ([run] duration).",
+    "no contact": "Move the wall, or extend the run ([run] duration).",
     "lost contact": "Lower the gain or the learning rate, or approach more slowly.",
     "diverged": "Lower the gain or the learning rate.",
 }
@@ -35,7 +35,7 @@ def sentence(summary: dict[str, Any]) -> str:
 
 def _contact(summary: dict[str, Any]) -> str:
     if summary["end"] in _FAILED:
-        return f"the run ended before its time: {summary['why']}"
+        return f"the run ended early: {summary['why']}"
     lost = summary["contacts_lost"]
     return "contact was kept" if not lost else f"contact was lost {lost} time{'s' if lost > 1 else ''}"
 

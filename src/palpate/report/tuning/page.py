@@ -30,16 +30,16 @@ def page(told: Tuning, command: str = "palpate tune") -> str:
     return render(
         "page.html",
         title=f"A force loop for {told.gains.arm.title}",
-        about="Gains, what they will do, and where they are proved stable.",
+        about="Gains, their predicted performance, and the surfaces of the stability proof.",
         notes=[text for _, text in told.warnings],
         tables=[
-            Table("What there is to know", ("", ""), rows(told)),
+            Table("Notes", ("", ""), rows(told)),
             Table("Not covered by a proof", ("",), [(text,) for text in UNCOVERED]),
         ],
         **shown_in(
             [
-                _figure("Where it is proved stable, and what is touched", one(_intervals, told, 1.6)),
-                _figure("The press at both ends, its stiffness known", one(steps, told, 2.6)),
+                _figure("Proved stable surfaces, and the surface of the log", one(_intervals, told, 1.6)),
+                _figure("The press at both ends, with known stiffness", one(steps, told, 2.6)),
                 _figure("Nyquist's curve on the stiffest surface", one(_nyquist, told, 4.0)),
             ]
         ),

@@ -44,7 +44,7 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
 
 def _domain(told: Tuning) -> str:
     if told.domain is None:
-        return "noise hides a touch at the approach's speed: overshoot and settling are not said"
+        return "noise hides a touch at the approach speed: overshoot and settling are not predicted"
     low, high = told.domain
     seconds = settling_bound(told.gains, high)
     return (
@@ -64,8 +64,8 @@ def _stiffening(told: Tuning) -> str:
 def _peak(told: Tuning) -> str:
     bound = told.peak_bound
     if bound is None:
-        return f"{told.peak:.4g} N to expect (no bound)"
-    return f"{told.peak:.4g} N to expect; at most {bound:.4g} N while K_u >= K, without noise and damping"
+        return f"{told.peak:.4g} N predicted (no bound)"
+    return f"{told.peak:.4g} N predicted; at most {bound:.4g} N while K_u >= K, without noise and damping"
 
 
 def show(told: Tuning, console: Console) -> None:

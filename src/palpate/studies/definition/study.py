@@ -99,7 +99,7 @@ def _parameters(tables: Mapping[str, Any], prefix: str) -> dict[str, Any]:
         elif not isinstance(value, dict):
             raise InputError(
                 f"the parameter {name!r} needs a list of values or a range, got {value!r}; "
-                f"what does not vary stands in [fixed]"
+                f"constants belong to [fixed]"
             )
         elif VALUES & value.keys():
             found[name] = value
@@ -110,7 +110,7 @@ def _parameters(tables: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 
 def _check(study: Study) -> None:
     if not study.metrics:
-        raise InputError("metrics is empty; name what is to be measured, such as 'force_rms'")
+        raise InputError("metrics is empty; name at least one metric, such as 'force_rms'")
     _check_metrics(study)
     searched = study.search is not None
     everywhere = [
@@ -120,14 +120,14 @@ def _check(study: Study) -> None:
     for name, parameter in everywhere:
         _check_parameter(name, parameter, searched)
     if not study.parameters:
-        raise InputError("[parameters] is empty; name what is to be varied")
+        raise InputError("[parameters] is empty; name at least one parameter")
     if searched:
         _check_search(study)
     drawn = any(p.random for _, p in everywhere)
     if drawn and study.samples is None:
-        raise InputError("parameters are random, and samples does not say how many points to draw")
+        raise InputError("random parameters need samples, the number of points to draw")
     if study.samples is not None and not drawn:
-        raise InputError("samples says how many points to draw, and no parameter is random; leave it out")
+        raise InputError("samples is for random parameters, and there are none; leave it out")
     if study.seeds == []:
         raise InputError("seeds is empty; give a number or a list of them")
     if study.window is not None and not 0.0 <= study.window[0] < study.window[1]:
@@ -170,16 +170,16 @@ def _check_parameter(name: str, p: Parameter, searched: bool) -> None:
     elif p.points is not None or p.random:
         raise InputError(f"the parameter {name!r} has {kind}: points and random belong to range and log")
     if kind == "cases" and (p.sets or p.times or p.plus or p.factor != 1.0):
-        raise InputError(f"the parameter {name!r} has cases, which say themselves what they set")
+        raise InputError(f"the parameter {name!r} has cases, which name their own targets")
 
 
 def _check_search(study: Study) -> None:
     if study.best is None:
-        raise InputError("[search] needs [best]: the metric that is searched for")
+        raise InputError("[search] needs [best]: the metric to optimise")
     if study.against:
         raise InputError("[search] and [against] do not go together; measure the other in a study of its own")
     if "seed" in study.parameters:
-        raise InputError("a seed is not searched for; say how many there are in seeds")
+        raise InputError("a seed cannot be searched; give the number of seeds in seeds")
     if study.best.each:
         raise InputError("a search has one best setting; leave each out of [best]")
 

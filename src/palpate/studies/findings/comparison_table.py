@@ -29,8 +29,8 @@ def sentence(comparison: Comparison) -> str:
     place = "".join(f" for {name} {short(value)}" for name, value in comparison.of.items())
     if not pair.decided:
         return (
-            f"Over {n} surfaces no setting has the {side} {comparison.metric} beyond doubt{place}: {first.name} and "
-            f"{next_one} cannot be told apart ({won(pair)} against {100 * pair.lost:.0f} % of the surfaces)."
+            f"Over {n} surfaces no setting has significantly the {side} {comparison.metric}{place}: {first.name} "
+            f"and {next_one} do not differ ({won(pair)} against {100 * pair.lost:.0f} % of the surfaces)."
         )
     lead = f"{first.name} has the {side} {comparison.metric}{place}"
     better = f"it is better on {won(pair)} of {n} surfaces"

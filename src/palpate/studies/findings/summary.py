@@ -92,7 +92,7 @@ def headline(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: 
         side = "least" if best.least else "most"
         return f"The {side} {with_unit(metric_of(best.metric))} is {interval(one.metric)}, with {at}."
     done = sum(result == DONE for result in frame["result"].to_list())
-    return f"{done} of {len(frame)} runs came to their end."
+    return f"{done} of {len(frame)} runs were completed."
 
 
 def _seeds(plan: Plan) -> str:
@@ -169,7 +169,7 @@ def each_table(plan: Plan, part: str, ranked: Sequence[Ranking]) -> Table:
     """The best setting for each combination of what is given, and what cannot be told from it."""
     good = [one for one in ranked if one.settings]
     if not good:
-        return Table(f"The best settings{_of(part)}", ("",), [("no setting has all its runs done",)])
+        return Table(f"The best settings{_of(part)}", ("",), [("no setting has all its runs completed",)])
     given, chosen = good[0].of, good[0].settings[0].at
     rows = [
         (
@@ -231,18 +231,14 @@ def notes(
     if plan.study.best is None:
         return found
     if not settings:
-        return [*found, "No setting has all its runs done, so there is no best one."]
+        return [*found, "No setting has all its runs completed, so none is the best."]
     if settings[0].runs == 1:
-        found.append(
-            "One seed only: nothing is known of the spread, and the best setting may be the luckiest."
-        )
+        found.append("One seed only: the spread is unknown, and the best setting may be best by chance.")
     elif len(ranked) == 1 and len(ranked[0].alike) > 1:
         found.append(_alike(ranked[0]))
     failed = sum(one.failed for one in ranked)
     if failed:
-        found.append(
-            f"{failed} settings had a run that was not done, or is without this number, and are not ranked."
-        )
+        found.append(f"{failed} settings are not ranked: one of their runs failed, or has no such number.")
     return found
 
 
@@ -252,16 +248,16 @@ def _of_pairs(one: Comparison, plan: Plan) -> list[str]:
     found = []
     if failed:
         told = ", ".join(f"{count} of {name}" for name, count in failed.items())
-        found.append(f"A run that failed counts as worse than any that was done: {told}.")
+        found.append(f"A failed run counts as worse than any completed one: {told}.")
     if len(plan.parts[0].seeds) == 1:
-        found.append("One seed on each surface: its noise is the same for all settings, and is not averaged.")
+        found.append("One seed on each surface: the noise is the same for all settings and is not averaged.")
     return found
 
 
 def _alike(ranking: Ranking) -> str:
     told = [f"{name} {_range(values)}" for name, values in ranking.spans().items() if len(values) > 1]
     where = f": {'; '.join(told)}" if told else ""
-    return f"{len(ranking.alike)} settings cannot be told from the best one with these seeds{where}."
+    return f"{len(ranking.alike)} settings do not differ significantly from the best one with these seeds{where}."
 
 
 def _range(values: Sequence[Any]) -> str:
@@ -287,7 +283,7 @@ def _ranked_by(plan: Plan) -> str:
 
 def _results(frame: DataFrame) -> Table:
     counted = Counter(frame["result"].to_list()).most_common()
-    return Table("What the runs came to", ("result", "runs"), [(result, f"{n}") for result, n in counted])
+    return Table("Results of the runs", ("result", "runs"), [(result, f"{n}") for result, n in counted])
 
 
 def _description(name: str) -> str:
@@ -301,7 +297,7 @@ def _behind(one: Ranked, place: int) -> str:
     return (
         interval(one.behind)
         if one.behind.half is None or one.behind.excludes_zero
-        else f"{interval(one.behind)}, not told apart"
+        else f"{interval(one.behind)}, not significant"
     )
 
 

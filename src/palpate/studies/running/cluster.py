@@ -135,8 +135,8 @@ class Cluster:
             raise
         except Exception as error:
             raise InputError(
-                f"the workers of {self.address} did not come to an end: {_line(error)}; what is done is saved, and the "
-                "same command goes on from there"
+                f"the workers of {self.address} did not finish: {_line(error)}; the finished runs are saved, and the "
+                "same command resumes"
             ) from error
         finally:
             if self._client.status == "running":
@@ -308,7 +308,7 @@ class Hand:
         elif time.monotonic() - self._alone > self.patience:
             raise InputError(
                 f"the cluster at {self.address} has had no worker for {self.patience:g} s; start some: what is done "
-                "is saved, and the same command goes on from there"
+                "are saved, and the same command resumes"
             )
 
     def taken(self, future: Any, jobs: list[Job]) -> list[Done] | None:
@@ -337,7 +337,7 @@ class Hand:
     def _gone(self, error: Exception | None) -> InputError:
         what = f" ({_line(error)})" if error is not None else ""
         return InputError(
-            f"the cluster at {self.address} went away{what}; what is done is saved, and the same command goes on "
+            f"the cluster at {self.address} disappeared{what}; the finished runs are saved, and the same command "
             "from there"
         )
 

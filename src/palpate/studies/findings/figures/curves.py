@@ -32,10 +32,10 @@ def curves_of(table: Rows, asked: Curves, number: int) -> Drawn:
             panels.append(Curve(title, x, drawn, decades(np.concatenate([one.middle for one in drawn]))))
         return panels
 
-    against = " Dashed: what it is compared with." if table.plan.study.against else ""
+    against = " Dashed: the reference runs." if table.plan.study.against else ""
     caption = (
         f"{sentence(metric)}, over {x.label}{restricted_to(asked)}: median, and the range over the seeds and "
-        f"whatever else varies. Settings with a run that did not come to its end have no point.{against}"
+        f"the other parameters. Settings with an incomplete run have no point.{against}"
     )
     return Drawn(f"curves{number}", caption, metric, made, curves_figure)
 

@@ -37,13 +37,13 @@ def map_of(table: Rows, asked: Map, number: int) -> Drawn:
         return panels
 
     what = (
-        "What most runs came to"
+        "Most frequent outcome of the runs"
         if metric.words
         else f"{sentence(metric)}: the median of the runs of each cell"
     )
-    line = " The line is where the linear model of the loop loses its stability." if asked.bound else ""
+    line = " The line is the stability boundary of the loop's linear model." if asked.bound else ""
     over = f"over {x.label} and {y.label}{restricted_to(asked)}"
-    caption = f"{what}, {over}. Crosses: most runs did not come to their end.{line}"
+    caption = f"{what}, {over}. Crosses: most runs were incomplete.{line}"
     return Drawn(f"map{number}", caption, metric, made, heat_figure)
 
 
