@@ -56,7 +56,8 @@ def _sentence(found: Design) -> str:
     asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     lasts = quantity(found.seconds, "s", digits=3)
     if found.feasible:
-        return f"In {lasts} this force identifies every surface of the range to the requested precision: {asked} (95 %)."
+        says = f"In {lasts} this force identifies every surface of the range to the requested precision"
+        return f"{says}: {asked} (95 %)."
     worst = reached(found.made.worst(found.seconds), found)
     limits = "No force within these limits identifies every surface to the requested precision"
     return f"{limits}, {asked} (95 %): at best {worst}."
