@@ -134,8 +134,9 @@ class Bag:
             raise InputError(f"{self.path}: no message came on {name}; name another topic")
         if not topic.known:
             raise InputError(
-                f"{self.path}: the type of {name}, {topic.kind}, is not defined in the bag, and its layout is "
-                "not guessed; record it as a type of geometry_msgs or sensor_msgs, or into an MCAP file, which holds definitions"
+                f"{self.path}: the type of {name}, {topic.kind}, is not defined in the bag, and its layout is not "
+                "guessed; record it as a type of geometry_msgs or sensor_msgs, or into an MCAP file, which contains "
+                "definitions"
             )
         return topic
 

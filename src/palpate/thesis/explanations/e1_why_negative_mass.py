@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 NUMBER = "why-negative-mass"
 TITLE = "Why the mass comes out negative"
 CAPTION = (
-    "Least squares on the same presses, fed with perfect signals first and then with one fault more at a time, down to "
-    "what the thesis' estimator sees; last, channels matched in lag. Bars: the middle of the seeds, what each fault "
-    "adds; dots: each seed. (g), (h): perfect signals with the force made late by T, against M - B T + K T²/2 and "
-    "B - K T (dashed). (i), (j): the same under other friction, poses, masses and dampings."
+    "Least squares on the same presses. The first column has perfect signals; each next one adds one fault, up to the "
+    "signals of the thesis' estimator. The last column has channels matched in lag. Bars: median of the seeds, and "
+    "the contribution of each fault; dots: each seed. (g), (h): perfect signals with the force delayed by T, against "
+    "M - B T + K T²/2 and B - K T (dashed). (i), (j): the same under other friction, poses, masses and dampings."
 )
 PARAMETERS = {
     name: changed(e, {"run.press": 4.2})
@@ -147,12 +147,12 @@ def _sum(data: Data) -> str:
     filter_alone = data.middle("rubber", "alone")[list(CAUSES).index("acceleration"), 0]
     return (
         "A small mass is no difficulty while the signals are right. Added in the order of the figure: "
-        f"{'; '.join(parts)}. The order matters, since causes act on each other: the filter on the acceleration, "
-        f"which alone gives {filter_alone:.2f} kg on rubber, does much once displacement counts from the 5 N point. "
-        "That offset by itself makes the mass too large; without the force's lag the same chain would give "
+        f"{'; '.join(parts)}. The order matters, because the faults interact: the filter on the acceleration alone "
+        f"gives {filter_alone:.2f} kg on rubber, and has a large effect once displacement counts from the 5 N point. "
+        "That offset alone makes the mass too large; without the force's lag the same chain would give "
         f"{without['plain foam']:.2f} kg on foam and {without['rubber']:.2f} kg on rubber. In one sense the thesis is "
-        "right: the faults shift M by so much whatever it is, and a mass of some kilograms would have stayed positive. "
-        f"{_signs(data)}"
+        "right: the faults shift M by so much whatever it is, and a mass of some kilograms would have stayed "
+        f"positive. {_signs(data)}"
     )
 
 
