@@ -126,7 +126,7 @@ def _whole(name: str, parts: Sequence[Claim]) -> Claim:
         measured="; ".join(told),
         tolerance="each part by its own threshold",
         verdict=verdict,
-        note="One sentence of the thesis claims several things at once. They are measured one by one: see the rows "
+        note="One sentence of the thesis makes several claims. Each is measured separately: see the rows "
         f"{', '.join(part.id for part in parts)}.",
         group=True,
     )

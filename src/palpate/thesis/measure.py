@@ -100,7 +100,7 @@ def _noted(claim: Claim, runs: Runs) -> Claim:
     if runs.laboratory.chosen:
         return claim
     told = ", ".join(f"{name} {value:.3g}" for name, value in values(runs.laboratory).items())
-    note = f"In this laboratory: {told}. Why it is so on the hand-chosen bench stands in that measurement."
+    note = f"In this laboratory: {told}. The reason on the hand-chosen bench is in that measurement."
     return replace(claim, note=note)
 
 

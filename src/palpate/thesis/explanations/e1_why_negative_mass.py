@@ -146,12 +146,12 @@ def _sum(data: Data) -> str:
     }
     filter_alone = data.middle("rubber", "alone")[list(CAUSES).index("acceleration"), 0]
     return (
-        "A small mass is no difficulty while the signals are right. Added in the order of the figure: "
-        f"{'; '.join(parts)}. The order matters, because the faults interact: the filter on the acceleration alone "
-        f"gives {filter_alone:.2f} kg on rubber, and has a large effect once displacement counts from the 5 N point. "
-        "That offset alone makes the mass too large; without the force's lag the same chain would give "
+        f"A small mass is no difficulty with correct signals. Added in the order of the figure: {'; '.join(parts)}. "
+        "The order matters, because the faults interact: the filter on the acceleration alone gives "
+        f"{filter_alone:.2f} kg on rubber, and has a large effect once displacement counts from the 5 N point. That "
+        "offset alone makes the mass too large; without the force's lag the same chain would give "
         f"{without['plain foam']:.2f} kg on foam and {without['rubber']:.2f} kg on rubber. In one sense the thesis is "
-        "right: the faults shift M by so much whatever it is, and a mass of some kilograms would have stayed "
+        "right: the faults shift M by the same amount for any M, and a mass of some kilograms would have stayed "
         f"positive. {_signs(data)}"
     )
 
@@ -192,9 +192,10 @@ def _lag(data: Data) -> Claim:
         tolerance=f"perfect signals, force late by the sensor's {1e3 * SENSOR_LAG:g} ms: within 25 % of the shift",
         verdict=decided(worst < NEAR_FORMULA),
         note=(
-            "x(t - T) to second order is x - T v + T²/2 a: a late stiffness is a smaller damping and a late damping a "
-            f"negative mass. {_reach(data)} Beyond, terms of third order count, sooner on rubber where the push is "
-            "faster. So with B T above M + K T²/2 the mass is negative whatever it really is."
+            "To second order, x(t - T) is x - T v + T²/2 a: a delayed stiffness reduces the damping, and a delayed "
+            f"damping acts as a negative mass. {_reach(data)} For larger lags third-order terms matter, sooner on "
+            "rubber, where the push is faster. So if B T exceeds M + K T²/2, the estimated mass is negative for any "
+            "true mass."
         ),
     )
 
@@ -226,10 +227,10 @@ def _wrong_model(data: Data) -> Claim:
         tolerance="below zero on every seed",
         verdict=decided(max(masses) < 0.0),
         note=(
-            "Mass, damper and spring cannot describe a material that relaxes: its stiffness rises and its damping "
-            "falls with frequency, and over the band of the push a negative mass is the nearest that the model has. No "
-            "filter and no better sensor mends that; only another model does. Real foams relax, so the thesis' foam "
-            "may have had both reasons at once."
+            "Mass, damper and spring cannot describe a relaxing material: its stiffness rises and its damping falls "
+            "with frequency, and over the band of the push a negative mass gives the best fit. No filter and no "
+            "better sensor corrects that; only another model does. Real foams relax, so both causes may have acted on "
+            "the thesis' foam."
         ),
     )
 
@@ -256,11 +257,12 @@ def _matched(data: Data) -> Claim:
         tolerance="the middle of the seeds within 2 % for K, 5 % for B and 0.25 kg for M, four seconds after 5 N",
         verdict=decided(bool(good)),
         note=(
-            "The position goes through a model of the force sensor's chain, everything through one filter, and the fit "
-            "has an intercept; it starts before 5 N. K and B are then right, and M is right on average. But M spreads "
-            "over several times its own value from seed to seed: a push of 20 N carries no more about a mass of 50 to "
-            "100 g, and an honest estimator says so. The lag has to be known to some 0.2 ms: each "
-            "millisecond missed shifts M by B times that, 0.2 kg on the foam and 0.5 kg on the rubber."
+            "The position is filtered by a model of the force sensor's chain, all channels by one common filter, and "
+            "the fit has an intercept; it starts before 5 N. K and B are then correct, and M is correct on average. "
+            "But M varies between seeds by several times its own value: a push of 20 N contains no more information "
+            "about a mass of 50 to 100 g, and the interval of a correct estimator shows it. The lag has to be known "
+            "to some 0.2 ms: an error of one millisecond shifts M by B times 1 ms, 0.2 kg on the foam and 0.5 kg on "
+            "the rubber."
         ),
     )
 

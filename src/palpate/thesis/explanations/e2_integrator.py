@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NUMBER = "neural-is-an-integrator"
-TITLE = "Why it works: the neural controller is an integrator"
+TITLE = "Why it works: the neural controller acts as an integrator"
 CAPTION = (
     "Above: true force under the neural controller and under a plain PI of the same integral gain, on the "
     "four experiments of figures 6.11, 6.12, 6.16 and 6.17; bars below: a motor at its limit. Below, left: "
@@ -116,13 +116,12 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"a line fitted over the first {FITTED:g} s gives it within {SHARE:.0%} at each rate up to 1e-4",
             verdict=decided(worst <= SHARE),
             note=(
-                "Where the weights are small the output for the force is A s(w) with the slope A/2 in its "
-                "threshold w. Back-propagation moves the threshold each tick by eta e A/2, and so the "
-                "output by eta e (A/2)²: the error is summed, tick by tick, which is what an integral term "
-                "does. The hidden neurons add next to nothing as long as what they put out is small. The "
-                "slope falls with the square of the output over A, which makes the gain a little smaller "
-                "when the command is large. From 5e-4 on the loop rings and the hidden weights take part at "
-                "once; there the line no longer holds."
+                "For small weights the output for the force is A s(w), with the slope A/2 in its threshold w. "
+                "Back-propagation changes the threshold by eta e A/2 per tick, and so the output by eta e (A/2)²: the "
+                "error is summed tick by tick, as in an integral term. The hidden neurons contribute almost nothing "
+                "as long as their outputs are small. The slope falls with the square of the output over A, so the "
+                "gain is slightly smaller for a large command. From 5e-4 on the loop rings and the hidden weights act "
+                "at once; there the fitted line is not valid."
             ),
         ),
         Claim(
@@ -134,13 +133,13 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"the medians of the RMS error over 10 to 15 s, steps included, differ by at most {SHARE:.0%}",
             verdict=decided(apart <= SHARE),
             note=(
-                "So the experiments of sec. 6.3 show integral action, which the hybrid controller was "
-                "denied, and not yet what a network adds; the thesis' comparison with figure 6.10 cannot "
-                "tell the two apart. What is the network's own comes later, when its hidden weights from "
-                "the torques have grown: at first it helps (fig. 6.14), then it may cost the contact "
-                f"(delayed-divergence). {_outliers(data)} Below one the network is the better: where errors "
-                "are large these weights have grown within the fifteen seconds already. Held at zero, the "
-                f"network's errors are {_held_range(data)} times the PI's."
+                "So the experiments of sec. 6.3 show integral action, which the thesis' hybrid controller lacks, and "
+                "not an effect of the network; the comparison with figure 6.10 cannot separate the two. The network's "
+                "own effect appears later, when its hidden weights from the torques have grown: at first it helps "
+                f"(fig. 6.14), later it may cause loss of contact (delayed-divergence). {_outliers(data)} A ratio "
+                "below one favours the network: with large errors these weights grow within the first fifteen "
+                f"seconds. With these weights held at zero, the network's errors are {_held_range(data)} times the "
+                "PI's."
             ),
         ),
     ]

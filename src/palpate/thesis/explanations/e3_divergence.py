@@ -35,14 +35,14 @@ if TYPE_CHECKING:
     from palpate.controllers.neural import NeuralState
 
 NUMBER = "delayed-divergence"
-TITLE = "Why it fails later: the network learns an answer to its own torques"
+TITLE = "Why it fails later: the network learns a response to its own torques"
 CAPTION = (
-    "Learning never stops. First row: size of the weights over the time in contact at the text's learning "
-    "rate, on the foam that relaxes until contact is lost (dashed), and on the plain foam. Second row: the "
-    "gain from the hybrid controller's torques to the network's force; and the last moments before the "
-    "loss, where that force goes along with the velocity and drives the motion. Third row: time to the loss "
-    "against the learning rate, with the plain PI beside; and the growth of the force's output weights "
-    "against the number of steps asked for. Last row: what brings the loss forward, and what prevents it."
+    "Learning never stops. First row: size of the weights over the time in contact at the text's learning rate, on "
+    "the foam that relaxes until contact is lost (dashed), and on the plain foam. Second row: the gain from the "
+    "hybrid controller's torques to the network's force; and the last moments before the loss, where that force is in "
+    "phase with the velocity and drives the motion. Third row: time to the loss against the learning rate, with the "
+    "plain PI beside; and the growth of the force's output weights against the number of steps of the desired force. "
+    "Last row: conditions that advance the loss, and conditions that prevent it."
 )
 RELAXING = changed(FOAM, RELAXING_FOAM)
 PARAMETERS: Mapping[str, Experiment] = {"foam that relaxes": RELAXING, "foam": FOAM, "rubber": RUBBER}
@@ -123,18 +123,17 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"contact lost within {DURATION:g} s in every run from 5e-6 to 1e-4, and in none with the PI",
             verdict=decided(all(lost is not None for lost in times) and steady),
             note=(
-                "What grows are two layers at once: the hidden weights from the torques and the output "
-                "weights of the force; thresholds only carry the integral, and weights from the poses stay "
-                "small. They feed each other: after each step of the desired force the error and the hybrid "
-                "controller's torques are both away from their means, so that their product has one sign, "
-                "step after step, and the network learns to answer torque with force. A smaller rate leaves "
-                "a longer error after each step, which makes up for much of it: a twentieth of the rate "
-                "takes only five times as long. With a constant force nothing of it happens, without noise "
-                "it happens just the same; with the weights from the torques held at zero, and all others "
-                f"learning, contact is {_kept(data.causes, 'weights from all torques held at zero')}. "
-                f"{_negative_damping(data.loss)} The torques contain velocities through K_pv, so that the "
-                "answer to them comes in phase with the motion and drives it; with half the K_pv it takes "
-                "longer."
+                "Two layers grow together: the hidden weights from the torques and the output weights of the force. "
+                "Thresholds only carry the integral, and weights from the poses stay small. The two layers amplify "
+                "each other: after each step of the desired force the error and the hybrid controller's torques both "
+                "deviate from their means, so their product has the same sign at every step, and the network learns "
+                "to respond to torque with force. A smaller rate leaves a longer error after each step, which "
+                "compensates for much of it: a twentieth of the rate takes only five times as long. With a constant "
+                "force there is no growth; without noise the growth is the same. With the weights from the torques "
+                "held at zero, and all others learning, contact is "
+                f"{_kept(data.causes, 'weights from all torques held at zero')}. {_negative_damping(data.loss)} The "
+                "torques contain velocities through K_pv, so the response to them is in phase with the motion and "
+                "drives it; with half the K_pv it takes longer."
             ),
         ),
         Claim(
@@ -146,11 +145,11 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"contact lost within {DURATION:g} s in every run on foam and on rubber",
             verdict=decided(gone == len(others)),
             note=(
-                "The weights grow there too, to about the same size. But foam with a damper of 200 N s/m "
-                "and rubber with 480 N s/m take up what the network's answer feeds in, while the relaxing "
-                "foam, with 13 N s/m and little more from its slow branch, does not; give it 200 N s/m and "
-                "it holds. What real styrofoam has decides whether the thesis' controller was on its way to "
-                f"losing it. Times of loss on the relaxing foam: {_times_by_cause(data.causes)}."
+                "The weights grow there too, to about the same size. But foam with a damper of 200 N s/m and rubber "
+                "with 480 N s/m dissipate the power of the network's response. The relaxing foam, with 13 N s/m and "
+                "little more from its slow branch, does not; with 200 N s/m it keeps contact. The damping of real "
+                "styrofoam decides whether the thesis' controller would have lost contact later. Times of loss on the "
+                f"relaxing foam: {_times_by_cause(data.causes)}."
             ),
         ),
     ]
@@ -249,6 +248,6 @@ def _negative_damping(loss: Loss | None) -> str:
         return ""
     slope = float(np.polyfit(loss.velocity, loss.force, 1)[0])
     return (
-        f"Before the loss the network's force goes along with the velocity, by {slope:.0f} N s/m over the "
-        "last 0.4 s: a negative damper."
+        f"Before the loss the network's force is in phase with the velocity, by {slope:.0f} N s/m over the last 0.4 "
+        "s: a negative damper."
     )

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NUMBER = "what-the-probe-depends-on"
-TITLE = "What K, B and M by probing depend on"
+TITLE = "Causes of K, B and M by probing"
 CAPTION = (
-    "The network of figures 6.7 and 6.9 under one change at a time. K by probing is a secant from zero "
-    "force at zero displacement; what the network knows is one point of rest and an offset. M by probing "
-    "is the start's doing: each start keeps its sign, whatever the noise."
+    "The network of figures 6.7 and 6.9 under one change at a time. K by probing is a secant from zero force at zero "
+    "displacement; the network has learned one point of rest and an offset. M by probing is caused by the initial "
+    "weights: each set of weights keeps its sign under all noise seeds."
 )
 STUDY = (1.3, 2.3)
 """What an earlier study of ours found for K over f/x with thresholds that learn."""
@@ -67,13 +67,12 @@ def _secant(foam: Surface) -> str:
         _median(foam, t) for t in ("probe at half", "probe where it rests", "1 s of contact")
     )
     return (
-        f"The probe is a secant from nothing pressed. On foam the surface's own is {foam.perfect:.2f} "
-        "times f/x, since 5 N are there before displacement counts; the network makes its offset larger "
-        f"still. With thresholds fixed at zero there is no offset, and the {fixed:.2f} that is left is the "
-        f"bend of the sigmoid, which goes with large amplitude and small weights ({straight:.2f}). Asked "
-        f"at half the displacement the median is {half:.2f}; asked where the press rests, {rest:.2f}: "
-        "every network that has learned anything says f/x there, so that agreement proves nothing. Time "
-        f"does not help: {short:.2f} after 1 s already."
+        f"The probe is a secant from the unloaded state. On foam the surface's own is {foam.perfect:.2f} times f/x, "
+        "because displacement counts from the 5 N point; the network increases this offset further. With thresholds "
+        f"fixed at zero there is no offset, and the remaining {fixed:.2f} is caused by the curvature of the sigmoid, "
+        f"which vanishes for a large amplitude and small weights ({straight:.2f}). With a probe at half the "
+        f"displacement the median is {half:.2f}; with a probe at the point of rest, {rest:.2f}: every trained network "
+        f"gives f/x there, so that agreement proves nothing. Time does not help: {short:.2f} after 1 s already."
     )
 
 
@@ -84,8 +83,8 @@ def _slope(data: Data) -> str:
         for name, s in data.items()
     ]
     return (
-        f"The network's local derivative at rest errs the other way: {' and '.join(parts)}. Nothing moves "
-        "there, and an offset explains the force as well as a slope does."
+        f"The network's local derivative at rest has the opposite error: {' and '.join(parts)}. At rest an offset "
+        "explains the force as well as a slope does."
     )
 
 
@@ -133,15 +132,14 @@ def _mass(data: Data) -> Claim:
         tolerance="the same sign with every noise seed for 9 of 10 starts, and both signs occur, on each surface",
         verdict=decided(holds),
         note=(
-            f"Initial weights make {_percent(data['foam'])} (foam) and {_percent(data['rubber'])} (rubber) "
-            f"of M's variance. The sign is that of the untrained network for {kept['foam']:.0%} and "
-            f"{kept['rubber']:.0%} of the starts; learning turns the others. The probe's values lie within "
-            "what each channel has seen, and so no warning is due, but their combination does not: no "
-            f"sample is nearer to it than {data['foam'].gap[1]:.2g} (foam) and {data['rubber'].gap[1]:.2g} "
-            "(rubber) in scaled units, where the whole press spans about 3, and the acceleration is there "
-            "for a few hundredths of a second only. The surfaces' masses are 0.1 and 0.05 kg; a small "
-            f"positive M is chance. Of {total} varied conditions (friction, pose, surface) {steady} leave "
-            "the sign of 9 of 10 starts as it was."
+            f"Initial weights make {_percent(data['foam'])} (foam) and {_percent(data['rubber'])} (rubber) of M's "
+            f"variance. The sign is that of the untrained network for {kept['foam']:.0%} and {kept['rubber']:.0%} of "
+            "the starts; learning turns the others. Each value of the probe lies within the range of its channel, so "
+            "no warning is given, but their combination lies outside the data: no sample is nearer to it than "
+            f"{data['foam'].gap[1]:.2g} (foam) and {data['rubber'].gap[1]:.2g} (rubber) in scaled units, while the "
+            "whole press spans about 3, and the acceleration lasts only a few hundredths of a second. The surfaces' "
+            f"masses are 0.1 and 0.05 kg; a small positive M is chance. Of {total} varied conditions (friction, pose, "
+            f"surface) {steady} leave the sign of 9 of 10 starts as it was."
         ),
     )
 
@@ -178,11 +176,10 @@ def _outside(data: Data) -> Claim:
         tolerance="off by more than 10 % in 9 of 10 runs, with the warning probe-outside-learned each time",
         verdict=decided(often(wrong)),
         note=(
-            "A sigmoid bends to its end, and a threshold does not grow with displacement: the force is "
-            "underestimated. That the probe be inside what was learned is not enough, though: at the "
-            f"thesis' own values, inside and without a warning, the network says {np.median(near):.2f} "
-            f"times the surface's force ({min(near):.2f} to {max(near):.2f}), since the press went past "
-            "there within milliseconds."
+            "A sigmoid saturates, and a threshold does not grow with displacement: the force is underestimated. A "
+            "probe within the learned range is not enough: at the thesis' own values, inside that range and without a "
+            f"warning, the network gives {np.median(near):.2f} times the surface's force ({min(near):.2f} to "
+            f"{max(near):.2f}), because the press passed there within milliseconds."
         ),
     )
 
@@ -207,11 +204,10 @@ def _scaling(data: Data) -> Claim:
         tolerance="slope of the network's force over displacement, at rest: less than a tenth of that with scaling",
         verdict=decided(holds),
         note=(
-            "A displacement of millimetres, in metres, moves no neuron: the thresholds carry the force "
-            f"alone. K by probing does not show it, for it is then {K['foam']:.2f} (foam) and "
-            f"{K['rubber']:.2f} (rubber) times f/x, the force at rest over the probe's displacement and "
-            "nothing else: a number in the usual range from a network that does not know displacement at "
-            "all."
+            "A displacement of millimetres, in metres, changes no neuron: the thresholds alone carry the force. K by "
+            f"probing does not reveal this: it is then {K['foam']:.2f} (foam) and {K['rubber']:.2f} (rubber) times "
+            "f/x, simply the force at rest over the probe's displacement: a plausible number from a network that "
+            "ignores displacement."
         ),
     )
 

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 NUMBER = "rate-layers-neurons"
 TITLE = "Left open by the thesis: learning rate, layers, neurons, stability"
 CAPTION = (
-    "Steps between 10 and 20 N, a dot a run, each from random weights of its own. Above: RMS error from 10 "
-    "to 15 s, steps included, against the learning rate, with the plain PI of the same integral gain as a "
-    "line. Below: the same at the text's rate for networks of other sizes, and when they lose the foam that "
-    "relaxes."
+    "Steps between 10 and 20 N, one dot per run, each with its own random weights. Above: RMS error from 10 to 15 s, "
+    "steps included, against the learning rate, with the plain PI of the same integral gain as a line. Below: the "
+    "same at the text's rate for networks of other sizes, and the time at which they lose contact with the relaxing "
+    "foam."
 )
 RATES = (5e-6, 2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 5e-4, 1e-3)
 SIZES = ((1,), (2,), (4,), (12,), (30,), (60,), (12, 12), (12, 12, 12))
@@ -104,19 +104,17 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance="none: a question",
             verdict="not checkable",
             note=(
-                "The rate sets the integral gain, so it has the optimum that an integral gain has: too "
-                "small is late, too large rings against the 8 ms lag of the force signal, and the plain PI "
-                f"of the same gain has its own optimum near it. {_rising(data)} The best rate here is not "
-                "the text's: the listing's 1e-4, or twice it on a damped surface. More neurons do better at "
-                "first and lose the foam sooner, for one and the same reason: they learn earlier to answer "
-                "torque with force, the growth told under delayed-divergence. Two or three hidden layers "
-                "from small weights stay what they are at the start, the integrator of their output "
-                "thresholds, since a product of more small factors grows more slowly: steady, and no better "
-                "than a PI. So the answer that these runs give is none or many layers, which amounts to an "
-                "integral term. A network that adds something and lasts would need what the thesis' law "
-                "lacks: no torques among its inputs, which delayed-divergence shows to be enough, a leak or "
-                "a bound on the weights, or no learning while a motor is at its limit; the last two were "
-                "not tried here."
+                "The rate sets the integral gain, so it has the optimum of an integral gain: too small is slow, too "
+                "large rings because of the 8 ms lag of the force signal, and the plain PI of the same gain has its "
+                f"optimum near it. {_rising(data)} The best rate here is not the text's: the listing's 1e-4, or twice "
+                "it on a damped surface. More neurons perform better at first and lose the foam sooner, for one "
+                "reason: they learn earlier to respond to torque with force, the growth described under "
+                "delayed-divergence. Two or three hidden layers with small initial weights remain the integrator of "
+                "their output thresholds, because a product of more small factors grows more slowly: they are steady, "
+                "and no better than a PI. So these runs favour no layers or many layers, and both are equivalent to "
+                "an integral term. A network with a lasting benefit would need one of these changes to the thesis' "
+                "law: no torques among its inputs, which suffices by delayed-divergence; a leak or a bound on the "
+                "weights; or no learning while a motor is at its limit. The last two were not tried here."
             ),
         )
     ]

@@ -40,13 +40,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NUMBER = "friction-compensation"
-TITLE = "Friction compensation, and contact lost and found again"
+TITLE = "Friction compensation, and loss and recovery of contact"
 CAPTION = (
-    "The laws of chapter 4 add F_c sgn(q'). Above: 20 N on foam without integral, as the listing compensates "
-    "(not at all), with its blend of 0.002 rad/s made to act, and with one of 0.05. Middle: force error and "
-    "shaking against the blend; dotted: what one encoder count a tick amounts to for motors 1 and 2. Below: "
-    "the error with the blend of 0.05 over the one without. Last: the surface is drawn back by 5 mm; the arm "
-    "waits, looks for it and presses again."
+    "The laws of chapter 4 add F_c sgn(q'). Above: 20 N on foam without integral, with the listing's compensation "
+    "(which has no effect), with its blend of 0.002 rad/s made effective, and with one of 0.05. Middle: force error "
+    "and shaking against the blend; dotted: the rate of one encoder count per tick for motors 1 and 2. Below: the "
+    "error with the blend of 0.05 over the one without. Last: the surface retracts by 5 mm; the arm waits, approaches "
+    "and presses again."
 )
 LEVEL = (3.0, 0.25, 0.03)
 """What is compensated [N m]: the Coulomb levels of the bench; the listing's own are doubtful, see the errata."""
@@ -130,11 +130,11 @@ def _never(data: Data) -> Claim:
         ),
         verdict=decided(often(f >= 0.9 for f in factors)),
         note=(
-            "The listing's factor is the speed over 0.002 rad/s up to that speed, and above it whatever it "
-            "was before. One encoder count in a millisecond is 0.010 rad/s for motor 1 and 0.015 for motor "
-            "2: a rate is either zero, which makes the factor zero, or beyond the blend, which leaves it "
-            "zero. It holds for any friction, pose and surface, since it is arithmetic. As the text has it, "
-            "sgn(q') without a blend, it would act: see FRICTION.HAMMER."
+            "The listing's factor is the speed over 0.002 rad/s up to that speed, and above it keeps its last value. "
+            "One encoder count in a millisecond is 0.010 rad/s for motor 1 and 0.015 for motor 2: a rate is either "
+            "zero, which makes the factor zero, or beyond the blend, which leaves it zero. This is arithmetic and "
+            "holds for any friction, pose and surface. As in the text, sgn(q') without a blend, it would act: see "
+            "FRICTION.HAMMER."
         ),
     )
 
@@ -160,12 +160,12 @@ def _acting(data: Data) -> Claim:
         ),
         verdict=decided(often(r.helps for r in nominal)),
         note=(
-            "Levels known exactly, which nobody has: they are the bench's own. How much is left depends on "
-            "how the last motion ended, since a Coulomb law knows the direction of motion and nothing of "
-            f"friction at rest; of the blends tried {best:g} rad/s left least. With friction half or double, "
-            "the compensation stays as it is. On the foam that relaxes, which damps little, the compensated "
-            "arm bounces off three times and the run ends (no dot): what it takes away had also been "
-            "damping. With the wall at 0.40 m motor 2 is at its limit. "
+            "The levels are known exactly here, unlike on a real arm: they are the bench's own. The remaining error "
+            "depends on the end of the last motion, because a Coulomb law contains the direction of motion and no "
+            f"friction at rest; of the blends tried, {best:g} rad/s left the smallest error. With half or double "
+            "friction, the compensation stays the same. On the relaxing foam, which has little damping, the "
+            "compensated arm bounces off three times and the run ends (no dot): the compensated friction had also "
+            "been damping. With the wall at 0.40 m motor 2 is at its limit. "
             f"{stops_holding(data.varied, lambda r: r.helps)}"
         ),
     )
@@ -190,11 +190,10 @@ def _hammer(data: Data) -> Claim:
         ),
         verdict=decided(often(s >= SHAKES for s in shares)),
         note=(
-            "Below one velocity quantum the blend is a relay: the encoder's last bit switches the whole "
-            "Coulomb torque, a thousand times a second at worst. That shakes the arm loose, as a dither "
-            "does, and so leaves little force error, at the price of the shaking and of the motors. A real "
-            "motor's current loop and a real joint's flexibility would change the shaking; neither is on the "
-            "bench."
+            "Below one velocity quantum the blend is a relay: the encoder's last bit switches the full Coulomb "
+            "torque, up to a thousand times a second. Like a dither, this overcomes friction and so leaves a small "
+            "force error, at the cost of shaking and of wear of the motors. A real motor's current loop and a real "
+            "joint's flexibility would change the shaking; the bench has neither."
         ),
     )
 

@@ -37,11 +37,10 @@ if TYPE_CHECKING:
 NUMBER = "2.1"
 TITLE = "The original hybrid controller, and the one with dynamics"
 CAPTION = (
-    "The thesis' figure is the block diagram of Raibert and Craig's controller, of which the text says that "
-    "it has some problems and leaves out the robot's dynamics. Above: steps of force on foam under it and "
-    "under (4.13), with equal force gains. Lower left: how fast the original's position loop grows by itself "
-    "over the arm's workspace (angle 0, elbow to the left); (4.13) grows nowhere. Lower right: how far steps "
-    "of force turn the tip, original over (4.13)."
+    "The thesis' figure is the block diagram of Raibert and Craig's controller, which, by the text, has some problems "
+    "and neglects the robot's dynamics. Above: steps of force on foam under it and under (4.13), with equal force "
+    "gains. Lower left: rate of growth of the original's position loop alone over the arm's workspace (angle 0, elbow "
+    "to the left); (4.13) grows nowhere. Lower right: rotation of the tip by steps of force, original over (4.13)."
 )
 PARAMETERS = changed(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
 DYNAMIC = {"controller": {"kind": "proportional-integral", "kp": 400.0, "kv": 80.0, "kf": 1.0, "ki": 3.0}}
@@ -132,14 +131,13 @@ def _problems(data: Data) -> Claim:
         ),
         verdict=decided(always > 0.0),
         note=(
-            "Errors are selected at the tip and carried to the joints by J^-1, and each joint then pulls by "
-            "itself: where inertia couples the joints against the selection, the position loop feeds itself. "
-            "An and Hollerbach called it kinematic instability; that this is the problem the thesis means is "
-            "our reading. It lies where the arm is nearly stretched. On the line y = 0, where the "
-            "experiments are, "
+            "Errors are selected at the tip and carried to the joints by J^-1, and each joint then acts alone: where "
+            "inertia couples the joints against the selection, the position loop has positive feedback. An and "
+            "Hollerbach called it kinematic instability; we assume that the thesis means this problem. It occurs "
+            "where the arm is nearly stretched. On the line y = 0, where the experiments are, "
             + ("it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too")
-            + ". Linear, at rest, at angle 0, without friction, which would hide a slow growth; the force loop is left "
-            "out."
+            + ". The model is linear, at rest, at angle 0, without friction, which would hide a slow growth, and without "
+            "the force loop."
         ),
     )
 
@@ -174,14 +172,13 @@ def _dynamics(data: Data) -> Claim:
         ),
         verdict=decided(often(p.worse for p in foam)),
         note=(
-            "The thesis shows no comparison. The force overshoots as expected: without the inertia's "
-            "couplings, the joints' pull for y and angle acts on x as well. But the angle strays less than "
-            "under (4.13), not more: the wrist's friction holds the angle, and against it the original pulls "
-            "with 1.7 N m/rad at the wrist, (4.13) with 0.4, and the wrong way, counting on its model of the "
-            "inertia to make up for it. At speeds this low dynamics count for little. Where a run lost "
-            "contact the original counts as worse. Its gains are 400 and 80 times each joint's own inertia "
-            f"where the arm starts: another choice gives another result. {_lost(data)} "
-            f"{stops_holding(data.varied, lambda p: p.worse)}"
+            "The thesis shows no comparison. The force overshoots as expected: without the inertia's couplings, the "
+            "joint torques for y and angle act on x as well. But the angle strays less than under (4.13), not more: "
+            "the wrist's friction holds the angle. Against it the original has 1.7 N m/rad at the wrist; (4.13) has "
+            "0.4, with the wrong sign, and relies on its model of the inertia to compensate. At such low speeds the "
+            "dynamics have little effect. If a run lost contact, the original counts as worse. Its gains are 400 and "
+            "80 times each joint's own inertia where the arm starts: another choice gives another result. "
+            f"{_lost(data)} {stops_holding(data.varied, lambda p: p.worse)}"
         ),
     )
 

@@ -36,12 +36,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NUMBER = "2.2"
-TITLE = "Impedance control: the mass, damper and spring asked for, and those found"
+TITLE = "Impedance control: target and estimated mass, damper and spring"
 CAPTION = (
-    "The thesis' figure is a drawing of a mass, a damper and a spring. Here the arm is told to be 5 kg, 600 "
-    "N s/m and 2000 N/m (2.3), and the depth to which it is drawn into the foam jumps each second. Above: "
-    "the true force, and that of the target impedance itself on the same foam, with friction as chosen and "
-    "with hardly any. Below: spring, damper and mass found from true position and force, over the target's."
+    "The thesis' figure is a drawing of a mass, a damper and a spring. Here the target impedance is 5 kg, 600 N s/m "
+    "and 2000 N/m (2.3), and the desired depth in the foam jumps each second. Above: the true force, and that of the "
+    "target impedance itself on the same foam, with friction as chosen and with hardly any. Below: spring, damper and "
+    "mass estimated from true position and force, over the target's."
 )
 DEPTHS = (0.0090, 0.0050, 0.0080, 0.0040, 0.0095, 0.0060, 0.0085, 0.0045)
 """Of the desired x beyond the wall [m], a second each; within what motor 2 can press on rubber."""
@@ -97,19 +97,19 @@ def check(data: Data) -> Sequence[Claim]:
 _WORDS = {"K": "spring", "B": "damper", "M": "mass"}
 _WHY = {
     "K": (
-        "In steady state the force is K times the displacement, less what friction holds: some 2 N along x, "
-        "as much as a millimetre of this spring. The tip stops anywhere within that band, so the slope over "
-        "the ends of the intervals comes out flat. Impedance control measures the force, but (2.3) has no "
-        "integral that would find friction out."
+        "In steady state the force is K times the displacement minus the friction: some 2 N along x, equal to a "
+        "millimetre of this spring. The tip stops anywhere within that band, so the slope over the ends of the "
+        "intervals is too small. Impedance control measures the force, but (2.3) has no integral that would "
+        "compensate friction."
     ),
     "B": (
-        "Friction of the joints before they slide is a damper of its own, and after that it withholds force "
-        "from each motion: both look like more damping. Without it, the damper is near its target."
+        "Before the joints slide, their friction acts as a damper; afterwards it reduces the force of each motion. "
+        "Both appear as more damping. Without friction, the damper is near its target."
     ),
     "M": (
-        "The velocity is filtered at 35 Hz and comes 7 ms late, and a late damper is a damper and a negative "
-        "mass: M less B times the lag, 5 - 600 x 0.007 = 0.8 kg. That holds without friction; with it, the "
-        "fit has no mass left to find. A target with less damping would keep more of its mass."
+        "The velocity is filtered at 35 Hz and lags by 7 ms, and a delayed damper acts as a damper and a negative "
+        "mass: M minus B times the lag, 5 - 600 x 0.007 = 0.8 kg. That holds without friction; with friction, the fit "
+        "finds no mass. A target with less damping would keep more of its mass."
     ),
 }
 

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 NUMBER = "2.4"
 TITLE = "Direct neural force control of one joint (figures 2.3 and 2.4)"
 CAPTION = (
-    "Joint 2 of the arm alone, its lever on foam. A network of 4-6-1 neurons sees the desired force, the "
-    "measured one, that of the tick before and its own torque, gives the torque, and learns each millisecond "
-    "from the force's error; nothing else controls. Above: its first fifteen seconds. Left: the error "
-    "against the learning rate; right: at the chosen rate, over surfaces, friction and weights. The thesis "
-    "says that Yabuta and Yamada proposed this and tested it by experiment."
+    "Joint 2 of the arm alone, its lever on foam. A network of 4-6-1 neurons receives the desired force, the measured "
+    "one, that of the previous tick and its own torque. It outputs the torque and learns each millisecond from the "
+    "force error; there is no other controller. Above: its first fifteen seconds. Left: the error against the "
+    "learning rate; right: at the chosen rate, over surfaces, friction and weights. The thesis says that Yabuta and "
+    "Yamada proposed this and tested it by experiment."
 )
 
 
@@ -147,12 +147,11 @@ def _follows(data: Data) -> Claim:
         tolerance=FOLLOWS,
         verdict=decided(all(often(p.follows for p in v) for v in both.values())),
         note=(
-            "The thesis only cites this, so inputs, size and rate are ours; 5e-5 is the rate of its own "
-            f"neural controller. Rates from {slow[0]:g} to {slow[1]:g} follow on both surfaces: slower ones "
-            "have not learned enough within ten seconds, faster ones oscillate against the motor's limit, "
-            "since the gain grows with the weights. The network knows one thing of the plant, that more "
-            "torque presses harder, and no Jacobian is needed for a sign. "
-            f"{stops_holding(data.worlds, lambda p: p.follows)}"
+            "The thesis only cites this, so inputs, size and rate are ours; 5e-5 is the rate of its own neural "
+            f"controller. Rates from {slow[0]:g} to {slow[1]:g} follow on both surfaces: slower ones have not learned "
+            "enough within ten seconds, faster ones oscillate against the motor's limit, because the gain grows with "
+            "the weights. The only prior of the network is that more torque increases the force; this sign needs no "
+            f"Jacobian. {stops_holding(data.worlds, lambda p: p.follows)}"
         ),
     )
 
@@ -180,11 +179,11 @@ def _is_integral(data: Data) -> Claim:
         ),
         verdict=decided(all(often(abs(s - 1) <= SAME for s in v) for v in shares.values())),
         note=(
-            "Each step of learning adds to the torque in proportion to the force error: that is an integral, "
-            "its gain the learning rate times what the network's own sensitivities add up to. Where the "
-            "integral does not match, the network's other terms show: it sees the desired force, so once "
-            "trained a step of it changes the torque at once, which an integral cannot do, and its gain "
-            "changes with what it has learned. The same in three joints: see neural-is-an-integrator."
+            "Each step of learning changes the torque in proportion to the force error: this is an integral, whose "
+            "gain is the learning rate times the sum of the network's sensitivities. A mismatch with the integral "
+            "comes from the network's other terms: a trained network responds at once to a step of the desired force, "
+            "which an integral cannot do, and its gain changes as it learns. The same in three joints: see "
+            "neural-is-an-integrator."
         ),
     )
 

@@ -41,11 +41,10 @@ if TYPE_CHECKING:
 NUMBER = "2.5"
 TITLE = "Indirect scheme: a network tunes the gains"
 CAPTION = (
-    "The PID on the force whose gains a network tunes. At the dotted line the foam turns into rubber under "
-    "the tip. Middle: the three gains, over the value that they start about. Below: the error from 7.5 to "
-    "12.5 s after contact, for several surfaces and poses. The thesis says of Fukuda's controllers that "
-    "simulation and experiment show them robust to a change of the environment's dynamics and of the arm's "
-    "configuration."
+    "The PID on the force whose gains a network tunes. At the dotted line the foam turns into rubber under the tip. "
+    "Middle: the three gains, over their initial values. Below: the error from 7.5 to 12.5 s after contact, for "
+    "several surfaces and poses. The thesis says of Fukuda's controllers that simulation and experiment show them "
+    "robust to a change of the environment's dynamics and of the arm's configuration."
 )
 PARAMETERS = changed(
     load("foam-self-tuning"),
@@ -99,11 +98,11 @@ def _environment(data: Data) -> Claim:
         tolerance=f"on foam, on rubber and after foam turned into rubber, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(following(f) for f in found.values())),
         note=(
-            "The thesis only cites this; architecture, learning rule and numbers are ours: three gains "
-            "between 0 and twice a middle value, tuned down the squared force error with the force taken to "
-            "answer the command one to one. Robust it is, but so is the same PID with its gains left alone: "
-            f"it follows in {_kept(data.fixed)} of the {len(data.fixed)} worlds below, and the learning one "
-            f"in {_kept(data.tuned)}. {stops_holding({**data.tuned, **found}, lambda f: f.follows)}"
+            "The thesis only cites this; architecture, learning rule and numbers are ours: three gains between 0 and "
+            "twice a middle value, tuned down the squared force error with the force taken to answer the command one "
+            f"to one. It is robust, but so is the same PID with constant gains: it follows in {_kept(data.fixed)} of "
+            f"the {len(data.fixed)} worlds below, and the learning one in {_kept(data.tuned)}. "
+            f"{stops_holding({**data.tuned, **found}, lambda f: f.follows)}"
         ),
     )
 
@@ -120,10 +119,9 @@ def _configuration(data: Data) -> Claim:
         tolerance=f"with the wall at 0.40, 0.465 and 0.49 m on foam, {FOLLOWS}, from 7.5 to 12.5 s",
         verdict=decided(all(following(f) for f in found.values())),
         note=(
-            "The law divides by the arm's inertia and uses its Jacobian, so the pose changes friction's "
-            "share of the force and little else. With the wall at 0.40 m the force comes from a longer "
-            f"lever, and motor 2 is at its limit {reach} of the time below 20 N: no gain can help there. "
-            f"{stops_holding(found, lambda f: f.follows)}"
+            "The law divides by the arm's inertia and uses its Jacobian, so the pose mainly changes the share of "
+            f"friction in the force. With the wall at 0.40 m the lever is longer, and motor 2 is at its limit {reach} "
+            f"of the time below 20 N: no gain can help there. {stops_holding(found, lambda f: f.follows)}"
         ),
     )
 
@@ -143,10 +141,9 @@ def _network(data: Data) -> Claim:
         tolerance=f"in 9 of 10 runs of each of these worlds at most {BETTER:.0%}",
         verdict=decided(all(often(s <= BETTER for s in v) for v in shares.values())),
         note=(
-            "The untaught loop is already a PID with a moderate integral, so there is little for tuning to "
-            "make better: what helps is more integral against friction, and that the network finds. As the "
-            "gains stay between 0 and twice their middle, choosing the middle decides most of what the loop "
-            "can become. "
+            "The loop without learning is already a PID with a moderate integral, so tuning can improve little: a "
+            "larger integral helps against friction, and the network finds it. The gains stay between 0 and twice "
+            "their middle value, so the choice of that value largely determines the result. "
             f"{stops_holding({n: [*_shares(data, n)] for n in data.tuned}, lambda s: s <= BETTER)}"
         ),
     )

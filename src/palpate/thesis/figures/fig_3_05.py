@@ -28,8 +28,8 @@ NUMBER = "3.5"
 TITLE = "Spectra of the force signal, with and without the 190 Hz filter"
 CAPTION = (
     "Left: power spectra (Welch) of the force as sampled at 1 kHz during 12 s of steady pressing with 20 N, the same "
-    "noise with and without the analog filter of figure 3.6. The thesis: below 120 Hz they are almost the same, so the "
-    "filter can be left out. Right: tones of 0.5 N on the sensor's line and where the sampling puts them."
+    "noise with and without the analog filter of figure 3.6. The thesis: below 120 Hz they are almost the same, so "
+    "the filter can be left out. Right: tones of 0.5 N on the sensor's line and their frequencies after sampling."
 )
 PARAMETERS = changed(nearer(load("foam-hybrid")), {"run.press": 14.0})
 STEADY = 12.0
@@ -140,12 +140,12 @@ def _agreement(data: Data) -> Claim:
         tolerance=f"no line of 2 Hz below 120 Hz differs by more than {ALMOST:g} dB, the middle of the seeds",
         verdict=decided(float(np.median(data.apart)) <= ALMOST),
         note=(
-            "The sensor samples at 480 Hz and holds, so that what it puts out has images around 480 and 960 Hz. "
-            "Sampling at 1 kHz folds those near 960 Hz to below 120 Hz, but holding has weakened them by 20 dB and "
-            "more before. The filter's own gain at 120 Hz is 1.03. So the filter can indeed be left out. White noise "
-            "at the sensor's samples is chosen; the glitches of a real converter are not in the bench, and so the "
-            "spikes that the thesis saw in the filtered signal are not either. Over friction, pose and the surface's "
-            f"M and B the worst is {data.varied[worst]:.2g} dB ({worst})."
+            "The sensor samples at 480 Hz and holds, so its output has images around 480 and 960 Hz. Sampling at 1 "
+            "kHz folds those near 960 Hz to below 120 Hz, but the hold attenuates them by at least 20 dB. The "
+            "filter's own gain at 120 Hz is 1.03. So the filter can indeed be left out. The noise at the sensor's "
+            "samples is chosen to be white. The bench has no converter glitches, so it does not show the spikes that "
+            "the thesis reports in the filtered signal. Over friction, pose and the surface's M and B the worst is "
+            f"{data.varied[worst]:.2g} dB ({worst})."
         ),
     )
 
@@ -163,10 +163,10 @@ def _folding(data: Data) -> Claim:
         tolerance="a tone of 480 Hz is read below 120 Hz",
         verdict=decided(stays[0] < BAND),
         note=(
-            "480 Hz lies below 500 Hz and is read where it is; the 120 Hz low-pass behind the sampling removes it. It "
-            f"is the second harmonic, 960 Hz, that folds to 40 Hz, into the band; the 190 Hz filter takes {-loss:.0f} "
-            "dB off it. What aliases is that, not what the thesis names. The tones are put on the line for this; how "
-            "strong they were on the real one is not known."
+            "480 Hz lies below 500 Hz and keeps its frequency; the 120 Hz low-pass after the sampling removes it. The "
+            f"second harmonic, 960 Hz, folds to 40 Hz, into the band; the 190 Hz filter attenuates it by {-loss:.0f} "
+            "dB. So the harmonic aliases, not the tone that the thesis names. The tones are added to the line for "
+            "this test; their strength on the real line is unknown."
         ),
     )
 

@@ -101,9 +101,9 @@ def _designed(data: Data) -> Claim:
         tolerance="the corner 1/(2 pi sqrt(R1 R2 C1 C2)) within 5 % of 190 Hz",
         verdict=decided(abs(data.corner / 190.0 - 1.0) < NEAR),
         note=(
-            "True of the corner, from the transfer function as printed. The values are printed in ohm and microfarad, "
-            "which would ask an amplifier to drive 1.5 ohm; kilo-ohm and nanofarad give the same gain and can be "
-            "built. Nothing was chosen here."
+            "True of the corner, from the printed transfer function. The values are printed in ohm and microfarad; an "
+            "amplifier would have to drive 1.5 ohm. Kilo-ohm and nanofarad give the same gain and can be built. No "
+            "value was chosen here."
         ),
     )
 
@@ -119,9 +119,9 @@ def _half_power(data: Data) -> Claim:
         tolerance="-3 dB within 5 % of 190 Hz",
         verdict=decided(abs(data.cutoff / 190.0 - 1.0) < NEAR),
         note=(
-            f"A quality of {data.quality:.2f} in place of a Butterworth's 0.71 keeps the gain up around the corner: it "
-            f"rises to {data.resonance:.1f} dB below it and is -3 dB at {data.cutoff:.0f} Hz only. At 190 Hz it is "
-            f"{20.0 * np.log10(data.quality):.1f} dB. For what the filter is there for the difference does not matter."
+            f"A quality of {data.quality:.2f} in place of a Butterworth's 0.71 keeps the gain up around the corner: "
+            f"it rises to {data.resonance:.1f} dB below it and is -3 dB at {data.cutoff:.0f} Hz only. At 190 Hz it is "
+            f"{20.0 * np.log10(data.quality):.1f} dB. For the purpose of the filter the difference does not matter."
         ),
     )
 

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 NUMBER = "4.2"
 TITLE = "From position control to hybrid control"
 CAPTION = (
-    "(a) Measured force around the moment at which it reaches 5 N and hybrid control takes over from position control, "
-    "with 20 N asked for. (b) Share of runs whose controller was switched in the air by noise, and true force at the "
-    "switch, by threshold; the thesis chose 5 N because of the noise, its listing has 0.8 N."
+    "(a) Measured force around the moment at which it reaches 5 N and control switches from position to hybrid, with "
+    "a desired force of 20 N. (b) Share of runs that noise switched in free motion, and true force at the switch, by "
+    "threshold; the thesis chose 5 N because of the noise, its listing has 0.8 N."
 )
 PARAMETERS = {
     "foam": press_runs.nearer(changed(load("foam-hybrid"), {"run.press": 4.0})),
@@ -128,7 +128,7 @@ def _clean(data: Data) -> Claim:
         verdict=decided(all(2 * count > len(data.switches[name]) for name, count in good.items())),
         note=(
             "The figure is lost and the text gives no number but the 5 N; the threshold is ours. Friction of joint 2 "
-            "decides how the last newtons are reached: without the integral gain some 2 N would stay. "
+            "decides the last newtons: without the integral gain an error of some 2 N would remain. "
             f"{press_runs.where_it_fails(fails, len(data.varied))} With the wall at 0.40 m joint 2's limit of 2.5 N m "
             f"holds the force at {press_runs.median([s.last for s in data.varied['wall at 0.40 m']]):.1f} N."
         ),
@@ -156,10 +156,9 @@ def _threshold(data: Data) -> Claim:
         tolerance="no run is switched in the air at 5 N",
         verdict=decided(_false(chosen) == 0.0),
         note=(
-            f"Noise alone switches at thresholds up to {early:g} N on this bench, so that 0.8 N, "
-            "which the listing has, cannot have run with this noise. 5 N is more than is needed: "
-            f"{enough:g} N would do. What it "
-            "costs: all displacements count from the 5 N point, and every K_e comes out a quarter too high."
+            f"Noise alone causes a switch at thresholds up to {early:g} N on this bench, so the listing's 0.8 N "
+            f"cannot have been used with this noise. 5 N is more than necessary: {enough:g} N would suffice. The "
+            "cost: all displacements count from the 5 N point, and every K_e is a quarter too high."
         ),
     )
 

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NUMBER = "4.3"
-TITLE = "The hybrid force loop: how stiff a surface it bears"
+TITLE = "The hybrid force loop: largest stable stiffness of the surface"
 CAPTION = (
-    "The block diagram of figure 4.3 is the law (4.13), which every run here uses; its force loop is looked "
-    "at here for stability, which the thesis does not do. Left: the stiffness from which the loop is "
-    "unstable against the surface's damping, linear, with the thesis' two sets of gains; dots: the whole arm "
-    "with hardly any friction, filled where it stays stable. Right: the same limit against the cut-off of "
-    "the controller's own force filter. Below: the limit over both gains."
+    "The block diagram of figure 4.3 is the law (4.13), which every run here uses. This page analyses the stability "
+    "of its force loop, which the thesis does not do. Left: the stiffness from which the loop is unstable against the "
+    "surface's damping, linear, with the thesis' two sets of gains; dots: the whole arm with hardly any friction, "
+    "filled where it stays stable. Right: the same limit against the cut-off of the controller's own force filter. "
+    "Below: the limit over both gains."
 )
 PARAMETERS = changed(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
 TIP = 8.2
@@ -105,15 +105,14 @@ def _linear(data: Data) -> Claim:
         tolerance=f"each within {NEAR:.0%} of the study's",
         verdict=decided(all(abs(data.limits[c] / k - 1.0) <= NEAR for c, k in STUDY.items())),
         note=(
-            f"A tip of {TIP:g} kg on a spring and a damper, the sensor's third-order filter, its delay, and "
-            "the controller's filter, in steps of a millisecond; no friction. The mass is the arm's at the "
-            "wall at 0.465 m; between 5 and 11 kg, which is what poses from 0.40 to 0.49 m give, the first "
-            "three move by up to 8 %, the fourth by a seventh, and below 6 kg there is none. The force's lag "
-            "of 7.6 ms is what limits them: the loop has to turn small before the phase of the tip on its "
-            "spring and of the lag add up. With the foam's gains a surface of 44 kN/m, the thesis' rubber, "
-            f"is stable from a damping of {_needed(data):.0f} N s/m on; whether the gains had to be changed "
-            "for rubber, as the thesis did, therefore depends on the rubber's damping, which least squares "
-            "got from lagging signals."
+            f"A tip of {TIP:g} kg on a spring and a damper, the sensor's third-order filter, its delay, and the "
+            "controller's filter, in steps of a millisecond; no friction. The mass is the arm's at the wall at 0.465 "
+            "m; between 5 and 11 kg, which is what poses from 0.40 to 0.49 m give, the first three move by up to 8 %, "
+            "the fourth by a seventh, and below 6 kg there is none. The force's lag of 7.6 ms sets these limits: the "
+            "loop gain has to be small before the phases of the tip on its spring and of the lag add up. With the "
+            f"foam's gains a surface of 44 kN/m, the thesis' rubber, is stable from a damping of {_needed(data):.0f} "
+            "N s/m on; whether the gains had to be changed for rubber, as the thesis did, therefore depends on the "
+            "rubber's damping, which least squares got from lagging signals."
         ),
     )
 
@@ -142,12 +141,12 @@ def _whole(data: Data) -> Claim:
         ),
         verdict=decided(holds),
         note=(
-            "Three joints, encoders, noise and one-sided contact are on the bench and not in the linear "
-            "loop, so this tests the one against the other. The wall is smooth here, too. With the bench's "
-            f"friction the arm bears far more: {friction} times the limit in the four cases (the most tried "
-            f"was {STIFFER[-1]:g} times), because before they slide the joints' bristles are springs and "
-            "dampers themselves. What stays stable for small motions may still ring after a hard enough "
-            "knock. Gains found by trial and error on such an arm lean on its friction."
+            "Three joints, encoders, noise and one-sided contact are on the bench and not in the linear loop, so this "
+            "is a test of the linear model. The wall is smooth here, too. With the bench's friction the stability "
+            f"limit is far higher: {friction} times the limit in the four cases (the most tried was {STIFFER[-1]:g} "
+            "times), because before the joints slide, their bristles act as springs and dampers. A loop that is "
+            "stable for small motions may still ring after a hard impact. Gains found by trial and error on such an "
+            "arm depend on its friction."
         ),
     )
 
@@ -169,9 +168,9 @@ def _slow(data: Data) -> Claim:
         verdict=decided(all(s <= 0.5 * f for s, f in zip(slow, fast, strict=True))),
         note=(
             "The thesis speaks of the force's derivative, which these loops do not use; the lag acts on the "
-            "proportional part just the same. A lower cut-off need not lower the limit: far enough below the "
-            "tip's own frequency the filter also takes the gain away, and the curve of the figure says where "
-            "which of the two wins. Linear, without friction, which would hide it."
+            "proportional part in the same way. A lower cut-off need not lower the limit: far below the tip's own "
+            "frequency the filter also reduces the gain, and the figure's curve shows which effect dominates. The "
+            "model is linear, without friction, which would hide the effect."
         ),
     )
 

@@ -61,9 +61,9 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance="half of peak-to-peak over two steady seconds between 1.5 and 2.5 N",
             verdict=decided(1.5 <= middle <= 2.5),
             note=(
-                "White noise of 0.6 N at each of the sensor's samples was chosen so that it comes out like this: "
-                "agreement shows that the chain passes it on, not where the thesis' noise came from. Nothing is said "
-                "about its spectrum there, and none is confirmed here."
+                "White noise of 0.6 N at each of the sensor's samples was chosen to give this result: agreement shows "
+                "that the chain passes the noise on, and not the origin of the thesis' noise. The thesis does not "
+                "state its spectrum, and this figure confirms none."
             ),
         )
     ]

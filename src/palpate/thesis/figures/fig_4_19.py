@@ -44,11 +44,10 @@ if TYPE_CHECKING:
 NUMBER = "4.19"
 TITLE = "Decoupled hybrid control, as printed and corrected"
 CAPTION = (
-    "The force steps between 10 and 20 N; in between, at the dotted lines, the desired y jumps by 5 mm. Left "
-    "the bench as chosen, right with hardly any friction, in the joints or along the wall. The thesis says "
-    "that (4.19) with the identified stiffness decouples force and position. As printed it loses the "
-    "surface; put right, it takes the spikes out of the angle (right). What couples the two on the left is "
-    "friction, which no law here knows."
+    "The force steps between 10 and 20 N; in between, at the dotted lines, the desired y jumps by 5 mm. Left the "
+    "bench as chosen, right with hardly any friction, in the joints or along the wall. The thesis says that (4.19) "
+    "with the identified stiffness decouples force and position. As printed it loses contact; corrected, it removes "
+    "the spikes of the angle (right). On the left, friction couples the two; no law here models it."
 )
 PARAMETERS = changed(
     load("foam-decoupled"), {**SHORT, "run.press": 7.5, "force.first": 10.0, "force.second": 20.0}
@@ -114,11 +113,10 @@ def _as_printed(data: Data, same: Mapping[str, Any]) -> Claim:
         ),
         verdict=decided(often(map(_all, data.printed))),
         note=(
-            "K_e multiplies where dimensions ask for 1/K_e: with the thesis' K_fp = 1 and K_e in N/m the "
-            "loop gain is some twenty-seven million, and the motors hammer between their limits. There is no "
-            "damping of the force, and the desired force is fed forward where only the measured one "
-            "decouples. All three are put right in the next rows; that correction is ours, the paper that "
-            "the thesis cites was not at hand."
+            "K_e multiplies where the dimensions require 1/K_e: with the thesis' K_fp = 1 and K_e in N/m the loop "
+            "gain is some twenty-seven million, and the motors switch between their limits. The force has no damping, "
+            "and the desired force is fed forward where only the measured one decouples. All three are corrected in "
+            "the next rows. The correction is ours; the paper cited by the thesis was not available."
         ),
         **same,
     )
@@ -139,13 +137,12 @@ def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
         ),
         verdict=decided(often(map(angle_kept, data.nominal))),
         note=(
-            "The spike that (4.13) gives the angle at each step is gone, as the right half of the figure "
-            f"shows; there the corrected law leaves {spread([100 * p.angle for p in free], '%', 2)}, most of "
-            "it a limit cycle of the wrist's encoder that both laws have. With friction as chosen the "
-            "wrist's own friction holds the angle anywhere within a degree or two; a step shakes it loose "
-            "and it settles elsewhere, whatever the law. The law has no integral either, so what friction "
-            "holds back of the force stays. The threshold of one half is ours. "
-            f"{stops_holding(data.varied, angle_kept)}"
+            "The spike that (4.13) gives the angle at each step is gone, as the right half of the figure shows; there "
+            f"the corrected law leaves {spread([100 * p.angle for p in free], '%', 2)}, most of it a limit cycle of "
+            "the wrist's encoder that both laws have. With friction as chosen the wrist's own friction holds the "
+            "angle anywhere within a degree or two; a step overcomes the friction and the angle settles elsewhere, "
+            "under any law. The law has no integral either, so the force error by friction remains. The threshold of "
+            f"one half is ours. {stops_holding(data.varied, angle_kept)}"
         ),
         **same,
     )
@@ -166,10 +163,10 @@ def _side(data: Data, same: Mapping[str, Any]) -> Claim:
         ),
         verdict=decided(often(map(_side_kept, data.nominal))),
         note=(
-            "On the bench as chosen the tip sticks to the wall, a friction coefficient of 0.7, and y moves "
-            "by a tenth of a millimetre under any law: there is nothing to decouple. The thesis does not "
-            "give its surfaces' friction. With hardly any, half of what is left is the wrist's limit cycle, "
-            f"and the rest comes with the force's 7.6 ms of lag. {stops_holding(data.varied, _side_kept)}"
+            "On the bench as chosen the tip sticks to the wall, a friction coefficient of 0.7, and y moves by a tenth "
+            "of a millimetre under any law: there is nothing to decouple. The thesis does not state its surfaces' "
+            "friction. With hardly any friction, half of the remaining motion is the wrist's limit cycle, and the "
+            f"rest is caused by the force's 7.6 ms of lag. {stops_holding(data.varied, _side_kept)}"
         ),
         **same,
     )
@@ -192,11 +189,11 @@ def _force(data: Data, same: Mapping[str, Any]) -> Claim:
         ),
         verdict=decided(often(map(force_kept, data.nominal))),
         note=(
-            "Neither law lets u_x into the force: even (4.18) couples one way only. What disturbs the force "
-            "is the joints' friction: once y moves, joint 2 slides, and its friction is the force's main "
-            "error. The corrected law strays further than the coupled one even without friction, because its "
-            "higher gain turns more of the sensor's noise into motion, which the number includes. At 20 N a "
-            f"jump like this would also find motor 2 at its limit. {stops_holding(data.varied, force_kept)}"
+            "Neither law couples u_x into the force: even (4.18) couples in one direction only. The joints' friction "
+            "disturbs the force: once y moves, joint 2 slides, and its friction is the main error of the force. The "
+            "corrected law strays further than the coupled one even without friction, because its higher gain turns "
+            "more of the sensor's noise into motion, which the number includes. At 20 N such a jump would also drive "
+            f"motor 2 to its limit. {stops_holding(data.varied, force_kept)}"
         ),
         **same,
     )

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 NUMBER = "6.3"
 TITLE = "Least squares on foam from raw signals"
 CAPTION = (
-    "The first four seconds with nothing filtered. The thesis: M_e and B_e both negative, K_e still right. (g): M_e "
-    "and B_e from raw signals on 40 foams, one press each; the thesis found both negative (shaded). (h): what each of "
-    "these foams shows of figures 6.1 to 6.3; dark where it does."
+    "The first four seconds without filters. The thesis: M_e and B_e both negative, K_e still right. (g): M_e and B_e "
+    "from raw signals on 40 foams, one press each; the thesis found both negative (shaded). (h): the sentences of "
+    "figures 6.1 to 6.3 that are true for each of these foams (dark)."
 )
 SOURCE = "fig. 6.3, sec. 6.1"
 PLAIN_DAMPINGS = (5.0, 15.0, 30.0, 60.0, 100.0, 200.0, 300.0, 400.0)
@@ -103,8 +103,8 @@ def _inertia(data: Data) -> Claim:
         lambda f: f.M_raw < 0.0,
         "kg",
         "below zero at 8 s",
-        "The second difference of the encoders' counts is mostly their quantum, which drowns the true acceleration: "
-        f"M_e shrinks toward zero, and the lag decides its sign. Negative on {_share(data, 'raw: M < 0')}.",
+        "The second difference of the encoders' counts is mostly quantisation, which masks the true acceleration: M_e "
+        f"shrinks toward zero, and the lag decides its sign. Negative on {_share(data, 'raw: M < 0')}.",
     )
 
 
@@ -116,8 +116,8 @@ def _damping(data: Data) -> Claim:
         lambda f: f.B_raw < 0.0,
         "N s/m",
         "below zero at 8 s",
-        "Raw signals lag less than filtered ones (5.6 ms against 7.6 ms), so that less is taken off B_e, not more: a "
-        f"negative B_e needs a foam with B below K T, some 30 N s/m. It comes out on {_share(data, 'raw: B < 0')}, "
+        "Raw signals lag less than filtered ones (5.6 ms against 7.6 ms), so the lag reduces B_e less, not more: a "
+        f"negative B_e needs a foam with B below K T, some 30 N s/m. It is negative on {_share(data, 'raw: B < 0')}, "
         f"both raw signs on {_share(data, 'raw: B < 0', 'raw: M < 0')}, and both together with a positive B_e from "
         f"the filtered signals on {_share(data, 'raw: B < 0', 'raw: M < 0', 'B > 0')}.",
     )
@@ -131,8 +131,8 @@ def _stiffness(data: Data) -> Claim:
         lambda f: abs(f.apart_raw) < NEAR,
         "%",
         "K_e at 8 s within 6 % of mean force over mean displacement from 6 to 8 s",
-        "After the first push the foam is at rest, and at rest only K_e is asked for; what the other signals are fed "
-        f"through does not matter to it. So on {_share(data, 'raw: K = f/x')}.",
+        "After the first push the foam is at rest, and at rest only K_e matters; the filters of the other signals do "
+        f"not affect it. So on {_share(data, 'raw: K = f/x')}.",
     )
 
 
@@ -151,11 +151,11 @@ def _together(data: Data) -> Claim:
         tolerance=f"one of {len(counts)} foams shows all {len(SHOWS)}, one press each: {', '.join(SHOWS)}",
         verdict=decided(most == len(SHOWS)),
         note=(
-            "Settling in 0.12 s asks for a foam without memory, the gap between K_e and f/x for one that relaxes; a "
-            "negative raw B_e asks for little damping, a negative M_e and a plausible B_e for much. So each sentence "
-            "is scored by itself, and the foam that shows it is named. What was not tried: a foam whose B and K change "
-            "with depth, noise that is correlated with the motion, and an arm that vibrates; one of them may be what "
-            "the thesis had."
+            "Settling in 0.12 s requires a foam without memory; the gap between K_e and f/x requires one that "
+            "relaxes. A negative raw B_e requires little damping; a negative M_e and a plausible B_e require much. So "
+            "each sentence is scored separately, and the foam for which it is true is named. Not tried: a foam whose "
+            "B and K change with depth, noise that is correlated with the motion, and a vibrating arm; the thesis' "
+            "laboratory may have had one of them."
         ),
     )
 

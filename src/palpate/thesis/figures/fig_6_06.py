@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 NUMBER = "6.6"
 TITLE = "Learning rate of the neural identifier"
 CAPTION = (
-    "The same press on foam learned at several rates. The thesis: a smaller rate takes more time (it "
-    "settled on 1e-4), and one that is too large may never converge."
+    "The same press on foam, learned at several rates. The thesis: a smaller rate takes more time (it chose 1e-4), "
+    "and a rate that is too large may never converge."
 )
 PARAMETERS = network.FOAM
 RATES = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
@@ -97,13 +97,12 @@ def _slower(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
         ),
         verdict=decided(often(ordered(found))),
         note=(
-            "As long as learning is slower than the press, the error dies away with a time constant that "
-            "is roughly inversely proportional to the learning rate and to the square of the output "
-            "amplitude; faster than that, it is the force itself that takes its time. With the amplitude "
-            f"chosen here the thesis' 0.6 s belongs, of the rates tried, to {nearest:g} and not to its "
-            "1e-4: rate and amplitude are known only together. Checked also with output amplitudes of "
-            f"{' and '.join(f'{a:g}' for a in OTHERS)} N and under {len(data.varied)} varied conditions of "
-            f"friction, pose and surface. {limits}"
+            "As long as learning is slower than the press, the error decays with a time constant that is roughly "
+            "inversely proportional to the learning rate and to the square of the output amplitude; for faster "
+            "learning, the rise of the force itself sets the time. With the amplitude chosen here, of the rates tried "
+            f"the thesis' 0.6 s corresponds to {nearest:g} and not to its 1e-4: rate and amplitude are known only "
+            f"together. Checked also with output amplitudes of {' and '.join(f'{a:g}' for a in OTHERS)} N and under "
+            f"{len(data.varied)} varied conditions of friction, pose and surface. {limits}"
         ),
     )
 
@@ -124,11 +123,10 @@ def _too_large(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
         tolerance="from some rate up to 1e-1 on, in 9 of 10 runs the error is still above 1 N at the end of the 4 s",
         verdict=decided(bool(np.isfinite(first[data.amplitude]))),
         note=(
-            "One step then changes the output by more than the error it is to remove. The weights are "
-            "thrown to where the sigmoid is flat, and there its slope, with which every step is "
-            "multiplied, is nearly zero: the output stays at its largest value and learning does not come "
-            "back. From which rate on depends on the output amplitude, which the thesis does not give; "
-            f"with the chosen one it is {first[data.amplitude] / 1e-4:.0f} times its 1e-4."
+            "One step then changes the output by more than the error. The weights reach the flat part of the sigmoid, "
+            "where its slope, a factor of every step, is nearly zero: the output stays at its largest value and "
+            "learning does not recover. The critical rate depends on the output amplitude, which the thesis does not "
+            f"state; with the chosen one it is {first[data.amplitude] / 1e-4:.0f} times its 1e-4."
         ),
     )
 

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 NUMBER = "6.8"
 TITLE = "Error of the neural identifier's output on foam"
 CAPTION = (
-    "Measured force less the network's output before it learns from the sample. The thesis: almost zero after about "
-    "0.6 s. Left as chosen, and with what comes nearest to the 0.6 s; right: the time by output amplitude and initial "
-    "weights, which the thesis does not give (shaded: what counts as about 0.6 s)."
+    "Measured force minus the network's output before it learns from the sample. The thesis: almost zero after about "
+    "0.6 s. Left: as chosen, and with the values nearest to 0.6 s; right: the time by output amplitude and initial "
+    "weights, which the thesis does not state (shaded: counts as about 0.6 s)."
 )
 PARAMETERS = network.FOAM
 NEAR = Choice(amplitude=25.0, weights=0.01)

@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 NUMBER = "6.10"
 TITLE = "Hybrid controller alone on foam: steps between 10 and 20 N"
 CAPTION = (
-    "The hybrid controller with K_fp = 0.25 and no integral, asked for steps between 10 and 20 N. The "
-    "thesis says that the force cannot reach the desired one. Below: what is missing at the end of the "
-    "intervals."
+    "The hybrid controller with K_fp = 0.25 and no integral, with steps of the desired force between 10 and 20 N. The "
+    "thesis says that the force cannot reach the desired one. Below: the remaining error at the end of the intervals."
 )
 HYBRID = {"controller": {"kind": "hybrid", "kp": 400.0, "kv": 80.0, "kf": 0.25, "ki": 0.0}}
 PARAMETERS = changed(FOAM, {**HYBRID, "run.press": 15.0})
@@ -78,11 +77,10 @@ def check(data: Data) -> Sequence[Claim]:
             ),
             verdict=decided(often(map(misses, data.nominal))),
             note=(
-                "Too little at 20 N and too much at 10 N: what is missing is the friction of the joints, "
-                "which holds against the motion and which the gain of 1 + K_fp = 1.25 leaves almost as it "
-                "is. The levels of friction are chosen; the claim hangs on them and on the surface, since "
-                "on stiff rubber the tip hardly moves and friction stays elastic. "
-                f"{stops_holding(data.varied, misses)}"
+                "Too little at 20 N and too much at 10 N: the error is the friction of the joints, which opposes the "
+                "motion and which the gain of 1 + K_fp = 1.25 hardly reduces. The levels of friction are chosen. The "
+                "claim depends on them and on the surface, because on stiff rubber the tip hardly moves and friction "
+                f"stays elastic. {stops_holding(data.varied, misses)}"
             ),
         )
     ]

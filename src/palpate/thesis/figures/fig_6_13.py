@@ -43,11 +43,10 @@ def check(data: Tracked) -> Sequence[Claim]:
             tolerance=f"in 9 of 10 runs it does not follow from 0 to 10 s; following: {FOLLOWING}",
             verdict=decided(often(map(_late, data.nominal))),
             note=(
-                "The network starts as an integrator whose gain is proportional to the learning rate: K_i = "
-                "1 per second here, a time constant of (1 + K_fp)/K_i = 1.25 s, half the length of an "
-                "interval. A step is over before what friction withholds is learned. How much friction "
-                "there is decides how much is missing. That the force does not follow "
-                f"{stops_holding(data.varied, _late)[3:]}"
+                "The network starts as an integrator whose gain is proportional to the learning rate: K_i = 1 per "
+                "second here, a time constant of (1 + K_fp)/K_i = 1.25 s, half the length of an interval. A step ends "
+                "before the controller has compensated friction. The level of friction determines the remaining "
+                f"error. That the force does not follow {stops_holding(data.varied, _late)[3:]}"
             ),
         )
     ]

@@ -25,10 +25,9 @@ if TYPE_CHECKING:
 NUMBER = "6.15"
 TITLE = "Position along the surface and angle under the neural controller"
 CAPTION = (
-    "Desired force, measured force, measured y and measured angle on foam, from the first touch on; y and "
-    "angle ought to be zero. The thesis says that they are not, since the approach leaves errors and since "
-    "the tip sticks to soft foam. Below: the RMS of y in contact when one possible cause at a time is "
-    "changed."
+    "Desired force, measured force, measured y and measured angle on foam, from the first touch on; y and angle "
+    "should be zero. The thesis says that they are not, because the approach leaves errors and the tip sticks to soft "
+    "foam. Below: the RMS of y in contact, with one possible cause changed at a time."
 )
 PARAMETERS = changed(load("foam-neural"), {"run.press": 15.0})
 SHOWN, JUDGED = (0.0, 15.0), (10.0, 15.0)
@@ -101,14 +100,13 @@ def _not_zero(data: Data) -> Claim:
         ),
         verdict=decided(often(map(visible, nominal))),
         note=(
-            "Friction of the joints, and gains too soft to overcome it: an error of y by 3 mm asks "
-            "motor 1 for about the torque that its friction withholds, so it stays. With half the "
-            f"friction {1 - half:.0%} of the error of y goes. The network is told of both errors and "
-            "could remove them as it does the force's, but it counts in metres, radians and newtons "
-            "with one learning rate: an error of 1 mm moves its y force by eta (A/2)^2/Ts = 1.25 mN per "
-            "second, and hybrid control alone leaves the same errors. The amount follows from the "
-            "chosen friction; the slow turning of the angle with the force comes from the motion in x "
-            "that each step needs."
+            "The causes are friction of the joints, and gains too low to overcome it: an error of y of 3 mm commands "
+            f"about the friction torque of motor 1, so the error remains. With half the friction {1 - half:.0%} of "
+            "the error of y disappears. The network receives both errors and could remove them like the force's, but "
+            "it has one learning rate for metres, radians and newtons: an error of 1 mm changes its y force by eta "
+            "(A/2)^2/Ts = 1.25 mN per second, and hybrid control alone leaves the same errors. Their size follows "
+            "from the chosen friction. The slow rotation of the angle with the force is caused by the motion in x of "
+            "each step."
         ),
     )
 
@@ -124,9 +122,8 @@ def _there_before(data: Data) -> Claim:
         tolerance=f"more than {1e3 * VISIBLE[0]:g} mm at the switch in 9 of 10 runs",
         verdict=decided(often(abs(b) > 1e3 * VISIBLE[0] for b in before)),
         note=(
-            "The whole error of y stands there already at the switch, and contact adds nothing to it; "
-            "the cause is the same on both sides of the switch: friction of the joints against the same "
-            "position gains."
+            "The whole error of y exists already at the switch, and contact adds nothing to it. The cause is the same "
+            "before and after the switch: friction of the joints against the same position gains."
         ),
     )
 
@@ -143,10 +140,9 @@ def _sticks(data: Data) -> Claim:
         tolerance=f"without friction along the surface the RMS of y is at least {SHARE:.0%} smaller",
         verdict=decided(bool(taken >= SHARE)),
         note=(
-            "In part. Without friction along the surface the tip lies off by about as much after each "
-            "step, but it moves with the steps from one side to the other, where a sticking tip stays; "
-            "that is the difference found here. What keeps it from zero is in both cases the friction "
-            "of the joints."
+            "In part. Without friction along the surface the tip has about the same error after each step, but it "
+            "moves with the steps from one side to the other, while a sticking tip stays; this is the difference "
+            "found here. In both cases the friction of the joints causes the error."
         ),
     )
 

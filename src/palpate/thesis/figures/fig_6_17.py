@@ -34,10 +34,9 @@ if TYPE_CHECKING:
 NUMBER = "6.17"
 TITLE = "Neural controller on rubber from the first touch: steps with 4 sin(πt) added"
 CAPTION = (
-    "The first ten seconds on rubber, network and all. The thesis says that the force follows well and that "
-    "the controller adapts in almost 5 s. The bar at the lower edge: motor 2 at its limit, near the "
-    "peaks of 24 N; the sine starts anew every 5 s as in the listing. Below the runs: how far the force is "
-    "from what it settles to."
+    "The first ten seconds on rubber, with the network. The thesis says that the force follows well and that the "
+    "controller adapts in almost 5 s. The bar at the lower edge: motor 2 at its limit, near the peaks of 24 N; the "
+    "sine starts anew every 5 s as in the listing. Below the runs: distance of the force from the settled cycles."
 )
 PARAMETERS = changed(RUBBER, {**SINE, "run.press": 20.0})
 SHOWN, JUDGED = (0.0, 10.0), (0.0, 10.0)
@@ -82,11 +81,10 @@ def check(data: Data) -> Sequence[Claim]:
             tolerance=f"{FOLLOWS}, from 0 to 10 s",
             verdict=decided(following(found.nominal)),
             note=(
-                "The peaks of 24 N are more than motor 2 can press with at this pose: 2.5 N m are 23.7 N, "
-                "less about 2.4 N of friction on the way up, so they are cut off whatever the controller, "
-                "and the network learns on against the limit, which makes it late on the way down. The "
-                "limits of following were set before looking and the outcome lies close to them. "
-                f"{stops_holding(found.varied, lambda one: one.follows)}"
+                "The peaks of 24 N are more than motor 2 can press with at this pose: 2.5 N m are 23.7 N, less about "
+                "2.4 N of friction on the way up, so any controller clips them. The network continues to learn at the "
+                "limit, which makes it late when the force falls. The limits of following were set beforehand, and "
+                f"the result lies close to them. {stops_holding(found.varied, lambda one: one.follows)}"
             ),
         ),
         Claim(
@@ -102,12 +100,11 @@ def check(data: Data) -> Sequence[Claim]:
             ),
             verdict=decided(2.5 <= middle <= 7.5),
             note=(
-                "As an upper bound the claim holds. But an integrator with K_i = 5 per second beside K_fp = "
-                "0.25 has a time constant of a quarter of a second, and most of the force is fed forward: "
-                f"from the first touch on the force is what it will be in later cycles ({SMOOTHED:g} s is "
-                "the least that can be told here). What looked like adapting in 5 s may have been the first "
-                "cycle of the reference, which is 5 s long, or a rate smaller than the one printed: at 1e-5 "
-                "it takes seconds (fig. 6.13)."
+                "As an upper bound the claim is true. But an integrator with K_i = 5 per second beside K_fp = 0.25 "
+                "has a time constant of a quarter of a second, and most of the force is fed forward: from the first "
+                f"touch on the force equals that of later cycles ({SMOOTHED:g} s is the resolution here). The "
+                "apparent adaptation in 5 s may have been the first cycle of the reference, which is 5 s long, or a "
+                "smaller rate than the printed one: at 1e-5 it takes seconds (fig. 6.13)."
             ),
         ),
     ]

@@ -45,9 +45,9 @@ FOAM = FirstSeconds(
     "6.1",
     "Least squares on foam: the first four seconds",
     (
-        "Recursive least squares from the moment the force reaches 5 N, on a foam that is a spring, a damper and "
-        "a mass, and on one that relaxes. The thesis: practically identified in the first 0.12 s (dotted). "
-        "Insets: the first 0.3 s. (g), (h): what the thesis does not give, varied."
+        "Recursive least squares from the moment the force reaches 5 N, on a foam that is a spring, a damper and a "
+        "mass, and on one that relaxes. The thesis: practically identified in the first 0.12 s (dotted). Insets: the "
+        "first 0.3 s. (g), (h): variation of parameters that the thesis does not state."
     ),
     press_runs.FOAMS,
     "plain foam",
@@ -58,9 +58,9 @@ RUBBER = FirstSeconds(
     "6.4",
     "Least squares on rubber: the first four seconds",
     (
-        "Recursive least squares from the moment the force reaches 5 N, on rubber. The thesis: practically "
-        "identified in the first 0.05 s (dotted). Insets: the first 0.3 s. (g), (h): what the thesis does not "
-        "give, varied."
+        "Recursive least squares from the moment the force reaches 5 N, on rubber. The thesis: practically identified "
+        "in the first 0.05 s (dotted). Insets: the first 0.3 s. (g), (h): variation of parameters that the thesis "
+        "does not state."
     ),
     {"rubber": press_runs.RUBBER},
     "rubber",

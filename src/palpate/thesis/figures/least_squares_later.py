@@ -81,7 +81,7 @@ FOAM = Later(
     (
         "The press of figure 6.1 between 6 and 8 s, f/x and K_e on one scale (dashed: mean of f/x). The thesis: "
         "K_e 7.2 against f/x 6.8 kN/m, less than 6 % apart; B_e plausible; M_e negative. (g): the difference "
-        "under varied conditions. (h): what single samples give by the ratios of section 5.1."
+        "under varied conditions. (h): estimates from single samples by the ratios of section 5.1."
     ),
     press_runs.FOAMS,
     "relaxing foam",
@@ -94,24 +94,24 @@ FOAM = Later(
         "K_e and f/x are almost the same, less than 6 % apart.",
         "7.2 against 6.8 kN/m (5.9 %)",
         (
-            "Both divide the same force by the same displacement, so that they agree says little about either: "
-            "both are a quarter to a third above the surface's own stiffness, since the displacement counts from "
-            "the 5 N point. The thesis' gap of 6 % with K_e above f/x is what a foam that relaxes gives, and it "
-            "shrinks with time ({early:.1f} % at 4 s, {late:.1f} % at 8 s); a foam without memory gives none."
+            "Both divide the same force by the same displacement, so their agreement proves little: both are a "
+            "quarter to a third above the surface's own stiffness, because the displacement counts from the 5 N "
+            "point. A relaxing foam causes the thesis' gap of 6 %, with K_e above f/x, and the gap shrinks with time "
+            "({early:.1f} % at 4 s, {late:.1f} % at 8 s); a foam without memory gives none."
         ),
     ),
     (
         (
-            "The stiffness of the plain foam was chosen for f/x to come out near 6.8 kN/m, so this level is put "
-            "in and no confirmation."
+            "The stiffness of the plain foam was chosen to give f/x near 6.8 kN/m, so this level is an input and no "
+            "confirmation."
         ),
         (
-            "On the plain foam the 5 N offset puts a third on B_e, and the lag of the force takes two thirds of "
-            "that off again (see why-negative-mass). The relaxing foam has no single damping, and the estimate "
-            "there depends on how long one waits."
+            "On the plain foam the 5 N offset increases B_e by a third, and the lag of the force cancels two thirds "
+            "of that (see why-negative-mass). The relaxing foam has no single damping, and the estimate there depends "
+            "on time."
         ),
         (
-            "Not because M_e is small: the force arrives late, and a late force looks like a negative mass (see "
+            "The cause is not a small M_e: the force lags, and a lagging force acts as a negative mass (see "
             "why-negative-mass). On the relaxing foam it would be negative even with perfect signals. The more "
             "damping, the more negative; with little damping it is positive."
         ),
@@ -137,21 +137,21 @@ RUBBER = Later(
         "44 and 44 kN/m",
         (
             "Both divide the same force by the same displacement. They are a quarter above the rubber's own 34.5 "
-            "kN/m, since the displacement counts from the 5 N point while the force is total."
+            "kN/m, because the displacement counts from the 5 N point while the force is total."
         ),
     ),
     (
         (
-            "The rubber's stiffness was chosen for this, so the level is put in and no confirmation. The arm "
-            "sinks in by half a millimetre only: where exactly the 5 N point falls moves K_e by several percent "
-            "from seed to seed."
+            "The rubber's stiffness was chosen for this, so the level is an input and no confirmation. The "
+            "penetration is only half a millimetre: the exact 5 N point changes K_e by several percent from seed to "
+            "seed."
         ),
         (
-            "The 5 N offset puts a half on B_e and the lag of the force takes more than that off again (see "
-            "why-negative-mass): a plausible sum is no proof of being right."
+            "The 5 N offset increases B_e by a half, and the lag of the force reduces it by more than that (see "
+            "why-negative-mass): a plausible sum is not necessarily correct."
         ),
         (
-            "A rubber of 50 g cannot weigh minus two kilograms; the late force makes it so (see "
+            "A rubber of 50 g cannot weigh minus two kilograms; the lag of the force causes this estimate (see "
             "why-negative-mass)."
         ),
     ),

@@ -67,20 +67,20 @@ FOAM = Steps(
     "6.11",
     "Neural controller on foam: steps between 10 and 20 N",
     (
-        "Four seconds of the force, some ten seconds after contact, with the hybrid controller of figure 6.10 "
-        "and the network at learning rate 5e-5. The thesis says that the force follows acceptably well. Below: "
-        "the same over the seeds and under what was varied."
+        "Four seconds of the force, some ten seconds after contact, with the hybrid controller of figure 6.10 and the "
+        "network at learning rate 5e-5. The thesis says that the force follows acceptably well. Below: the same over "
+        "the seeds and under varied conditions."
     ),
     changed(tracking.FOAM, {"run.press": 15.0}),
     "neural-foam-steps",
     "On foam the neural controller follows steps between 10 and 20 N, about 10 s after the start.",
     "follows acceptably well",
     (
-        "The feed-forward of the desired force makes most of each step at once; what friction withholds the "
-        "network then learns, within about a quarter of a second, as an integral term would. The foam is a "
-        "spring, a damper and a mass, chosen because the thesis gives none; the foam that relaxes is among the "
-        "variations. {} With the wall at 0.40 m, motor 2 reaches its limit below 20 N, which no controller can "
-        "change. Minutes later the picture is another one: see delayed-divergence."
+        "The feed-forward of the desired force makes most of each step at once. The network then compensates friction "
+        "within about a quarter of a second, as an integral term would. The foam is a spring, a damper and a mass, "
+        "chosen because the thesis states none; the relaxing foam is among the variations. {} With the wall at 0.40 "
+        "m, motor 2 reaches its limit below 20 N, which no controller can change. After minutes the result differs: "
+        "see delayed-divergence."
     ),
 )
 RUBBER = Steps(
@@ -95,19 +95,18 @@ RUBBER = Steps(
     "On rubber, with the same gains, it follows steps between 10 and 20 N, about 10 s after the start.",
     "follows pretty well",
     (
-        "That the gains need no change is true, and owes little to the network: with the desired force fed "
-        "forward the loop's speed hardly depends on the surface's stiffness, and a PI of fixed gain does the "
-        "same (neural-is-an-integrator). On rubber less motion goes with the same force, so that friction, which "
-        "is elastic at first, withholds less of a step than on foam. {} With the wall at 0.40 m motor 2 reaches "
-        "its limit below 20 N."
+        "It is true that the gains need no change, but the network contributes little: with the desired force fed "
+        "forward the loop's speed hardly depends on the surface's stiffness, and a PI of fixed gain does the same "
+        "(neural-is-an-integrator). On rubber the same force needs less motion, so friction, which is elastic at "
+        "first, reduces a step less than on foam. {} With the wall at 0.40 m motor 2 reaches its limit below 20 N."
     ),
 )
 SINE = Steps(
     "6.12",
     "Neural controller on foam: steps with 4 sin(πt) added",
     (
-        "The same controller, asked for steps between 10 and 20 N with a sine of 4 N on top, which starts anew "
-        "every 5 s as in the listing. The thesis says that the force follows acceptably well. The bar at the "
+        "The same controller, with steps of the desired force between 10 and 20 N and a sine of 4 N added, which "
+        "restarts every 5 s as in the listing. The thesis says that the force follows acceptably well. The bar at the "
         "lower edge: motor 2 at its limit of 2.5 N m, near the peaks of 24 N."
     ),
     changed(tracking.FOAM, {**tracking.SINE, "run.press": 15.0}),
@@ -115,12 +114,12 @@ SINE = Steps(
     "On foam it also follows the steps with 4 sin(πt) added.",
     "follows acceptably well",
     (
-        "The limits are those of the plain steps, set before looking, and the outcome lies close to them: with 2 "
-        "N instead of 1.5 N this would be following. By eye the force comes a fifth of a second late and turns "
-        "flat at the crests. Two causes: friction in the joints turns around with every half wave, and the "
-        "network, a slow integrator, has to learn its new sign each time (half the friction takes a third off "
-        "the error, and so does the listing's rate, twice that of the text); and at the 24 N peaks motor 2 is at "
-        "its limit, which matters less on foam: a stronger motor hardly helps. {}"
+        "The limits are those of the plain steps, set beforehand, and the result lies close to them: with 2 N instead "
+        "of 1.5 N this would be following. In the figure the force lags by a fifth of a second and is flat at the "
+        "crests. There are two causes. First, friction in the joints reverses with every half wave, and the network, "
+        "a slow integrator, has to learn its new sign each time (half the friction reduces the error by a third, and "
+        "so does the listing's rate, twice that of the text). Second, motor 2 is at its limit at the 24 N peaks; on "
+        "foam this matters less, and a stronger motor hardly helps. {}"
     ),
     shown=(9.75, 15.0),
     limited=True,

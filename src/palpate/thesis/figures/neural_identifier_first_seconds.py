@@ -44,11 +44,11 @@ FOAM = FirstSeconds(
     "6.7",
     "Neural identifier on foam: the first four seconds",
     (
-        "A 3-4-1 network learns the force (learning rate 1e-4) and is asked for M, B and K at 2 mm, 10 mm/s, 1 "
-        "m/s²; five starts, with least squares on the same press (dashed). The thesis: identified after about "
-        "0.6 s, K 6.6 beside f/x 6.7 kN/m, B like that of least squares, M small and positive. (g), (h): output "
-        "amplitude, initial weights and thresholds, which it does not give; a dot where a part of the claim "
-        "holds."
+        "A 3-4-1 network learns the force (learning rate 1e-4) and gives M, B and K by probes at 2 mm, 10 mm/s, 1 "
+        "m/s²; five sets of initial weights, with least squares on the same press (dashed). The thesis: identified "
+        "after about 0.6 s, K 6.6 beside f/x 6.7 kN/m, B like that of least squares, M small and positive. (g), (h): "
+        "output amplitude, initial weights and thresholds, which it does not state; a dot where a part of the claim "
+        "is true."
     ),
     network.FOAM,
     "foam",
@@ -60,9 +60,9 @@ RUBBER = FirstSeconds(
     "6.9",
     "Neural identifier on rubber: the first four seconds",
     (
-        "As figure 6.7, on a rubber of its own (f/x 62 kN/m here, 44 in figure 6.5), asked at 0.2 mm, 10 mm/s, "
-        "0.5 m/s². The thesis: about 0.6 s, K 56 beside f/x 62 kN/m, B smaller than that of least squares, M "
-        "small and positive."
+        "As figure 6.7, on another rubber (f/x 62 kN/m here, 44 in figure 6.5), with probes at 0.2 mm, 10 mm/s, 0.5 "
+        "m/s². The thesis: about 0.6 s, K 56 beside f/x 62 kN/m, B smaller than that of least squares, M small and "
+        "positive."
     ),
     network.RUBBER,
     "rubber",

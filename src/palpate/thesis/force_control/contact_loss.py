@@ -62,11 +62,11 @@ def found_again(found: Sequence[Recovery]) -> Claim:
         ),
         verdict=decided(often(r.well for r in found)),
         note=(
-            "What is done at a loss is ours: below zero measured force the arm holds for a second, then "
-            "approaches anew, a millimetre a second, with the 5 N switch as at first. The time is that for "
-            "the distance, and for the millimetres by which friction keeps position control behind. A gap "
-            "smaller than about the surface's depth is no loss: the force loop simply follows. Foam, "
-            "friction as chosen, one gap; the integral starts anew at each contact."
+            "The reaction to a loss is ours: below zero measured force the arm holds for a second, then approaches "
+            "again with a millimetre a second, with the 5 N switch as at first. The time is needed for the distance, "
+            "and for the millimetres by which position control lags because of friction. A gap smaller than about the "
+            "surface's depth is no loss: the force loop simply follows. Foam, friction as chosen, one gap; the "
+            "integral restarts at each contact."
         ),
     )
 

@@ -75,7 +75,7 @@ def opened(path: Path, head: Head) -> Iterator[Archive]:
     there, known = read(path)
     if there != head:
         raise InputError(
-            f"{path} is of another search, or of other sources; choose another --out, or add --force to begin anew"
+            f"{path} is of another search, or of other sources; choose another --out, or add --force to start again"
         )
     end = max((at for _, at in journal.entries(path, Tried)), default=journal.end_of_head(path))
     with journal.opened(path, end) as file:

@@ -109,4 +109,4 @@ def _kept(path: Path, kind: type[T], none: T) -> T:
     try:
         return msgspec.json.decode(path.read_bytes(), type=kind)
     except msgspec.DecodeError as error:
-        raise InputError(f"{path} is spoiled ({error}); remove it, and it is made anew") from error
+        raise InputError(f"{path} is damaged ({error}); remove it, and it is rebuilt") from error

@@ -105,9 +105,9 @@ def _why(data: Data, surface: str, key: str, limit: float) -> str:
     if key == "M":
         jump, later = _drift(data.shown[surface], limit)
         return (
-            f"M_e is moved by the noise for seconds: after {limit:g} s it still changes by {later:.2g} kg. On a graph "
-            f"that has to show its first excursion of {jump:.0f} kg this looks settled, which may be what was meant. "
-            f"{swept}"
+            f"M_e varies with the noise for seconds: after {limit:g} s it still changes by {later:.2g} kg. On a graph "
+            f"with the scale of its first excursion of {jump:.0f} kg this looks settled, which the thesis may have "
+            f"meant. {swept}"
         )
     relaxing = [name for name in data.found if name != surface]
     slow = (
@@ -115,7 +115,7 @@ def _why(data: Data, surface: str, key: str, limit: float) -> str:
         if relaxing
         else ""
     )
-    return f"The first push beyond 5 N holds most of what is ever learned about {key}_e. {slow}{swept}"
+    return f"The first push beyond 5 N contains most of the information about {key}_e. {slow}{swept}"
 
 
 def _held(data: Data, surface: str, key: str, limit: float) -> str:
@@ -144,7 +144,7 @@ def reach_in_words(good: Mask) -> str:
 def _edge(times: list[float], limit: float) -> str:
     """How many seeds hold it, where that is no matter of course."""
     good = sum(t <= limit for t in times)
-    return "" if good in (0, len(times)) else f"It is close: {good} of {len(times)} seeds hold it. "
+    return "" if good in (0, len(times)) else f"It is close: {good} of {len(times)} seeds satisfy it. "
 
 
 def _drift(press: Record, limit: float) -> tuple[float, float]:

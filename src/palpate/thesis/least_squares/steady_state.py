@@ -185,11 +185,12 @@ def ratio_claim(data: Data, id_: str) -> Claim:
         tolerance="the middle eight tenths of the samples of B span more than the true B itself",
         verdict=decided(wide > 1.0),
         note=(
-            f"Of the ratios only f/x at rest is of use: eight of ten samples between {f_low:.3g} and {f_high:.3g} kN/m "
-            f"around {f_middle:.3g} kN/m. It is not the surface's K, which is {1e-3 * data.truth['K']:g} kN/m: the "
-            "displacement counts from the 5 N point while the force is total, so 20 N are divided by the way of 15 N. "
-            "The ratio for B inherits that offset and divides it by a velocity of a few encoder counts; the one for M "
-            "divides what is left by an acceleration that is noise as soon as the push is over."
+            f"Of the ratios only f/x at rest is of use: eight of ten samples between {f_low:.3g} and {f_high:.3g} "
+            f"kN/m around {f_middle:.3g} kN/m. It is not the surface's K, which is {1e-3 * data.truth['K']:g} kN/m: "
+            "the displacement counts from the 5 N point while the force is total, so 20 N are divided by the "
+            "displacement of 15 N. The ratio for B inherits that offset and divides it by a velocity of a few encoder "
+            "counts; the ratio for M divides the remainder by an acceleration that is noise as soon as the push is "
+            "over."
         ),
     )
 

@@ -45,18 +45,17 @@ def why(suffix: str, grounds: Grounds) -> str:
 def _why_time(suffix: str, grounds: Grounds) -> str:
     gone = float(np.median([a.error_gone for a in grounds.nominal]))
     text = (
-        "How fast the network learns goes with the square of its output amplitude, which the thesis does "
-        f"not give; with the chosen one ({Choice().amplitude:g} N) the error of the output is gone after "
-        f"{gone:.2g} s."
+        "The network's speed of learning is proportional to the square of its output amplitude, which the thesis does "
+        f"not state; with the chosen one ({Choice().amplitude:g} N) the error of the output is gone after {gone:.2g} "
+        "s."
     )
     if suffix == "time-K":
         return text
     times = [getattr(a, f"settled_{suffix[-1]}") for a in grounds.nominal]
     early, late = sum(t < TIME[0] for t in times), sum(t > TIME[1] for t in times)
     return (
-        f"{text} {suffix[-1]}_e is early in {early} and late in {late} of {len(times)} runs. That it "
-        "settles says only that learning has stopped moving it: in steady contact no sample tells what "
-        "the force would be if the tip moved."
+        f"{text} {suffix[-1]}_e is early in {early} and late in {late} of {len(times)} runs. Its settling only means "
+        "that learning has stopped: in steady contact no sample contains the force of a moving tip."
     )
 
 
@@ -65,14 +64,13 @@ def _why_stiffness(grounds: Grounds) -> str:
     fixed = [float(np.median([a.over for a in s])) for c, s in grounds.swept.items() if not c.thresholds]
     at_zero = float(np.median([a.at_zero for a in grounds.nominal]))
     return (
-        "Displacement counts from where the force is 5 N already, so that even a network without any "
-        f"error would say {grounds.perfect:.2f} times f/x at the probe of {1e3 * x:g} mm. This one adds to "
-        "it: a threshold that learns takes up part of the force as a constant. With nothing pressed the "
-        f"network says {at_zero:.3g} N, and the probe divides that by its displacement. With thresholds "
-        f"fixed at zero the medians go from {min(fixed):.2f} to {max(fixed):.2f}: least where the "
-        "amplitude is so large and the weights so small that the network is a straight line through zero, "
-        f"which answers f/x wherever it is asked. {_by_surface(grounds)}The surface's stiffness was chosen "
-        "for the thesis' f/x."
+        "Displacement counts from the 5 N point, so that even a network without error would give "
+        f"{grounds.perfect:.2f} times f/x at the probe of {1e3 * x:g} mm. This network increases the error: a "
+        "learning threshold absorbs part of the force as a constant. Without penetration the network gives "
+        f"{at_zero:.3g} N, and the probe divides that by its displacement. With thresholds fixed at zero the medians "
+        f"go from {min(fixed):.2f} to {max(fixed):.2f}: the least for a large amplitude and small weights, where the "
+        f"network is linear through zero and gives f/x at any probe. {_by_surface(grounds)}The surface's stiffness "
+        "was chosen for the thesis' f/x."
     )
 
 
@@ -86,10 +84,9 @@ def _by_surface(grounds: Grounds) -> str:
 def _why_damping(grounds: Grounds) -> str:
     values = [a.B for a in grounds.nominal]
     return (
-        f"B_e goes from {min(values):.3g} to {max(values):.3g} N s/m. {_by_start(values, grounds)} The tip "
-        "moves for a tenth of a second or less, and its error there can be removed through any of 21 "
-        "weights and thresholds: one push does not settle how the force is shared out between "
-        "displacement, velocity and the thresholds."
+        f"B_e goes from {min(values):.3g} to {max(values):.3g} N s/m. {_by_start(values, grounds)} The tip moves for "
+        "a tenth of a second or less, and any of 21 weights and thresholds can remove its error there: one push does "
+        "not determine the shares of displacement, velocity and thresholds in the force."
     )
 
 
@@ -98,9 +95,9 @@ def _why_mass(grounds: Grounds) -> str:
     by_start = values.reshape(-1, grounds.starts)
     firm = int(np.sum(np.all(by_start > 0, axis=0) | np.all(by_start < 0, axis=0)))
     return (
-        f"M_e is positive in {int(np.sum(values > 0))} of {values.size} runs; for {firm} of "
-        f"{grounds.starts} starts its sign is the same with every noise seed. {_by_start(values, grounds)} "
-        "It is no property of the surface, and a positive value says no more than a negative one would."
+        f"M_e is positive in {int(np.sum(values > 0))} of {values.size} runs; for {firm} of {grounds.starts} starts "
+        f"its sign is the same with every noise seed. {_by_start(values, grounds)} It is no property of the surface, "
+        "and a positive value means no more than a negative one."
     )
 
 
@@ -120,8 +117,8 @@ def _why_error(grounds: Grounds) -> str:
     times = {c.amplitude: some for c, some in grounds.swept.items() if c == Choice(c.amplitude)}
     told_ = ", ".join(f"{np.median([x.error_gone for x in s]):.2g} s at {a:g} N" for a, s in times.items())
     return (
-        "The error does become almost zero; when, follows from the output amplitude and the initial "
-        f"weights, which the thesis does not give: {told_} (weights and thresholds as chosen). The loop "
-        "gain of learning goes with the amplitude's square, and an amplitude close to the force leaves "
-        "only the flat end of the sigmoid."
+        "The error does become almost zero. The time follows from the output amplitude and the initial weights, which "
+        f"the thesis does not state: {told_} (weights and thresholds as chosen). The loop gain of learning is "
+        "proportional to the square of the amplitude, and an amplitude close to the force uses only the flat end of "
+        "the sigmoid."
     )
