@@ -154,7 +154,7 @@ def test_newton_has_both_shapes_and_says_where_its_damper_works(tmp_path):
     names["apply"](builder, 0, 1)
     assert builder.shape_material_ke == [5000.0, 5000.0, 1.0]
     assert builder.shape_material_kd == [50.0, 50.0, 1.0]
-    assert any("going in only" in note for note in made.notes)
+    assert any("in loading only" in note for note in made.notes)
 
 
 @pytest.mark.long

@@ -127,7 +127,7 @@ def test_gone_and_back(browser):
         page.set_default_timeout(MS)
         page.goto(str(address))
         until(page, "palpate.live.rows > 10")
-    until(page, "document.getElementById('alerts').textContent.includes('The program is gone')")
+    until(page, "document.getElementById('alerts').textContent.includes('The program has ended')")
     own.close()
 
 

@@ -20,7 +20,9 @@ def test_the_first_answers_are_those_of_the_linear_model():
     found = answers(OfBench(experiment))
     assert next(found)["text"] == "Stable on this surface, by the linear model."
     second = next(found)
-    assert f"the gain may grow {plain(margins(linearise(experiment)).gain, 2)} times" in second["text"]
+    assert (
+        f"the gain may grow by a factor of {plain(margins(linearise(experiment)).gain, 2)}" in second["text"]
+    )
     assert second["more"]
 
 
@@ -72,7 +74,10 @@ def test_an_arm_s_proof_and_margins_are_those_of_its_gains(proof):
     gains = gains_for(loop_of("ur5e", "UR5e", "position", 5.0), 20.0)
     found = list(answers(OfArm(gains, 5000.0, 0.0)))
     assert "Proving" in found[0]["text"]
-    assert f"the gain may grow {plain(margins_on(gains, gains.seen_cap).gain, 2)} times" in found[-1]["text"]
+    assert (
+        f"the gain may grow by a factor of {plain(margins_on(gains, gains.seen_cap).gain, 2)}"
+        in found[-1]["text"]
+    )
     # The claim is of what the encoders feel; the page's axis of the surface's own stiffness.
     assert found[-1]["stiffness"] == [gains.arm.surface(400.0), gains.cap]
     assert "while it adapts: every constant K, without damping" in found[-1]["text"]

@@ -77,5 +77,5 @@ def test_numbers_that_are_no_rotation_are_refused(tmp_path):
     mirrored = written("matrix")
     mirrored[:, 3:6] *= -1
     path, names = csv(tmp_path, mirrored)
-    with pytest.raises(InputError, match="left"):
+    with pytest.raises(InputError, match="reflection"):
         read_wrench_and_pose(path, "fx,fy,fz", names, "matrix", time="t")

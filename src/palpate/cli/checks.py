@@ -42,5 +42,5 @@ def checks(name: str | None = None, /, *, output: JsonOption | None = None) -> i
         rows = [(one.sentence, one.failed or "holds") for one in some]
         show_table(screen, Table(subject, ("", ""), rows), ["red" if one.failed else "green" for one in some])
     total = sum(map(len, found.values()))
-    screen.print(f"{failed} of {total} checks failed" if failed else f"all {total} checks pass")
+    screen.print(f"{failed} of {total} checks failed" if failed else f"all {total} checks hold")
     return 1 if failed else 0

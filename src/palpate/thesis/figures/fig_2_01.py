@@ -136,8 +136,8 @@ def _problems(data: Data) -> Claim:
             "Hollerbach called it kinematic instability; we assume that the thesis means this problem. It occurs "
             "where the arm is nearly stretched. On the line y = 0, where the experiments are, "
             + ("it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too")
-            + ". The model is linear, at rest, at angle 0, without friction, which would hide a slow growth, and without "
-            "the force loop."
+            + ". The model is linear, at rest, at angle 0, without friction, which would hide a slow growth, and "
+            "without the force loop."
         ),
     )
 

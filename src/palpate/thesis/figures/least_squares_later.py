@@ -122,8 +122,8 @@ RUBBER = Later(
     "Least squares on rubber: some time later",
     (
         "The press of figure 6.4 between 6 and 8 s, f/x and K_e on one scale (dashed: mean of f/x). The thesis: "
-        "both 44 kN/m; B_e plausible; M_e negative. (g): the difference under varied conditions. (h): what "
-        "single samples give by the ratios of section 5.1."
+        "both 44 kN/m; B_e plausible; M_e negative. (g): the difference under varied conditions. (h): "
+        "estimates from single samples by the ratios of section 5.1."
     ),
     {"rubber": press_runs.RUBBER},
     "rubber",
