@@ -99,6 +99,7 @@ def test_the_ways_in_know_of_a_lag_and_of_few_readings():
         assert abs(slope.stiffness - 20e3) < slope.half
 
 
+@pytest.mark.long  # the foreign simulator is compiled
 def test_an_inertia_taken_off_twice_is_no_mass_behind_a_lag():
     """Two lags fit such a log, one of them with a mass of its own: the likelier one is found."""
     for trial in list(wrong_payload(None))[:2]:
