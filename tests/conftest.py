@@ -1,5 +1,6 @@
 """What every test may lean on: the project's folder, the measured logs, the program."""
 
+import gc
 import os
 import signal
 import sys
@@ -17,7 +18,7 @@ from palpate.cli import main
 ROOT = Path(__file__).resolve().parent.parent
 
 # The same examples on every machine, and no failure because a machine was busy.
-settings.register_profile("palpate", deadline=None, derandomize=True, print_blob=True)
+settings.register_profile("palpate", max_examples=50, deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("palpate")
 
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -28,6 +29,16 @@ sys.path.insert(0, str(ROOT / "benchmarks" / "live"))
 
 # A shell that starts the tests in the background has Ctrl-C ignored, and whatever they start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Thousands of tests are collected, each some objects, and nothing of them is garbage before the end.
+gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Collect garbage again, and look no more at what there is already."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_xdist_auto_num_workers() -> int:

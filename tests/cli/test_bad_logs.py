@@ -98,7 +98,7 @@ def test_a_file_that_may_not_be_read(tmp_path, capsys, command):
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
     _, whole = a_press()
-    record = Record({name: column[::4] for name, column in whole.columns.items()}, whole.units, whole.meta)
+    record = Record({name: column[::10] for name, column in whole.columns.items()}, whole.units, whole.meta)
     flat = np.zeros((len(record), 1))
     joint = joints("/joint_states", record["time"], ["lift"], flat, flat)
     return write_bag(

@@ -42,7 +42,9 @@ def test_an_arm_at_rest_tells_nothing():
     assert found is None or found[1] > 10.0
 
 
-@pytest.mark.parametrize(("left", "named"), [(-0.3, True), (0.0, False), (0.3, False)])
+@pytest.mark.parametrize(
+    ("left", "named"), [(-0.3, True), (0.0, False), pytest.param(0.3, False, marks=pytest.mark.long)]
+)
 def test_a_wrong_sign_is_named_and_damping_refused(left, named):
     """A sensor that shows what is exerted on the surface shows f + m a: what moves the tool goes through it."""
     rng = np.random.default_rng(3)

@@ -24,7 +24,7 @@ def without(record: Record, *families: str) -> Record:
     return Record(kept, dict.fromkeys(kept, "1"), record.meta)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(n, marks=pytest.mark.long) for n in range(2, 6))])
 def test_the_press_comes_back_whatever_the_axes_lever_arms_signs_and_loads(seed):
     rng = np.random.default_rng(seed)
     world = any_world(rng)

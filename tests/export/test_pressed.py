@@ -27,7 +27,7 @@ def within(checked):
     return [max(one.error_K, one.error_B) for one in checked]
 
 
-@pytest.mark.parametrize("mass", [0.5, 2.0, 8.0])
+@pytest.mark.parametrize("mass", [0.5, 8.0, pytest.param(2.0, marks=pytest.mark.long)])
 @pytest.mark.parametrize("joint", [scenes.SLIDE, scenes.FREE])
 def test_mujoco_whatever_presses(tmp_path, mass, joint):
     _, checked = exported(tmp_path, "mujoco", scenes.mjcf(tmp_path, joint, mass=mass))
@@ -52,7 +52,7 @@ def test_mujoco_shares_the_force_among_points(tmp_path, cone):
     assert within(checked)[0] < 1e-4
 
 
-@pytest.mark.parametrize("arm", ["ur5e", "panda"])
+@pytest.mark.parametrize("arm", ["ur5e", pytest.param("panda", marks=pytest.mark.long)])
 def test_mujoco_under_an_arm(tmp_path, arm):
     """Six and seven joints, no weight taken off by hand: the press is led along the normal."""
     _, checked = exported(tmp_path, "mujoco", scenes.arm_mjcf(tmp_path, arm))
@@ -98,7 +98,7 @@ def test_an_unstable_time_step_is_named_and_fails(tmp_path):
     assert not checked.passed
 
 
-@pytest.mark.parametrize("mass", [0.5, 8.0])
+@pytest.mark.parametrize("mass", [0.5, pytest.param(8.0, marks=pytest.mark.long)])
 def test_drake(tmp_path, mass):
     _, (checked,) = exported(tmp_path, "drake", scenes.sdf(tmp_path, mass))
     assert within([checked])[0] < 1e-6  # K over the probe's stiffness, and rounding

@@ -32,7 +32,7 @@ def contradicts(parameter, truth):
     return abs(truth - parameter.value) > 1.5 * (high - low) / 2
 
 
-@pytest.mark.parametrize("rate", [250, 1000, 4000])
+@pytest.mark.parametrize("rate", [250, *(pytest.param(r, marks=pytest.mark.long) for r in (1000, 4000))])
 @pytest.mark.parametrize("lag", [0.0, 0.005])
 def test_a_mass_that_hides_behind_a_lag_is_in_the_interval(rate, lag):
     """Nobody tells the lag: M a looks like a lag of -M/B of B v, and K x late like a damping."""
@@ -69,7 +69,7 @@ def test_intervals_of_heavy_presses_cover_the_truth():
 
 
 @pytest.mark.parametrize("b", [5.0, 100.0])
-@pytest.mark.parametrize("ramp", [0.06, 0.2])
+@pytest.mark.parametrize("ramp", [pytest.param(0.06, marks=pytest.mark.long), 0.2])
 def test_a_lag_that_nobody_told_leaves_the_stiffness_right(b, ramp):
     found = identify(heavy(m=0.0, b=b, lag=0.008, ramp=ramp))
     assert not contradicts(found.parameters["K"], TRUTH["K"])

@@ -17,6 +17,8 @@ from foreign.surfaces import SURFACES, Surface, random_surface, touch
 from foreign.tables import BEGIN, END, in_page, tables
 from foreign.truth import dynamic_stiffness, octave_stiffness, press_stiffness
 
+physics = pytest.mark.long
+"""Of the judge's own physics, which takes seconds to compile: nothing of the package."""
 SLICE = [cell for i, cell in enumerate(CELLS) if i % 23 == 5]
 
 
@@ -39,6 +41,7 @@ def test_the_generator_and_the_truth_know_nothing_of_the_package():
         assert "palpate" not in text, name
 
 
+@physics
 @pytest.mark.parametrize("name", SURFACES)
 def test_out_of_contact_there_is_no_force_and_in_contact_none_pulls(name):
     surface, depth = drawn(name)
@@ -52,6 +55,7 @@ def test_out_of_contact_there_is_no_force_and_in_contact_none_pulls(name):
     assert np.all(x <= touched.depth + 1e-12)
 
 
+@physics
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_surface_gives_back_no_more_than_it_took(name):
     surface, depth = drawn(name)
@@ -62,6 +66,7 @@ def test_a_surface_gives_back_no_more_than_it_took(name):
     assert work.min() >= -1e-3 * work.max()
 
 
+@physics
 @pytest.mark.parametrize("name", SURFACES)
 def test_integrated_twice_as_fine_the_force_is_the_same(name):
     surface, depth = drawn(name)
@@ -72,6 +77,7 @@ def test_integrated_twice_as_fine_the_force_is_the_same(name):
     assert np.percentile(apart, 97) < (0.02 if surface["M"] else 2e-3) * fine.max()
 
 
+@physics
 @pytest.mark.parametrize("name", ["kelvin-voigt", "mass"])
 def test_regression_on_the_force_without_noise_returns_the_parameters(name):
     surface, depth = drawn(name)
@@ -83,6 +89,7 @@ def test_regression_on_the_force_without_noise_returns_the_parameters(name):
     assert found[2] == pytest.approx(surface["M"], rel=1e-6, abs=1e-9)
 
 
+@physics
 @pytest.mark.parametrize("name", ["kelvin-voigt", "mass", "standard-linear", "arms"])
 def test_a_small_sine_has_the_dynamic_stiffness_of_the_formula(name):
     surface, depth = drawn(name)
@@ -94,6 +101,7 @@ def test_a_small_sine_has_the_dynamic_stiffness_of_the_formula(name):
     assert measured == pytest.approx(formula, rel=2e-3)
 
 
+@physics
 def test_the_octave_and_the_press_of_a_spring_are_its_stiffness():
     log = make_log(Cell("kelvin-voigt", "clean", "multisine"), 4)
     stiffness = log.plan.surface["K"]
@@ -102,6 +110,7 @@ def test_the_octave_and_the_press_of_a_spring_are_its_stiffness():
     assert press_stiffness(log.plan.surface, soft) == pytest.approx((stiffness, stiffness), rel=1e-9)
 
 
+@physics
 def test_a_surface_that_recovers_slowly_is_met_deeper_again():
     slow = Surface("slow", {"K": 1000.0, "B": 500.0})
     x, _, _, touched = pressed(slow, 5e-3, 1e-4)
@@ -111,9 +120,8 @@ def test_a_surface_that_recovers_slowly_is_met_deeper_again():
     assert decay == pytest.approx(np.exp(-1000 * 999 / 500 * 1e-4 / 1), rel=2e-2)
 
 
-@pytest.mark.parametrize(
-    "cell", [pytest.param(c, id=str(c), marks=pytest.mark.long if i % 3 else ()) for i, c in enumerate(SLICE)]
-)
+@physics
+@pytest.mark.parametrize("cell", SLICE, ids=str)
 def test_a_seed_makes_one_log(cell):
     log, again = make_log(cell, 11), make_log(cell, 11)
     for one, other in ((log.time, again.time), (log.position, again.position), (log.force, again.force)):
@@ -129,6 +137,7 @@ def scores():
     return [score(Cell(name, "low-rate", "sine"), 11) for name in ("kelvin-voigt", "friction", "arms")]
 
 
+@physics
 def test_every_log_has_one_outcome_and_counts_once(scores):
     assert {s.outcome for s in scores} <= {"answered", "refused"}
     for rows in tables(scores).values():
@@ -138,6 +147,7 @@ def test_every_log_has_one_outcome_and_counts_once(scores):
             assert figures["K known and given"] <= figures["K known"] <= figures["logs"]
 
 
+@physics
 def test_the_tables_stand_between_the_marks_of_the_page(scores):
     page = f"before {BEGIN} stale {END} after"
     written = in_page(page, scores, "judge.py")
@@ -149,6 +159,7 @@ def test_the_tables_stand_between_the_marks_of_the_page(scores):
         in_page("no marks", scores, "judge.py")
 
 
+@physics
 def test_a_knowing_estimator_scatters_as_the_bound_says():
     log = make_log(Cell("kelvin-voigt", "lag-told", "multisine"), 2)
     columns, _ = columns_of(log, ["K", "B"])
@@ -172,15 +183,18 @@ def test_confidently_wrong_is_far_off_or_many_half_widths():
     assert judged("K", 100, (95, 105), (90, 200), defined=False).holds
 
 
+@physics
 @pytest.mark.parametrize(
     "cell",
     [
         "friction/held-steady",  # friction that holds as a spring
         "kelvin-voigt/payload",  # air beside a tool's inertia
         "kelvin-voigt/encoder",  # a motion of a few counts
-        "standard-linear/drift",  # a force that drifts along a bent line, and a relaxation time to be found beside it
+        # a force that drifts along a bent line, and a relaxation time to be found beside it
+        "standard-linear/drift",
         "stiffening/jitter",  # a lag that nobody knows, behind a stiffness that goes with depth
-        "mass/high-rate",  # octaves in which the acceleration is noise and the position is not
+        # octaves in which the acceleration is noise and the position is not
+        "mass/high-rate",
     ],
 )
 def test_no_answer_is_wrong_on_these_logs_again(cell):

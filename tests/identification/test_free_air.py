@@ -60,8 +60,10 @@ def test_a_short_stretch_of_air_at_the_begin_is_seen():
     ("ramp", "every"),
     [
         (0.06, 8),
-        (0.3, 2),
-        *(pytest.param(*case, marks=pytest.mark.long) for case in ((0.06, 2), (0.06, 4), (0.3, 4), (0.3, 8))),
+        *(
+            pytest.param(*case, marks=pytest.mark.long)
+            for case in ((0.06, 2), (0.06, 4), (0.3, 2), (0.3, 4), (0.3, 8))
+        ),
     ],
 )
 def test_a_held_position_leaves_the_surface_all_the_same(every, ramp):

@@ -145,7 +145,7 @@ def test_one_sine_cannot_tell_a_lag_from_damping_unless_it_is_calibrated():
     assert abs(near.loss - omega * 40) < near.loss_half  # one frequency tells the loss, and no more
 
 
-@pytest.mark.parametrize("lag", [0.02, 0.04])
+@pytest.mark.parametrize("lag", [pytest.param(0.02, marks=pytest.mark.long), 0.04])
 def test_a_large_lag_is_no_damping(lag):
     """Twice as long as sensors have it at most: nothing below zero is given, nothing wrong is identified."""
     found = identify(pressed(lag=lag))
@@ -164,6 +164,7 @@ def test_a_lag_is_not_taken_for_a_mass_below_zero():
     assert found.parameters["K"].value == pytest.approx(3000, rel=0.02)
 
 
+@pytest.mark.long
 def test_a_mass_that_is_asked_for_where_there_is_none_spares_the_stiffness():
     all_found = [
         identify(pressed(k=3000.0, b=60.0, seed=seed), model="kelvin-voigt-mass") for seed in range(4)
@@ -208,7 +209,14 @@ def test_an_offset_of_the_force_does_no_harm():
         assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
 
 
-@pytest.mark.parametrize(("offset", "sign"), [(-60.0, 1), (-7.0, -1), (-4.0, 1), (7.0, -1), (60.0, 1)])
+@pytest.mark.parametrize(
+    ("offset", "sign"),
+    [
+        (-7.0, -1),
+        (60.0, 1),
+        *(pytest.param(*o, marks=pytest.mark.long) for o in ((-60.0, 1), (-4.0, 1), (7.0, -1))),
+    ],
+)
 def test_the_weight_of_a_tool_is_no_contact(offset, sign):
     # The force rests anywhere, even so that it changes sign in contact: what matters is where the probe moves freely.
     rng = np.random.default_rng(0)
@@ -229,7 +237,7 @@ def test_a_falling_force_has_no_stiffness():
 
 
 @pytest.mark.parametrize("channel", ["position", "force"])
-@pytest.mark.parametrize("every", [2, 4])
+@pytest.mark.parametrize("every", [pytest.param(2, marks=pytest.mark.long), 4])
 def test_a_channel_that_is_refreshed_slowly(channel, every):
     log = pressed()
     held = np.repeat(log[channel][::every], every)[: len(log)]
@@ -241,6 +249,7 @@ def test_a_channel_that_is_refreshed_slowly(channel, every):
         assert holds(found.parameters[name], truth), name
 
 
+@pytest.mark.long
 def test_a_force_at_the_end_of_its_range_is_left_out():
     held = []
     for seed in range(5):

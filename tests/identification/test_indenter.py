@@ -100,7 +100,7 @@ def test_a_press_that_shows_no_slope_gives_no_modulus(press):
     assert own.reason
 
 
-@pytest.mark.parametrize("shape", ["sphere", "cone"])
+@pytest.mark.parametrize("shape", ["sphere", pytest.param("cone", marks=pytest.mark.long)])
 def test_a_press_of_a_simulated_surface(shape):
     """From a log: the loading of an elastic half space, with noise."""
     indenter, law = SHAPES[shape]

@@ -71,7 +71,9 @@ def test_a_contact_without_mass():
     assert np.all(found.std[:2] < [0.02 * K, 0.1 * B])
 
 
-@pytest.mark.parametrize(("noisy", "std"), [("position", 1e-4), ("force", 0.3)])
+@pytest.mark.parametrize(
+    ("noisy", "std"), [("position", 1e-4), pytest.param("force", 0.3, marks=pytest.mark.long)]
+)
 def test_a_standard_linear_solid_under_noise_of_either_channel(noisy, std):
     position, force = steady(solid)
     truth = np.array([3000, 20, 4000, 0.03])

@@ -36,7 +36,9 @@ def risen(t, begin, seconds):
     return s**3 * (10 - 15 * s + 6 * s**2)
 
 
-@pytest.mark.parametrize(("frequency", "rate"), [(12, 1000), (12, 250), (20, 500)])
+@pytest.mark.parametrize(
+    ("frequency", "rate"), [(12, 250), (20, 500), pytest.param(12, 1000, marks=pytest.mark.long)]
+)
 def test_a_probe_that_bounces_is_seen_to_leave_the_surface(frequency, rate):
     """A filter joins the touches; the readings before it do not."""
     t = np.arange(0, 8, 1 / rate)
@@ -68,7 +70,7 @@ def test_the_stiffness_of_what_holds_the_probe_is_not_called_the_surfaces():
     assert sentence(found).startswith("The force falls by ")
 
 
-@pytest.mark.parametrize("tone", [0.0, 0.03, 0.06])
+@pytest.mark.parametrize("tone", [0.06, *(pytest.param(t, marks=pytest.mark.long) for t in (0.0, 0.03))])
 def test_mains_in_the_force_are_no_tool(tone):
     """At 49 rows a second, 50 Hz are 1 Hz, about as slow as the loading."""
     t = np.arange(0, 14, 1 / 49)
@@ -97,6 +99,7 @@ def test_the_ways_in_know_of_a_lag_and_of_few_readings():
         assert abs(slope.stiffness - 20e3) < slope.half
 
 
+@pytest.mark.long  # the foreign simulator is compiled
 def test_an_inertia_taken_off_twice_is_no_mass_behind_a_lag():
     """Two lags fit such a log, one of them with a mass of its own: the likelier one is found."""
     for trial in list(wrong_payload(None))[:2]:
@@ -104,7 +107,10 @@ def test_an_inertia_taken_off_twice_is_no_mass_behind_a_lag():
         assert not faults, said
 
 
-@pytest.mark.parametrize(("rate", "frequency", "seed"), [(250, 2.3, 2), (1000, 2.3, 1), (250, 1.2, 0)])
+@pytest.mark.parametrize(
+    ("rate", "frequency", "seed"),
+    [(250, 2.3, 2), (250, 1.2, 0), pytest.param(1000, 2.3, 1, marks=pytest.mark.long)],
+)
 def test_a_spring_that_is_tapped_is_no_branch_that_relaxes_behind_a_lag(rate, frequency, seed):
     """Nobody told the lag: a branch whose time is a tap's does to a force what a lag does.
 
@@ -120,7 +126,7 @@ def test_a_spring_that_is_tapped_is_no_branch_that_relaxes_behind_a_lag(rate, fr
     assert found.working_point.stiffness.budget["lag"] > 0
 
 
-@pytest.mark.parametrize("damping", [200, 400])
+@pytest.mark.parametrize("damping", [200, pytest.param(400, marks=pytest.mark.long)])
 def test_steps_that_a_damper_ends_are_not_the_air(damping):
     """At the deep end the force falls while the position still rises; the air is where the force hardly goes at all."""
     t = np.arange(0, 9, 1e-3)

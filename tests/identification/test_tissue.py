@@ -56,7 +56,9 @@ def test_tissue_is_recognised_and_its_intervals_hold():
     assert "at a penetration of" in found.parameters["K"].reason
 
 
-@pytest.mark.parametrize(("n", "share"), [(1.0, 0.0), (1.0, 0.8), (1.6, 0.0)])
+@pytest.mark.parametrize(
+    ("n", "share"), [(1.0, 0.8), (1.6, 0.0), pytest.param(1.0, 0.0, marks=pytest.mark.long)]
+)
 def test_a_surface_that_does_not_stiffen_or_does_not_relax_is_not_called_tissue(n, share):
     log = tissue(TIME, once, n=n, share=share)
     assert identify(log, lag=0.0).model != NAME

@@ -1,5 +1,7 @@
 """An arm in space, a few ticks at a time: the numbers of a press; sliders change the surface, not the force."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -17,12 +19,12 @@ def pressed(arm, seconds):
 @pytest.fixture(scope="module")
 def arms():
     """One of torques and one of positions; each test begins again."""
-    return {name: PressingArm(name, seed=1) for name in ("fr3", "ur5e")}
+    return cache(lambda name: PressingArm(name, seed=1))
 
 
-@pytest.fixture(params=["fr3", "ur5e"])
+@pytest.fixture(params=["fr3", pytest.param("ur5e", marks=pytest.mark.long)])
 def arm(arms, request):
-    own = arms[request.param]
+    own = arms(request.param)
     for slider in own.view.sliders:
         own.set(slider.key, slider.value)
     own.reset(seed=1)

@@ -25,11 +25,11 @@ def opened(path) -> Bag:
     return Bag(path, kind_of(path))
 
 
-@pytest.fixture(params=KINDS)
-def bag(request, tmp_path):
+@pytest.fixture(params=KINDS, scope="module")
+def bag(request, tmp_path_factory):
     sent = [wrench("/ft", TIME, FORCE), pose("/pose", TIME, PLACE)]
     sent.append(joints("/joints", TIME, ["lift", "turn"], PLACE[:, :2], FORCE[:, 1:]))
-    return write_bag(tmp_path / "log.bag", request.param, sent, extra="/grip")
+    return write_bag(tmp_path_factory.mktemp("bags") / "log.bag", request.param, sent, extra="/grip")
 
 
 def test_topics_with_their_types(bag):

@@ -29,7 +29,9 @@ def cut(bag, tmp_path, share):
     return path
 
 
-@pytest.mark.parametrize("share", [0.25, 0.5, 0.77, 0.96])
+@pytest.mark.parametrize(
+    "share", [0.5, 0.96, *(pytest.param(s, marks=pytest.mark.long) for s in (0.25, 0.77))]
+)
 def test_what_is_whole_is_read(bag, tmp_path, share):
     path = cut(bag, tmp_path, share)
     with Bag(path, kind_of(path)) as found:
@@ -42,7 +44,7 @@ def test_what_is_whole_is_read(bag, tmp_path, share):
     assert f"{sum(topic.count for topic in found.topics.values())} complete messages are read" in said
 
 
-@pytest.mark.parametrize("kind", ["bag1", "mcap"])
+@pytest.mark.parametrize("kind", ["mcap", pytest.param("bag1", marks=pytest.mark.long)])
 def test_packed_chunks_are_lost_one_at_a_time(tmp_path, kind):
     time = np.arange(20_000) / 1000
     noise = np.random.default_rng(0).normal(size=(len(time), 3))

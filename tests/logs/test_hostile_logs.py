@@ -182,7 +182,12 @@ def test_a_file_that_the_metadata_names_and_that_is_missing(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "spoiled", ["[", "[]", '{"units": 3}', '{"units": {"t": 1}, "meta": {}}', "[" * 5000]
+    "spoiled",
+    [
+        '{"units": {"t": 1}, "meta": {}}',
+        "[" * 5000,
+        *(pytest.param(s, marks=pytest.mark.long) for s in ("[", "[]", '{"units": 3}')),
+    ],
 )
 def test_metadata_of_ours_that_is_spoiled(tmp_path, spoiled):
     path = tmp_path / "r.parquet"
@@ -192,7 +197,13 @@ def test_metadata_of_ours_that_is_spoiled(tmp_path, spoiled):
             read(path)
 
 
-@pytest.mark.parametrize("instruments", ['{"force": 3}', '{"force": {"filter": 1, "delay_s": 0}}', '"x"'])
+@pytest.mark.parametrize(
+    "instruments",
+    [
+        '{"force": {"filter": 1, "delay_s": 0}}',
+        *(pytest.param(s, marks=pytest.mark.long) for s in ('{"force": 3}', '"x"')),
+    ],
+)
 def test_instruments_of_ours_that_are_spoiled(tmp_path, instruments):
     path = tmp_path / "r.parquet"
     about = f'{{"units": {{"t": "s"}}, "meta": {{"instruments": {instruments}}}}}'

@@ -26,32 +26,31 @@ def law(function):
     return any(ast.unparse(decorator) == "law" for decorator in function.decorator_list)
 
 
-def reasons(text, function):
+def reasons(lines, function):
     """The comments right above a function."""
-    above = text.splitlines()[: min([function.lineno, *(d.lineno for d in function.decorator_list)]) - 1]
+    above = lines[: min([function.lineno, *(d.lineno for d in function.decorator_list)]) - 1]
     found = []
     while above and above[-1].strip().startswith("#"):
         found.append(above.pop().strip())
     return found
 
 
-def unexplained(text):
-    for function in functions(ast.parse(text)):
+def unexplained(text, tree=None):
+    written = text.splitlines()
+    for function in functions(tree or ast.parse(text)):
         too_much = {
             LONG: lines(function) > LINES,
             WIDE: arguments(function) > ARGUMENTS and not law(function),
         }
         for begins, holds in too_much.items():
             if holds and not any(
-                len(r) > len(begins) and r.startswith(begins) for r in reasons(text, function)
+                len(r) > len(begins) and r.startswith(begins) for r in reasons(written, function)
             ):
                 yield f"{function.name}: {begins.strip('# :').lower()}; divide it, or write above it: {begins} why"
 
 
-def test_a_function_is_short_and_takes_little_or_says_why(root):
-    sources = sorted((root / "src" / "palpate").rglob("*.py"))
-    assert len(sources) > 5
-    found = [f"{p.relative_to(root)}: {one}" for p in sources for one in unexplained(p.read_text("utf-8"))]
+def test_a_function_is_short_and_takes_little_or_says_why(sources):
+    found = [f"{path}: {one}" for path, text, tree in sources for one in unexplained(text, tree)]
     assert not found, "\n".join(found)
 
 

@@ -36,17 +36,14 @@ def public_names(tree):
                 yield from public_names(node)
 
 
-def private(path):
+def private(path, tree):
     """The private words in the names of a file: its own, and the public ones in it."""
-    names = [*path.with_suffix("").parts[-1:], *public_names(ast.parse(path.read_text("utf-8")))]
+    names = [path.stem, *public_names(tree)]
     return [f"{name}: say {PRIVATE[word]}" for name in names for word in sorted(words(name) & PRIVATE.keys())]
 
 
-def test_names_are_those_of_the_field(root):
-    found = {}
-    for path in sorted((root / "src" / "palpate").rglob("*.py")):
-        if private(path):
-            found[path.relative_to(root).as_posix()] = private(path)
+def test_names_are_those_of_the_field(sources):
+    found = {path: names for path, _, tree in sources if (names := private(path, tree))}
     assert not found, "\n".join(f"{path}: {', '.join(names)}" for path, names in found.items())
 
 

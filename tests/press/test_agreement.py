@@ -33,7 +33,7 @@ def difference(one, other, column="force"):
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.long if n in NAMES[1::2] else ()) for n in NAMES]
+    "name", [pytest.param(n, marks=pytest.mark.long if n != "ur5e" else ()) for n in NAMES]
 )
 def test_the_force_is_the_same_through_touch_and_press(name):
     """M, h and J differ by 1e-15 relative; some hundred steps and the surface's 5000 N/m make 1e-9 N of it at most."""

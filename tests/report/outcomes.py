@@ -1,8 +1,9 @@
-"""One identification for every kind of outcome that a page has to tell of."""
+"""One identification for every kind of outcome that a page has to tell of, made once."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -11,16 +12,19 @@ from palpate.identification import Identification, identify
 from palpate.records import Record
 
 
+@cache
 def identified() -> Identification:
     """K, B and M of a shaken contact."""
     return identify(shaken(noise=0.05), lag=0.0)
 
 
+@cache
 def not_identifiable() -> Identification:
     """A press that shows no mass."""
     return identify(pressed(), lag=0.0)
 
 
+@cache
 def rejected() -> Identification:
     """A contact whose stiffness grows, held to a model in which it does not."""
     time = np.arange(6000) / 1000
@@ -30,6 +34,7 @@ def rejected() -> Identification:
     return identify(record(time, x, force + noise), model="kelvin-voigt", lag=0.0)
 
 
+@cache
 def with_its_touch() -> Identification:
     """A power of the depth, told from before the touch on: the place of the surface is found, and no offset."""
     time = np.arange(6000) / 1000
@@ -39,6 +44,7 @@ def with_its_touch() -> Identification:
     return identify(record(time, x, force + noise), model="hunt-crossley", lag=0.0)
 
 
+@cache
 def no_contact() -> Identification:
     """The motion of a press, and nothing but noise of the force."""
     log = pressed()
@@ -46,12 +52,14 @@ def no_contact() -> Identification:
     return identify(record(log["time"], log["position"], noise))
 
 
+@cache
 def volts() -> Identification:
     """The same as identified, of a log in volts."""
     log = shaken(noise=0.05)
     return identify(Record(log.columns, {"time": "s", "position": "1", "force": "1"}, log.meta), lag=0.0)
 
 
+@cache
 def many_contacts() -> Identification:
     """Identified, over fifty contacts; their times are what the page lists."""
     return replace(identified(), contacts=tuple((k / 10, k / 10 + 0.05) for k in range(50)))

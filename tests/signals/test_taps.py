@@ -79,7 +79,9 @@ def test_a_straight_line_comes_out_late_by_the_lag(low_pass):
     np.testing.assert_allclose(got[2], 0.0, rtol=0, atol=1e-4)
 
 
-@pytest.mark.parametrize("name", ["sensor", "two", "slow", "sixth"])
+@pytest.mark.parametrize(
+    "name", ["sensor", "slow", *(pytest.param(n, marks=pytest.mark.long) for n in ("two", "sixth"))]
+)
 def test_it_is_the_convolution_on_a_fine_grid(name):
     """A bump no faster than 100 Hz, through scipy's integrator at twenty steps a sample."""
     low_pass, steps = CHAINS[name], 20

@@ -169,7 +169,9 @@ def test_a_sign_is_firm_when_no_noise_seed_turns_it():
     assert e4_probe.firm_signs(values).tolist() == [True, True, False]
 
 
-@pytest.mark.parametrize("study", [fig_6_06, fig_6_08], ids=lambda one: one.NUMBER)
+@pytest.mark.parametrize(
+    "study", [fig_6_06, pytest.param(fig_6_08, marks=pytest.mark.long)], ids=lambda one: one.NUMBER
+)
 def test_a_study_runs_and_says_why(study):
     """By one seed; what all come to over ten: test_frozen_claims.py."""
     data = study.run(Runs(seeds=(3,)))

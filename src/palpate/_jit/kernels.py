@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
+from palpate._jit.compile_lock import CompileLock
 from palpate._jit.inline_compiler import entry, inside
 from palpate._jit.interrupts import uninterrupted
 from palpate._jit.overloads import operators_and_members
@@ -28,6 +29,7 @@ class Kernel:
         self.plain, self._superword = function, superword
         self._waiting: Callable[[], None] | None = None
         self._dispatcher: Any = None
+        self._lock = CompileLock(home_of(function))
         functools.update_wrapper(self, function)
 
     @property
@@ -35,7 +37,7 @@ class Kernel:
         """The Numba dispatcher, made when first asked for; by one thread, or each would compile its own."""
         with _MAKING:
             if self._dispatcher is None:
-                self._dispatcher = _dispatcher(self.plain, self._superword, self._wait)
+                self._dispatcher = _dispatcher(self.plain, self._superword, self._wait, self._lock)
         return self._dispatcher
 
     def __call__(self, *args: Any) -> Any:
@@ -43,7 +45,8 @@ class Kernel:
         with uninterrupted():
             try:
                 return self.compiled(*args)
-            except Exception as error:
+            except BaseException as error:
+                self._lock.release()
                 if type(error).__module__.startswith("numba."):
                     raise NotCompiled(error) from error
                 raise
@@ -82,8 +85,21 @@ def kernel(function: Callable[..., Any], superword: bool = False) -> Kernel:
     return Kernel(function, superword)
 
 
-def _dispatcher(function: Callable[..., Any], superword: bool, wait: Callable[[], None]) -> Any:
+def _dispatcher(
+    function: Callable[..., Any], superword: bool, wait: Callable[[], None], lock: CompileLock
+) -> Any:
     import numba
+
+    dispatcher = numba.njit(**entry(superword))(function)
+    try:
+        dispatcher._cache = _cache(function, wait, lock)
+    except RuntimeError:  # nowhere to write: every process compiles anew
+        _hand_over()
+    return dispatcher
+
+
+def _cache(function: Callable[..., Any], wait: Callable[[], None], lock: CompileLock) -> Any:
+    """Numba's cache of one kernel, its entries stamped by what they depend on, one process at a time adding to it."""
     from numba.core import caching
     from numba.core.runtime import rtsys
 
@@ -98,31 +114,33 @@ def _dispatcher(function: Callable[..., Any], superword: bool, wait: Callable[[]
             return (text_of(sig), *machine_and_code, stamp_of(function, sig))
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
-            known, found = stamp_of(function, sig) is not None, None
             # Without what Numba imports to compile, which takes as long again as importing Numba.
             rtsys.initialize(target_context)
-            try:
-                with self._guard_against_spurious_io_errors():
-                    found = self._load_overload(sig, target_context) if known else None
-            except (ImportError, AttributeError):  # written by another version of these sources
-                found = None
+            found = self._kept(sig, target_context)
             if found is None:
                 wait()
+                lock.wait()
+                found = self._kept(sig, target_context)
+            if found is None:
                 target_context.refresh()
                 _hand_over()
             return found
+
+        def _kept(self, sig: Any, target_context: Any) -> Any:
+            if stamp_of(function, sig) is None:
+                return None
+            # Those errors where another version of these sources has written it.
+            with suppress(ImportError, AttributeError), self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
+            return None
 
         def save_overload(self, sig: Any, data: Any) -> None:
             if stamp_of(function, sig) is not None:
                 with suppress(OSError):  # where there is no room, every process compiles anew
                     super().save_overload(sig, data)
+            lock.release()
 
-    dispatcher = numba.njit(**entry(superword))(function)
-    try:
-        dispatcher._cache = PackageCache(function)
-    except RuntimeError:  # nowhere to write: every process compiles anew
-        _hand_over()
-    return dispatcher
+    return PackageCache(function)
 
 
 def _hand_over() -> None:

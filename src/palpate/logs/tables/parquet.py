@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 _BYTES = 8
 _KEPT = 8
 """Heads that are kept: several questions are asked about one log."""
+_AT_ONCE = 16 * 10**6
+"""A record of palpate's own up to this size [bytes] is read with its head: a second process would take longer."""
 
 
 class About(msgspec.Struct, frozen=True):
@@ -70,7 +72,7 @@ class Parquet:
     def __init__(self, path: Path, budget: Budget) -> None:
         self.path, self._budget = path, budget
         self.about = stored_about(path, budget.limits)
-        found = head(path, budget.limits)
+        found, self._numbers = _opened(path, budget.limits)
         self._rows, self.names = found.rows, found.names
         self.stated = (
             {name: Stated(symbol) for name, symbol in self.about.units.items()} if self.about else {}
@@ -94,7 +96,8 @@ class Parquet:
         Raises:
             InputError: a cell that is not a finite number; its row and its text are named.
         """
-        columns, wrong = self._read(places, missing)
+        own = self._own(places)
+        columns, wrong = (own, ()) if own and np.isfinite(own).all() else self._read(places, missing)
         for i, row, text in wrong:
             raise InputError(
                 f"{self.path}: column {self.names[places[i]]!r}, row {row + 1} holds {text!r}, which is no finite"
@@ -108,12 +111,16 @@ class Parquet:
 
     def raw(self, places: Sequence[int]) -> list[Array]:
         """The same; what is infinite is so."""
-        return self._read(places, ())[0]
+        return self._own(places) or self._read(places, ())[0]
 
     def counts(self, place: int) -> NDArray[np.int64] | None:
         """A column of whole numbers, exact; None if it holds others."""
         found = self._asked([place], exact=True)[0]
         return as_counts(found["counts"]) if found else None
+
+    def _own(self, places: Sequence[int]) -> list[Array]:
+        """Columns that were read with the head."""
+        return [] if self._numbers is None else [self._numbers[i].copy() for i in places]
 
     def _read(self, places: Sequence[int], missing: Sequence[str]) -> tuple[list[Array], Any]:
         """Columns; and of each that has one, the first cell that holds something and yet no finite number."""
@@ -156,6 +163,11 @@ def head(path: Path, limits: Limits | None = None) -> Head:
     Raises:
         InputError: there is no such file, or it cannot be read as Parquet.
     """
+    return _opened(path, limits)[0]
+
+
+def _opened(path: Path, limits: Limits | None) -> tuple[Head, Array | None]:
+    """The head; and all columns, shape (columns, rows), of a small record of palpate's own."""
     try:
         state = path.stat()
     except FileNotFoundError:
@@ -164,8 +176,9 @@ def head(path: Path, limits: Limits | None = None) -> Head:
 
 
 @lru_cache(maxsize=_KEPT)
-def _head(path: Path, state: tuple[int, ...], limits: Limits) -> Head:
-    return msgspec.convert(read_confined("parquet", path, "Parquet", Budget(path, limits))[1], Head)
+def _head(path: Path, state: tuple[int, ...], limits: Limits) -> tuple[Head, Array | None]:
+    arrays, also = read_confined("parquet", path, "Parquet", Budget(path, limits))
+    return msgspec.convert(also, Head), arrays.get("numbers")
 
 
 def unpack(path: Path, size: int, question: Any) -> tuple[dict[str, NDArray[Any]], Any]:
@@ -178,7 +191,12 @@ def unpack(path: Path, size: int, question: Any) -> tuple[dict[str, NDArray[Any]
     if question is None:
         lists = [name for name, dtype in schema.items() if isinstance(dtype, polars.List | polars.Array)]
         about = polars.read_parquet_metadata(path).get(SIGNATURE)
-        return {}, (rows.select(polars.len()).collect().item(), [name for name, _ in leaves], lists, about)
+        count = rows.select(polars.len()).collect().item()
+        whole = {}
+        if about is not None and set(schema.dtypes()) == {polars.Float64}:
+            few = _BYTES * count * len(leaves) <= min(_AT_ONCE, size)
+            whole = {"numbers": rows.collect().to_numpy().T} if few else {}
+        return whole, (count, [name for name, _ in leaves], lists, about)
     places = question["places"]
     frame = rows.select(leaves[i][1].alias(str(i)) for i in sorted(set(places))).collect(engine="streaming")
     if question["exact"]:
