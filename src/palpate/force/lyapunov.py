@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+EPS = float(np.finfo(np.float64).eps)
 _STEPS = 60
 _MARGIN = 1e-9
 _HEAVIER, _HEAVIEST = 8.0, 1e13
@@ -20,21 +21,49 @@ _ROWS = 16
 """Of a product at a time: below the size from which BLAS starts threads, which cost more than they bring here."""
 
 
-def single(Phi: Array) -> Array | None:
+def single(Phi: Array, weight: Array | None = None) -> Array | None:
     """L with |L^T Phi L^-T| < 1, shape (n, n); None if Phi is not stable.
 
-    Lyapunov's equation of Phi over a rate between its spectral radius and 1, so that what is near Phi contracts too.
-    """
-    from scipy.linalg import solve_discrete_lyapunov
+    Lyapunov's equation P = W + Phi^T P Phi of Phi over a rate between its spectral radius and 1, so that what is near
+    Phi contracts too.
 
-    radius = float(np.abs(np.linalg.eigvals(Phi)).max())
-    if not radius < 1.0:
+    Args:
+        Phi: shape (n, n).
+        weight: W, shape (n, n); one in units in which Phi is balanced if left out.
+    """
+    rate = _rate(Phi)
+    if rate is None:
         return None
-    rate = 0.5 * (1.0 + radius)
+    if weight is not None:
+        return _root(_summed(Phi / rate, weight))
     scale = _balanced(Phi)
-    scaled = Phi / scale[:, None] * scale
-    P = solve_discrete_lyapunov(scaled.T / rate, np.eye(len(Phi)))
+    P = _summed(Phi / scale[:, None] * scale / rate, np.eye(len(Phi)))
     return _root(P / np.outer(scale, scale))
+
+
+def weight_of(L: Array, Phi: Array) -> Array:
+    """W with which Lyapunov's equation of Phi has L for an answer: near Phi, others have one as good by it."""
+    P, rate = L @ L.T, _rate(Phi) or 1.0
+    return np.asarray(P - Phi.T @ P @ Phi / rate**2)
+
+
+def _rate(Phi: Array) -> float | None:
+    radius = float(np.abs(np.linalg.eigvals(Phi)).max())
+    return 0.5 * (1.0 + radius) if radius < 1.0 else None
+
+
+def _summed(A: Array, W: Array) -> Array:
+    """P = W + A^T P A of a stable A: the sum of all A^T^k W A^k, with twice as many terms at each step.
+
+    For one matrix of this size several times as fast as SciPy's solvers.
+    """
+    P = W
+    for _ in range(_STEPS):
+        more = A.T @ P @ A
+        P, A = P + more, A @ A
+        if np.trace(more) <= EPS * np.trace(P):
+            break
+    return P
 
 
 def common(matrices: Sequence[Array], near: Array) -> Array | None:
