@@ -13,6 +13,7 @@ import time
 
 import numpy as np
 from rich.progress import track
+from scipy.linalg import expm
 from touches import Rig
 
 from palpate.force.certifying import certify, exact_interval
@@ -83,7 +84,29 @@ def matrices(gains, claim, K, B, gain, loss):
         zero = loop.phi(0.0, 0.0, law, loss)
         one, two = loop.phi(unit, 0.0, law, loss) - zero, loop.phi(0.0, unit, law, loss) - zero
         return zero + np.multiply.outer(K / unit, one) + np.multiply.outer(B / unit, two)
-    return np.array([loop.phi(k, b, Law(gain), loss) for k, b in zip(K, B, strict=True)])
+    return stacked(loop, K, B, Law(gain), loss)
+
+
+def stacked(loop, K, B, law, loss):
+    """`SampledLoop.phi` of many surfaces, shape (n, size, size): what happens within a tick is affine in (K, B) too."""
+    zero, one, two = (held_rates(loop, *kb) for kb in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    rates = zero + np.multiply.outer(K, one - zero) + np.multiply.outer(B, two - zero)
+    within, p = expm(loop.arm.tick * rates), len(zero) - 1
+    none, reading = np.zeros((p, p)), loop.force_gain(1.0, 0.0)
+    if not len(loop.low_pass[1]):
+        raise SystemExit("a sensor without a low-pass reads the surface itself: not written here")
+    rest = loop.assembled(none, np.zeros(p), reading, law, loss)
+    acting = (loop.assembled(none, np.ones(p), reading, law, loss) - rest)[0]
+    Phi = np.broadcast_to(rest, (len(K), *rest.shape)).copy()
+    Phi[:, :p] += within[:, :p, p:] * acting
+    Phi[:, :p, :p] += within[:, :p, :p]
+    return Phi
+
+
+def held_rates(loop, K, B):
+    """d/dt of z and the held input, shape (p + 1, p + 1)."""
+    A, b = loop.rates(K, B)
+    return np.vstack([np.column_stack([A, b]), np.zeros(len(b) + 1)])
 
 
 def unstable(rig, gains, claim, rng, draws, low, high, damped=True) -> int:

@@ -181,7 +181,7 @@ class Prover:
         turned = np.array([L.T @ Phi @ back for Phi in matrices])
         size = max(float(np.linalg.norm(Phi)) for Phi in matrices)
         worst = float(np.linalg.norm(turned, 2, axis=(1, 2)).max())
-        if not self.exact:
+        if not self.exact and worst < 1.0:
             worst = _with_rest(turned, self._rest(box, L, back), worst)
         return worst, 16.0 * len(L) * EPS * condition * size
 

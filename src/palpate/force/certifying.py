@@ -14,7 +14,7 @@ from palpate.force.arm import PositionLoop
 from palpate.force.cells import Box, Prover
 from palpate.force.certificate import FORM, Certificate, with_inner
 from palpate.force.claims import Claim, ProvedCell, adapting_claims, held_claim, one_sided_claim
-from palpate.force.cover import Cell, covered
+from palpate.force.cover import Cell, Search
 from palpate.force.gains import Gains
 from palpate.force.lag import ultimate_gain
 from palpate.force.sampled_loop import SampledLoop
@@ -137,11 +137,12 @@ def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None
         starts: boxes that tile it, from which the search for cells begins.
     """
     prover = claim.prover(gains)
+    search = Search(prover)
     cells: list[Cell] = []
     whole = claim.boxes(gains)
     edge = exact_interval(gains)[1] / claim.shares[1]
     for start in starts or [s for box in whole for s in _starts(prover, box, edge)]:
-        found, left = covered(prover, start)
+        found, left = search.covered(start)
         if left:
             return None
         cells += found
