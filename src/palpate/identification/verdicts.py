@@ -141,6 +141,7 @@ _REMEDY = {
     "tool's inertia": "move faster in the air, or take the tool's inertia out beforehand",
     "calibration": "calibrate force and position",
     "series stiffness": "measure the position nearer to the surface",
+    "tip's mass": "measure the position nearer to the surface",
 }
 
 
