@@ -1,7 +1,7 @@
 """What identification finds on each arm's press, torques and positions, on a soft and on a stiff surface.
 
-K, B and the force are of the first press; verdicts and intervals are counted, and the overshoot is the largest, over all
-seeds. `--markdown docs/arms.md` puts the table between the marks of that page.
+K, B and the force are of the first press; verdicts and intervals are counted, and the overshoot is the largest, over
+all seeds. `--markdown docs/arms.md` puts the table between the marks of that page.
 """
 
 import argparse
