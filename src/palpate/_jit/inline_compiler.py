@@ -109,29 +109,30 @@ def _entry_compiler(superword: bool) -> type:
     return Entry
 
 
+class _Unloaded:
+    """The code generator, but that it looks for no environment of a function that is nowhere in memory."""
+
+    def __init__(self, codegen: Any):
+        self._codegen = codegen
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
+
+    def set_env(self, name: str, environment: Any) -> None:
+        pass
+
+
 @functools.cache
 def _swallowed() -> type:
     """Code that is linked into other code, and never loaded itself."""
     from numba.core.codegen import JITCodeLibrary
-
-    class Unloaded:
-        """The code generator, but that it looks for no environment of a function that is nowhere in memory."""
-
-        def __init__(self, codegen: Any):
-            self._codegen = codegen
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self._codegen, name)
-
-        def set_env(self, name: str, environment: Any) -> None:
-            pass
 
     class Swallowed(JITCodeLibrary):
         """Code that is linked into other code, and never loaded itself."""
 
         @property
         def codegen(self) -> Any:
-            return Unloaded(self._codegen)
+            return _Unloaded(self._codegen)
 
         def _optimize_functions(self, module: Any) -> None:
             module.data_layout = self._codegen._data_layout

@@ -90,8 +90,8 @@ def mass_note(gains: Gains, mass: float | None = None) -> str | None:
             return None
         known = f"{mass:.2g} kg here"
     return (
-        f"the gains take the arm's tip for one without mass: a heavy one swings on the arm's {inner.stiffness:g} N/m, and"
-        f" after a touch the force may go over; add mass = M, {known}, under [inner] of the arm's file, and tune again"
+        f"the gains take the arm's tip for one without mass: a heavy one swings on the arm's {inner.stiffness:g} N/m,"
+        f" and after a touch the force may go over; add mass = M, {known}, under [inner] of the arm's file, and tune again"
     )
 
 
