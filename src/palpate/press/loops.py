@@ -7,7 +7,7 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
-from palpate.force.gains import Gains, approach_speed, known_lag
+from palpate.force.gains import Gains, approach_speed
 from palpate.force.lag import lag_of
 
 MODES = ("torque", "position")
@@ -77,21 +77,16 @@ def mass_note(gains: Gains, mass: float | None = None) -> str | None:
 
     Args:
         gains: of the loop.
-        mass: of the tip, where it is known [kg]; it counts if it makes the loop's lag longer or the approach too fast.
+        mass: of the tip, where it is known [kg].
     """
     inner = gains.arm.inner
     if not isinstance(inner, PositionLoop) or inner.mass is not None:
         return None
-    known = "its mass along the normal, 1/(n^T J M^-1 J^T n) of the arm's model"
-    if mass is not None:
-        heavy = msgspec.structs.replace(gains.arm, inner=msgspec.structs.replace(inner, mass=mass))
-        slower = approach_speed(heavy, gains.force, gains.theta, gains.cap) < gains.approach
-        if not slower and known_lag(heavy) <= gains.theta:
-            return None
-        known = f"{mass:.2g} kg here"
+    known = "the tip's along the normal, 1/(n^T J M^-1 J^T n)" if mass is None else f"{mass:.2g} kg here"
     return (
         f"the gains take the arm's tip for one without mass: a heavy one swings on the arm's {inner.stiffness:g} N/m,"
-        f" and after a touch the force may go over; add mass = M, {known}, under [inner] of the arm's file, and tune again"
+        f" and after a touch the force may go over; add mass = M, {known}, under [inner] of the arm's file, and tune"
+        " again"
     )
 
 
