@@ -9,6 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from compiling import LISTED, SPENT, listed
+
 COLD, WARM, RUN = 10.0, 0.6, 2.0
 """Budgets [s]: to compile the whole tick, to load it from the cache, and for `palpate run` of ten seconds."""
 FIRST_CALL = """
@@ -19,31 +21,15 @@ wall, cpu = time.perf_counter(), time.process_time()
 bench.run(0.01)
 print(time.perf_counter() - wall, time.process_time() - cpu)
 """
-TIMED = """
-import time
-from llvmlite.binding import ffi
-inside, call = [0.0, 0], ffi._lib_fn_wrapper.__call__
-def timed(function, *arguments):
-    begin = time.process_time()
-    inside[1] += 1
-    try:
-        return call(function, *arguments)
-    finally:
-        inside[1] -= 1
-        if not inside[1]:
-            inside[0] += time.process_time() - begin
-ffi._lib_fn_wrapper.__call__ = timed
-"""
-"""What counts the processor's seconds in LLVM, into `inside[0]`."""
 WHERE = (
-    TIMED
+    SPENT
     + """
 from palpate.bench import build, load
 bench = build(load("foam-neural"))
 begin = time.process_time()
 bench.run(0.01)
-print(time.process_time() - begin, inside[0])
 """
+    + LISTED
 )
 TEN_SECONDS = r"""
 import sys, time
@@ -63,16 +49,21 @@ print(time.perf_counter() - wall, time.process_time() - cpu, file=sys.stderr)
 """
 
 
-def child(code: str, *arguments: str, **environment: str) -> tuple[float, float]:
-    """Wall and processor seconds that a process of its own reports last."""
-    ran = subprocess.run(  # noqa: S603 - our own interpreter
+def ran(code: str, *arguments: str, **environment: str) -> str:
+    """What a process of its own printed."""
+    done = subprocess.run(  # noqa: S603 - our own interpreter
         [sys.executable, "-c", code, *arguments],
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
         check=True,
     )
-    wall, cpu = (ran.stdout + ran.stderr).split()[-2:]
+    return done.stdout + done.stderr
+
+
+def child(code: str, *arguments: str, **environment: str) -> tuple[float, float]:
+    """Wall and processor seconds that a process of its own reports last."""
+    wall, cpu = ran(code, *arguments, **environment).split()[-2:]
     return float(wall), float(cpu)
 
 
@@ -91,10 +82,8 @@ def main() -> None:
             code = FIRST_CALL.format(name=name)
             told(f"the loop of {name}, compiled", child(code, **cache), COLD)
             told(f"the loop of {name}, from the cache", min(child(code, **cache) for _ in range(5)), WARM)
-        whole, llvm = child(WHERE, **{**cache, "NUMBA_CACHE_DIR": str(Path(folder) / "another")})
-        print(
-            f"of the processor's {whole:.2f} s for foam-neural, compiled, LLVM takes {llvm:.2f} s, Numba the rest"
-        )
+        anew = {**cache, "NUMBA_CACHE_DIR": str(Path(folder) / "another")}
+        print(listed(ran(WHERE, **anew), "the loop of foam-neural"))
         ten = [child(TEN_SECONDS, str(experiments / "foam-hybrid.toml"), folder, **cache) for _ in range(5)]
         told("palpate run, 10 s on the bench, with record and report", min(ten), RUN)
 

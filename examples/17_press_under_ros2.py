@@ -26,8 +26,8 @@ os.environ["CYCLONEDDS_URI"] = (
 # The controller makes the arm slow, 2 Hz; its update rate is 100 Hz.
 Path("cell.toml").write_text(
     'title = "our arm under an admittance controller"\nrate = 100\n[inner]\nkind = "position"\nbandwidth = 2\n'
-    "damping = 1.0\ndelay = 0.05\nstiffness = 5e4\n[sensor]\nsampling = 100\nnoise = 0.1\nfull_scale = 100\n"
-    "[limits]\nspeed = 0.25\nstiffness = 1e5\n"
+    "damping = 1.0\ndelay = 0.05\nstiffness = 5e4\nmass = 3.7\n[sensor]\nsampling = 100\nnoise = 0.1\n"
+    "full_scale = 100\n[limits]\nspeed = 0.25\nstiffness = 1e5\n"
 )
 
 
@@ -57,10 +57,12 @@ with subprocess.Popen(node, stdout=subprocess.PIPE, text=True) as arm:  # noqa: 
     limits = "--force-limit 40:N --speed-limit 50:mm/s --travel-limit 15:mm --time-limit 20:s"
     try:
         palpate("tune --arm cell.toml --stiffness 1e3:1e4 --force 15 --out gains.toml")
-        words = f"press --wire {wire} --force 15:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 3 --probe 0.2"
+        words = f"press --wire {wire} --force 15:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 6 --probe 0.2"
         palpate(f"{words} --dry-run")
         if palpate(f"{words} --yes --ordinary-priority --record first"):
-            print("the press ended before it was done, as said above: a busy machine is late")
+            sys.exit(
+                "the press ended before it was done, as said above: a busy machine is late; run this again"
+            )
         palpate("identify first/record.parquet --robot-stiffness 50000:2000 --no-figure")
     finally:
         arm.kill()

@@ -41,7 +41,9 @@ with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PI
         words = f"press --wire {wire} --force 20:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 3 --probe 0.2"
         palpate(f"{words} --dry-run")
         if palpate(f"{words} --yes --record first"):
-            print("the press ended before it was done, as said above: a busy machine is late")
+            sys.exit(
+                "the press ended before it was done, as said above: a busy machine is late; run this again"
+            )
         elif Path("first/record.parquet").exists():
             palpate("identify first/record.parquet --no-figure")
     finally:

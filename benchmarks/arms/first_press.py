@@ -4,14 +4,13 @@ Seconds of the processor stand beside those of the clock: they are what is left 
 first tick is compiled beside it, for a measure of the machine.
 """
 
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from cold_start import TIMED
+from cold_start import child, ran
+from compiling import LISTED, SPENT, listed
 
 COLD, WARM = 12.0, 1.0
 """Budgets [s of the processor]."""
@@ -22,12 +21,15 @@ wall, cpu = time.perf_counter(), time.process_time()
 prepared(Question(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
 print(time.perf_counter() - wall, time.process_time() - cpu)
 """
-WHERE = """
+WHERE = (
+    SPENT
+    + """
 from palpate.press.prepare import Question, prepared, surface_of
 begin = time.process_time()
 prepared(Question(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
-print(time.process_time() - begin, inside[0])
 """
+    + LISTED
+)
 BENCH = """
 import time
 from palpate.bench import build, load
@@ -38,18 +40,6 @@ print(time.perf_counter() - wall, time.process_time() - cpu)
 """
 
 
-def child(code: str, cache: str) -> tuple[float, float]:
-    ran = subprocess.run(  # noqa: S603 - our own interpreter
-        [sys.executable, "-c", code],
-        env={**os.environ, "NUMBA_CACHE_DIR": cache},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    wall, cpu = map(float, ran.stdout.split()[-2:])
-    return wall, cpu
-
-
 def main() -> None:
     with tempfile.TemporaryDirectory() as cache:
         for what, code, budget in (
@@ -57,13 +47,10 @@ def main() -> None:
             ("the next", PRESS, WARM),
             ("the bench's first tick", BENCH, 10.0),
         ):
-            wall, cpu = child(code, cache)
+            wall, cpu = child(code, NUMBA_CACHE_DIR=cache)
             print(f"{what:28}{wall:7.2f} s{cpu:9.2f} s of the processor; the budget is {budget:g} s")
     with tempfile.TemporaryDirectory() as another:
-        whole, llvm = child(TIMED + WHERE, another)
-    print(
-        f"of the processor's {whole:.2f} s for the first press, LLVM takes {llvm:.2f} s, Numba and the rest Python's"
-    )
+        print(listed(ran(WHERE, NUMBA_CACHE_DIR=another), "the first press"))
 
 
 if __name__ == "__main__":

@@ -1,53 +1,76 @@
 """What identification finds on each arm's press, torques and positions, on a soft and on a stiff surface.
 
-`--markdown docs/arms.md` puts the table between the marks of that page.
+K, B and the force are of the first press; verdicts and intervals are counted, and the overshoot is the largest, over
+all seeds. `--markdown docs/arms.md` puts the table between the marks of that page.
 """
 
 import argparse
+from itertools import product
 from pathlib import Path
 
 from pages import put
 
+from palpate.press.loops import MODES
 from palpate.press.prepare import Question, prepared, surface_of
 from palpate.press.summary import summarise
 from palpate.report.numbers import with_half
 from palpate.robots.serial.from_toml import names
 
 STIFFNESSES, DAMPING, FORCE = (5e3, 6e4), 50.0, 20.0
-HEAD = "| arm | mode | K [N/m] | K found | B found, 50 N s/m | force, last second [N] | overshoot [N] | settling [s] |"
+HEAD = (
+    "| arm | mode | K [N/m] | K found | identified | B found, 50 N s/m | identified | rejected | truth in the interval"
+    " | force, last second [N] | largest overshoot [N] | settling [s] |"
+)
 
 
-def row(arm: str, mode: str, stiffness: float, seed: int) -> str:
+def pressed(arm: str, mode: str, stiffness: float, seed: int) -> dict:
     surface = surface_of(f"K={stiffness},B={DAMPING}")
     pressing = prepared(Question(arm=arm, force=FORCE, surface=surface, mode=mode, seed=seed))
-    summary = summarise(pressing.run(), pressing.asked)
-    found, force = summary["identified"]["parameters"], summary["force"]
-    K, B = (told(found[name]) for name in ("K", "B"))
+    return summarise(pressing.run(), pressing.asked)
+
+
+def row(arm: str, mode: str, stiffness: float, seeds: int) -> str:
+    presses = [pressed(arm, mode, stiffness, seed) for seed in range(seeds)]
+    found = [press["identified"]["parameters"] for press in presses]
+    K, B = (told(found[0][name]) for name in ("K", "B"))
+    counted = {
+        verdict: [sum(own[name]["verdict"] == verdict for own in found) for name in ("K", "B")]
+        for verdict in ("identified", "rejected")
+    }
+    intervals = [
+        (own[name]["ci95"], true)
+        for own in found
+        for name, true in (("K", stiffness), ("B", DAMPING))
+        if own[name]["ci95"] is not None
+    ]
+    inside = sum(low < true < high for (low, high), true in intervals)
+    force = presses[0]["force"]
     settling = "-" if force["settling_s"] is None else f"{force['settling_s']:.2f}"
-    pressed = f"{force['mean_N']:.3f} ± {force['std_N']:.3f}"
-    return f"| {arm} | {mode} | {stiffness:g} | {K} | {B} | {pressed} | {force['overshoot_N']:.2f} | {settling} |"
+    over = max(press["force"]["overshoot_N"] for press in presses)
+    return (
+        f"| {arm} | {mode} | {stiffness:g} | {K} | {counted['identified'][0]} of {seeds} | {B}"
+        f" | {counted['identified'][1]} of {seeds} | {sum(counted['rejected'])} | {inside} of {len(intervals)}"
+        f" | {force['mean_N']:.3f} ± {force['std_N']:.3f} | {over:.2f} | {settling} |"
+    )
 
 
 def told(parameter: dict) -> str:
     if parameter["value"] is None or parameter["ci95"] is None:
-        return parameter["verdict"]
+        return "-"
     low, high = parameter["ci95"]
-    note = "" if parameter["verdict"] == "identified" else f" ({parameter['verdict']})"
-    return with_half(parameter["value"], 0.5 * (high - low)) + note
+    return with_half(parameter["value"], 0.5 * (high - low))
 
 
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("--seed", type=int, default=0)
+    asked.add_argument("--seeds", type=int, default=4)
     asked.add_argument("--markdown", type=Path)
     words = asked.parse_args()
-    lines = [HEAD, "|" + "---|" * HEAD.count(" | ") + "---|"]
+    lines = [HEAD, "|" + "---|" * (HEAD.count("|") - 1)]
     print(HEAD)
-    for mode in ("torque", "position"):
-        for arm in names():
-            for stiffness in STIFFNESSES:
-                lines.append(row(arm, mode, stiffness, words.seed))
-                print(lines[-1], flush=True)
+    for mode, arm, stiffness in product(MODES, names(), STIFFNESSES):
+        lines.append(row(arm, mode, stiffness, words.seeds))
+        print(lines[-1], flush=True)
     put(words.markdown, "identify", lines)
 
 

@@ -31,7 +31,7 @@ def overshoot(arm: str, stiffness: float, seed: int) -> float:
 
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("--seeds", type=int, default=3)
+    asked.add_argument("--seeds", type=int, default=20)
     asked.add_argument("--arms", nargs="*", default=names())
     asked.add_argument("--swing", type=float, default=gains.SWING)
     asked.add_argument("--markdown", type=Path)

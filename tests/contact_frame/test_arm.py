@@ -103,6 +103,10 @@ def test_a_log_that_shows_no_stiffness_calibrates_nothing():
         robot_stiffness(identify(free), "air.csv")
 
 
-def test_a_negative_tool_is_refused():
-    with pytest.raises(InputError, match="0 kg or more"):
+def test_a_negative_mass_is_refused():
+    with pytest.raises(InputError, match="tool's mass must be 0 kg or more"):
         Arm(tool_mass=(-1.0, 0.0))
+    with pytest.raises(InputError, match="robot's mass must be 0 kg or more"):
+        Arm(mass=(-1.0, 0.0))
+    with pytest.raises(InputError, match="give --robot-stiffness too"):
+        identify_contact(in_series(40e3), arm=Arm(mass=(1.0, 0.0)))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import signal
 
 from identification.problems import problem
 from identification.synthetic_contacts import pressed, record, shaken
@@ -153,3 +154,67 @@ def test_a_late_force_behind_a_soft_arm_leaves_the_damping_right(lag):
     b = found.parameters["B"]
     assert b.ci95 is None or b.ci95[0] < 40 < b.ci95[1]
     assert found.parameters["K"].value == pytest.approx(5000, rel=0.03)
+
+
+SWINGING = 1.2
+"""Mass of the tip that swings on SERIES [kg]."""
+
+
+def test_a_mass_that_swings_on_the_spring_comes_off_to_the_second_order(seen):
+    """Z k/(Z + k + m s^2), expanded by a fit at small s, comes back as Z; without the mass told M is K m/k too low."""
+    k, b, m = TRUTH.values()
+    s = np.array([-2, -1, 1, 2]) * 1e-3 * k / b
+    z = k + b * s + m * s**2
+    together = z * SERIES / (z + SERIES + SWINGING * s**2)
+    at_rest = k * SERIES / (k + SERIES)
+    b_a, m_a, *_ = np.polynomial.polynomial.polyfit(s, (together - at_rest) / s, 3)
+    stiff = in_series.without_series(with_numbers(seen, at_rest, b_a, m_a), SERIES, 0.0)
+    found = in_series.without_swing(stiff, SWINGING / SERIES, 0.1 / SERIES)
+    values = dict(zip(found.names, found.theta, strict=True))
+    # The expansion leaves its fifth order: 1e-3 to the fourth power.
+    assert values["K"] == pytest.approx(k, rel=1e-6)
+    assert values["B"] == pytest.approx(b, rel=1e-4)
+    assert values["M"] == pytest.approx(m, rel=1e-3)
+    at = stiff.names.index("M")
+    assert stiff.theta[at] == pytest.approx(m - k * SWINGING / SERIES, rel=1e-3)
+    assert np.sqrt(found.budget["tip's mass"].variance[at]) == pytest.approx(0.1 * k / SERIES, rel=1e-6)
+
+
+@given(st.floats(10, 7000), st.floats(-3000, 20000), st.floats(0.1, 10.0))
+def test_dynamic_stiffness_behind_a_spring_and_a_mass(storage, loss, frequency):
+    z, s = complex(storage, loss), 2j * np.pi * frequency
+    together = z * SERIES / (z + SERIES + SWINGING * s**2)
+    octave = DynamicStiffness(frequency, together.real, 1.0, together.imag, 2.0, 9, 0.5)
+    (found,) = in_series.spectrum_without_swing(
+        in_series.spectrum_without_series((octave,), SERIES, 0.0), SWINGING / SERIES, 0.0
+    )
+    assert found.storage == pytest.approx(storage, rel=1e-6, abs=1e-6 * abs(z))
+    assert found.loss == pytest.approx(loss, rel=1e-6, abs=1e-6 * abs(z))
+
+
+def test_a_tip_that_swings_is_no_negative_mass():
+    """An arm's tip of 4 kg on 20 kN/m, moved by its motors: solved as a differential equation, not as algebra."""
+    k, m, K, B = 20e3, 4.0, 5000.0, 40.0
+    t = np.arange(4000) / 1000
+    motors = 2e-3 + 5e-4 * (np.sin(2 * np.pi * 1.1 * t) + 0.6 * np.sin(2 * np.pi * 4.3 * t + 1))
+    system = signal.lti([k], [m, B, K + k])
+    _, tip, _ = signal.lsim(system, motors, t, X0=None)
+    force = K * tip + B * np.gradient(tip, t) + np.random.default_rng(1).normal(0, 0.02, len(t))
+    settled = t > 0.5
+    log = record(t[settled], motors[settled], force[settled])
+    told = {"lag": 0.0, "bonded": True, "series_stiffness": k}
+    without, found = identify(log, **told), identify(log, **told, series_mass=(m, 0.0))
+    assert without.parameters["M"].verdict is Verdict.REJECTED
+    assert "below zero" in without.parameters["M"].reason
+    for name, true in (("K", K), ("B", B)):
+        own = found.parameters[name]
+        assert own.verdict is Verdict.IDENTIFIED
+        assert own.ci95[0] < true < own.ci95[1]
+    assert found.parameters["M"].verdict is not Verdict.IDENTIFIED
+
+
+def test_a_mass_needs_a_spring_to_swing_on():
+    with pytest.raises(InputError, match="give that too"):
+        identify(pressed(), series_mass=(3.0, 0.0))
+    with pytest.raises(InputError, match="mass in series and its std must be 0 or more, got -1 and 0"):
+        identify(pressed(), series_stiffness=2e4, series_mass=(-1.0, 0.0))

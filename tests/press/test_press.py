@@ -5,6 +5,7 @@ import re
 import sys
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -50,7 +51,30 @@ def test_it_presses_with_the_force_asked_for_and_finds_the_surface(arm, mode, st
     K = summary["identified"]["parameters"]["K"]
     assert K["verdict"] == "identified"
     assert K["ci95"][0] < stiffness < K["ci95"][1]
+    if mode == "position":  # the tip's mass between encoders and surface is no negative mass of the surface
+        B, M = (summary["identified"]["parameters"][name] for name in ("B", "M"))
+        assert B["ci95"][0] < 50.0 < B["ci95"][1]
+        assert "rejected" not in (B["verdict"], M["verdict"])
     assert np.abs(record["y"] - record["y"][0]).max() < 1e-3
+
+
+def test_a_slow_touch_of_a_heavy_tip_is_not_taken_for_a_soft_surface():
+    """In the noise for 30 ms: a start of the contact that is sought too coarsely has air before it, and is flat."""
+    over = []
+    for seed in (2, 9, 16, 36):
+        pressing = prepared(question(arm="iiwa14", mode="position", seconds=0.4, seed=seed))
+        over.append(float((pressing.run()["force"] - 20.0).max()))
+    assert max(over) < 0.05 * 20.0
+
+
+def test_gains_for_a_tip_without_mass_say_what_to_add(tmp_path):
+    known = prepared(question(arm="ur5e", mode="position")).asked.gains
+    assert not any("under [inner]" in note for note in prepared(question(arm="ur5e")).asked.notes)
+    inner = msgspec.structs.replace(known.arm.inner, mass=None)
+    massless = msgspec.structs.replace(known, arm=msgspec.structs.replace(known.arm, inner=inner))
+    (tmp_path / "gains.toml").write_text(massless.to_toml())
+    notes = prepared(question(arm="ur5e", gains=tmp_path / "gains.toml")).asked.notes
+    assert [note for note in notes if "add mass = M, 3.7 kg here, under [inner]" in note and "\n" not in note]
 
 
 @pytest.mark.long

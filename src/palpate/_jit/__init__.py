@@ -9,5 +9,6 @@ from palpate._jit.bound import Bound
 from palpate._jit.kernels import Kernel, NotCompiled, kernel
 from palpate._jit.registry import law, part
 from palpate._jit.stamp import sources_stamp
+from palpate._jit.stored import reader, writer
 
-__all__ = ["Bound", "Kernel", "NotCompiled", "kernel", "law", "part", "sources_stamp"]
+__all__ = ["Bound", "Kernel", "NotCompiled", "kernel", "law", "part", "reader", "sources_stamp", "writer"]

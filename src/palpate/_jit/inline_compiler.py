@@ -56,16 +56,45 @@ def _flags() -> tuple[Any, type]:
     return shared, Entered
 
 
+def _link_below(library: Any, module: Any) -> None:
+    """Links into a library's module all that it calls, directly or not, each once.
+
+    A function comes after one that calls it: LLVM leaves out what nobody has asked for.
+    """
+    order: dict[Any, None] = {}
+
+    def visit(one: Any) -> None:
+        for below in one._linking_libraries:
+            if below not in order:
+                order[below] = None
+                if isinstance(below, _swallowed()):
+                    visit(below)
+
+    visit(library)
+    for below in order:
+        library._reload_init.update(below._reload_init)
+        alone = below.alone if isinstance(below, _swallowed()) else below._get_module_for_linking()
+        module.link_in(alone, preserve=True)
+
+
 def _entry_compiler(superword: bool) -> type:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import Compiler
 
-    class Superword(JITCodeLibrary):
-        """Code in which LLVM looks for neighbouring operations that one instruction can do."""
+    class Kernel(JITCodeLibrary):
+        """Code that takes in each function that it calls once, and runs."""
+
+        def finalize(self) -> None:
+            _link_below(self, self._final_module)
+            self._linking_libraries = []
+            super().finalize()
 
         def _optimize_final_module(self) -> None:
+            if not superword:
+                return super()._optimize_final_module()
             manager, builder = self._codegen._module_pass_manager(slp_vectorize=True)
             manager.run(self._final_module, builder)
+            return None
 
     class Entry(Compiler):
         """Numba's compiler, but that what is called sees the flags of everything inside."""
@@ -73,46 +102,72 @@ def _entry_compiler(superword: bool) -> type:
         def __init__(
             self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, *more: Any
         ):
-            if superword:
-                library = Superword(target.codegen(), "kernel")
-                library.enable_object_caching()
+            library = Kernel(target.codegen(), "kernel")
+            library.enable_object_caching()
             super().__init__(typing, target, library, args, result, _flags()[1](flags), *more)
 
     return Entry
 
 
-def _inside_compiler() -> type:
+class _Unloaded:
+    """The code generator, but that it looks for no environment of a function that is nowhere in memory."""
+
+    def __init__(self, codegen: Any):
+        self._codegen = codegen
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
+
+    def set_env(self, name: str, environment: Any) -> None:
+        pass
+
+
+@functools.cache
+def _swallowed() -> type:
+    """Code that is linked into other code, and never loaded itself."""
     from numba.core.codegen import JITCodeLibrary
-    from numba.core.compiler import Compiler
-
-    class Unloaded:
-        """The code generator, but that it looks for no environment of a function that is nowhere in memory."""
-
-        def __init__(self, codegen: Any):
-            self._codegen = codegen
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self._codegen, name)
-
-        def set_env(self, name: str, environment: Any) -> None:
-            pass
 
     class Swallowed(JITCodeLibrary):
         """Code that is linked into other code, and never loaded itself."""
 
         @property
         def codegen(self) -> Any:
-            return Unloaded(self._codegen)
+            return _Unloaded(self._codegen)
 
-        def _optimize_final_module(self) -> None:
-            pass
+        def _optimize_functions(self, module: Any) -> None:
+            module.data_layout = self._codegen._data_layout
+            for function in module.functions:
+                if not function.is_declaration:
+                    manager, builder = self._codegen._function_pass_manager()
+                    manager.run(function, builder)
 
-        def _finalize_final_module(self) -> None:
+        def finalize(self) -> None:
+            """Nothing is linked in: the kernel takes in each function once, and not once for each that calls it."""
+            self._raise_if_finalized()
             self._finalize_dynamic_globals()
             self._finalized = True
 
+        @property
+        def alone(self) -> Any:
+            """The module without what it calls."""
+            return super()._get_module_for_linking()
+
+        def _get_module_for_linking(self) -> Any:
+            """The module with all that it calls, for code that is no kernel of ours."""
+            whole = self.alone.clone()
+            _link_below(self, whole)
+            return whole
+
         def get_pointer_to_function(self, name: str) -> int:
             return 0
+
+    return Swallowed
+
+
+def _inside_compiler() -> type:
+    from numba.core.compiler import Compiler
+
+    swallowed = _swallowed()
 
     class Inside(Compiler):
         """Numba's compiler, its result such code."""
@@ -120,7 +175,7 @@ def _inside_compiler() -> type:
         def __init__(
             self, typing: Any, target: Any, library: Any, args: Any, result: Any, _: Any, *more: Any
         ):
-            library = library or Swallowed(target.codegen(), "inside")
+            library = library or swallowed(target.codegen(), "inside")
             super().__init__(typing, target, library, args, result, _flags()[0], *more)
 
         def define_pipelines(self) -> list[Any]:

@@ -14,6 +14,7 @@ from palpate._jit.interrupts import uninterrupted
 from palpate._jit.overloads import operators_and_members
 from palpate._jit.registry import laws
 from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
+from palpate._jit.stored import hand_over
 
 _MAKING = threading.Lock()
 
@@ -146,5 +147,6 @@ def _cache(function: Callable[..., Any], wait: Callable[[], None], lock: Compile
 def _hand_over() -> None:
     """Gives Numba the laws registered since the last time, and once and for all the way to ask parts."""
     operators_and_members()
+    hand_over()
     while laws:
         importlib.import_module("numba.extending").register_jitable(**inside())(laws.pop())

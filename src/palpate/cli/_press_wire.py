@@ -88,6 +88,8 @@ def _pressed(arm: Wire, order: Order, rows: Rows, ordinary: bool) -> tuple[Outco
 
 
 def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
+    from palpate.press.loops import mass_note
+
     task, limits, gains = order.task, order.limits, order.loop.gains
     x, y, z = task.direction
     lowered = f" (lowered by {100.0 * task.probe:g} % three times)" if task.probe else ""
@@ -103,7 +105,9 @@ def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     )
     kept = f"record: {record}" if record is not None else "no record is kept (--record DIR keeps one)"
     arms = f"arm: {arm.title}; gains for {gains.arm.title}"
-    return [arms, does, stops, f"if this process dies: {arm.watchdog}", kept]
+    massless = mass_note(gains)
+    notes = [] if massless is None else [f"note: {massless}"]
+    return [arms, does, stops, f"if this process dies: {arm.watchdog}", kept, *notes]
 
 
 def _ask(yes: bool) -> None:

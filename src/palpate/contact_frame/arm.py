@@ -26,7 +26,7 @@ def with_arm(found: Identification, arm: Arm, tolerance: float, *, from_pose: bo
     """
     parameters = dict(found.parameters)
     if "M" in parameters and parameters["M"].unit == "kg":
-        parameters["M"] = _without_tool(parameters["M"], arm, tolerance)
+        parameters["M"] = _of_swing(_without_tool(parameters["M"], arm, tolerance), arm)
     warnings = list(found.warnings)
     warning = _compliance(parameters, arm, from_pose)
     if warning is not None:
@@ -87,6 +87,14 @@ def _without_tool(mass: Parameter, arm: Arm, tolerance: float) -> Parameter:
         reason = f"{taken}, the interval is wider than {tolerance:.0%}"
         return Parameter(value, std, (low, high), mass.unit, Verdict.NOT_IDENTIFIABLE, reason)
     return Parameter(value, std, (low, high), mass.unit, mass.verdict, f"{taken}; {mass.reason}")
+
+
+def _of_swing(mass: Parameter, arm: Arm) -> Parameter:
+    """M below zero, as it is seen where the arm's own mass swings and nobody has told it."""
+    if arm.stiffness is None or arm.mass is not None or "below zero" not in mass.reason:
+        return mass
+    why = "the arm's mass m swings on its own stiffness k and counts as -K m/k: give --robot-mass"
+    return replace(mass, reason=f"{mass.reason}; {why}")
 
 
 def _compliance(parameters: Mapping[str, Parameter], arm: Arm, from_pose: bool) -> Warn | None:

@@ -79,6 +79,9 @@ def _arm(arm: Mapping[str, Any]) -> list[str]:
     if arm.get("robot_stiffness_N_per_m"):
         value, std = arm["robot_stiffness_N_per_m"]
         lines.append(f"the arm's own {value:.4g} N/m (std {std:.2g}) are taken out of K")
+    if any(arm.get("robot_mass_kg") or ()):
+        value, std = arm["robot_mass_kg"]
+        lines.append(f"the arm's {value:.3g} kg (std {std:.2g}) swing on that, which is taken out of M")
     if any(arm.get("tool_mass_kg") or ()):
         value, std = arm["tool_mass_kg"]
         lines.append(f"the tool's {value:.3g} kg (std {std:.2g}) are taken out of M")

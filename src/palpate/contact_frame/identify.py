@@ -12,6 +12,7 @@ from palpate.contact_frame.declared import Arm, ContactFrame
 from palpate.contact_frame.free_motion.inertia import wrong_sign, wrong_sign_of
 from palpate.contact_frame.projecting import project
 from palpate.contact_frame.signals_in_base import FORCE
+from palpate.errors import InputError
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
 from palpate.identification.options import LEAST_SQUARES
 from palpate.records import Record
@@ -47,6 +48,8 @@ def identify_contact(
         arm,
         position_from=arm.position_from or record.meta.get("position_from"),
         tool_mass=arm.tool_mass or record.meta.get("tool_mass_kg"),
+        stiffness=arm.stiffness or record.meta.get("robot_stiffness_N_per_m"),
+        mass=arm.mass or record.meta.get("robot_mass_kg"),
     )
     spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
     in_space = FORCE[0] in record.columns
@@ -57,6 +60,9 @@ def identify_contact(
         record = _noted(record, inertia)
     if arm.stiffness is not None:
         options |= {"series_stiffness": arm.stiffness[0], "series_std": arm.stiffness[1]}
+        options["series_mass"] = arm.mass
+    elif arm.mass is not None:
+        raise InputError("the robot's mass swings on the robot's own stiffness: give --robot-stiffness too")
     scale = float(np.hypot(calibration, spread))
     found = identify(record, tolerance=tolerance, calibration=scale, **options)
     if in_space and not record.meta["contact_frame"]["normal_shown"]:
@@ -113,5 +119,6 @@ def _about(arm: Arm) -> dict[str, Any]:
     return {
         "tool_mass_kg": list(arm.tool_mass) if arm.tool_mass else None,
         "robot_stiffness_N_per_m": list(arm.stiffness) if arm.stiffness else None,
+        "robot_mass_kg": list(arm.mass) if arm.mass else None,
         "position_from": arm.position_from,
     }

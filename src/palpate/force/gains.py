@@ -138,15 +138,14 @@ class Gains(Table):
         """The law's numbers."""
         arm = self.arm
         low_pass = arm.low_pass
-        memory = _FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick
-        if isinstance(arm.inner, PositionLoop):
-            memory += SWING * arm.inner.swing
+        memory = (_FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick) + 1.0 / arm.sensor.sampling
+        swing = SWING * arm.inner.swing if isinstance(arm.inner, PositionLoop) else 0.0
         E, e0, e1, c = followed(arm)
         numbers: dict[str, Any] = {
             "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,
             "relief": self.relief, "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed,
             "approach": self.approach,
-            "noise": arm.sensor.noise, "memory": memory + 1.0 / arm.sensor.sampling,
+            "noise": arm.sensor.noise, "memory": memory, "blind": memory + swing,
             "period": max(1.0 / arm.sensor.sampling, arm.tick), "E": E, "e0": e0, "e1": e1, "c": c,
             "d": 0.0 if low_pass.sections else 1.0, "z": _SURE, "eps": _ROOM, "full_scale": arm.sensor.full_scale,
             "force_limit": self.force_limit, "locking": 1.0, "bounding": 1.0, "backing": 1.0,

@@ -39,6 +39,7 @@ class Cautious(NamedTuple):
         approach: speed in the air [m/s].
         noise: standard deviation of a reading, until the air has told better [N].
         memory: time in which the sensor's low-pass forgets [s].
+        blind: time after a touch for which nothing is learned: the low-pass', and half of a swing of the tip [s].
         period: between two readings [s].
         E, e0, e1: the sensor's low-pass on the position, from tick to tick: z' = E z + e0 x + e1 x'.
         c: its output is c z + d x.
@@ -63,6 +64,7 @@ class Cautious(NamedTuple):
     approach: float
     noise: float
     memory: float
+    blind: float
     period: float
     E: Mat3
     e0: Vec3

@@ -38,7 +38,7 @@ def begun(law, known, before, stage, w, f, starts, air):
         x = law.cap * (f.y - 0.004 / law.tick * (f.y - f.y0) - origin)
         fast = fit_through(x, w.rest + 0.5 * sigma, sigma)
     if before.phase == AIR and stage.phase == LEARNING:
-        if w.mean - w.rest > LEVEL * sigma and stage.firm * law.tick < law.memory:
+        if w.mean - w.rest > LEVEL * sigma and stage.firm * law.tick < law.blind:
             readings = stage.firm * law.tick / law.period + 1.0
             back = (stage.firm + 0.004 / law.tick) * (f.y - f.y0)
             level = w.mean - w.rest
@@ -61,7 +61,7 @@ def begun(law, known, before, stage, w, f, starts, air):
 def taken(law, known, state, stage, w, f, force):
     """What is known with this tick's reading."""
     since = known.since + 1.0
-    if w.age > 0.0 or since * law.tick < law.memory:
+    if w.age > 0.0 or since * law.tick < law.blind:
         return Learned(known.slow, known.fast, since, known.origin, known.shown, known.found, known.std)
     rate = (f.y - f.y0) / law.tick
     phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
@@ -77,7 +77,7 @@ def taken(law, known, state, stage, w, f, force):
     noise = 2.0 * law.theta * w.tide / (w.gap * law.tick)
     weight = 1.0 / (noise + moving * moving / 12.0)
     fast = known.fast
-    if stage.firm * law.tick >= law.memory:
+    if stage.firm * law.tick >= law.blind:
         fast = fast.taking(phi, force, weight, 1.0 - law.tick / law.theta)
     if stage.phase == LOCKED:
         return Learned(known.slow, fast, since, known.origin, known.shown, known.found, known.std)

@@ -53,7 +53,7 @@ def bounded(law, bound, stage, known):
     """
     if stage.phase == AIR:
         return Bound(law.cap, law.cap, 0.0)
-    if known.since * law.tick < law.memory or stage.since * law.tick < SURE * law.period:
+    if known.since * law.tick < law.blind or stage.since * law.tick < SURE * law.period:
         return bound
     p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
     upper = min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), law.cap)

@@ -50,6 +50,7 @@ _CAUSES = {
     "series stiffness": Cause(
         "the compliance in series with the surface", "measure the position nearer to the surface"
     ),
+    "tip's mass": Cause("the arm's mass at its tip", "measure the position nearer to the surface"),
     "tangent": Cause("the slope of the press", "press more often"),
     "the indenter's law": Cause("the deviation from the indenter's law", "press less deep"),
     "surface position": Cause(

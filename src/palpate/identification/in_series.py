@@ -1,8 +1,8 @@
 """What lies between the position sensor and the surface, and gives way with it: taken out of what was identified.
 
-An arm of stiffness k in series with a surface of impedance Z is seen as Z k / (Z + k). Both channels pass through the
-same filters first, and the surface is found from what they say together: nothing is subtracted from a position that
-the force's lag and noise would come with.
+An arm of stiffness k in series with a surface of impedance Z is seen as Z k / (Z + k), and as Z k / (Z + k + m s^2)
+where a tip of mass m swings between the two. Both channels pass through the same filters first, and the surface is
+found from what they say together: nothing is subtracted from a position that the force's lag and noise would come with.
 """
 
 from __future__ import annotations
@@ -62,6 +62,44 @@ def fit_without_series(found: Fit, series: float, series_std: float) -> Fit:
     return replace(found, theta=new, cov=cov, fixed_cov=fixed)
 
 
+def without_swing(found: Answer, share: float, share_std: float) -> Answer:
+    """Parameters of the surface where a tip of mass m swings on the arm's k: its Z/(1 + m s^2/k) was identified.
+
+    To the second order of the frequency M is M_a + K m/k, K and B are as they were.
+
+    Args:
+        found: with the stiffness in series taken out.
+        share: m/k [s^2].
+        share_std: standard deviation of that [s^2].
+    """
+    jacobian, missed = _swinging(found.names, share), _swinging(found.names, share_std)
+    moved = missed @ found.theta - found.theta
+    budget = {
+        cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
+        for cause, part in found.budget.items()
+    }
+    budget["tip's mass"] = Spread(moved**2)
+    return replace(found, theta=jacobian @ found.theta, cov=jacobian @ found.cov @ jacobian.T, budget=budget)
+
+
+def fit_without_swing(found: Fit, share: float, share_std: float) -> Fit:
+    """The same of what holds if the model does."""
+    jacobian, missed = _swinging(found.names, share), _swinging(found.names, share_std)
+    moved = missed @ found.theta - found.theta
+    cov, fixed = (
+        jacobian @ own @ jacobian.T + np.outer(moved, moved) for own in (found.cov, found.fixed_cov)
+    )
+    return replace(found, theta=jacobian @ found.theta, cov=cov, fixed_cov=fixed)
+
+
+def _swinging(names: tuple[str, ...], share: float) -> Array:
+    """M + K share, and all else as it is, shape (p, p)."""
+    place, matrix = _places(names), np.eye(len(names))
+    if {"K", "M"} <= place.keys():
+        matrix[place["M"], place["K"]] = share
+    return matrix
+
+
 def with_payload(found: Answer, std: float) -> Answer:
     """An answer whose mass errs by as much as that of a payload, which was taken out of the force [kg]."""
     variance = np.where(np.array(found.names) == "M", std**2, 0.0)
@@ -117,6 +155,30 @@ def spectrum_without_series(
                 budget={
                     **{cause: gain * half for cause, half in octave.budget.items()},
                     "series stiffness": more,
+                },
+            )
+        )
+    return tuple(found)
+
+
+def spectrum_without_swing(
+    spectrum: tuple[DynamicStiffness, ...], share: float, share_std: float
+) -> tuple[DynamicStiffness, ...]:
+    """Dynamic stiffness Z (1 + m s^2/k) of the surface, the deviation of m/k in its half-widths."""
+    found = []
+    for octave in spectrum:
+        squared = (2.0 * np.pi * octave.frequency) ** 2
+        gain, more = 1.0 - squared * share, 1.96 * squared * share_std
+        found.append(
+            replace(
+                octave,
+                storage=gain * octave.storage,
+                loss=gain * octave.loss,
+                storage_half=float(np.hypot(gain * octave.storage_half, more * octave.storage)),
+                loss_half=float(np.hypot(gain * octave.loss_half, more * octave.loss)),
+                budget={
+                    **{cause: abs(gain) * half for cause, half in octave.budget.items()},
+                    "tip's mass": more * abs(octave.storage),
                 },
             )
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import hypot, isfinite
 from typing import Any
 
 from palpate.errors import InputError, unknown
@@ -28,6 +28,7 @@ class Options:
     calibration: float = 0.0
     series_stiffness: float | None = None
     series_std: float = 0.0
+    series_mass: tuple[float, float] | None = None
     bonded: bool | None = None
     cutoff: float | None = None
     force_filter: LowPass | None = None
@@ -54,6 +55,14 @@ class Options:
         own = self.force_filter.lag if self.force_filter else 0.0
         return own + USUAL_LAG if self.lag is None else self.lag
 
+    @property
+    def swing(self) -> tuple[float, float]:
+        """m/k of a tip that swings on what is in series, and its standard deviation [s^2]; 0 where none was told."""
+        if self.series_mass is None or self.series_stiffness is None:
+            return 0.0, 0.0
+        (mass, mass_std), k = self.series_mass, self.series_stiffness
+        return mass / k, hypot(mass_std / k, mass / k * self.series_std / k)
+
     def check_lag(self, duration: float) -> None:
         """Refuse a lag in other units than seconds."""
         if self.lag is not None and abs(self.lag) >= duration:
@@ -73,7 +82,16 @@ def _check(o: Options) -> None:
         raise InputError(
             f"a known force filter is for {LEAST_SQUARES}: leave --force-filter out for {o.method}"
         )
+    _check_masses(o)
     _check_numbers(o)
+
+
+def _check_masses(o: Options) -> None:
+    for name, mass in (("mass", o.mass), ("mass in series", o.series_mass)):
+        if mass is not None and not all(isfinite(number) and number >= 0 for number in mass):
+            raise InputError(f"the {name} and its std must be 0 or more, got {mass[0]:g} and {mass[1]:g}")
+    if o.series_mass is not None and o.series_stiffness is None:
+        raise InputError("a mass in series swings on a stiffness in series: give that too")
 
 
 def _check_numbers(o: Options) -> None:
@@ -83,8 +101,6 @@ def _check_numbers(o: Options) -> None:
         raise InputError(f"the calibration must be below 1, got {o.calibration:g}; 0.01 means 1 %")
     if o.lag is not None and not isfinite(o.lag):
         raise InputError(f"the lag must be a number of seconds, got {o.lag:g}")
-    if o.mass is not None and not all(isfinite(number) and number >= 0 for number in o.mass):
-        raise InputError(f"the mass and its std must be 0 or more, got {o.mass[0]:g} and {o.mass[1]:g}")
     deviations = {
         "calibration": o.calibration,
         "lag's std": o.lag_std,

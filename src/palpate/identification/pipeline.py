@@ -34,6 +34,7 @@ def identify(
     calibration: float = 0.0,
     series_stiffness: float | None = None,
     series_std: float = 0.0,
+    series_mass: tuple[float, float] | None = None,
     bonded: bool | None = None,
     cutoff: float | None = None,
     force_filter: LowPass | str | None = None,
@@ -57,6 +58,7 @@ def identify(
         calibration: relative standard deviation of the scales of force and position together.
         series_stiffness: of what lies between the position sensor and the surface [N/m]; it is taken out.
         series_std: standard deviation of that [N/m].
+        series_mass: mass between that and the surface, which swings on it, and its standard deviation [kg].
         bonded: True if the probe is fixed to the surface, False if it is not, None to find out.
         cutoff: of the filter chain [Hz]; None to choose.
         force_filter: what the force sensor low-passes the force with before it is sampled, as `butterworth3:120`.
@@ -71,8 +73,8 @@ def identify(
     """
     options = Options.of(
         model=model, lag=lag, lag_std=lag_std, tolerance=tolerance, calibration=calibration,
-        series_stiffness=series_stiffness, series_std=series_std, bonded=bonded, cutoff=cutoff,
-        force_filter=force_filter, mass=mass, method=method, force_sign=force_sign,
+        series_stiffness=series_stiffness, series_std=series_std, series_mass=series_mass, bonded=bonded,
+        cutoff=cutoff, force_filter=force_filter, mass=mass, method=method, force_sign=force_sign,
     )  # fmt: skip
     channels = channels_of(record)
     options.check_lag(channels.duration)
@@ -95,6 +97,9 @@ def identify(
     if series_stiffness is not None:
         choice = replace(choice, answer=in_series.without_series(choice.answer, series_stiffness, series_std))
         holds = in_series.fit_without_series(holds, series_stiffness, series_std)
+    if series_mass is not None:
+        choice = replace(choice, answer=in_series.without_swing(choice.answer, *options.swing))
+        holds = in_series.fit_without_swing(holds, *options.swing)
     if contacts.payload is not None:
         choice = replace(choice, answer=in_series.with_payload(choice.answer, contacts.payload.std))
     parameters, told = verdicts(choice, holds, evidence[2], terms)

@@ -35,22 +35,22 @@ def read_run(path: Path, **options: Any) -> Record:
             "a press over a wire: force and position along its direction, the force relative to free motion"
         )
         wire = about.meta["wire"]
-        meta = {**record.meta, "facts": [fact], "position_from": "joints", **_tool(path, wire)}
+        meta = {**record.meta, "facts": [fact], "position_from": "joints", **_arm(path, wire)}
         return Record(record.columns, record.units, meta)
     fact = f"a run's record: {RUN['position']} and {RUN['force']}, with the record's own instruments"
     # Without a tool the bench's force is that on the surface itself.
-    tool = {} if about is None else _tool(path, about.meta)
-    return Record(record.columns, record.units, {**record.meta, **(tool or _NO_TOOL), "facts": [fact]})
+    arm = {} if about is None else _arm(path, about.meta)
+    return Record(record.columns, record.units, {**record.meta, **_NO_TOOL, **arm, "facts": [fact]})
 
 
-def _tool(path: Path, known: Any) -> dict[str, Any]:
-    """The mass beyond the sensor, the one that the force follows, and their std [kg], where a press was told them."""
+def _arm(path: Path, known: Any) -> dict[str, Any]:
+    """What gives way and swings on both sides of the force sensor, with standard deviations, as far as it is known."""
     if not isinstance(known, dict):
         return {}
     try:
-        return {name: msgspec.convert(known[name], kind) for name, kind in _TOOL.items() if name in known}
+        return {name: msgspec.convert(known[name], kind) for name, kind in _ARM.items() if name in known}
     except msgspec.ValidationError as error:
-        raise InputError(f"{path}: its metadata of the tool is damaged ({error}); press again") from None
+        raise InputError(f"{path}: its metadata of the arm is damaged ({error}); press again") from None
 
 
 def measured_by(path: Path) -> dict[str, Any]:
@@ -77,7 +77,11 @@ def measured_by(path: Path) -> dict[str, Any]:
 
 _Kilograms = Annotated[float, msgspec.Meta(ge=0, le=1e3)]
 _Followed = Annotated[float, msgspec.Meta(ge=-1e3, le=1e3)]
-_TOOL: dict[str, Any] = {
+_Stiffness = Annotated[float, msgspec.Meta(gt=0, le=1e9)]
+_Deviation = Annotated[float, msgspec.Meta(ge=0, le=1e9)]
+_ARM: dict[str, Any] = {
+    "robot_stiffness_N_per_m": tuple[_Stiffness, _Deviation],
+    "robot_mass_kg": tuple[_Kilograms, _Kilograms],
     "tool_mass_kg": tuple[_Kilograms, _Kilograms],
     "tool_inertia_kg": tuple[_Followed, _Kilograms],
 }

@@ -72,6 +72,24 @@ def check_mode(gains: Gains, mode: str | None) -> str:
     return gains.arm.kind
 
 
+def mass_note(gains: Gains, mass: float | None = None) -> str | None:
+    """What to add where gains take the tip of an arm of positions for one without mass; None where nothing is lacking.
+
+    Args:
+        gains: of the loop.
+        mass: of the tip, where it is known [kg].
+    """
+    inner = gains.arm.inner
+    if not isinstance(inner, PositionLoop) or inner.mass is not None:
+        return None
+    known = "the tip's along the normal, 1/(n^T J M^-1 J^T n)" if mass is None else f"{mass:.2g} kg here"
+    return (
+        f"the gains take the arm's tip for one without mass: a heavy one swings on the arm's {inner.stiffness:g} N/m,"
+        f" and after a touch the force may go over; add mass = M, {known}, under [inner] of the arm's file, and tune"
+        " again"
+    )
+
+
 def series_of(arm: Arm) -> float | None:
     """Stiffness between the encoders and the surface [N/m]; None where the encoders sit on the links."""
     return arm.inner.stiffness if isinstance(arm.inner, PositionLoop) else None

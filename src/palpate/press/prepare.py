@@ -13,7 +13,7 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.gains import Gains, load_gains
 from palpate.press.engines import ENGINES
-from palpate.press.loops import MODES, check_mode, gains_for, loop_of, usual_mode
+from palpate.press.loops import MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
 from palpate.press.pilots import CAUTIOUS, CONTROLLERS, pilot_of
 from palpate.press.plan import Plan, plan_for
 from palpate.press.pressing import Progress, press
@@ -107,7 +107,8 @@ def prepared(question: Question) -> Pressing:
     gains = _gains(question, arm, place)
     _check_force(question, gains)
     notes = check_able(arm, place, gains.approach, question.force)
-    notes = [*arm.notes, *notes, *_engine_notes(question, arm)]
+    massless = mass_note(gains, place.mass)
+    notes = [*arm.notes, *notes, *([massless] if massless else []), *_engine_notes(question, arm)]
     asked = Asked(
         arm=arm, gains=gains, place=place, surface=question.surface, controller=question.controller,
         physics=question.physics, seed=question.seed, payload=question.payload, notes=tuple(notes),

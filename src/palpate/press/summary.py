@@ -13,10 +13,12 @@ from palpate.bench.sequence import CONTACT
 from palpate.contact_frame import Payload, identify_contact
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
+from palpate.force.arm import PositionLoop
 from palpate.force.gains import Gains
 from palpate.identification.sample_clock import sample_clock_of
 from palpate.press.loops import series_of
 from palpate.press.setting import Place
+from palpate.press.tool import held_tool
 from palpate.records import Record
 from palpate.robots.serial.serial_arm import SerialArm
 
@@ -65,8 +67,20 @@ class Asked:
                 "position": {"lag_s": 0.0},
             },
             "notes": list(self.notes),
-            **({} if self.payload is None else self.payload.meta),
+            **self.between,
         }
+
+    @property
+    def between(self) -> dict[str, Any]:
+        """What gives way and swings between encoders and surface, as `palpate identify` reads it: value and std."""
+        tool = {} if self.payload is None else self.payload.meta
+        inner = self.gains.arm.inner
+        if not isinstance(inner, PositionLoop):
+            return tool
+        known = {"robot_stiffness_N_per_m": (inner.stiffness, 0.0), **tool}
+        if inner.mass is not None:  # of which the part beyond the sensor counts as the tool's
+            known["robot_mass_kg"] = (max(inner.mass - held_tool(self.payload).inertia, 0.0), 0.0)
+        return known
 
     def delay(self, record: Record) -> float:
         """From the sampling of a force to its reading [s]: identification finds the clock of a slower sensor itself.
@@ -141,7 +155,7 @@ def identified(record: Record, asked: Asked) -> dict[str, Any]:
     log = Record(
         {"time": record["t"], "position": record["x_measured"], "force": record["force_sampled"]},
         {"time": "s", "position": "m", "force": "N"},
-        {"tool_mass_kg": (0.0, 0.0)} if asked.payload is None else asked.payload.meta,
+        {"tool_mass_kg": (0.0, 0.0), **asked.between},
     )
     low_pass = loop.low_pass
     try:
@@ -150,7 +164,6 @@ def identified(record: Record, asked: Asked) -> dict[str, Any]:
             lag=low_pass.lag + asked.delay(record),
             lag_std=asked.delay_std(record),
             force_filter=low_pass if low_pass.sections else None,
-            series_stiffness=series_of(loop),
         )
     except InputError as error:
         return {"why_not": str(error), "parameters": {}, "warnings": []}

@@ -102,6 +102,8 @@ class ArmOptions:
         Mass between force sensor and surface in kg, VALUE or VALUE:STD; it is subtracted from M.
     robot_stiffness
         Stiffness between position sensor and surface, N/m or N/m:STD; its compliance is subtracted from that of K.
+    robot_mass
+        The arm's mass at the tip, before the force sensor, which swings on its own stiffness, in kg or kg:STD.
     robot_stiffness_from
         A log of a press on a rigid wall, with the same columns or topics: only the arm deflects in it.
     payload
@@ -113,6 +115,7 @@ class ArmOptions:
     tool_mass: str | None = None
     payload: Path | None = None
     robot_stiffness: Annotated[str | None, Parameter(name=["--robot-stiffness", "--series-stiffness"])] = None
+    robot_mass: str | None = None
     robot_stiffness_from: Path | None = None
     position_from: Literal["joints", "tip"] | None = None
 
@@ -132,5 +135,6 @@ class ArmOptions:
         return Arm(
             tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02") or (hung.beyond if hung else None),
             stiffness=with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),
+            mass=with_std("robot-mass", self.robot_mass, "3.7:0.4"),
             position_from=self.position_from,
         )

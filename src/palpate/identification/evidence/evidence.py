@@ -41,6 +41,8 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
         series = options.series_stiffness, options.series_std
         spectrum = in_series.spectrum_without_series(spectrum, *series)
         press = None if press is None else in_series.press_without_series(press, *series)
+    if options.series_mass is not None:
+        spectrum = in_series.spectrum_without_swing(spectrum, *options.swing)
     point = working_point(whole, spectrum, options, unit, hidden)
     return spectrum, press, point
 

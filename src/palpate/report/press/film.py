@@ -19,7 +19,7 @@ FRAMES = 96
 _BEFORE = 0.4
 """Seconds of the approach that are shown."""
 _WIDE, _HIGH = 900.0, 420.0
-_ARM = (20.0, 20.0, 420.0, 380.0)
+_ARM = (20.0, 20.0, 420.0, 372.0)
 """Left, top, width and height of the arm's panel; then of the tip's, and of the force's."""
 _TIP = (480.0, 30.0, 400.0, 170.0)
 _FORCE = (480.0, 250.0, 400.0, 130.0)
@@ -94,13 +94,13 @@ def _frames(record: Record) -> NDArray[np.intp]:
 def _arm_panel(arm: SerialArm, place: Place, q: Array, seconds: float) -> list[str]:
     bones = [arm.joint_places(one) for one in q]
     patch = _patch(place, 0.16)
-    view = _view_of(np.vstack([bones[0], bones[-1], patch]))
-    ground = [np.column_stack([b[:, :2], 0.0 * b[:, 2]]) for b in bones[:1]]
+    ground = np.column_stack([bones[0][:, :2], 0.0 * bones[0][:, 2]])
+    view = _view_of(np.vstack([bones[0], bones[-1], patch, ground]))
     seen = [view(b) for b in bones]
     moving = _animated("points", [_points(s) for s in seen], seconds)
     return [
         f'<polygon class="surface" points="{_points(view(patch))}" fill-opacity="0.55"/>',
-        f'<polyline class="shadow" points="{_points(view(ground[0]))}"/>',
+        f'<polyline class="shadow" points="{_points(view(ground))}"/>',
         _MARKER,
         '<polyline class="arm" marker-start="url(#joint)" marker-mid="url(#joint)" ',
         f'points="{_points(seen[0])}">{moving}</polyline>',
