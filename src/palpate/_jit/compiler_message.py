@@ -1,4 +1,4 @@
-"""What Numba says of a function that it cannot compile, in one line: where, and what to write instead."""
+"""Numba's error about a function, in one line: the place, and the remedy."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ def _overload_method_of_first(function: Any, name: str, *names: str) -> None:
 
 
 def _scalar_functions() -> None:
-    """What `_vector`'s functions mean on plain numbers."""
+    """Overloads of `_vector`'s functions for plain numbers."""
     import math
 
     from numba import types
@@ -101,7 +101,7 @@ def _scalar_functions() -> None:
 
 
 def _array_functions() -> None:
-    """What `_vector`'s functions mean on NumPy arrays."""
+    """Overloads of `_vector`'s functions for NumPy arrays."""
     import numpy as np
     from numba import types
 

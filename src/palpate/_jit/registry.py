@@ -1,4 +1,4 @@
-"""What is registered to be compiled: laws and parts. Nothing is compiled here, and Numba is not imported."""
+"""Registry of laws and parts to compile. Nothing is compiled here, and Numba is not imported."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a cached kernel depends on, as a hash: stale kernels are never run."""
+"""Hash of a cached kernel's sources: stale kernels are never run."""
 
 import functools
 import hashlib

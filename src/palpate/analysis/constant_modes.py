@@ -1,4 +1,4 @@
-"""What never changes, told apart from what moves."""
+"""Constant modes, separated from the moving ones."""
 
 from __future__ import annotations
 

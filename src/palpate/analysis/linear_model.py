@@ -102,5 +102,5 @@ def _unrest(motion: Motion, x: Array, first: int, ticks: int) -> Array:
 
 
 def _row(motion: Motion, x: Array) -> dict[str, float]:
-    """What the record shows of a state, by column; of its second tick, which has felt the force."""
+    """Recorded values of a state, by column; of its second tick, which includes the force."""
     return dict(zip(COLUMNS, motion.after(x, 0, 2)[1][-1].tolist(), strict=True))

@@ -80,7 +80,7 @@ def growth_with(loop: LinearLoop, gain: float = 1.0, late: int = 0) -> float:
 
 
 def loop_gain(loop: LinearLoop, frequency: ArrayLike) -> Complex:
-    """What comes back of a sine in the measured force, its sign turned: L of 1 + L = 0, shape as `frequency`'s.
+    """Loop gain at the measured force, L of 1 + L = 0, shape as `frequency`'s.
 
     The sensor samples out of step with the ticks, so that a sine returns with others beside it; this is the part of
     its own frequency, averaged over a period: what a measurement with sines would give.

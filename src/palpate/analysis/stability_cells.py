@@ -25,7 +25,7 @@ EXACT = 1e-4
 FIRST = 4
 """Cells at the start, of five values each."""
 MISSED = 1.1
-"""What a quadratic misses at most, over what it misses halfway between its values: 1.03 for a cubic's remainder."""
+"""Largest error of a quadratic over its error halfway between its values: 1.03 for a cubic's remainder."""
 SMOOTH = 1e-3
 """Of a period's size, that its quadratic may miss where the quartic through all five stands for it, and misses 1e-5."""
 
@@ -49,7 +49,7 @@ class Cell:
         return self.high - self.low
 
     def missed(self) -> list[Array]:
-        """What the quadratic through ends and middle misses at the quarters."""
+        """Error at the quarters of the quadratic through ends and middle."""
         a, p, m, q, b = self.nodes
         return [p - (0.375 * a + 0.75 * m - 0.125 * b), q - (0.375 * b + 0.75 * m - 0.125 * a)]
 

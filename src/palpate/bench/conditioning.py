@@ -1,4 +1,4 @@
-"""What the controller makes of encoder angles and sampled force: the signals of the thesis' listing (App. E)."""
+"""Signals of the thesis' listing (App. E) from encoder angles and sampled force."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from palpate.signals.types import Sense
 
 @part
 class Signals(NamedTuple):
-    """What a tick makes of the sensors, for controllers and estimators."""
+    """Conditioned sensor signals of a tick, for controllers and estimators."""
 
     sense: Sense  # what controllers see
     velocity: float  # of x, first difference, unfiltered [m/s]

@@ -1,4 +1,4 @@
-"""What is wrong with a part of the user's in a loop: stepped once in plain Python, then compiled by itself."""
+"""Diagnosis of a user's part in a loop: stepped once in plain Python, then compiled alone."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def not_finite(loop: Loop, state: LoopState) -> str:
 
 
 def _wrong(call: Call, value: Any) -> str:
-    """What is wrong with what a method returns."""
+    """Fault of a method's return value."""
     if call.method == "step":
         if not isinstance(value, tuple) or isinstance(value, Vec3) or len(value) != 2:
             return f"returns a {type(value).__name__}; it must return (torque, state)"
@@ -144,7 +144,7 @@ def calls(loop: Loop, state: LoopState) -> Iterator[Call]:
 
 
 def _moment(loop: Loop, state: LoopState) -> tuple[Sense, Task, Any]:
-    """What a controller is given in contact at the arm's start."""
+    """Input of a controller in contact at the arm's start."""
     q = loop.encoder.read(state.plant.q)
     arm = loop.conditioning.arm
     x = arm.pose(q)

@@ -33,7 +33,7 @@ class ElasticMode(NamedTuple):
         return ElasticState(0.0, 0.0)
 
     def acceleration(self, state):
-        """What spring and damper do [m/s^2]."""
+        """Acceleration by spring and damper [m/s^2]."""
         return -self.frequency * (2.0 * self.damping * state.rate + self.frequency * state.bend)
 
     def step(self, state, acceleration, dt):

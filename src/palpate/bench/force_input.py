@@ -47,11 +47,11 @@ class ForceInput(NamedTuple):
         return ForceInputState(sensor, analog, smooth if self.filtered == 1.0 else line)
 
     def sampled(self, state):
-        """What the converter reads now [N]."""
+        """Present reading of the converter [N]."""
         return self.converter.convert(state.line)
 
     def description(self):
-        """What an identifier has to know of the sampled force: its low-pass, its sampling [Hz], its delay [s].
+        """Properties of the sampled force for an identifier: its low-pass, its sampling [Hz], its delay [s].
 
         The delay is that of a reading that is fresh, beside the low-pass: from its sampling to the line. The
         analog filter of the line, where it is in use, is no part of what the sensor samples: no name is right.

@@ -163,7 +163,7 @@ class GivenMotion:
         return now, (after - before) * 0.5 * physics, (after - 2.0 * now + before) * physics * physics
 
     def _description(self, rests: list[float]) -> dict[str, Any]:
-        """What a record says of its making, in plain values."""
+        """Metadata of the record, in plain values."""
         told = [
             {"from_s": since, "rest_m": rest, "truth": _truth(surface)}
             for (since, surface), rest in zip(self.surfaces, rests, strict=False)

@@ -24,7 +24,7 @@ COLUMNS = {
     "B_identifier_std": "N s/m",
     "K_identifier_std": "N/m",
 }
-"""What an identifier adds to a record: its estimate after each tick, NaN before its first sample."""
+"""Columns of an identifier in a record: its estimate after each tick, NaN before its first sample."""
 
 
 class Identifier(Protocol):
@@ -34,7 +34,7 @@ class Identifier(Protocol):
         """Take one sample in: (acceleration, velocity, position), shape (3,), and the force [N]."""
 
     def estimate(self) -> Estimate:
-        """What is known so far, of M [kg], B [N s/m], K [N/m]."""
+        """Estimate so far of M [kg], B [N s/m], K [N/m]."""
 
 
 @law

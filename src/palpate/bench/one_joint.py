@@ -48,7 +48,7 @@ class JointState(NamedTuple):
 
 @part
 class JointTouch(NamedTuple):
-    """What was felt during a step."""
+    """Force and friction during a step."""
 
     force: float  # into the surface [N]
     friction: float  # torque lost [N m]

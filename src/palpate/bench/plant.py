@@ -24,7 +24,7 @@ class PlantState(NamedTuple):
 
 @part
 class Touch(NamedTuple):
-    """What the tip exerts on the surface during a step."""
+    """Force of the tip on the surface during a step."""
 
     normal: float  # into the surface [N], never negative
     tangential: float  # along y [N]

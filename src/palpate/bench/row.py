@@ -1,4 +1,4 @@
-"""What a run records at each tick: one row, every column a number with a unit."""
+"""Record of one tick: one row, every column a number with a unit."""
 
 from palpate._jit import law
 

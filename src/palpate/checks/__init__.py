@@ -1,4 +1,4 @@
-"""What is true of every part: a suite that palpate's own parts pass, for you to run on yours.
+"""Laws of every part: the conformance suite of palpate's own parts, for your own parts too.
 
 import pytest
 from palpate.checks import controller_checks

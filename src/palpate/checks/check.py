@@ -35,7 +35,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a check.
+    """Outcome of a check.
 
     Args:
         sentence: what must be true.

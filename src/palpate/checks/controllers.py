@@ -1,4 +1,4 @@
-"""What is true of every controller."""
+"""Laws of every controller."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def controller_checks(controller: Any) -> list[Check]:
 
 
 def a_moment() -> tuple[Sense, Task, Any]:
-    """What a controller is given at a tick in contact."""
+    """Input of a controller at a tick in contact."""
     arm = Arm3(limits=Vec3(16.0, 2.5, 0.6), rotor=ZERO3)
     x = Vec3(0.466, 1e-4, -1e-3)
     q, qd = arm.inverse(x, 1.0), Vec3(0.01, -0.02, 0.03)

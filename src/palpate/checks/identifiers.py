@@ -1,4 +1,4 @@
-"""What is true of every identifier that takes a regressor and a force."""
+"""Laws of every identifier with a regressor and a force."""
 
 from __future__ import annotations
 

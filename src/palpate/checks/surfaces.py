@@ -173,7 +173,7 @@ def no_step_is_too_long_when_it_is_free(surface: Any) -> None:
 
 
 def it_stays_at_rest_untouched(surface: Any) -> None:
-    """What nothing touches does not move."""
+    """Without contact it does not move."""
     state = surface.start()
     for _ in range(5):
         state = surface.free(state, DT)

@@ -17,7 +17,7 @@ EXAMPLE = "palpate "
 _INDENT = 4
 """Letters by which a command stands in from the text."""
 _PHRASE = (".", ",", ";", ":", ")", "]")
-"""What a phrase ends with."""
+"""Last characters of a phrase."""
 _BROKEN = 0.3
 """Share of the width that is rather left empty than a phrase broken."""
 

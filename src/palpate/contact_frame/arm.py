@@ -1,4 +1,4 @@
-"""What the arm itself puts into the numbers: the tool's mass beyond the sensor, and the arm's own compliance."""
+"""The arm's effect on the numbers: the tool's mass beyond the sensor, and the arm's own compliance."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _of_swing(mass: Parameter, arm: Arm) -> Parameter:
 
 
 def _compliance(parameters: Mapping[str, Parameter], arm: Arm, from_pose: bool) -> Warn | None:
-    """What to say about an arm whose own compliance nobody has told."""
+    """Warning about an arm of unknown compliance."""
     stiffness = parameters.get("K")
     if arm.stiffness is not None or arm.position_from == "tip" or stiffness is None:
         return None

@@ -1,4 +1,4 @@
-"""What a user says about an arm's log: the axes of its wrench, its tool, the contact's normal."""
+"""Properties of an arm's log declared by the user: axes of the wrench, tool, normal of the contact."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class ContactFrame:
 
 @dataclass(frozen=True)
 class Arm:
-    """What lies between the sensors and the surface.
+    """Mass and stiffness between the sensors and the surface.
 
     Args:
         tool_mass: mass between the force sensor and the surface and its standard deviation [kg]; None if not known.

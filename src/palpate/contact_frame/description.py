@@ -1,4 +1,4 @@
-"""What was declared and found about an arm's log, in sentences."""
+"""Declared and estimated properties of an arm's log, in sentences."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def _all_free(found: Identification, record: Record) -> tuple[Identification, Re
 
 
 def _about(arm: Arm) -> dict[str, Any]:
-    """What is known of the arm, as plain values."""
+    """Properties of the arm, as plain values."""
     return {
         "tool_mass_kg": list(arm.tool_mass) if arm.tool_mass else None,
         "robot_stiffness_N_per_m": list(arm.stiffness) if arm.stiffness else None,

@@ -1,4 +1,4 @@
-"""What a force sensor shows while nothing is touched: the tool's weight, and its own bias.
+"""Readings of a force sensor in free motion: the tool's weight, and the sensor's bias.
 
 The weight w keeps its direction in the base, the bias b in the sensor: f = R^T w + b with the tool's rotation R. Only a
 tool that turns tells the two apart. Least squares over all orientations: with R' the mean of R,

@@ -74,7 +74,7 @@ def across_per_along(vectors: Array, axis: Array) -> Array:
 
 
 def scale_std(normal: Normal, force: Array, place: Array) -> float:
-    """What the normal's uncertainty does to K, B and M, as a relative standard deviation.
+    """Effect of the normal's uncertainty on K, B and M, as a relative standard deviation.
 
     Args:
         normal: with its uncertainty.

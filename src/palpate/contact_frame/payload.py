@@ -1,4 +1,4 @@
-"""What hangs on a force sensor, as one value and one TOML file: the tool's mass and centre, the sensor's bias."""
+"""Payload of a force sensor, as one value and one TOML file: the tool's mass and centre, the sensor's bias."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Payload(Table):
 
     @property
     def meta(self) -> dict[str, list[float]]:
-        """What a record of a press with this tool says of it, for `identify_contact` [kg]."""
+        """Metadata of this tool in the record of a press, for `identify_contact` [kg]."""
         known = {"tool_mass_kg": self.beyond, "tool_inertia_kg": self.followed}
         return {name: list(value) for name, value in known.items() if value is not None}
 

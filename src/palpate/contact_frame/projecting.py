@@ -155,7 +155,7 @@ def _inertia_in_air(
 def _doubts(
     freed: Unloaded, signals: Signals, frame: ContactFrame, inertia: tuple[float, float] | None
 ) -> list[dict[str, Any]]:
-    """What the free rows say against the tool as it is compensated, or was weighed."""
+    """Contradictions between the free rows and the compensated or weighed tool."""
     from scipy.special import chdtri
 
     notes = []
@@ -181,7 +181,7 @@ def _doubts(
 def _about(
     signals: Signals, freed: Unloaded, normal: Normal, sign: float, frame: ContactFrame
 ) -> dict[str, Any]:
-    """What was declared and what was found, as plain values."""
+    """Declared and estimated properties, as plain values."""
     load = freed.load
     return {
         "wrench_frame": signals.wrench_frame,

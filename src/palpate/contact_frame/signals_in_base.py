@@ -111,7 +111,7 @@ def _wrench_frame(record: Record, frame: ContactFrame, turned: bool) -> tuple[st
 
 
 def _into_tool(wrench_frame: str, frame: ContactFrame, rotations: Array) -> Array:
-    """What turns the wrench's axes into the tool's, shape (n, 3, 3)."""
+    """Rotations from the wrench's axes to the tool's, shape (n, 3, 3)."""
     if wrench_frame == "base":
         return rotations.transpose(0, 2, 1)
     if wrench_frame == "tool":

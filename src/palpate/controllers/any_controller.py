@@ -59,7 +59,7 @@ class AnyController(NamedTuple):
         return self.second.report(state[1])
 
     def trouble(self, state):
-        """What is wrong with the one that acts."""
+        """Trouble of the active controller."""
         if self.chosen == 1:
             return self.first.trouble(state[0])
         return self.second.trouble(state[1])

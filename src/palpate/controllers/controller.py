@@ -1,4 +1,4 @@
-"""What every controller answers beside its law, and the table by which an experiment asks for it."""
+"""Methods of every controller beside its law, and its table in an experiment's file."""
 
 from typing import Any, ClassVar, TypeVar
 

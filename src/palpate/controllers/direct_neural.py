@@ -64,7 +64,7 @@ def see(signals, desired, f, f_before, torque):
 
 @part
 class DirectIntegral(NamedTuple):
-    """What `DirectNeural` is to first order: the integral of the force error, as a torque.
+    """First-order equivalent of `DirectNeural`: the integral of the force error, as a torque.
 
     Args:
         ki: [N m per N and sample].

@@ -91,7 +91,7 @@ class Neural(NamedTuple):
         return torque + model.J.T @ command, NeuralState(memory, sense.x, command)
 
     def rest(self, state, sense):
-        """What it has learned is kept; the pose is followed, so that the next contact has a pose before."""
+        """Keeps the learned weights and tracks the pose, so that the next contact has a previous pose."""
         return NeuralState(state.network, sense.x, ZERO3)
 
     def report(self, state):

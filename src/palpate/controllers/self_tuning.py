@@ -102,7 +102,7 @@ class SelfTuning(NamedTuple):
         return torque, SelfTuningState(memory, integral, rate, sense.f, by_ki, owing, Vec3(kf, ki, kd))
 
     def rest(self, state, sense):
-        """What was learned stays."""
+        """Keeps the learned weights."""
         no = 0.0 * self.kp
         return SelfTuningState(state.network, no, no, sense.f, no, no, state.gains)
 
@@ -134,7 +134,7 @@ class SelfTuningController(ControllerTable, tag="self-tuning"):
     scale: NotNegative = 0.3
     """The weights are drawn evenly from -scale ... scale."""
     inputs: PositiveTriple = (10.0, 5.0, 100.0)
-    """What the network's inputs are divided by: force error [N], the integral's share [N], force rate [N/s]."""
+    """Scales of the network's inputs: force error [N], the integral's share [N], force rate [N/s]."""
     dead_zone: NotNegative = 1.0
     """Force error that is not learned from [N]."""
     smoothing: Positive = 0.01

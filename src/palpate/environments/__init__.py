@@ -1,4 +1,4 @@
-"""What is touched: one-sided surfaces along their normal, and friction along them."""
+"""Environments: one-sided surfaces along their normal, and friction along them."""
 
 from palpate.environments.hunt_crossley import HuntCrossley, HuntCrossleySurface
 from palpate.environments.kelvin_voigt import KelvinVoigt, KelvinVoigtSurface

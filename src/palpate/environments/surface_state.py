@@ -1,4 +1,4 @@
-"""What is true of every surface, whatever its law: its state, and what happens at touch and at parting.
+"""Common parts of all surface laws: the state, and the events of touch and separation.
 
 Penetration p and deflection s are positive into the surface; forces are those on the surface, positive when
 it is pressed. In contact the surface moves with the tip (s = p); free, it moves by its own law. The surface

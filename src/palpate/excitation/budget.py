@@ -1,4 +1,4 @@
-"""What an excitation may ask of the robot and of the surface."""
+"""Limits of an excitation for the robot and the surface."""
 
 from __future__ import annotations
 

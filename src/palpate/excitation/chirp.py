@@ -30,7 +30,7 @@ def make(problem: Problem, seconds: float) -> Made:
 
 
 def _frequencies(sweep: Chirp) -> Array:
-    """What the sweep passes at even times [rad/s], shape (_FINE,)."""
+    """Frequencies of the sweep at even times [rad/s], shape (_FINE,)."""
     share = (np.arange(_FINE) + 0.5) / _FINE
     if sweep.logarithmic:
         return 2 * np.pi * sweep.low * (sweep.high / sweep.low) ** share

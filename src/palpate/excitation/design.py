@@ -40,7 +40,7 @@ class Design:
 
     @property
     def wave(self) -> Wave:
-        """What is added to the mean force."""
+        """The wave that is added to the mean force."""
         return self.made.wave
 
     @property

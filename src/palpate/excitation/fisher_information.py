@@ -1,4 +1,4 @@
-"""What a force sensor's readings of a known motion can say at best: Fisher information and the Cramer-Rao bound.
+"""Fisher information and Cramer-Rao bound of a force sensor's readings of a known motion.
 
 The chain: the force f = M a + B v + K x + offset passes the sensor's continuous low-pass H, is sampled at the
 sensor's own rate, and each sample carries white noise of its own. A log that repeats a reading in several rows has
@@ -24,7 +24,7 @@ from palpate.signals import Estimate
 from palpate.signals.low_pass import LowPass
 
 NAMES = ("K", "B", "M", "offset", "lag")
-"""What a bound is given for, in this order."""
+"""Parameters of the bound, in this order."""
 
 THESIS_FILTER = LowPass(((3, 120.0),))
 """Of the thesis' sensor (sec. 3.4)."""
@@ -57,7 +57,7 @@ class ForceChain:
 
 
 def phase_std(sampling: int, rate: int) -> float:
-    """What the pattern of fresh rows leaves open of the sensor's sampling instants: a standard deviation [s].
+    """Uncertainty of the sensor's sampling instants given the pattern of new rows: a standard deviation [s].
 
     Samples at `sampling` Hz, logged at `rate` Hz, fall on the instants of a grid of gcd/(sampling rate) between the
     rows; anywhere within one such step the log looks the same. 480 Hz in 1 kHz: 1/12 ms, a deviation of 24 us.

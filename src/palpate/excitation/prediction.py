@@ -1,4 +1,4 @@
-"""What an excitation will tell about a surface, known before the robot moves."""
+"""Predicted uncertainty of a surface under an excitation, before the robot moves."""
 
 from __future__ import annotations
 

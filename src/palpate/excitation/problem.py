@@ -1,4 +1,4 @@
-"""What is asked of an excitation, and what it is asked of."""
+"""Problem of an excitation: goals, surfaces, limits, sensors and loop."""
 
 from __future__ import annotations
 

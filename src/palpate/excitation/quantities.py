@@ -1,4 +1,4 @@
-"""What a user asks for, from text to SI: `3:8:N/mm`, `15:N`, `10%`, `K=2%,M=25%`."""
+"""Quantities of the command line, from text to SI: `3:8:N/mm`, `15:N`, `10%`, `K=2%,M=25%`."""
 
 from __future__ import annotations
 

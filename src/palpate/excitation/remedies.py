@@ -1,4 +1,4 @@
-"""What would help where an excitation cannot do what is asked."""
+"""Remedies if an excitation cannot reach the requested precision."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the sensors make of a motion: information about the surface, a second and a frequency at a time."""
+"""Information of the sensors about the surface, per second and frequency of a motion."""
 
 from __future__ import annotations
 
@@ -99,5 +99,5 @@ class Sensors:
 
     @property
     def lag_error(self) -> float:
-        """What is not known of the lag, the phase of the samples included: a standard deviation [s]."""
+        """Uncertainty of the lag, the phase of the samples included: a standard deviation [s]."""
         return hypot(self.lag_std, self.force.phase_std)

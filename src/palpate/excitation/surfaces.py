@@ -68,7 +68,7 @@ class SurfaceRange:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What is to be identified: K and B, and M if there is one."""
+        """Parameters to identify: K and B, and M if there is one."""
         return ("K", "B") if self.mass is None else ("K", "B", "M")
 
     def surfaces(self) -> tuple[Surface, ...]:

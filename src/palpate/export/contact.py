@@ -46,7 +46,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Contact:
-    """What is exported: f = K x + B v, one-sided, x the penetration.
+    """The exported contact: f = K x + B v, one-sided, x the penetration.
 
     Args:
         stiffness: K [N/m].

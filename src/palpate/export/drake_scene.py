@@ -171,7 +171,7 @@ def _no_entities(*_: Any) -> None:
 
 
 def probe_of(scene: Scene, surface: Collision, name: str | None) -> Collision | None:
-    """What presses: of that name, or the only other collision; None if there is no other.
+    """The probe: of that name, or the only other collision; None if there is no other.
 
     Raises:
         InputError: there are several, or none of that name.
@@ -189,10 +189,10 @@ def probe_of(scene: Scene, surface: Collision, name: str | None) -> Collision | 
 
 
 def notes(probe: bool) -> tuple[str, ...]:
-    """What holds for the file.
+    """Notes of the file.
 
     Args:
-        probe: whether what presses is in it too.
+        probe: whether the probe is in it too.
     """
     known = f"a point stiffness of {RIGID:g} N/m and a relaxation time of 0"
     other = (

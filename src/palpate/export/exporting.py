@@ -23,7 +23,7 @@ _DEPTH = 1e-3
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked.
+    """An export as requested.
 
     Args:
         target: one of `TARGETS`.
@@ -69,7 +69,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Checked:
-    """What pressing in the engine showed.
+    """Result of a press in the engine.
 
     Args:
         probe: what pressed.
@@ -142,7 +142,7 @@ class Exported:
         return f"{first}<!-- {safe} -->\n{self.text[at:]}"
 
     def lines(self) -> list[str]:
-        """What it is, with intervals and assumptions."""
+        """Description with intervals and assumptions."""
         own = self.contact
         mass = [f"M = {own.mass}"] if own.mass else []
         return [

@@ -62,13 +62,13 @@ class Rig(Protocol):
 
 @dataclass(frozen=True)
 class Pressed:
-    """What a simulator's contact did.
+    """Result of a press in a simulator.
 
     Args:
         stiffness, damping: of the force over penetration and its rate, by least squares [N/m], [N s/m].
         depth, force: largest [m], [N].
         residual: largest deviation from K x + B v, as a share of the largest force.
-        mass: of what presses, as the contact feels it [kg].
+        mass: effective mass of the probe at the contact [kg].
         time_step: [s].
         samples: in contact.
     """

@@ -111,7 +111,7 @@ def _line_of(value: Any) -> bytes:
 
 
 def _decoded(line: bytes, kind: type[T]) -> T | None:
-    """What a line holds; None where it is torn or its checksum is another."""
+    """Content of a line; None if it is truncated or its checksum differs."""
     import msgspec
 
     checksum, _, text = line.rstrip(b"\n").partition(b" ")

@@ -25,7 +25,7 @@ _FEET = {
     b"PAR1": b"\x18\x07palpate\x18",  # a key and its value, as Thrift writes them
     b"%PDF-": b"/Creator (palpate)",
 }
-"""What begins so bears its mark at its end."""
+"""Marks at the end of a file, by its first bytes."""
 _MARKS = re.compile(
     rb"|".join(
         (

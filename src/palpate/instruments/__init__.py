@@ -1,4 +1,4 @@
-"""What is measured, and how late: each instrument states its lag [s], the group delay at zero frequency."""
+"""Instruments: each states its lag [s], the group delay at zero frequency."""
 
 from palpate.instruments.converter import Converter
 from palpate.instruments.encoder import Encoder

@@ -48,7 +48,7 @@ class Feed:
         self.tell()
 
     def since(self, epoch: int, count: int) -> tuple[int, int, Array, int]:
-        """What a reader has not had yet.
+        """The rows that a reader has not received yet.
 
         Args:
             epoch: of its last row.

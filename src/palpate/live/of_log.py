@@ -55,7 +55,7 @@ def of_log(title: str, found: Identification, along: Record) -> Replay:
 
 
 def identified(found: Identification) -> tuple[dict[str, str], ...]:
-    """What `palpate identify` says, parameter by parameter: as it prints it."""
+    """Answer of `palpate identify`, parameter by parameter, as printed."""
     parameters = dict(found.parameters)
     point = found.working_point
     rows = [_fact("working point", point.stiffness)] if point else []

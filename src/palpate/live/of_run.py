@@ -33,7 +33,7 @@ _PLAIN = {
 
 
 def of_run(path: Path, found: Identification, *, whole: bool = False) -> Replay:
-    """What `palpate run` wrote, played again.
+    """The replayed record of `palpate run`.
 
     Args:
         path: of its `record.parquet`.
@@ -92,7 +92,7 @@ def _truth(meta: Mapping[str, Any], name: str) -> float:
 
 
 def _told(meta: Mapping[str, Any], *keys: str) -> Any:
-    """What stands in the record's experiment; None where it is spoiled."""
+    """The record's experiment; None if it is damaged."""
     value: Any = meta.get("experiment")
     for key in keys:
         value = value.get(key) if isinstance(value, dict) else None

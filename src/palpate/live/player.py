@@ -19,7 +19,7 @@ from palpate.live.view import STRIDE, Source
 PERIOD = 0.01
 """Between two looks at the clock [s]."""
 BEHIND = 0.1
-"""What is made up for after a stall; a longer one is lost [s]."""
+"""Longest stall that is caught up; a longer one is lost [s]."""
 STEP = 0.01
 """Of the step button [s]."""
 WAITING = 64

@@ -251,7 +251,7 @@ class PressingArm:
 
 
 def _sliders(gains: Gains) -> tuple[Slider, ...]:
-    """What can be changed while it presses."""
+    """Sliders of a press."""
     least = max(1.0, 10.0 * gains.arm.sensor.noise)
     return (
         Slider("force", "desired force", "N", least, min(40.0, 0.8 * gains.force_limit), FORCE),

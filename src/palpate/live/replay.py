@@ -16,7 +16,7 @@ FEWEST = 3
 
 @dataclass(frozen=True)
 class Signals:
-    """What is played: any of `COLUMNS`, by name, each of shape (n,), with times that grow.
+    """The replayed columns: any of `COLUMNS`, by name, each of shape (n,), with times that grow.
 
     Args:
         columns: signals by name; `t` is among them.

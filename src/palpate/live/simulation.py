@@ -269,7 +269,7 @@ def _notes(experiment: Experiment) -> tuple[str, ...]:
 
 
 def sliders_of(experiment: Experiment) -> tuple[Slider, ...]:
-    """What can be changed of an experiment while it runs."""
+    """Sliders of a running experiment."""
     force, surface = float(experiment.force.first), experiment.surface
     K, B = (
         float(getattr(surface, name, 0.0)) for name in ("stiffness", "damping")

@@ -117,7 +117,7 @@ class Stability:
 
 
 def answers(asked: Asked) -> Iterator[Answer]:
-    """What can be said of the loop, sooner and then better.
+    """Answers on the loop's stability, a fast one first, then better ones.
 
     Each has `stiffness`, the interval of surfaces [N/m] or None, and its `label`; `proved`, whether this surface is one
     of which a proof holds; and `text`.
@@ -178,7 +178,7 @@ def _of_arm(asked: OfArm) -> Iterator[Answer]:
 
 @cache
 def _proof(encoded: bytes, adapting: bool) -> tuple[Claim, ...]:
-    """What is proved of gains, given as JSON; a proof that does not hold proves nothing."""
+    """Proved claims of gains, given as JSON; a certificate that fails its check has none."""
     from palpate.force import certify
 
     certificate = certify(msgspec.json.decode(encoded, type=Gains), adapting=adapting)

@@ -1,4 +1,4 @@
-"""What a page is shown: rows of these columns, and a description of what they are of."""
+"""Content of the live page: rows of these columns, and a description of their source."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class View:
-    """What is shown.
+    """Description of the shown simulation or log.
 
     Args:
         title: in a few words.
@@ -223,14 +223,14 @@ def planar_bones(links: tuple[float, ...], row: Array) -> Array:
 
 
 class Source(Protocol):
-    """What runs: a simulation, or a log that is played again."""
+    """The source of rows: a simulation, or a replayed log."""
 
     view: View
     state: State
 
     @property
     def loop_asked(self) -> Any:
-        """What `palpate.live.stability` is asked of it; None where there is no loop."""
+        """Question to `palpate.live.stability`; None without a loop."""
         ...
 
     def bones(self, row: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What kind of log a file is: told by what it begins with, not by its name."""
+"""The format of a log file, recognised by its first bytes, not by its name."""
 
 from __future__ import annotations
 

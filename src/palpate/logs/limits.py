@@ -35,7 +35,7 @@ class LimitError(InputError):
 
 @dataclass
 class Budget:
-    """What is left of the limits while one log is read.
+    """Remaining limits while one log is read.
 
     Args:
         path: the log.

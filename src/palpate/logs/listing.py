@@ -1,4 +1,4 @@
-"""What a log holds: topics, variables or columns, and how each is named on the command line."""
+"""Contents of a log: topics, variables or columns, and their names on the command line."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Listing:
-    """What a log holds.
+    """Contents of a log.
 
     Args:
         entries: of the log, in its order.
@@ -67,7 +67,7 @@ class Listing:
 
 
 def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | None = None) -> Listing:
-    """What a log holds, what is wrong with it, and how to identify it.
+    """Contents of a log, its faults, and a command to identify it.
 
     Args:
         path: of the log.

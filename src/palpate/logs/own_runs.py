@@ -15,7 +15,7 @@ from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 
 RUN = {"time": "t", "position": "x_measured", "force": "force_sampled"}
-"""What a run's record calls the columns of a log: encoder's position, and the force as the sensor sampled it."""
+"""Columns of a run's record that form a log: the encoder's position, and the sampled force."""
 
 
 def is_run(path: Path) -> bool:

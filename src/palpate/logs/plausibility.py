@@ -77,7 +77,7 @@ def check_range(columns: Mapping[str, Array], names: Mapping[str, str], path: Pa
 
 
 def implausible_times(columns: Mapping[str, Array], start: float, spec: str) -> list[dict[str, Any]]:
-    """What is strange about the time of a log, as a record's meta has it.
+    """Doubts about the time of a log, as in a record's meta.
 
     Args:
         columns: by role, in SI units.

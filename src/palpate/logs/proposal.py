@@ -26,9 +26,9 @@ _NAMES = {
     ),
     "force": r"forc|^f$|^f[nxyz]$|[_.]f[nxyz]?$|^f_|load|kraft|fuerza|weight|scale|effort|torque|newton|press",
 }
-"""What the columns of laboratories are called."""
+"""Usual names of columns in laboratories."""
 _SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}
-"""What changes by more than so much is hardly in SI units; and which unit it is taken in then."""
+"""Largest plausible range in SI units, and the assumed unit above it."""
 _RATE = 1000
 """Of the example [Hz]; nothing is computed with it."""
 
@@ -245,7 +245,7 @@ def _with_unit(table: Columns, own: Seen, quantity: str, guesses: list[str]) -> 
 
 
 def _call(table: Columns, own: Seen) -> str:
-    """What to name a column by: its name, or its number where the name would be misread."""
+    """Identifier of a column: its name, or its number if the name would be misread."""
     plain = re.fullmatch(r"[^\W\d-][^\x00-\x1f\x7f-\x9f,:]*", own.name) is not None
     return own.name if plain and table.names.count(own.name) == 1 else str(own.place)
 

@@ -1,4 +1,4 @@
-"""What a column of a record is: a time, a length, a force; and which units it may have in a log."""
+"""Roles of a record's columns (time, length, force) and their possible units in a log."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ _ALLOWED = {
 
 @dataclass
 class Loaded:
-    """What a file gave for the columns asked for.
+    """Values of the requested columns of a file.
 
     Args:
         columns: by role, in SI units, each of shape (n,); with the role `time`, which begins at 0.
@@ -79,12 +79,12 @@ class Loaded:
 
 
 def family(role: str) -> str:
-    """What a role is one of: `force` for `force` and for `force_x`."""
+    """Base role: `force` for `force` and for `force_x`."""
     return role.partition("_")[0]
 
 
 def quantity(role: str) -> str:
-    """What a role measures; empty for one that palpate does not know."""
+    """Quantity of a role; empty for an unknown one."""
     return _QUANTITY.get(family(role), "")
 
 

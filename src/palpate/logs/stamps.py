@@ -14,7 +14,7 @@ from palpate.logs.bags import Stream
 _BLOCKS = 20
 """Parts of a log in each of which the quickest message is looked for: a drift of the clocks shows between them."""
 _AGREE = 0.02
-"""What different ways to the recorder may make [s]."""
+"""Largest difference of transport times to the recorder [s]."""
 _TRANSPORT = 0.2
 """No message is longer on its way [s]; a larger difference is one of clocks."""
 _BEFORE = -0.005
@@ -111,7 +111,7 @@ def _delay(stream: Stream) -> _Delay:
 
 
 def _disagreement(streams: Sequence[Stream], delays: Sequence[_Delay]) -> tuple[str | None, bool]:
-    """What to say about clocks that seem to differ, and whether they do for certain."""
+    """Message about clocks that seem to differ, and whether the difference is certain."""
     early, late = min(delays, key=lambda d: d.offset), max(delays, key=lambda d: d.offset)
     offset = late.offset - early.offset
     drift = max(d.drift for d in delays) - min(d.drift for d in delays)

@@ -63,7 +63,7 @@ class Network(NamedTuple):
         descend(self.sizes, state.weights, state.signals, state.deltas, self.learning_rate, 1.0)
 
     def gain(self, state, k):
-        """What a step for error 1 of output k alone would add to that output, to first order.
+        """Change of output k by one step of learning for error 1 of that output alone, to first order.
 
         A learning network is an integrator: this is its integral gain per sample, at this place and time.
         """

@@ -1,4 +1,4 @@
-"""What is asked for: the approach to the surface, and the force to press with."""
+"""Desired motion and force: the approach to the surface, and the force schedule."""
 
 from palpate.references.approach import Approach
 from palpate.references.force_schedule import ForceSchedule

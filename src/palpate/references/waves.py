@@ -1,4 +1,4 @@
-"""What may be added to a desired force to excite a surface: a sweep, or many sines at once."""
+"""Excitations that are added to a desired force: a chirp, or a multisine."""
 
 from __future__ import annotations
 

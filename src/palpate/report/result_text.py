@@ -18,7 +18,7 @@ _WIDTH = 100
 
 
 def printed(show: Callable[[Console], None]) -> str:
-    """What a function prints on a console, as plain text."""
+    """Console output of a function, as plain text."""
     from io import StringIO
 
     from rich.console import Console

@@ -23,7 +23,7 @@ K, B, M, F = (DATA[name] for name in ("K", "B", "M", "F"))
 """One colour a quantity, the same by light and by dark: stiffness, damping, mass; true force and contact."""
 MEASURED, FAIL, DOUBT, OK = (DATA[name] for name in ("measured", "fail", "warn", "ok"))
 SERIES = tuple(tokens.SERIES.values())
-"""What is compared and is no quantity of its own."""
+"""Colours of compared series that are no quantity."""
 KNOWN: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": (0, (5, 4))}
 """The line of what is asked for, or known to be true."""
 FORMATS = (".png", ".svg", ".pdf")

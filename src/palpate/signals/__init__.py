@@ -1,4 +1,4 @@
-"""What passes between rooms: what is sensed, what is asked for, what is estimated."""
+"""Values that pass between rooms: measurements, tasks, estimates."""
 
 from palpate.signals.types import Estimate, Sense, Task, passive_verdict, verdict
 

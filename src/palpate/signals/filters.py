@@ -129,7 +129,7 @@ class Channel(NamedTuple):
 
 
 class StateVariableState(NamedTuple):
-    """What the two trapezoidal integrators hold."""
+    """State of the two trapezoidal integrators."""
 
     i1: Any
     i2: Any

@@ -1,4 +1,4 @@
-"""What a force sensor's electronics do to the force before it is sampled: low-passes in continuous time."""
+"""Low-passes of a force sensor before its sampling, in continuous time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tables of an experiment's or a study's file are made of, and how the kinds of a part are found."""
+"""Base of the tables in an experiment's or a study's file, and the discovery of the kinds of a part."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from palpate.results import Compared
 
 @part
 class Sense(NamedTuple):
-    """What the controller knows at a tick."""
+    """Measurements of the controller at a tick."""
 
     q: Vec3  # joint angles [rad], shape (n,)
     qd: Vec3  # joint rates [rad/s], shape (n,)
@@ -27,7 +27,7 @@ class Sense(NamedTuple):
 
 @part
 class Task(NamedTuple):
-    """What is asked of the controller at a tick."""
+    """Task of the controller at a tick."""
 
     x: Vec3  # desired pose, shape (m,)
     xd: Vec3  # its rate
@@ -38,7 +38,7 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Estimate(Compared):
-    """What an identifier knows so far.
+    """Estimate of an identifier so far.
 
     Args:
         names: of the parameters, in their order: ("M", "B", "K") for the thesis' regressor.

@@ -49,7 +49,7 @@ def rougher(experiment: Experiment, factor: float) -> Mapping[str, Any]:
 
 
 def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
-    """What no figure of force control is left without: half and double friction, the wall nearer and farther."""
+    """Variations of every force-control figure: half and double friction, the wall nearer and farther."""
     return {
         "friction\nhalf": rougher(experiment, 0.5),
         "friction\ndouble": rougher(experiment, 2.0),

@@ -1,4 +1,4 @@
-"""What a file under `figures/` or `explanations/` has to offer, and how the files are found."""
+"""Interface of a file under `figures/` or `explanations/`, and the discovery of these files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Study(Protocol):
     PARAMETERS: Any
 
     def run(self, runs: Runs) -> Any:
-        """What `check` and `plot` need, and no more."""
+        """Measured values for `check` and `plot`, and no others."""
         ...
 
     def check(self, data: Any) -> Sequence[Claim]:

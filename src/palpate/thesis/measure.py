@@ -42,7 +42,7 @@ class Written:
 
 @dataclass
 class State:
-    """What the folder holds, and for which sources and seeds."""
+    """Content of the folder, with its sources and seeds."""
 
     stamp: str
     wanted: list[str]

@@ -60,7 +60,7 @@ def _chapters(done: Sequence[Done]) -> list[dict[str, Any]]:
 
 
 def chapter_of(number: str) -> str:
-    """What a figure is about, by its number in the thesis; names of ours are explanations."""
+    """Chapter of a figure, by its number in the thesis; a name of ours is an explanation."""
     for start, title in _CHAPTERS:
         if number.startswith(start):
             return title

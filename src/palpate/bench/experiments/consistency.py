@@ -1,4 +1,4 @@
-"""What the numbers of an experiment must be to one another; each by itself is checked where it is read."""
+"""Consistency of an experiment's numbers with each other; each number alone is checked where it is read."""
 
 from __future__ import annotations
 

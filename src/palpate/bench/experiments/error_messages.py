@@ -52,7 +52,7 @@ def explained(message: str, tables: Mapping[str, Any], kind: Any) -> str:
 
 
 def not_finite(tables: Any, steps: tuple[str, ...] = ()) -> str | None:
-    """What to say of the first number that is infinite or none; None where all are well."""
+    """Message about the first number that is not finite; None if all are."""
     if isinstance(tables, float) and not math.isfinite(tables):
         return f"{_name(list(steps))} must be finite, got {tables}"
     pairs = (
@@ -97,7 +97,7 @@ def _keys(kind: Any, tables: Mapping[str, Any], steps: list[str]) -> list[str]:
 
 
 def _choices(kind: Any, tables: Mapping[str, Any], steps: list[str]) -> list[str]:
-    """What a key may say that takes one of several words."""
+    """Allowed words of a key."""
     *table, key = steps
     structs = list(_structs(kind, tables, table, of_any_kind=True))
     tags = [s.__struct_config__.tag for s in structs if s.__struct_config__.tag_field == key]

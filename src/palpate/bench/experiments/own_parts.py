@@ -25,7 +25,7 @@ _FIELDS: dict[Any, Any] = {float: float, int: int, bool: bool, Vec3: float | Tri
 
 @dataclass(frozen=True)
 class Role:
-    """What a part of the user's may be in an experiment.
+    """Role of a user's part in an experiment.
 
     Args:
         key: its table.
@@ -135,7 +135,7 @@ def _table_of(key: str, known: Plugin) -> Any:
 
 
 def role_of(name: str) -> Role:
-    """What a plug-in is, by what it can do.
+    """Role of a plug-in, from its methods.
 
     Raises:
         InputError: it cannot be imported, or is no part.

@@ -1,4 +1,4 @@
-"""What is measured of a run: pure functions of its record, by name."""
+"""Metrics of a run: pure functions of its record, by name."""
 
 from __future__ import annotations
 

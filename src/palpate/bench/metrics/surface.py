@@ -1,4 +1,4 @@
-"""What the estimators that watch a run make of the surface, at its end, and how far that is from the truth."""
+"""Final estimates of a run's on-line estimators, and their errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the thesis claims of a run, as numbers and as yes or no."""
+"""Claims of the thesis about a run, as numbers and as yes or no."""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ class Look:
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """What `palpate run` says of the record."""
+        """Summary of the record by `palpate run`."""
         return summarise(self.record)
 
 

@@ -38,7 +38,7 @@ class StepsAndSine(Table):
 
 
 class Priors(Table):
-    """What the law is told, over what is so; 1 is the truth."""
+    """Factors of the law's prior over the truth; 1 is the truth."""
 
     cap: Positive = 1.0
     """Of the stiffest surface that there may be."""

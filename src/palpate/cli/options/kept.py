@@ -23,7 +23,7 @@ _NEVER = {
     "options", "preset", "save-options", "figure", "no-figure", "report", "json", "out", "replace",
     "wire", "yes", "dry-run", "record", "recover",
 }  # fmt: skip
-"""What is of one call and not of a cell; above all what moves an arm."""
+"""Options of a single call rather than of a cell, above all those that move an arm."""
 _TYPED = {"press": {"force", "position", "seconds"}}
 """By command, what is of a call there, though the same word is of the cell elsewhere."""
 _PATHS = {"payload", "robot-stiffness-from", "gains", "certificate"}

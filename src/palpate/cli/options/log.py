@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _SHOWN = 40
 Rotation = Literal["quaternion", "quaternion-wxyz", "rotation-vector", "rpy", "matrix", "matrix-by-columns"]
 GB = 2.0
-"""What a log may unpack to [GB]; the default of `palpate.logs.limits`."""
+"""Largest unpacked size of a log [GB]; the default of `palpate.logs.limits`."""
 
 
 @Parameter(name="*", group=Group("Signals of the log", sort_key=1))

@@ -58,7 +58,7 @@ def wrong_sign(inertia: tuple[float, float] | None) -> bool:
 
 
 def wrong_sign_of(inertia: tuple[float, float]) -> str:
-    """What to say of it."""
+    """Text of the warning."""
     return (
         f"in free motion the force follows the acceleration as a mass of {inertia[0]:.3g} kg (std {inertia[1]:.2g})"
         " would: the tool's inertia is compensated with the wrong sign, or twice"

@@ -1,4 +1,4 @@
-"""What speaks against a log by which a tool was weighed: another frame, a touch, a sensor at its end, an inertia."""
+"""Checks of a log for weighing: wrong frame, contact, saturation, wrong compensation of the inertia."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _FEWEST = 3
 _UPRIGHT = 0.5**0.5
 """Cosine of the angle to the vertical at which a base is as near to one on a wall as to one that stands or hangs."""
 _ROUNDS = 3
-"""What is left of the tool's acceleration after a round is the share by which its mass is still wrong: of ten per cent
+"""After a round the residual of the tool's acceleration is the relative error of its mass: of ten per cent
 three rounds leave a thousandth."""
 _SMOOTH = 0.1
 """Of the window by which an acceleration is read off the positions [s]: what is slower than some 6 Hz passes, and no
@@ -43,7 +43,7 @@ arm turns its tool faster."""
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Weighed(Result, shown_by="palpate.report.payload.in_python"):
-    """What a log tells of a tool.
+    """A tool's payload, estimated from a log.
 
     Args:
         payload: None where the poses do not tell it.

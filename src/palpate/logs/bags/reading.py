@@ -78,7 +78,7 @@ class Storage:
             return
 
     def _items(self) -> Iterator[Channel | Raw | End]:
-        """What the file holds up to its end, or to whatever in it cannot be read."""
+        """Content of the file up to its end, or to the first unreadable part."""
         try:
             for item in self._scan(self.path, self._budget):
                 if isinstance(item, Raw) and not (
@@ -148,7 +148,7 @@ def open_files(
 
 
 class _About(msgspec.Struct, frozen=True):
-    """What matters of a bag's metadata."""
+    """The used part of a bag's metadata."""
 
     relative_file_paths: list[str] = []
     compression_mode: str = ""
@@ -192,5 +192,5 @@ def _unpacked(path: Path, budget: Budget, to: TemporaryDirectory[str]) -> Path:
 
 
 def first_line(error: Exception) -> str:
-    """What an error of a library says, in a line."""
+    """Message of a library's error, in a line."""
     return (str(error).splitlines() or [""])[0].rstrip(".") or type(error).__name__

@@ -77,7 +77,7 @@ def _records(file: BinaryIO, budget: Budget, *, packed: bool = False) -> Iterato
 
 
 def _inside(data: bytes, packing: str, size: int, crc: int, budget: Budget) -> bytes | None:
-    """What a chunk holds; None if it is damaged."""
+    """Content of a chunk; None if it is damaged."""
     try:
         inside = unpacked(data, packing, size, budget)
     except LimitError:

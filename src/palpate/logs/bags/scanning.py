@@ -1,4 +1,4 @@
-"""What the scanners of bags yield, and how much of a file they found whole."""
+"""Output of the bag scanners, and the intact part of a file."""
 
 from __future__ import annotations
 

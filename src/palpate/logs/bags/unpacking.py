@@ -1,4 +1,4 @@
-"""What bags pack, unpacked no further than they say and may."""
+"""Decompression of bags, up to their stated size and the limit."""
 
 from __future__ import annotations
 

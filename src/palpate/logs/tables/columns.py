@@ -16,7 +16,7 @@ from palpate.errors import InputError, unknown
 
 @dataclass(frozen=True)
 class Stated:
-    """What a file itself says about one of its columns.
+    """Statements of the file about one of its columns.
 
     Args:
         unit: its symbol; None if the file gives none that palpate knows.

@@ -26,7 +26,7 @@ _OWN = 2 * GB
 _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
 """Threads that libraries would start, one for each core, take address space of their own."""
 _COPIES = 3
-"""What is unpacked stands in memory packed, unpacked and as the answer."""
+"""Memory per unpacked byte: the data exist packed, unpacked and as the answer."""
 _MOST = 2**60
 _TOO_LARGE = 3
 """The exit code of the process where the file unpacks to more than it may."""

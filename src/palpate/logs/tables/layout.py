@@ -1,4 +1,4 @@
-"""What a text log looks like: what parts its cells, where its rows begin, the names and units above them."""
+"""Layout of a text log: its delimiter, its first row, the names and units above it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Layout:
 
     @property
     def delimiter_name(self) -> str:
-        """What to call the delimiter in a sentence."""
+        """Name of the delimiter in a sentence."""
         return _NAMES.get(self.parting.delimiter, repr(self.parting.delimiter))
 
 

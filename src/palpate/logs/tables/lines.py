@@ -15,7 +15,7 @@ LOOK = 4_000_000
 _LINES, _LETTERS, _FEWEST = 1000, 500_000, 20
 """Of these, no more lines are parted, or no more letters, but always some lines."""
 COMMENTS = ("#", "%", "//", ";")
-"""What a line of comment begins with; a semicolon only where it does not part the cells."""
+"""Beginnings of a comment line; a semicolon only if it is not the delimiter."""
 NO_READING = {"", "nan", "na", "n/a", "null", "none", "-", "--"}
 """Words that stand for no reading, in lower case."""
 
@@ -30,7 +30,7 @@ _NO_TEXT = {
     b"\xfe\xff": "is UTF-16 text; save it as UTF-8",
     b"TDSm": "is a TDMS file of LabVIEW; write its channels out as CSV or .lvm",
 }
-"""What other files begin with."""
+"""First bytes of other file formats."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _SPACED = re.compile(r"\[[^\]]*\]|\([^)]*\)|[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?")
@@ -54,7 +54,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Parting:
-    """What parts the cells of a line, and how numbers are written.
+    """Delimiter of the cells and format of the numbers.
 
     Args:
         delimiter: one character; a space stands for any run of white space.

@@ -31,7 +31,7 @@ _AT_ONCE = 16 * 10**6
 
 
 class About(msgspec.Struct, frozen=True):
-    """What palpate leaves in a Parquet file beside the columns.
+    """Metadata of palpate in a Parquet file.
 
     Args:
         units: the SI unit of each column.

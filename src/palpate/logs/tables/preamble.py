@@ -1,4 +1,4 @@
-"""What instruments write above their rows: the rate, the units, the scales of their channels."""
+"""Lines of instruments above the rows: the rate, the units, the scales of their channels."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LAST_HEADER = "***End_of_Header***"
 
 @dataclass(frozen=True)
 class Preamble:
-    """What the lines above the rows state.
+    """Statements of the lines above the rows.
 
     Args:
         rate: rows per second [1/s]; None if they do not say.

@@ -78,7 +78,7 @@ class Text:
             raise InputError(f"{error}{self._doubts(name)}") from None
 
     def _doubts(self, name: str) -> str:
-        """What may be behind a column that is not there."""
+        """Likely reason for a missing column."""
         if name in self.names or name.isdigit():
             return ""
         text = ""

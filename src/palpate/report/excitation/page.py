@@ -130,7 +130,7 @@ def _rows(found: Design) -> list[list[dict[str, Any]]]:
 
 
 def _charts(found: Design) -> dict[str, Any]:
-    """What the charts are drawn from, in plain values."""
+    """Data of the charts, in plain values."""
     time, force = found.force()
     rows = thinned(force, _ROWS)
     budget = found.problem.budget

@@ -34,7 +34,7 @@ def describe_remedy(remedy: Remedy, found: Design) -> str:
 
 
 def describe_wave(found: Design) -> str:
-    """What is asked for, in a line."""
+    """The request, in a line."""
     budget, wave = found.problem.budget, found.wave
     if isinstance(wave, Multisine):
         low, high = wave.frequencies[0], wave.frequencies[-1]

@@ -1,4 +1,4 @@
-"""What is drawn in a panel of matplotlib, by what it is: curves, levels, moments, stretches."""
+"""Drawn parts of a matplotlib panel, by kind: curves, levels, moments, intervals."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Level:
-    """What goes through the whole panel at a height: a line, or a band where `low` and `high` differ."""
+    """A horizontal line through the whole panel, or a band if `low` and `high` differ."""
 
     low: float
     high: float

@@ -1,4 +1,4 @@
-"""What stands at a panel of matplotlib, as plain text."""
+"""Labels of a matplotlib panel, as plain text."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def plain(text: str) -> str:
 
 
 def unit(text: str) -> str:
-    """What a label has in brackets at its end."""
+    """The bracketed end of a label."""
     found = _UNIT.search(text)
     return found[1] if found else ""
 

@@ -114,7 +114,7 @@ def _add_level(one: Level, series: list[dict[str, Any]], columns: dict[str, Any]
 
 
 def _silence(series: list[dict[str, Any]], axes: Axes) -> None:
-    """What has no name, or one that another line has, stands in no legend; a lone line is named by its axis."""
+    """Hide lines without a name, or with another's, from the legend; the axis names a single unnamed line."""
     told: set[str] = set()
     for one in series:
         one["silent"] = not one["label"] or one["label"] in told

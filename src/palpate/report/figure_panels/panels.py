@@ -41,19 +41,19 @@ def panels_of(drawing: Figure) -> list[dict[str, Any]]:
 
 
 def panel_scripts() -> tuple[str, ...]:
-    """What draws the panels of a page; it has them as JSON by the id of the element that holds them, in `#panels`."""
+    """Script of a page's panels; it reads them as JSON from `#panels`, by the id of their element."""
     return (*scripts(*CHARTS), text_of("panels.js", "palpate.report.figure_panels"))
 
 
 def shown_in(figures: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """What `page.html` takes to show figures, each an image (`source`) or `panels` of `panels_of`, with a caption."""
+    """Figures for `page.html`, each an image (`source`) or `panels` of `panels_of`, with a caption."""
     drawn = {str(i): one["panels"] for i, one in enumerate(figures, 1) if "panels" in one}
     codes = (*scripts(*TABLES), *panel_scripts()) if drawn else scripts(*TABLES)
     return {"figures": figures, "panels": data(drawn) if drawn else "", "scripts": codes}
 
 
 def _names(axes: Sequence[Axes]) -> dict[Kind, str]:
-    """What lines are called, where they have a name in one panel alone of all."""
+    """Names of the kinds of lines that have one name over all panels."""
     lines = [line for one in axes for line in one.lines if label_of(line)]
     found: dict[Kind, set[str]] = {}
     for line in lines:

@@ -12,7 +12,7 @@ from typing import Any
 from palpate.report.look.tokens import style_sheet
 
 CHARTS = ("vendor/uplot/uPlot.iife.min.js", "charts.js")
-"""What draws charts that can be zoomed and read."""
+"""Library of the interactive charts."""
 ARM = ("arm.js",)
 ARM_IN_SPACE = (*ARM, "arm3.js")
 TABLES = ("tables.js",)

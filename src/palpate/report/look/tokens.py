@@ -26,7 +26,7 @@ SERIES = {
     "s4": "#6f8c00",
     "s5": "#94707f",
 }
-"""What is compared and is no quantity of its own: laws, settings, seeds; none of them is a colour of `DATA`."""
+"""Colours of compared series that are no quantity: laws, settings, seeds; none is a colour of `DATA`."""
 
 OUTCOMES = {
     "follows": "#7fbf94",
@@ -41,7 +41,7 @@ OUTCOMES = {
     "failed": "#7a7a7a",
     "refused": "#dedede",
 }
-"""What a run may come to, as the fields of a map: grounds, not lines."""
+"""Background colours of the outcomes of a run in a map."""
 
 MAPS = {"map-low": "#e6f3c9", "map-high": "#173f6b", "map-mark": "#14181d", "map-halo": "#ffffff"}
 """Of a map: the ends of its scale, what is marked on it, and the rim that keeps a mark legible on any field."""
@@ -65,7 +65,7 @@ PAIRS = {
     "fail-ground": ("#fdeeee", "#331b1f"),
     "warn-ground": ("#fbf5e2", "#2c2614"),
 }
-"""What is turned where the reader's page is dark: grounds, lines, letters."""
+"""Colours that change on a dark page: backgrounds, lines, letters."""
 
 
 def style_sheet() -> str:

@@ -56,7 +56,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
 
 
 def notes(summary: dict[str, Any]) -> list[str]:
-    """What a reader must not miss."""
+    """Warnings of the page."""
     end = summary["end"]
     found = [] if end == "done" else [f"{end}: {summary['why']}."]
     if summary["contacts_lost"]:

@@ -26,7 +26,7 @@ MOST = 300
 _WIDE, _HIGH, _DPI = 6.4, 5.0, 100
 _REACH = (-0.06, 0.56)
 _SIDE = (-0.17, 0.1)
-"""What the picture shows along x and y [m]: all that the planar arm reaches before a wall, and its base."""
+"""Extent of the picture along x and y [m]: the planar arm's reach in front of a wall, and its base."""
 
 
 def write_movie(record: Record, path: Path) -> Path:

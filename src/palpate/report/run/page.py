@@ -41,7 +41,7 @@ _STILL = ("force", "identification")
 
 @dataclass(frozen=True)
 class Content:
-    """What the page is of.
+    """Content of the page.
 
     Args:
         title, about: of the experiment.
@@ -155,7 +155,7 @@ def _identified_by(content: Content) -> str:
 
 
 def _surface(content: Content) -> list[dict[str, str]]:
-    """What was identified beside the truth."""
+    """Identified parameters beside the truth."""
     if content.found is None:
         return []
     truth = content.summary["truth"]
@@ -192,7 +192,7 @@ def _pictures(record: Record) -> Iterator[dict[str, str]]:
 
 
 def _charts(record: Record, summary: dict[str, Any]) -> dict[str, Any]:
-    """What the charts and the arm are drawn from, in plain values."""
+    """Data of the charts and the arm, in plain values."""
     t, phase = record["t"], record["phase"]
     touched = summary["contact_at_s"]
     near = np.zeros(len(t), dtype=bool) if touched is None else (t > touched - 1.0) & (t < touched + 2.0)

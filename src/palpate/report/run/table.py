@@ -20,7 +20,7 @@ def tables(summary: dict[str, Any], found: Identification | None) -> list[Table]
 
 
 def notes(summary: dict[str, Any]) -> list[str]:
-    """What a reader must not miss."""
+    """Warnings of the table."""
     return [" ".join(part for part in (a["title"], a["text"], a["advice"]) if part) for a in alerts(summary)]
 
 
@@ -44,7 +44,7 @@ def force_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def surface_table(summary: dict[str, Any], found: Identification) -> Table:
-    """What `palpate identify` says of the record, beside the truth."""
+    """Answer of `palpate identify` for the record, beside the truth."""
     truth = summary["truth"]
     rows = []
     for name, p in found.parameters.items():
@@ -88,7 +88,7 @@ def thesis_table(summary: dict[str, Any]) -> Table:
 
 
 def _own(value: float | None, std: float | None) -> str:
-    """What the experiment's own identifier says."""
+    """Estimates of the experiment's own identifier."""
     if value is None or std is None:
         return plain(value)
     return with_half(value, 1.96 * std)

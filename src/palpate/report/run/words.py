@@ -15,7 +15,7 @@ _ADVICE = {
 
 
 def sentence(summary: dict[str, Any]) -> str:
-    """What came of the run."""
+    """Outcome of the run."""
     force, end = summary["force"], summary["end"]
     if force is None:
         return f"The arm touched nothing: {summary['why']}."
@@ -41,7 +41,7 @@ def _contact(summary: dict[str, Any]) -> str:
 
 
 def alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
-    """What a reader must not miss, what failed first."""
+    """Warnings, failures first."""
     found = []
     end = summary["end"]
     if end != "done":

@@ -13,7 +13,7 @@ from palpate.report.page import Table, captioned, render
 
 @dataclass(frozen=True)
 class StudyPage:
-    """What the page is of.
+    """Content of the page.
 
     Args:
         title, about: of the study.

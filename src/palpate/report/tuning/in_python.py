@@ -21,7 +21,7 @@ def line(told: Tuning) -> str:
 
 
 def text(told: Tuning) -> str:
-    """What `palpate tune` prints."""
+    """Output of `palpate tune`."""
     return printed(lambda console: show(told, console))
 
 

@@ -1,4 +1,4 @@
-"""What `palpate tune` prints."""
+"""Output of `palpate tune`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def rows(told: Tuning) -> list[tuple[str, str]]:
-    """What there is to know, name and value."""
+    """Results as pairs of name and value."""
     gains, arm = told.gains, told.gains.arm
     slowest = max(step.settling for step in told.steps)
     (low, high), at = told.exact, told.margins

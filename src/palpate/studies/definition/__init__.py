@@ -1,1 +1,1 @@
-"""What a study is: its file, its parameters, and the plan of its runs."""
+"""Definition of a study: its file, its parameters, and the plan of its runs."""

@@ -35,7 +35,7 @@ def experiment_of(base: AnyExperiment, tables: Tables) -> AnyExperiment:
 
 
 def value_at(tables: Tables, path: str) -> Any:
-    """What stands at a path.
+    """Value at a path.
 
     Raises:
         InputError: nothing does; the nearest path is named.

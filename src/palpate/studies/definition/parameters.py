@@ -56,7 +56,7 @@ class Axis:
 
     @property
     def title(self) -> str:
-        """What figures and tables call it: its label, or its name with the unit that it is known to have."""
+        """Name in figures and tables: its label, or its name with its known unit."""
         unit = UNITS.get(self.name, "")
         return self.parameter.label or (f"{self.name} [{unit}]" if unit else self.name)
 
@@ -162,7 +162,7 @@ def _whole(path: str, some: Sequence[Tables]) -> bool:
 
 
 def _first(path: str, some: Sequence[Tables]) -> Any:
-    """What stands at the path in the first experiment that has it."""
+    """Value at the path in the first experiment that has it."""
     trouble: InputError | None = None
     for tables in some:
         try:

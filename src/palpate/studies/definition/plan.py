@@ -102,7 +102,7 @@ class Part:
         return {a.name: found[a.name] for a in self.axes}
 
     def experiment(self, values: Mapping[str, Any]) -> AnyExperiment:
-        """What these values make of the experiment.
+        """The experiment with these values.
 
         Raises:
             InputError: values that are refused.
@@ -224,7 +224,7 @@ def plan(study: Study, where: str = "") -> Plan:
 
 
 def _whole(study: Study, other: Against) -> Against:
-    """What the study is compared with, with all that it has from the study."""
+    """Reference runs of the study, with the parameters that they share with it."""
     for name in other.shares:
         if name not in study.parameters:
             raise unknown("parameter", name, study.parameters)

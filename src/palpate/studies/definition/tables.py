@@ -33,11 +33,11 @@ class Parameter(Table, frozen=True):
     cases: dict[str, dict[str, Any]] | None = None
     """Changes of the experiment by a name; `experiment` in one takes another experiment."""
     sets: tuple[Path, ...] = ()
-    """What takes the value; the parameter's own name when nothing is said."""
+    """Paths that are set to the value; by default the parameter's own name."""
     times: tuple[Path, ...] = ()
-    """What is multiplied by the value."""
+    """Paths that are multiplied by the value."""
     plus: tuple[Path, ...] = ()
-    """What the value is added to."""
+    """Paths to which the value is added."""
     factor: float = 1.0
     """The value is multiplied by this before it is used; tables and figures show it as it was."""
     label: str = ""
@@ -45,7 +45,7 @@ class Parameter(Table, frozen=True):
 
 
 class Best(Table, frozen=True):
-    """What the settings are ranked by: one metric."""
+    """Ranking of the settings by one metric."""
 
     least: str = ""
     most: str = ""
@@ -117,7 +117,7 @@ class Study(Table, frozen=True, kw_only=True):
     experiment: str
     """A name, or a TOML file beside the study's."""
     fixed: dict[str, Any] = msgspec.field(default_factory=dict)
-    """What differs from the experiment in every run."""
+    """Changes of the experiment in every run."""
     parameters: dict[str, Parameter]
     seeds: Annotated[int, Meta(ge=1, le=1_000_000)] | list[Seed] = 1
     """How many, from 0 on, or which."""

@@ -1,1 +1,1 @@
-"""What a study came to: its best settings, its comparisons, its figures and its page."""
+"""Findings of a study: its best settings, its comparisons, its figures and its page."""

@@ -1,4 +1,4 @@
-"""What a study's page draws from, as plain values."""
+"""Data of the charts on a study's page, as plain values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said of a study: counts, the best settings with their uncertainty, the page, the summary."""
+"""Summary of a study: counts, the best settings with their uncertainty, the page, the JSON summary."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ EXAMPLES = 2
 
 @dataclass(frozen=True)
 class Findings:
-    """What a study came to.
+    """Findings of a study.
 
     Args:
         summary: plain JSON values.
@@ -105,7 +105,7 @@ def _seeds(plan: Plan) -> str:
 def summary(
     frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison] = ()
 ) -> dict[str, Any]:
-    """What a study came to: runs, results, and the best settings of each ranking, or those on the same surfaces."""
+    """JSON summary: runs, results, and the best settings of each ranking, or those on the same surfaces."""
     best = plan.study.best
     return {
         "study": plan.study.title,
@@ -218,7 +218,7 @@ def _overall(values: Sequence[float], name: str) -> str:
 def notes(
     frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison] = ()
 ) -> list[str]:
-    """What a reader must not miss."""
+    """Warnings of the summary."""
     found = []
     for result, count in Counter(frame["result"].to_list()).most_common():
         if result != DONE:
@@ -243,7 +243,7 @@ def notes(
 
 
 def _of_pairs(one: Comparison, plan: Plan) -> list[str]:
-    """What a comparison counts and what it does not."""
+    """Notes on the counts of a comparison."""
     failed = {e.name: int(e.failed.sum()) for e in one.entrants if e.failed.any()}
     found = []
     if failed:

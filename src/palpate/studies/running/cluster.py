@@ -23,9 +23,9 @@ A = TypeVar("A")
 B = TypeVar("B")
 
 UNIT = 0.2
-"""What a batch should take at least [s]: the scheduler's own work is then some hundredths of it."""
+"""Shortest duration of a batch [s]: the scheduler's own work is then some hundredths of it."""
 TICK = 2e-6
-"""What a tick costs, until it is measured [s]."""
+"""Assumed time of a tick until it is measured [s]."""
 LARGEST, LARGEST_KEPT = 1000, 8
 """Runs in a batch; and where their records come back too."""
 AHEAD = 2
@@ -143,7 +143,7 @@ class Cluster:
                 self._client.cancel(futures, force=True)
 
     def run(self, jobs: Iterable[Job]) -> Iterator[Done]:
-        """What becomes of the jobs, in the order in which they are done.
+        """Results of the jobs, in the order of completion.
 
         Raises:
             InputError: the scheduler went away, no worker is left, or the workers cannot run palpate.
@@ -204,7 +204,7 @@ class Batches:
         return list(chain([first], islice(self._jobs, count - 1)))
 
     def took(self, done: Sequence[Done]) -> None:
-        """What the runs of a batch took."""
+        """Updates the mean time of a run from a finished batch."""
         mean = sum(row.seconds for row, _ in done) / len(done)
         self.seconds = mean if self.seconds is None else 0.8 * self.seconds + 0.2 * mean
 
@@ -312,7 +312,7 @@ class Hand:
             )
 
     def taken(self, future: Any, jobs: list[Job]) -> list[Done] | None:
-        """What a batch came to; None if a worker died of one of several runs."""
+        """Result of a batch; None if a worker died of one of several runs."""
         from distributed import KilledWorker
 
         try:

@@ -1,4 +1,4 @@
-"""What a study will take, from a piece of its first run."""
+"""Predicted duration of a study, from a part of its first run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SAMPLES = 20
 
 
 def seconds_a_run(plan: Plan, waiting: Callable[[], None] | None = None) -> float:
-    """What a run takes on one core [s], from the first setting that runs; 0 where none of the first does.
+    """Time of a run on one core [s], from the first setting that runs; 0 if none of the first does.
 
     Args:
         plan: of the study.

@@ -29,7 +29,7 @@ class Local:
         self.threads, self._waiting = threads or cores(), waiting
 
     def run(self, jobs: Iterable[Job]) -> Iterator[Done]:
-        """What becomes of the jobs, in the order in which they are done.
+        """Results of the jobs, in the order of completion.
 
         Who stops asking stops the runs that are under way.
         """

@@ -25,7 +25,7 @@ class Stopped(Exception):
 
 
 class Row(msgspec.Struct, frozen=True, array_like=True):
-    """What is left of a run.
+    """Result of a run.
 
     Args:
         run: its number.

@@ -31,7 +31,7 @@ class Runner(Protocol):
     """Runs jobs: here, or on a cluster."""
 
     def run(self, jobs: Iterable[Job]) -> Iterator[Done]:
-        """What becomes of the jobs, in any order."""
+        """Results of the jobs, in any order."""
         ...
 
 
@@ -132,7 +132,7 @@ def begun(folder: Path) -> bool:
 
 
 def head(plan: Plan) -> Head:
-    """What tells a study's journal from any other."""
+    """Identity of a study's journal."""
     from palpate import __version__
 
     study = hashlib.sha256(resolved(plan)).hexdigest()[:16]

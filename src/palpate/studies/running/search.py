@@ -56,7 +56,7 @@ class Searching:
             yield self._proposed(first, min(self._search.batch, self._search.trials - first))
 
     def tell(self, number: int, values: Mapping[str, Any], objective: float | None) -> None:
-        """What a trial came to; None where it failed, which the search takes for worse than anything."""
+        """Value of a trial; None if it failed, which the search ranks last."""
         if number < len(self._kept.get_trials(deepcopy=False)):
             return
         optuna = self._optuna

@@ -54,7 +54,7 @@ NEAR_TRUTH = {"K": 0.02, "B": 0.05, "M": 0.25}
 
 @dataclass(frozen=True)
 class Press:
-    """What least squares makes of one press, each (M, B, K)."""
+    """Least-squares estimates of one press, each (M, B, K)."""
 
     steps: Array  # with perfect signals, then with one cause more each, shape (7, 3)
     alone: Array  # with one cause each, shape (6, 3)
@@ -133,7 +133,7 @@ def _smallness(data: Data) -> Claim:
 
 
 def _sum(data: Data) -> str:
-    """What each cause adds, in words."""
+    """Contribution of each cause, in words."""
     parts = []
     for surface in ("plain foam", "rubber"):
         steps = data.middle(surface, "steps")[:, 0]

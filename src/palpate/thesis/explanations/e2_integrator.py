@@ -43,7 +43,7 @@ CAPTION = (
 )
 AMPLITUDE, TICK, RATE = 20.0, 1e-3, 5e-5
 GAIN = RATE * (AMPLITUDE / 2) ** 2 / TICK
-"""What the learning rate of the text amounts to: 5 per second."""
+"""Integral gain equivalent to the text's learning rate: 5 per second."""
 PI: Mapping[str, Any] = {"controller": {"kind": "proportional-integral", "kf": 0.25, "ki": GAIN}}
 LONG = {"run.press": 15.0}
 PARAMETERS: Mapping[str, Experiment] = {
@@ -76,7 +76,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     pairs: dict[str, Pair]
     gains: dict[str, Array]  # by surface: (rates, seeds) [1/s]

@@ -80,7 +80,7 @@ HELD: Mapping[str, slice] = {
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     courses: dict[str, dict[float, list[Course]]]  # by surface and learning rate
     pi: dict[str, list[float | None]]  # times of loss under the PI, by surface

@@ -30,7 +30,7 @@ CAPTION = (
     "weights: each set of weights keeps its sign under all noise seeds."
 )
 STUDY = (1.3, 2.3)
-"""What an earlier study of ours found for K over f/x with thresholds that learn."""
+"""K over f/x with learning thresholds, from an earlier study of ours."""
 FAR = 0.10
 """A force is wrong when it is off by more than this share of the surface's."""
 
@@ -41,7 +41,7 @@ def run(runs: Runs) -> Data:
 
 
 def check(data: Data) -> Sequence[Claim]:
-    """What an earlier study found, and what sections 5.2 and 6.2 say of dummy values and scaling."""
+    """Results of an earlier study, and the statements of sections 5.2 and 6.2 on dummy values and scaling."""
     return [_stiffness(data), _mass(data), _outside(data), _scaling(data)]
 
 
@@ -229,5 +229,5 @@ def _spread(values: Sequence[float], unit: str) -> str:
 
 
 def plot(data: Data) -> Figure:
-    """What the networks know, how K follows from it, every toggle, and M by start."""
+    """Learned force, K by probing, every variation, and M by initial weights."""
     return panels.causes(data, replace(Choice(), thresholds=False), STRAIGHT)

@@ -47,7 +47,7 @@ GONE = 3.8
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     network: dict[str, dict[float, list[Tracking]]]  # by surface and rate
     pi: dict[str, dict[float, Tracking]]

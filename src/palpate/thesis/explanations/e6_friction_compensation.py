@@ -49,7 +49,7 @@ CAPTION = (
     "and presses again."
 )
 LEVEL = (3.0, 0.25, 0.03)
-"""What is compensated [N m]: the Coulomb levels of the bench; the listing's own are doubtful, see the errata."""
+"""Compensated levels [N m]: the Coulomb levels of the bench; the listing's own are doubtful, see the errata."""
 PLAIN = changed(load("foam-hybrid"), {**SHORT, "controller.ki": 0.0, "run.press": 4.0})
 PARAMETERS = changed(PLAIN, {"compensation.level": LEVEL, "compensation.blend": (0.05, 0.05, 0.05)})
 PRINTED_BLEND = 0.002
@@ -83,7 +83,7 @@ class Ratio:
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
     plain: list[Held]

@@ -84,7 +84,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
     varied: dict[str, list[Pair]]

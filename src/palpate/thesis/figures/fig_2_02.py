@@ -56,7 +56,7 @@ TARGET = {"K": 2000.0, "B": 600.0, "M": 5.0}
 
 @dataclass(frozen=True)
 class Found:
-    """What the arm was, over what it was told to be."""
+    """Estimated impedance of the arm over its target."""
 
     K: float  # slope of force over displacement at the ends of the intervals
     B: float  # least squares on the motion
@@ -70,7 +70,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
     varied: dict[str, list[Found]]

@@ -41,13 +41,13 @@ CAPTION = (
 
 @dataclass(frozen=True)
 class World:
-    """What the joint presses, and how it rubs."""
+    """The joint's surface and friction."""
 
     surface: KelvinVoigt | StandardLinearSolid
     friction: LuGre = JOINT_FRICTION
     noise: float = 0.6
     force: float = 20.0
-    """What forces are divided by before the network sees them [N]."""
+    """Scale of the forces at the network's inputs [N]."""
 
 
 FOAM, RUBBER = World(KelvinVoigt(5200.0, 200.0, 0.10)), World(KelvinVoigt(34500.0, 480.0, 0.05))
@@ -96,7 +96,7 @@ class Pressed:
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     record: dict[str, Array]
     worlds: dict[str, list[Pressed]]

@@ -63,7 +63,7 @@ Case = tuple[Experiment, int]
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     shown: Record
     tuned: dict[str, list[Tracking]]

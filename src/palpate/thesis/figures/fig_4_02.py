@@ -42,7 +42,7 @@ BEFORE, AFTER = 0.6, 1.5
 
 @dataclass(frozen=True)
 class Switch:
-    """What happened at the change-over of one run."""
+    """The switch of one run."""
 
     true_force: float  # at the change-over [N]
     lost: bool  # whether the contact was lost afterwards

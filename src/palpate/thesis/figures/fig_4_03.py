@@ -35,7 +35,7 @@ CAPTION = (
 )
 PARAMETERS = changed(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
 TIP = 8.2
-"""What the arm weighs along x at the wall, rotors included [kg]."""
+"""Effective mass of the arm along x at the wall, rotors included [kg]."""
 GAINS = {"K_fp 1, K_fi 0.003 (foam)": (1.0, 0.003), "K_fp 0.25, K_fi 0.0015 (rubber)": (0.25, 0.0015)}
 STUDY = {(60.0, 1.0): 12e3, (60.0, 0.25): 31e3, (480.0, 1.0): 95e3, (480.0, 0.25): 410e3}
 """Limits [N/m] that an earlier study of ours found, by damping [N s/m] and K_fp."""
@@ -58,7 +58,7 @@ Case = tuple[float, float]
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     limits: dict[Case, float]  # linear, by damping and K_fp [N/m]
     curves: dict[str, Array]  # by gains, over DAMPINGS [N/m]

@@ -57,13 +57,13 @@ HALF = 0.5
 """Largest share of what the coupled law lets through."""
 
 SIGNALS = {"force": 1.0, "y": 1e3, "phi": float(np.degrees(1.0))}
-"""What is drawn, and its factor to N, mm and degrees."""
+"""Drawn columns, and their factors to N, mm and degrees."""
 LAWS = ("(4.13), coupled", "(4.19) corrected", "(4.19) as printed")
 
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     traces: list[dict[str, Record]]  # as chosen, and with hardly any friction
     nominal: list[Pair]

@@ -59,7 +59,7 @@ SHOWS: dict[str, Callable[[Found], bool]] = {
     "raw: B < 0": lambda f: f.B_raw < 0.0,
     "raw: M < 0": lambda f: f.M_raw < 0.0,
 }
-"""What figures 6.1 to 6.3 show of a foam."""
+"""Sentences of figures 6.1 to 6.3 about a foam."""
 
 
 @dataclass(frozen=True)

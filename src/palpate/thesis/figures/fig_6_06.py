@@ -39,7 +39,7 @@ OTHERS = (25.0, 100.0)
 
 @dataclass(frozen=True)
 class Data:
-    """What the figure shows: one press learned at several rates, and how long each takes over seeds and conditions."""
+    """Data of the figure: one press learned at several rates, and the times over seeds and conditions."""
 
     press: Press
     curves: dict[float, Array]  # K, B, M and error by rate, of the first press and start

@@ -34,7 +34,7 @@ NEAR = Choice(amplitude=25.0, weights=0.01)
 
 @dataclass(frozen=True)
 class Data:
-    """What the figure shows: the answers of figure 6.7, and the error of a network that learns slowly."""
+    """Data of the figure: the answers of figure 6.7, and the error of a network that learns slowly."""
 
     shown: figure.Data
     near: Array  # error of the network that learns slowly [N]

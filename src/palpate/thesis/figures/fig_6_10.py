@@ -41,7 +41,7 @@ class Ends:
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     shown: Record
     nominal: list[Ends]

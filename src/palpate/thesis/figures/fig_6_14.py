@@ -61,7 +61,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     shown: Record
     nominal: list[Tracking]

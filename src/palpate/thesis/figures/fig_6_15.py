@@ -64,7 +64,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     shown: Record
     varied: dict[str, list[Errors]]  # by cause; the first as chosen

@@ -48,7 +48,7 @@ SMOOTHED = 0.25
 
 @dataclass(frozen=True)
 class Data:
-    """What `check` and `plot` need."""
+    """Measured values for `check` and `plot`."""
 
     tracked: Tracked
     t: Array

@@ -31,7 +31,7 @@ AGAIN, PEAK = 3.0, 1.25
 
 @dataclass(frozen=True)
 class Recovery:
-    """What became of a contact that was lost."""
+    """Outcome of a lost contact."""
 
     took: float  # from loss to contact [s]; infinite if never
     off: float  # of the force, `AGAIN` seconds later, as a share of the desired one
@@ -92,7 +92,7 @@ def drawn_back(seed: int) -> Record:
 
 
 def regained(record: Record) -> Recovery:
-    """What became of the contact after its first loss."""
+    """Outcome of the contact after its first loss."""
     t, phase, force = since_contact(record), record["phase"], record["force"]
     lost = np.flatnonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT)) + 1
     if not len(lost):

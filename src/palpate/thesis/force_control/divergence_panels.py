@@ -38,7 +38,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Loss:
-    """What went on in the last moments before contact was lost."""
+    """Signals in the last moments before the loss of contact."""
 
     t: Array  # before the loss [s]
     force: Array  # the network's [N]

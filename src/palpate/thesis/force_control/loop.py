@@ -16,7 +16,7 @@ TICK = 1e-3
 
 @dataclass(frozen=True)
 class ForceLoop:
-    """What decides whether it is stable, the surface's stiffness aside.
+    """Parameters that decide the stability, besides the surface's stiffness.
 
     Args:
         kf: K_fp.
@@ -56,7 +56,7 @@ class ForceLoop:
         return float(np.sqrt(low * high))
 
     def _ticks(self, stiffness: Array) -> Array:
-        """What one tick does to the state: tip and analog filter, a line of readings, the filter, the integral."""
+        """Transition of the state by one tick: tip and analog filter, delay line of readings, filter, integral."""
         A, b, c = self._held(stiffness)
         n, line = 5, int(self.late / TICK) + 1
         share = self.late / TICK + 1 - line

@@ -1,4 +1,4 @@
-"""What the figures of force control share: their experiments, when a force is said to follow, and what is varied."""
+"""Common parts of the force-control figures: experiments, criterion of following, varied conditions."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def robustness(
 
 @dataclass(frozen=True)
 class Tracked:
-    """What the figure of a force that is to be followed is made of."""
+    """Data of a figure of force tracking."""
 
     shown: Record
     nominal: list[Tracking]

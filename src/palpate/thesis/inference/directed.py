@@ -24,7 +24,7 @@ FIRST = 10_000_000
 
 @dataclass(frozen=True)
 class Bred:
-    """What a directed search came to.
+    """Result of a directed search.
 
     Args:
         tries: laboratories that were bred.

@@ -1,4 +1,4 @@
-"""What an inference found, as a page, a document, a figure and JSON."""
+"""Results of an inference, as a page, a document, a figure and JSON."""
 
 from __future__ import annotations
 

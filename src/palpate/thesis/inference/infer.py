@@ -35,7 +35,7 @@ is best, the sentences that it was inferred from say over ten."""
 
 @dataclass(frozen=True)
 class Inference:
-    """What is to be done.
+    """Settings of an inference.
 
     Args:
         folder: where everything goes.

@@ -1,4 +1,4 @@
-"""What a laboratory makes of every sentence, over many seeds and at the figures' own fineness."""
+"""Every sentence judged in one laboratory, over many seeds and with the figures' own time step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was judged and what was bred, kept in files, so that it is not done again."""
+"""Judged and bred laboratories, saved in files, so that they are not computed again."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class _Broods(msgspec.Struct):
 
 
 class Nest:
-    """What was bred, kept in a file."""
+    """Bred laboratories, saved in a file."""
 
     def __init__(self, path: Path, among: Table, runner: Runner, seed: int):
         self._path, self._among, self._runner, self._seed = path, among, runner, seed
@@ -99,7 +99,7 @@ class Nest:
 
 
 def _kept(path: Path, kind: type[T], none: T) -> T:
-    """What a file holds; nothing if there is none.
+    """Content of a file; nothing if there is none.
 
     Raises:
         InputError: it is spoiled.

@@ -1,4 +1,4 @@
-"""What the thesis tells of each unknown of its laboratory, and what it does not."""
+"""Marginal posterior of each unknown of the thesis' laboratory."""
 
 from __future__ import annotations
 

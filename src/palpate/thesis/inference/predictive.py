@@ -33,7 +33,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Predictive:
-    """What laboratories make of the sentences of a search, in the half that calibrates and in the one held out."""
+    """Shares of true sentences over laboratories, in the calibration half and in the validation half."""
 
     name: str
     laboratories: int

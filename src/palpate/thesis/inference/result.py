@@ -1,4 +1,4 @@
-"""What an inference found, and its numbers."""
+"""Results of an inference, and their numbers."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Contradiction:
 
 @dataclass(frozen=True)
 class Result:
-    """What was found.
+    """Results of the inference.
 
     Args:
         half: the posterior by the half that calibrates.

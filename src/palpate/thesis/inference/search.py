@@ -35,7 +35,7 @@ WRONG = 0.5 * MOST_WRONG
 """How probable it is, not knowing which sentence is how reliable: the mean of an even prior from 0 to `MOST_WRONG`,
 each sentence having a probability of its own. Integrated over, that is all that remains of it."""
 MISS = math.log((1.0 - WRONG) / WRONG)
-"""What a sentence that does not hold takes off the log-likelihood."""
+"""Decrease of the log-likelihood by one false sentence."""
 
 
 class Job(msgspec.Struct, frozen=True):
@@ -50,7 +50,7 @@ class Runner(Protocol):
     """Tries laboratories: here, or on a cluster."""
 
     def tried(self, jobs: Iterable[Job], ids: tuple[str, ...]) -> Iterator[Tried]:
-        """What becomes of the jobs, in any order, by the sentences of these names."""
+        """Results of the jobs, in any order, by the sentences of these names."""
         ...
 
 
@@ -121,7 +121,7 @@ class Search:
             asked(points, np.full(len(points), -np.inf))
 
     def head(self) -> Head:
-        """What tells its archive from any other."""
+        """Identity of its archive."""
         from palpate import __version__
 
         told = f"{self.settings} steps {STEPS} {[u.name for u in UNKNOWNS]}"
@@ -176,7 +176,7 @@ class _Asked:
 
 
 def borrowed(path: Path, head: Head, of: Sequence[Sentence], wanted: Sequence[Sentence]) -> dict[int, Tried]:
-    """What another search's archive tells of the sentences wanted, where it was not given up; nothing if it is none."""
+    """Verdicts on the wanted sentences in another search's archive, if not given up; nothing without one."""
     if not path.exists():
         return {}
     there, known = archive.read(path)

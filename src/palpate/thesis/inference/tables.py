@@ -1,4 +1,4 @@
-"""What an inference found, as tables of text."""
+"""Results of an inference, as tables of text."""
 
 from __future__ import annotations
 

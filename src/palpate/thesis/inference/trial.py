@@ -105,7 +105,7 @@ class Trial:
         return None if self.foam is None else self.identifiers_answer(self.foam.network, rate)
 
     def identifiers_answer(self, press: Press, rate: float = Choice().rate) -> Answer:
-        """What the network says of K, B and M over a press, at a learning rate."""
+        """The network's K, B and M over a press, at a learning rate."""
         lab = self.laboratory
         choice = replace(Choice(lab.amplitude, lab.weights), rate=rate)
         return network.answer(press, choice, int(self.seed if lab.start is None else lab.start))

@@ -20,7 +20,7 @@ CAUSES = {
     "counts": "encoder counts",
     "noise": "noise of the force",
 }
-"""What stands between the surface and the thesis' estimator, in the order of the waterfall."""
+"""Signal faults between the surface and the thesis' estimator, in the order of the waterfall."""
 BEFORE, PRESS = 1.5, 4.0
 TICK = 1e-3
 START, COVARIANCE = (0.0, 0.0, 2e5), 1e10
@@ -118,5 +118,5 @@ def late(signal: Array, seconds: float) -> Array:
 
 
 def delayed_fit(M: float, B: float, K: float, lag: float) -> tuple[float, float]:
-    """What a force late by `lag` makes of M and B, to second order: x(t - T) = x - T v + T^2/2 a."""
+    """M and B estimated from a force that lags by `lag`, to second order: x(t - T) = x - T v + T^2/2 a."""
     return M - B * lag + K * lag**2 / 2.0, B - K * lag

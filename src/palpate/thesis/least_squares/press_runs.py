@@ -1,4 +1,4 @@
-"""What the figures of recursive least squares share: the presses, how they are measured, what is varied."""
+"""Common parts of the least-squares figures: presses, their measures, varied conditions."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def settled_after(values: Array, end: float = FIRST, band: float = 0.10, tick: f
 
 
 def trajectory(phi: Array, y: Array, start: Sequence[float], covariance: Sequence[float]) -> Array:
-    """What recursive least squares without forgetting has estimated after each sample, shape (k, 3).
+    """Estimates of recursive least squares without forgetting after each sample, shape (k, 3).
 
     Not by recursion but as running batch solutions of (5.5), which for any P(0) it must equal: one run of the bench
     serves every P(0) and start.
@@ -121,7 +121,7 @@ def rubbing(experiment: Experiment, factor: float) -> Experiment:
 
 
 def conditions(experiment: Experiment) -> dict[str, Experiment]:
-    """What the thesis does not give, varied one at a time: friction, pose, the surface's B and M."""
+    """Variations of one unstated parameter at a time: friction, pose, the surface's B and M."""
     surface = experiment.surface
     return {
         "friction halved": rubbing(experiment, 0.5),
@@ -137,7 +137,7 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
 
 @dataclass(frozen=True)
 class Found:
-    """What one press answers."""
+    """Results of one press."""
 
     ratio: float  # f/x in the later slot [N/m]
     M: float  # estimates at the end of the later slot
@@ -176,7 +176,7 @@ def found(record: Record) -> Found:
 
 
 def swept(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[Found]]:
-    """What the presses of each experiment answer, over the first few seeds."""
+    """Results of the presses of each experiment, over the first few seeds."""
     seeds = list(runs.seeds)[:SWEPT_SEEDS]
     cases = [(e, seed) for e in experiments.values() for seed in seeds]
     answers = iter(runs.over(cases, found))

@@ -33,7 +33,7 @@ BAND = 0.10
 
 @dataclass(frozen=True)
 class Data:
-    """What a figure of the first seconds shows and is judged by."""
+    """Data and criteria of a figure of the first seconds."""
 
     shown: dict[str, Record]  # one press of each surface
     found: dict[str, list[Found]]  # over the seeds

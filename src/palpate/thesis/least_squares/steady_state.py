@@ -36,7 +36,7 @@ LEVEL, PLAUSIBLE = 0.10, 0.25
 
 @dataclass(frozen=True)
 class Data:
-    """What a figure of the later slot shows and is judged by."""
+    """Data and criteria of a figure of the later slot."""
 
     shown: dict[str, Record]  # one press of each surface
     found: dict[str, list[Found]]  # over the seeds
@@ -65,7 +65,7 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment], *, vary: int) -> Data:
 
 
 def by_ratios(press: Record) -> dict[str, Array]:
-    """Quantiles of what single samples give, by the three ratios of sec. 5.1, each with what the one before found.
+    """Quantiles of single-sample estimates by the three ratios of sec. 5.1, each using the result of the previous one.
 
     K = f/x where all rests; B = (f - K x)/v while the surface moves, of the half of the samples with the smaller
     acceleration, for the thesis asks for none; M = (f - K x - B v)/a. A ratio needs its denominator: samples in which

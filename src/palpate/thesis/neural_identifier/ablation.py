@@ -1,4 +1,4 @@
-"""What the answer of the neural identifier depends on: one change at a time, measured."""
+"""Sensitivity of the neural identifier's answer: one change at a time, measured."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Looked:
 
 @dataclass(frozen=True)
 class Surface:
-    """What was found on one surface."""
+    """Results on one surface."""
 
     press: Press  # of the first noise seed, 4 s
     long: Press  # the same, gone on with

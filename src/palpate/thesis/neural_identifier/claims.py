@@ -1,4 +1,4 @@
-"""What the thesis claims of its neural identifier, part by part, each with the threshold that decides it."""
+"""Claims of the thesis about its neural identifier, part by part, each with its threshold."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palpate.thesis.neural_identifier.network import GONE, Answer, Choice
 from palpate.thesis.neural_identifier.notes import TIME, Grounds, why
 
 SMALL = 1.0
-"""What a small mass is below [kg]."""
+"""Upper limit of a small mass [kg]."""
 FOAM_BAND, RUBBER_BAND = 0.06, 0.15
 """How far K may be from f/x, as a share of it: "almost same" is said of less than 6 % in sec. 6.1; on rubber the
 thesis' own are 10 % apart."""

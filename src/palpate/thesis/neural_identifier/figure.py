@@ -32,7 +32,7 @@ NAMES = {"foam": "plain foam", "rubber": "rubber"}
 
 @dataclass(frozen=True)
 class Data:
-    """What such a figure shows: a press, the answers of a few networks on it, and what the claims rest on."""
+    """Data of such a figure: a press, the answers of a few networks on it, and the grounds of the claims."""
 
     press: Press  # that of the first noise seed
     curves: list[Array]  # K, B, M and error of a few starts on it
@@ -50,7 +50,7 @@ def run(runs: Runs, experiment: Experiment, surface: str) -> Data:
 
 
 def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[Press]) -> Grounds:
-    """What claims about a surface are decided from."""
+    """Grounds of the claims about a surface."""
     x = SETTINGS[surface].values[0]
     at_probe = experiment.approach.switch + runs.laboratory.of(experiment).surface.stiffness * x
     return Grounds(

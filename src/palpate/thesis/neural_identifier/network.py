@@ -1,4 +1,4 @@
-"""What the figures of the neural identifier share: presses, the networks that learn from them, and what they answer."""
+"""Common parts of the neural-identifier figures: presses, the networks that learn from them, their answers."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def presses(
 
 @dataclass(frozen=True)
 class Choice:
-    """What the thesis leaves open about its network, and the learning rate that it gives (1e-4).
+    """Unstated parameters of the thesis' network, and its stated learning rate (1e-4).
 
     As chosen here: an output of up to twice the desired force, weights from -0.5 to 0.5, thresholds that learn (which
     sec. 5.2 does say).
@@ -132,7 +132,7 @@ SWEEP = [Choice(a, w, t) for t, a, w in product((True, False), AMPLITUDES, WEIGH
 
 @dataclass(frozen=True)
 class Answer:
-    """What one network says after one press: averages over the last half second."""
+    """Answer of one network after one press: averages over the last half second."""
 
     K: float
     B: float
@@ -221,7 +221,7 @@ def swept(
 
 
 def conditions(experiment: Experiment) -> dict[str, Experiment]:
-    """What else the thesis does not give, one at a time: friction, pose, and the surface's B, M and law."""
+    """Variations of one other unstated parameter at a time: friction, pose, and the surface's B, M and law."""
     cases = dict(press_runs.conditions(experiment))
     cases["stiffening"] = changed(experiment, {"surface": STIFFENING[_kind(experiment)]})
     if _kind(experiment) == "foam":

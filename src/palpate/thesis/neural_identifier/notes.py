@@ -12,12 +12,12 @@ from palpate.identifiers.neural_settings import SETTINGS
 from palpate.thesis.neural_identifier.network import Answer, Choice
 
 TIME = (0.3, 0.9)
-"""What "about 0.6 s" allows: half of it more or less [s]."""
+"""Limits of "about 0.6 s": half of it more or less [s]."""
 
 
 @dataclass(frozen=True)
 class Grounds:
-    """What a claim is decided from, and what is said about it.
+    """Data of a claim's verdict and note.
 
     Args:
         surface: "foam" or "rubber".

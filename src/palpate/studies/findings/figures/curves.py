@@ -56,7 +56,7 @@ def lines(table: Rows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[Lin
 
 
 def references(table: Rows, asked: Curves, x: Scale, panel: Any) -> Iterator[Line]:
-    """What the study is compared with: over the same parameter where that has it, and else as a level."""
+    """The reference runs: a curve if they have the same parameter, else a level."""
     import polars
 
     for part in table.plan.parts[1:]:

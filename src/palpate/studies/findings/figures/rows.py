@@ -118,7 +118,7 @@ def _unevenness(values: Array) -> float:
 
 
 def restricted_to(asked: Map | Curves) -> str:
-    """What a figure's runs have in common, for its caption."""
+    """Common values of a figure's runs, for its caption."""
     return "".join(f", {name} {short(value)}" for name, value in flat(asked.where).items())
 
 
