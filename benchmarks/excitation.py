@@ -1,4 +1,4 @@
-"""Designed excitations on the bench: the spread of what is identified over what was foretold before the arm moved.
+"""Designed excitations on the bench: the observed spread of the estimates over the predicted one.
 
     python benchmarks/excitation.py [RUNS]
 
@@ -69,16 +69,16 @@ def identified(run: Record, rows: NDArray[np.intp], position: NDArray[np.float64
 
 
 def main(runs: int) -> None:
-    """Print a row for each surface, kind and sensor: the foretold deviation, the one found, their ratio."""
+    """Print a row for each surface, kind and sensor: the predicted deviation, the observed one, their ratio."""
     print(f"{'':34}" + "".join(f"{name:^32}" for name in NAMES))
     for name in ("foam-hybrid", "rubber-hybrid"):
         for kind in ("multisine", "chirp"):
             made = designed(name, kind)
-            foretold = np.array([made.made.worst(made.seconds)[name] for name in NAMES]) / 1.96
+            predicted = np.array([made.made.worst(made.seconds)[name] for name in NAMES]) / 1.96
             tried = [errors(made, seed) for seed in range(runs)]
             for at in tried[0]:
                 rms = np.sqrt(np.mean([np.square(one[at]) for one in tried], axis=0))
-                cells = (f"{a:7.2%} {b:7.2%} ratio {b / a:4.2f}" for a, b in zip(foretold, rms, strict=True))
+                cells = (f"{a:7.2%} {b:7.2%} ratio {b / a:4.2f}" for a, b in zip(predicted, rms, strict=True))
                 print(f"{f'{name}, {kind}, {at}':34}" + "".join(f"{cell:^32}" for cell in cells))
 
 

@@ -1,4 +1,4 @@
-"""What `palpate excite` foretells for position sensors fine and coarse, beside what presses then give.
+"""Predictions of `palpate excite` for fine and coarse position sensors, beside the results of presses.
 
     python benchmarks/excitation_encoders.py [RUNS]         # 30 runs: two minutes
 
@@ -64,14 +64,14 @@ def errors(made: Design, step: float, seed: int) -> Array:
 
 
 def main(runs: int) -> None:
-    """Print a row for each surface and encoder: the foretold deviation, the one found, their ratio."""
+    """Print a row for each surface and encoder: the predicted deviation, the observed one, their ratio."""
     print(f"{'':28}" + "".join(f"{name:^32}" for name in NAMES))
     for name, surface in SURFACES.items():
         for step in STEPS:
             made = designed(surface, step)
-            foretold = np.array([made.made.worst(made.seconds)[n] for n in NAMES]) / 1.96
+            predicted = np.array([made.made.worst(made.seconds)[n] for n in NAMES]) / 1.96
             rms = np.sqrt(np.mean([np.square(errors(made, step, seed)) for seed in range(runs)], axis=0))
-            cells = (f"{a:7.2%} {b:7.2%} ratio {b / a:4.2f}" for a, b in zip(foretold, rms, strict=True))
+            cells = (f"{a:7.2%} {b:7.2%} ratio {b / a:4.2f}" for a, b in zip(predicted, rms, strict=True))
             label = f"{name}, {1e6 * step:g} um"
             print(f"{label:28}" + "".join(f"{cell:^32}" for cell in cells), flush=True)
 

@@ -31,9 +31,9 @@ told = palpate.identify(
     lag=sensor.lag + run.meta["instruments"]["force"]["delay_s"],
     bonded=True,
 )
-for name, foretold in found.made.worst(found.seconds).items():
+for name, predicted in found.made.worst(found.seconds).items():
     p = told.parameters[name]
     half = (p.ci95[1] - p.ci95[0]) / 2 / truth[name]
     print(
-        f"{name}: {p.value:.4g} {p.unit}, in truth {truth[name]:g}; ± {half:.1%}, foretold ± {foretold:.1%}"
+        f"{name}: {p.value:.4g} {p.unit}, in truth {truth[name]:g}; ± {half:.1%}, predicted ± {predicted:.1%}"
     )

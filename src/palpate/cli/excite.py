@@ -52,7 +52,7 @@ class SurfaceOptions:
         )
 
 
-@Parameter(name="*", group=Group("What is allowed", sort_key=2))
+@Parameter(name="*", group=Group("Limits", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class BudgetOptions:
     """Limits of force and frequency.
@@ -98,7 +98,7 @@ class BudgetOptions:
         )
 
 
-@Parameter(name="*", group=Group("What is asked", sort_key=3))
+@Parameter(name="*", group=Group("Goals", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class GoalOptions:
     """Precision and time.

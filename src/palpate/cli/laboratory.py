@@ -74,7 +74,7 @@ class RunnerOptions:
     scheduler: str | None = None
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=3))
+@Parameter(name="*", group=Group("Output", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class InferredOptions(FolderOptions):
     """Files to write.

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _DEFAULT = "foam-hybrid"
 
 
-@Parameter(name="*", group=Group("What is shown", sort_key=0))
+@Parameter(name="*", group=Group("Source", sort_key=0))
 @dataclass(frozen=True, kw_only=True)
 class ShownOptions:
     """A simulation, a log or a record.

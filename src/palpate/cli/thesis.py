@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
 
 
-_MEASURED = Group("What is measured", sort_key=1)
+_MEASURED = Group("Measurement", sort_key=1)
 
 
 def thesis(

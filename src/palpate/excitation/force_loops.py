@@ -53,7 +53,7 @@ class HybridLoop:
     (statistical linearisation, Booton, 1954).
 
     The defaults are the bench's arm before its wall, fitted to multisines of 0.5 to 40 Hz and 2 to 12 N on foam and
-    rubber, whose forces they foretell to some 10 % (at 2 N, where it mostly sticks, to 20 %).
+    rubber, whose forces they predict to some 10 % (at 2 N, where it mostly sticks, to 20 %).
 
     Args:
         tip_mass: m, effective at the tip [kg].

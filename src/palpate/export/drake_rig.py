@@ -109,7 +109,7 @@ class DrakeRig:
             named = (body.name(), inspector.GetName(own).split("::")[-1])
             if named == path[-2:] and inspector.GetProximityProperties(own) is not None:
                 return own
-        raise InputError(f"Drake has no collision geometry {'::'.join(path)!r} in what it read")
+        raise InputError(f"Drake has no collision geometry {'::'.join(path)!r} in the file")
 
     def _push(self, force: Array) -> None:
         self.plant.get_applied_generalized_force_input_port().FixValue(self.context, force)

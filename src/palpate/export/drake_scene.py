@@ -198,7 +198,7 @@ def notes(probe: bool) -> tuple[str, ...]:
     other = (
         f"the probe has {known}; any other body that touches the surface needs them too"
         if probe
-        else f"what presses needs {known}: Drake's defaults would add to the surface's"
+        else f"the probe needs {known}: Drake's defaults would add to the surface's"
     )
     return (_PLANT, other)
 

@@ -43,7 +43,7 @@ _BEGIN = (
     " of these two bodies: export again when their masses change"
 )
 _SLIDE = (
-    "in a contact as soft as this, MuJoCo's friction below its limit is a damper: what rests on a slope creeps; and"
+    "in a contact as soft as this, MuJoCo's friction below its limit is a damper: a body at rest on a slope creeps; and"
     " where the probe slides, its cone lets friction into the normal force"
 )
 NOTES = (_BEGIN, _SLIDE)

@@ -9,7 +9,7 @@ from cyclopts import Group, Parameter
 
 from palpate.errors import InputError
 
-DRAWN = Group("What is drawn", sort_key=4)
+DRAWN = Group("Figures", sort_key=4)
 
 
 @Parameter(name="*", group=DRAWN)

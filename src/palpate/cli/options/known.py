@@ -36,7 +36,7 @@ class KnownOptions:
     print_: Annotated[bool, FLAG, Parameter(name="--print")] = False
 
 
-@Parameter(name="*", group=Group("What is written", sort_key=3))
+@Parameter(name="*", group=Group("Output", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class FolderOptions:
     """Files to write.

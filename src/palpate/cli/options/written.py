@@ -11,7 +11,7 @@ from palpate.cli.options.flags import FLAG
 from palpate.errors import InputError
 from palpate.files import check_place
 
-WRITTEN = Group("What is written", sort_key=6)
+WRITTEN = Group("Output", sort_key=6)
 
 
 @Parameter(name="*", group=WRITTEN)

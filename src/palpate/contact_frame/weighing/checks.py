@@ -189,7 +189,7 @@ def _in_axes(poses: Poses, turn: Array) -> Poses:
 
 
 def _touched(time: Array, poses: Poses, means: Array) -> list[dict[str, Any]]:
-    """A stretch whose force the others do not foretell."""
+    """An interval whose force contradicts the prediction from the others."""
     from scipy.special import fdtri
 
     size = np.sum(means**2, axis=1)
@@ -216,7 +216,7 @@ def _inertia(parameters: dict[str, Estimated]) -> list[dict[str, Any]]:
     if wrong_sign((float(found.value), float(found.std))):
         text = (
             f"in the air the force follows the acceleration as a mass of {found.value:.3g} kg would: the tool's inertia"
-            " is compensated with the wrong sign, or twice; mend that, or damping and lag of what is touched are wrong"
+            " is compensated with the wrong sign, or twice; correct that, or damping and lag of the surface are wrong"
         )
         return [{"code": "tool-inertia", "text": text}]
     if found.value - found.half > mass.value + mass.half:

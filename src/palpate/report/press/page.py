@@ -66,9 +66,7 @@ def notes(summary: dict[str, Any]) -> list[str]:
         found.append(f"The motor of {joint} was at its limit in {100 * share:.1f} % of the ticks.")
     if summary["sensor_saturated"]:
         share = f"{100 * summary['sensor_saturated']:.2g} % of the ticks"
-        found.append(
-            f"The force sensor stood at the end of its scale in {share}: what it showed is not the force."
-        )
+        found.append(f"The force sensor was saturated in {share}: its reading is not the force.")
     identified = summary["identified"] or {}
     found += [note["text"][0].upper() + note["text"][1:] + "." for note in _of_tool(identified)]
     if identified.get("why_not"):

@@ -145,6 +145,6 @@ DRAWN = (
     (
         "bound",
         _bound,
-        "What the law takes the stiffness for: an upper bound, never the estimate. It falls as readings tell more.",
+        "The law's upper bound of the stiffness (not its estimate). It falls as the readings give more information.",
     ),
 )

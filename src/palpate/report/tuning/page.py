@@ -71,7 +71,7 @@ def _intervals(axis: Axes, told: Tuning) -> None:
         if found is not None:
             spans.append((name, found, style.OK if kind == "held" else style.SERIES[0]))
     if told.known is not None:
-        spans.append(("what is touched", told.known.stiffness, style.K))
+        spans.append(("surface of the log", told.known.stiffness, style.K))
     for i, (_, (low, high), colour) in enumerate(spans):
         ends = [max(low, _SHOWN[0]), min(max(high, 1.02 * low), _SHOWN[1])]
         axis.plot(ends, [i, i], color=colour, linewidth=9, solid_capstyle="butt")

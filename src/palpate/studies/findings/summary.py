@@ -56,9 +56,7 @@ def present(frame: DataFrame, plan: Plan, folder: Path, source: str, command: st
     told = signed({"command": command, **summary(frame, plan, ranked, compared)})
     found = Findings(told, tables(frame, plan, ranked, compared), notes(frame, plan, ranked, compared))
     drawn = list(figures(frame, plan))
-    described = Table(
-        "What is measured", ("metric", "is"), [(m, _description(m)) for m in plan.study.metrics]
-    )
+    described = Table("Metrics", ("metric", "meaning"), [(m, _description(m)) for m in plan.study.metrics])
     page = StudyPage(
         title=plan.study.title,
         about=plan.study.about,

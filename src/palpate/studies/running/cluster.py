@@ -307,7 +307,7 @@ class Hand:
             self._alone = time.monotonic()
         elif time.monotonic() - self._alone > self.patience:
             raise InputError(
-                f"the cluster at {self.address} has had no worker for {self.patience:g} s; start some: what is done "
+                f"the cluster at {self.address} has had no worker for {self.patience:g} s; start some: the finished runs "
                 "are saved, and the same command resumes"
             )
 

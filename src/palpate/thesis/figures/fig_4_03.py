@@ -107,7 +107,7 @@ def _linear(data: Data) -> Claim:
         note=(
             f"A tip of {TIP:g} kg on a spring and a damper, the sensor's third-order filter, its delay, and the "
             "controller's filter, in steps of a millisecond; no friction. The mass is the arm's at the wall at 0.465 "
-            "m; between 5 and 11 kg, which is what poses from 0.40 to 0.49 m give, the first three move by up to 8 %, "
+            "m; between 5 and 11 kg, as for poses from 0.40 to 0.49 m, the first three move by up to 8 %, "
             "the fourth by a seventh, and below 6 kg there is none. The force's lag of 7.6 ms sets these limits: the "
             "loop gain has to be small before the phases of the tip on its spring and of the lag add up. With the "
             f"foam's gains a surface of 44 kN/m, the thesis' rubber, is stable from a damping of {_needed(data):.0f} "

@@ -120,7 +120,7 @@ def plot(data: Data) -> Figure:
     away.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
     away.set(xlabel="time since contact [s]", ylabel="deviation [N]", xlim=SHOWN, ylim=(0.0, None))
     away.set_title(
-        "from the settled cycles, mean over 0.25 s; dashed: what counts as adapted", loc="left", fontsize=9.5
+        "from the settled cycles, mean over 0.25 s; dashed: limit of adapted", loc="left", fontsize=9.5
     )
     return drawing
 

@@ -136,7 +136,7 @@ class Inference:
         nest = Nest(self.folder / BRED, table, self.runner, self.settings.seed)
         found = []
         for i, one in enumerate(some):
-            self.told("bred for what was never true together", i, len(some))
+            self.told("bred for sentences never true together", i, len(some))
             found.append(Contradiction(one, nest.bred(one.ids, TRIES)))
         return found
 

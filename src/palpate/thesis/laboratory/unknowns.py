@@ -108,7 +108,13 @@ UNKNOWNS: tuple[Unknown, ...] = (
         600.0,
         "at 20 N; from hardly any to a time constant B/K of a tenth of a second",
     ),
-    _log("foam_mass", "kg", 0.005, 0.5, "what moves with the tip; a cube of foam with 0.2 m edges is 0.2 kg"),
+    _log(
+        "foam_mass",
+        "kg",
+        0.005,
+        0.5,
+        "mass that moves with the tip; a cube of foam with 0.2 m edges is 0.2 kg",
+    ),
     _log("foam_branch", "", 0.1, 3.0, "stiffness of the relaxing branch over K; only of a foam that relaxes"),
     _log(
         "foam_branch_time", "s", 0.01, 3.0, "of its relaxation; faster is damping, slower is not seen in 8 s"
@@ -118,7 +124,7 @@ UNKNOWNS: tuple[Unknown, ...] = (
     ),
     _log("rubber_stiffness", "N/m", 24000.0, 50000.0, "the reported f/x is 44 kN/m, and counts in full"),
     _log("rubber_damping", "N s/m", 30.0, 2000.0, "time constants B/K from 1 to 60 ms"),
-    _log("rubber_mass", "kg", 0.005, 0.5, "what moves with the tip; 0.5 kg is 0.4 litres of rubber"),
+    _log("rubber_mass", "kg", 0.005, 0.5, "mass that moves with the tip; 0.5 kg is 0.4 litres of rubber"),
     _even(
         "sticking",
         "",
