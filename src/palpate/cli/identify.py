@@ -117,7 +117,7 @@ def identify(
     output: OutputOptions | None = None,
     cell: CellOptions | None = None,
 ) -> int:
-    """Find what a robot touched, from a log: stiffness, damping, mass.
+    """Identify the touched surface from a log: stiffness, damping, mass.
 
     Columns are given as NAME or NAME:UNIT, where NAME may be a number from 0:
 

@@ -34,8 +34,8 @@ def check_mass(contact: Contact, source: str) -> None:
     """
     if contact.mass is None:
         raise InputError(
-            f"{source}: a plate on a spring has a mass, and none is identified; say one with --mass (kg), small beside"
-            " that of what presses"
+            f"{source}: a plate on a spring has a mass, and none is identified; give a small one with --mass (kg),"
+            " far below that of the probe"
         )
 
 

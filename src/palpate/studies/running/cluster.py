@@ -307,8 +307,8 @@ class Hand:
             self._alone = time.monotonic()
         elif time.monotonic() - self._alone > self.patience:
             raise InputError(
-                f"the cluster at {self.address} has had no worker for {self.patience:g} s; start some: the finished runs "
-                "are saved, and the same command resumes"
+                f"the cluster at {self.address} has had no worker for {self.patience:g} s; start some: the finished "
+                "runs are saved, and the same command resumes"
             )
 
     def taken(self, future: Any, jobs: list[Job]) -> list[Done] | None:
