@@ -29,7 +29,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         rows = list(measured(Path(folder)))
     lines = [
-        "| `--to` | what presses | K [N/m] | error in K | B [N s/m] | error in B |",
+        "| `--to` | probe | K [N/m] | error in K | B [N s/m] | error in B |",
         "|---|---|---|---|---|---|",
     ]
     table = "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
@@ -73,7 +73,7 @@ def measured(folder: Path) -> Iterator[tuple[str, ...]]:
         yield row(folder, "drake", f"sphere of {mass:g} kg, SDF", scenes.sdf(folder, mass))
     yield row(folder, "drake", "sphere of 2 kg, URDF", scenes.urdf(folder))
     yield row(folder, "mjcf-spring", "sphere of 1 kg on the plate", None)
-    yield row(folder, "newton", "sphere of 1 kg, SolverSemiImplicit, going in", None)
+    yield row(folder, "newton", "sphere of 1 kg, SolverSemiImplicit, loading", None)
 
 
 def row(

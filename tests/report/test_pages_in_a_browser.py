@@ -69,7 +69,7 @@ def test_it_opens_alone_and_is_no_wider_than_the_screen(browser, pages, name, wi
 def test_the_charts_of_an_excitation_are_drawn_and_told(browser, pages):
     with opened(browser, pages["little"], viewport={"width": 1400, "height": 1000}) as page:
         titles = page.locator("figure.chart h3").all_text_contents()
-        assert titles == ["Desired force", "Spectrum", "What it will tell"]
+        assert titles == ["Desired force", "Spectrum", "Predicted uncertainty"]
         for chart in page.locator("figure.chart canvas").all():
             assert chart.evaluate(
                 "c => [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data].some(v => v)"

@@ -79,7 +79,7 @@ class PressOptions:
     Parameters
     ----------
     force
-        Smallest desired force, N.
+        Desired force, N; the smallest one if it varies.
     peak
         Highest force allowed at the touch, N.
     """

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from palpate.bench.experiments.toml_files import TomlFiles
 
 
-@Parameter(name="*", group=Group("What there is", sort_key=2))
+@Parameter(name="*", group=Group("Known names", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class KnownOptions:
     """List or print, without a run.

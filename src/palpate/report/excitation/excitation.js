@@ -18,6 +18,6 @@
     { label: name, kind: "band", colour: name, high: `${name}_high`, low: `${name}_low`, silent: true },
     { label: name, kind: "own", colour: name, of: `${name}_high` },
     ...(told.precision[`${name}_asked`] ? [{ label: `${name} asked`, kind: "known", colour: name, of: `${name}_asked`, silent: true }] : [])]);
-  chart(host("precision"), { title: "What it will tell", y: "95 % half-width [%]", x: "duration [s]", unit: "s", log: "xy", height: 240, digits: 2,
-    caption: "Widest on any surface; shaded: on the others; dashed: asked for.", marks: [{ x: told.seconds, text: "this design" }], series }, told.precision, new Group());
+  chart(host("precision"), { title: "Predicted uncertainty", y: "95 % half-width [%]", x: "duration [s]", unit: "s", log: "xy", height: 240, digits: 2,
+    caption: "Line: the worst surface; shaded: the others; dashed: requested.", marks: [{ x: told.seconds, text: "this design" }], series }, told.precision, new Group());
 })();

@@ -33,7 +33,7 @@
   put("K", { title: "Stiffness K", y: "K [N/m]", x: "time [s]", height: 190, wordless: true, alt: "Estimate of K over time", series: estimate("K"), ...range("K") });
   put("B", { title: "Damping B", y: "B [N s/m]", x: "time [s]", height: 190, wordless: true, alt: "Estimate of B over time", series: estimate("B"), ...range("B") });
   put("M", { title: "Mass M", y: "M [kg]", x: "time [s]", height: 190, wordless: true, alt: "Estimate of M over time", series: estimate("M"), ...range("M") });
-  put("thesis", { title: "Stiffness, fed in three ways", y: "K [N/m]", x: "time [s]", height: 200, wordless: true, ...range("thesis"), series: [
+  put("thesis", { title: "Stiffness, from three kinds of signals", y: "K [N/m]", x: "time [s]", height: 200, wordless: true, ...range("thesis"), series: [
     { label: "thesis' signals", kind: "other", colour: "measured", of: "K_thesis" },
     { label: "raw signals", kind: "measured", colour: "measured", of: "K_raw" },
     { label: "matched", kind: "own", colour: "K", of: "K" },

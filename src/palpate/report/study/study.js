@@ -283,7 +283,7 @@
       body.append(row);
     });
     table.append(body);
-    host.append(make("h3", {}, "Each against each"), make("p", { class: "small" }, "Share of surfaces on which the row is better than the column."), make("div", { class: "scroll" }, table));
+    host.append(make("h3", {}, "Pairwise comparison"), make("p", { class: "small" }, "Share of surfaces on which the row is better than the column."), make("div", { class: "scroll" }, table));
   };
 
   const choice = (host, label, names, chosen, pick) => {
@@ -309,7 +309,7 @@
       const title = Object.entries(comparison.of).map(([name, value]) => `${name} ${value}`).join(", ");
       const left = make("div"), right = make("div");
       versus.append(make("h2", {}, `Surface by surface${title ? `: ${title}` : ""}`),
-        make("p", { class: "small" }, `Each dot is one surface: ${metric.text} on it, less that of the reference on the same surface. Below the dots the median with its 95 % interval: green where it is better beyond doubt, red where it is worse. A cross is a run that failed.`),
+        make("p", { class: "small" }, `Each dot is one surface: ${metric.text} on it, less that of the reference on the same surface. Below the dots the median with its 95 % interval: green where it is significantly better, red where it is worse. A cross is a run that failed.`),
         make("div", { class: "grid two" }, left, right));
       const reference = Math.min(state.reference, comparison.entrants.length - 1);
       strips(left, comparison, reference); bars(right, comparison, reference); matrix(right, comparison);
