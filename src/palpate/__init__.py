@@ -1,4 +1,4 @@
-"""palpate: identify what a robot touches, and press on it with exactly the force asked for.
+"""palpate: identify the surface that a robot touches, and press on it with exactly the desired force.
 
 The first three lines:
 
@@ -7,8 +7,8 @@ The first three lines:
     print(palpate.identify(log))
 
 A result is printed, shown by a notebook, drawn (`.plot()`), written as a page (`.report("press.html")`) and
-compared (`==`). What is wrong with a file or a number is an `InputError`, in one line. Numbers are in SI units; a
-column's own unit stands behind its name, as `position_mm:mm`.
+compared (`==`). A fault in a file or a number is an `InputError`, in one line. Numbers are in SI units; a column's own
+unit follows its name, as `position_mm:mm`.
 
 The rooms, each `palpate.ROOM`:
 
@@ -16,17 +16,17 @@ The rooms, each `palpate.ROOM`:
     identifiers     the same on line, sample by sample: RecursiveLeastSquares, ContactIdentifier, ...
     logs            files in and out: text, Parquet, MATLAB, ROS bags, MCAP
     contact_frame   an arm's wrench and pose along the contact's normal; weighing a tool
-    excitation      which force to ask for, so that a surface shows what it is
+    excitation      design of a desired force that identifies a surface
     force           a force loop for any arm: tune, certify, ForceLoop
     wires           force loops on real arms: UR, Franka, ROS 2
-    export          what was identified as the contact of a scene of MuJoCo, Drake or Newton
+    export          an identified surface as a contact of MuJoCo, Drake or Newton
     robots          kinematics and dynamics: Planar3R, SerialArm.named("ur5e")
     press           any serial arm presses on a surface, in simulation
     bench           the thesis' closed loop: arm, sensors, surface, controller, identifier
     controllers     of force and motion
     environments    surfaces: Kelvin-Voigt, Hunt-Crossley, standard linear solid
     instruments     encoders, force sensors, filters, each with its lag
-    checks          the laws that every part obeys, run on one of yours
+    checks          the conformance suite of all parts, for your own too
     analysis        a loop as a linear model: margins, boundaries of stability
     studies         many runs: grids, random points, a search
     report          figures, tables, pages

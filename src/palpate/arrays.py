@@ -1,4 +1,4 @@
-"""The two kinds of array that pass between functions; shapes and units stand in each docstring."""
+"""The two kinds of array that pass between functions; each docstring states shapes and units."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ class PalpateError(Exception):
 class InputError(PalpateError, ValueError):
     """A file, a flag or a number from outside is wrong.
 
-    The text is one line that says what is wrong, where, and what to do about it.
+    The text is one line: the fault, the place, and the remedy.
     The command line prints it and exits with code 2.
     """
 

@@ -42,7 +42,7 @@ def stable_intervals(
         options: of `linearise`.
 
     Raises:
-        InputError: a key that there is none of, a range that is none, a value out of its own range.
+        InputError: an unknown key, an empty range, a value out of its own range.
     """
     if not low < high:
         raise InputError(f"the range must have its lower end first, got {low:g} ... {high:g}")
@@ -74,7 +74,7 @@ def stable_stiffness(
 
     Args:
         of: any experiment, or a bench.
-        low: of what is looked at [N/m].
+        low: end of the range [N/m].
         high: of it; an interval that reaches either end may go on beyond.
         options: of `linearise`.
 

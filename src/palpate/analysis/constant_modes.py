@@ -31,7 +31,7 @@ def moving(transition: Array, steps: Array) -> tuple[Complex, Complex]:
     """Eigenvalues of all that moves, shape (m,), and their vectors, shape (m, n).
 
     Args:
-        transition: what a period makes of the state, shape (n, n).
+        transition: of the state over a period, shape (n, n).
         steps: units of the state's elements that make it well scaled, shape (n,).
     """
     kept = heeded(transition)
@@ -44,6 +44,6 @@ def moving(transition: Array, steps: Array) -> tuple[Complex, Complex]:
 
 
 def heeded(transition: Array) -> NDArray[np.intp]:
-    """Indices of what anything else depends on, or what goes back by itself: not of integrals that nothing reads."""
+    """Indices of states that affect others or decay alone: not of integrals without effect."""
     others = transition - np.diag(np.diag(transition))
     return np.flatnonzero(others.any(axis=0) | (np.abs(np.diag(transition) - 1.0) > CONSTANT))

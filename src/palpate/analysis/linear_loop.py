@@ -84,14 +84,14 @@ class LinearLoop:
     def eigenvalues(self) -> Complex:
         """Of a tick, on average over a period, shape (m,), the largest first; swings have two.
 
-        What never changes at all (where the tip stuck to the surface, an integral that nothing feeds) is left out.
+        Constant modes (the tip's contact point, an integral without input) are left out.
         """
         z = [m.growth * np.exp(2j * math.pi * m.frequency * self.tick) for m in self.modes]
         return np.array([w for v in z for w in ([v, v.conjugate()] if abs(v.imag) > 1e-9 * abs(v) else [v])])
 
     @property
     def growth(self) -> float:
-        """Factor from tick to tick of what grows fastest: the spectral radius."""
+        """Factor per tick of the fastest mode: the spectral radius."""
         return float(np.abs(self._floquet[0]).max()) ** (1.0 / self.period)
 
     @property
@@ -103,7 +103,7 @@ class LinearLoop:
     def ticks(self) -> tuple[Array, ...]:
         """d x(a tick later)/d x at each tick of a period, each of shape (n, n); `transition` is their product.
 
-        Ticks in which the sensor samples at the same moment, or not at all, are alike and differentiated once.
+        Ticks with the same sampling moment of the sensor are equal and differentiated once.
         """
         sensor: Any = self.motion.loop.force.sensor
         steps = self.motion.loop.steps

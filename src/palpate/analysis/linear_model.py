@@ -43,7 +43,7 @@ def linearise(
         The model, at the desired y and phi, or where else the controller comes to rest.
 
     Raises:
-        InputError: a pose out of reach, a state of rest that there is none of, a motor at its limit.
+        InputError: a pose out of reach, no equilibrium, a motor at its limit.
     """
     bench = of if isinstance(of, Bench) else build(of)
     wanted = float(bench.loop.schedule.first if force is None else force)

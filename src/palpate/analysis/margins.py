@@ -1,4 +1,4 @@
-"""How much gain, phase and delay the force loop bears: its response where the measured force enters the controller."""
+"""Gain, phase and delay margins of the force loop: its response at the input of the measured force."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def margins(loop: LinearLoop) -> Margins:
 
 
 def growth_with(loop: LinearLoop, gain: float = 1.0, late: int = 0) -> float:
-    """Factor from tick to tick of what grows fastest, the measured force multiplied and so many ticks late: exact."""
+    """Factor per tick of the fastest mode, with the measured force multiplied and delayed by so many ticks: exact."""
     cut, n = loop.motion.names.index(CUT), len(loop.x)
     steps = np.concatenate([loop.motion.steps, np.full(late, loop.motion.steps[cut])])
     period = np.eye(n + late)
@@ -83,7 +83,7 @@ def loop_gain(loop: LinearLoop, frequency: ArrayLike) -> Complex:
     """Loop gain at the measured force, L of 1 + L = 0, shape as `frequency`'s.
 
     The sensor samples out of step with the ticks, so that a sine returns with others beside it; this is the part of
-    its own frequency, averaged over a period: what a measurement with sines would give.
+    its own frequency, averaged over a period, as a measurement with sines would give it.
 
     Args:
         loop: its position loops stay closed.

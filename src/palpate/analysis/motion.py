@@ -39,7 +39,7 @@ CHUNK, LARGE = 25, 1e4
 
 
 class Moving(NamedTuple):
-    """The fields of a loop's state that act on its motion; the others watch, or stand still in force control."""
+    """The fields of a loop's state that affect its motion; the others observe, or are constant in force control."""
 
     plant: Any
     force: Any
@@ -52,7 +52,7 @@ class Motion:
 
     Args:
         loop: as `still` leaves it.
-        state: what does not move is taken from here.
+        state: source of the fields that do not move.
     """
 
     def __init__(self, loop: Loop, state: LoopState):

@@ -33,8 +33,8 @@ class Bench:
     Args:
         loop: all its parts.
         q: joint angles at the start [rad].
-        meta: what the record is to carry along.
-        losses: of contact after which a run ends; 0 lets it go on whatever happens, short of numbers that are none.
+        meta: additional metadata of the record.
+        losses: of contact after which a run ends; 0 ends it only at numbers that are not finite.
         identifier: makes the identifier that watches a run, a new one for each; None for none.
     """
 

@@ -38,7 +38,7 @@ def build(experiment: Experiment) -> Bench:
     """The bench of an experiment.
 
     Raises:
-        InputError: a start pose out of reach, a wall that the arm already stands in, numbers that do not go together.
+        InputError: a start pose out of reach, a wall behind the arm's start, inconsistent numbers.
     """
     e = experiment
     check(e)

@@ -1,4 +1,4 @@
-"""One elastic mode of an arm: how its tip gives way along x, between what the joints say and where it is."""
+"""One elastic mode of an arm: deflection of its tip along x, between the pose of the joints and the actual one."""
 
 import math
 from typing import NamedTuple

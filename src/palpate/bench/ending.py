@@ -1,4 +1,4 @@
-"""When a run has to end before its time, and why: what a learning rate too large comes to."""
+"""Early end of a run and its reason, for instance too large a learning rate."""
 
 from __future__ import annotations
 

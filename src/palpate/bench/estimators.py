@@ -1,4 +1,4 @@
-"""Three least-squares estimators side by side on one contact, so that what the front-end does is seen."""
+"""Three least-squares estimators on one contact, which show the effect of the front end."""
 
 from typing import NamedTuple
 
@@ -37,7 +37,7 @@ class Estimators(NamedTuple):
 
     thesis: force through 120 Hz, acceleration through 35 Hz, velocity and displacement as they are (sec. 6);
     raw: nothing filtered (fig. 6.3); matched: every channel through the same lags, and the offset taken out.
-    The first two run while the contact controller does, as in the thesis. The matched one starts anew when a
+    The first two run while the contact controller does, as in the thesis. The matched one restarts when a
     touch is felt: it would lose the first moments, which tell most, if it waited for the switch.
 
     Args:

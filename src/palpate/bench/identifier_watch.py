@@ -60,7 +60,7 @@ compiled_feed = kernel(feed)
 def watched(
     record: Record, identifier: Identifier, estimators: Estimators, *, compiled: bool = True
 ) -> Record:
-    """The record with the columns of an identifier, which goes on from where it is.
+    """The record with the columns of an identifier, which continues from its state.
 
     Args:
         record: of a run.

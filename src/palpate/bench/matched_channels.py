@@ -1,4 +1,4 @@
-"""From measured signals to a regressor: what recursive least squares is fed with decides what it finds.
+"""From measured signals to a regressor: the input of recursive least squares decides its estimates.
 
 The thesis filters only the acceleration and the force, so its three channels lag differently. A matched front-end
 sends the position through a model of the force sensor's chain, and all channels through one filter.
@@ -72,7 +72,7 @@ class CentringState(NamedTuple):
 
 @part
 class Centring(NamedTuple):
-    """Takes the offset out of a linear fit: what comes out is fitted as with an intercept, exactly.
+    """Removes the offset from a linear fit: the result is exactly that of a fit with an intercept.
 
     Welford's update; the scale sqrt(w/(w+1)) makes the two sums of squares equal.
 

@@ -1,4 +1,4 @@
-"""Parts of the user's are tried before the first run: a mistake is told once, not by every run at its end."""
+"""The user's parts are tried before the first run: an error is reported once, not by every run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The arm, its friction and the surface it touches: what moves between two ticks."""
+"""The plant between two ticks: the arm, its friction and the surface."""
 
 from typing import NamedTuple
 

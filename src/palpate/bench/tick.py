@@ -68,7 +68,7 @@ class LoopState(NamedTuple):
 
 @part
 class Command(NamedTuple):
-    """A torque before and after what limits it."""
+    """A torque before and after its limits."""
 
     wanted: Vec3  # torque that the control law asks for [N m]
     applied: Vec3  # torque after limits and converter [N m]
@@ -93,7 +93,7 @@ def start_at(loop, q):
 
 @law
 def think(loop, state, signals, sequence):
-    """Torque command and the controllers' states, from what is sensed."""
+    """Torque command and the controllers' states, from the measurements."""
     sense, pressing = signals.sense, sequence.phase == CONTACT
     arm = loop.conditioning.arm
     model = arm.model(sense.q, sense.qd)

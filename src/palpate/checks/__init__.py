@@ -7,7 +7,7 @@ from palpate.checks import controller_checks
 def test_my_controller(check):
     check()
 
-A check that fails raises an AssertionError that says what is not so. ``palpate checks module:Class`` runs them all.
+A check that fails raises an AssertionError that names the violated law. ``palpate checks module:Class`` runs them all.
 """
 
 from palpate.checks.check import Check, Outcome, outcomes

@@ -1,4 +1,4 @@
-"""One check of a part, and what becomes of it."""
+"""One check of a part, and its outcome."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Check:
 
     Args:
         law: a function of what is checked; its name is the sentence.
-        subject: what is checked: a part, or what makes an identifier.
+        subject: a part, or a maker of an identifier.
     """
 
     law: Callable[[Any], None]
@@ -47,7 +47,7 @@ class Outcome:
 
 
 def outcomes(checks: Iterable[Check]) -> Iterator[Outcome]:
-    """Runs checks one after another, whatever they raise."""
+    """Runs all checks; an exception of one does not stop the others."""
     for one in checks:
         try:
             one()

@@ -20,17 +20,17 @@ class ContactFrame:
 
     Args:
         wrench_frame: axes that the wrench is given in: the arm's base, the tool (the axes of the pose), or a sensor
-            that is turned against the tool; None to go by what the messages' headers name.
+            that is turned against the tool; None to use the frames of the messages' headers.
         sensor_rpy: how the sensor is turned against the tool: roll, pitch and yaw about fixed axes [rad].
         tcp: the point that touches, in the tool's axes from the pose's origin [m].
         wrench_at: the point that the torque is about, likewise [m]; only the lever arm's check needs it.
-        force_sign: `action` is what the tool exerts on the surface, `reaction` what the surface exerts on the tool;
+        force_sign: `action` acts from the tool on the surface, `reaction` from the surface on the tool;
             None to find out.
         normal: into the surface; None to find it from the force.
         normal_frame: axes of the normal: the base's, or the tool's.
-        gravity_compensated: the tool's weight is already taken off the wrench.
+        gravity_compensated: the tool's weight is already subtracted from the wrench.
         free: begin and end of a stretch in which nothing is touched [s]; None to find such stretches.
-        payload: what hangs on the sensor, if it was weighed; its wrench must be in the same axes.
+        payload: of the sensor, if it was weighed; its wrench must be in the same axes.
 
     Raises:
         InputError: they contradict each other.
@@ -78,7 +78,7 @@ class Arm:
         tool_mass: mass between the force sensor and the surface and its standard deviation [kg]; None if not known.
         stiffness: of the arm between the position sensors and the surface, with its std [N/m]; None if not known.
         mass: of the arm's tip before the force sensor, which swings on that stiffness, with its std [kg].
-        position_from: what the position is made of: encoders in the `joints`, or something that sees the `tip`.
+        position_from: source of the position: encoders in the `joints`, or a sensor of the `tip`.
 
     Raises:
         InputError: a negative mass, or one that no stiffness holds.

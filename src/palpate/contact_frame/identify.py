@@ -1,4 +1,4 @@
-"""A log of an arm, identified: projected on the contact's normal, with what the arm puts in taken out."""
+"""Identification of an arm's log: projected on the contact's normal, with the arm's own mass and compliance removed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def identify_contact(
     Args:
         record: force and position, or wrench and pose, over time.
         frame: how wrench and pose stand to each other and to the surface; not for a record of one axis.
-        arm: what lies between the sensors and the surface.
+        arm: mass and stiffness between the sensors and the surface.
         tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
         calibration: relative standard deviation of the scales of force and position together.
         options: of `palpate.identify`.

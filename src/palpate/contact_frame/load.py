@@ -41,7 +41,7 @@ class Load:
         weight: in the base's axes, as the sensor shows it [N], shape (3,).
         bias: in the tool's axes [N], shape (3,).
         std: standard deviation of an axis of their sum [N].
-        separable: whether the log tells the whole weight from the bias.
+        separable: whether the log separates the whole weight from the bias.
         weight_std: standard deviation of an axis of the weight [N]; infinite if it is not separable.
     """
 

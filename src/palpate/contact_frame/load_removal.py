@@ -1,4 +1,4 @@
-"""The force without what the sensor shows in the air, and the rows in which it is in the air and in contact."""
+"""The force without weight and bias, and the rows in free motion and in contact."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Unloaded:
         there: rows with a force, shape (n,).
         inside: rows in contact, shape (n,).
         free: rows with a force in which nothing is touched, shape (n,).
-        load: what was taken off.
+        load: the subtracted weight and bias.
     """
 
     force: Array

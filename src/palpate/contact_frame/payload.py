@@ -85,7 +85,7 @@ class Payload(Table):
         return "\n".join([head, *lines]) + "\n"
 
     def save(self, path: Path) -> None:
-        """Writes the file, whole or not at all."""
+        """Writes the file, atomically."""
         write_text(path, self.to_toml())
 
 

@@ -32,14 +32,14 @@ def project(record: Record, frame: ContactFrame) -> Record:
     Args:
         record: with `time`, `force_x`, ..., `position_x`, ..., and where there are some `torque_x`, ...,
             `quaternion_x`, ..., `quaternion_w`; as `palpate.logs.read_wrench_and_pose` gives it.
-        frame: what the user says.
+        frame: as declared by the user.
 
     Returns:
         A record with `time` [s], `position` [m] and `force` [N]. Its `meta["contact_frame"]` holds what was declared
         and found; its `scale_std` is what the normal's uncertainty adds to K, B and M, as `identify(calibration=...)`.
 
     Raises:
-        InputError: what was declared does not fit the record.
+        InputError: the declaration does not fit the record.
     """
     signals = signals_of(record, frame)
     signals, freed, notes = in_range(signals, frame)

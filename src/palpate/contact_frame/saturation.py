@@ -1,4 +1,4 @@
-"""Axes of a force sensor that stand at the end of their range: to be found before axes are mixed."""
+"""Saturated axes of a force sensor, found before the axes are rotated."""
 
 from __future__ import annotations
 

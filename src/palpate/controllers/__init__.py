@@ -1,4 +1,4 @@
-"""Control laws: from what is sensed and what is asked for to joint torques.
+"""Control laws: from measurements and a task to joint torques.
 
 A controller is a part: a frozen NamedTuple of gains with ``start()``, the state before the first tick, and
 ``step(state, sense, task, model) -> (torque, state)``. Gains are `Vec3` for the planar arm, or arrays of shape (m,).

@@ -1,4 +1,4 @@
-"""The cautious force law on the planar arm: a stiff spring along x whose far end the law moves."""
+"""The cautious force law on the planar arm: the law moves the far end of a stiff spring along x."""
 
 from typing import NamedTuple
 
@@ -73,7 +73,7 @@ class CautiousPress(NamedTuple):
 
 
 class CautiousController(ControllerTable, tag="cautious"):
-    """A stiff spring whose far end the cautious force law moves; it learns the surface and needs to be told none."""
+    """A stiff spring whose far end the cautious force law moves; it learns the surface and needs no prior of it."""
 
     spring: PositiveTriple = (1e5, 2e4, 4.0)
     """K_p, K_y, K_phi [N/m, N/m, N m/rad]."""

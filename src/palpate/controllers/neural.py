@@ -1,4 +1,4 @@
-"""Neural force control: a network learns, in the loop, what the hybrid controller lacks (thesis, sec. 4.5)."""
+"""Neural force control: a network in the loop compensates the hybrid controller's error (thesis, sec. 4.5)."""
 
 from __future__ import annotations
 

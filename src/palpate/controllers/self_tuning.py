@@ -1,4 +1,4 @@
-"""Force control whose gains a network tunes in the loop: the indirect scheme (thesis, fig. 2.5; Fukuda et al.)."""
+"""Force control with gains tuned by a network in the loop: the indirect scheme (thesis, fig. 2.5; Fukuda et al.)."""
 
 from typing import Annotated, NamedTuple
 

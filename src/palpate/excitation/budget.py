@@ -24,7 +24,7 @@ class Budget:
         least: lowest force, so that contact is kept [N].
         lowest, highest: frequencies in use [Hz].
         rate: fastest change of the desired force [N/s].
-        drive: how far the desired force may depart from its mean [N]; what the force on the surface may, when None.
+        drive: largest departure of the desired force from its mean [N]; as for the force on the surface when None.
             A loop that is slow lets little of the desired force through, so more may be asked for than shall arrive.
 
     Raises:

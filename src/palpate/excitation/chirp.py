@@ -1,4 +1,4 @@
-"""A sweep between the two frequencies that tell most."""
+"""A sweep between the two most informative frequencies."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class Design:
     """An excitation for a problem.
 
     Args:
-        problem: what was asked.
+        problem: as requested.
         made: the wave and its predictions.
         seconds: of the part that counts.
     """
@@ -60,7 +60,7 @@ class Design:
 
     @property
     def feasible(self) -> bool:
-        """Whether it reaches what was asked on every surface."""
+        """Whether it reaches the requested precision on every surface."""
         return self.excess <= 1.0
 
     @property
@@ -98,7 +98,7 @@ def design(problem: Problem) -> Design:
 
 
 def needed(made: Made, problem: Problem) -> float:
-    """Seconds of a wave that reach the precision: more of them never tell less."""
+    """Seconds of a wave that reach the precision: more of them never give less information."""
     low, high = 1e-3, FOREVER
     if made.excess(high, problem.precision) > 1:
         return np.inf

@@ -1,4 +1,4 @@
-"""A multisine whose power lies where it tells most, and whose peaks are low."""
+"""A multisine with optimal power and low peaks."""
 
 from __future__ import annotations
 

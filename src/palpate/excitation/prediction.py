@@ -27,7 +27,7 @@ class Prediction:
         surface: which.
         names: of the parameters that are identified.
         information: about them (of their logarithms) and the lag, of a second, shape (n, n).
-        prior: known beforehand about the same, shape (n, n).
+        prior: information of the same parameters, shape (n, n).
         pull: share by which noise of the position pulls each, shape (n,).
         force: lowest and highest force on the surface [N].
         travel: of the tip, from end to end [m].
@@ -52,7 +52,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Made:
-    """A wave about the mean force, and what it will tell.
+    """A wave about the mean force, and its predicted information.
 
     Args:
         wave: added to the mean force [N].

@@ -26,7 +26,7 @@ def quantity(option: str, text: str, kind: str) -> float:
 
     Args:
         option: that it was given for, as in `--force`; errors name it.
-        text: what was given.
+        text: the given text.
         kind: of `FACTORS`.
 
     Raises:

@@ -14,7 +14,7 @@ _HELPS, _SOONER = 0.95, 0.5  # of the excess, or of the time needed; what helps 
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change of the limits, and what it would bring.
+    """A change of the limits, and its effect.
 
     Args:
         change: in words.

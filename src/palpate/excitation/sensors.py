@@ -30,7 +30,7 @@ def bench_chain() -> ForceChain:
 
 @dataclass(frozen=True)
 class Sensors:
-    """Of force and position, and the log that keeps what they say.
+    """Sensors of force and position, and their log.
 
     Args:
         force: the force sensor's chain.
@@ -56,7 +56,7 @@ class Sensors:
         from the mean alone, and the mean says nothing else as long as the touch is not known exactly.
 
         Args:
-            surface: what is touched.
+            surface: the touched surface.
             omega: angular frequencies [rad/s], shape (F,).
             force: phasors of the force on the surface [N], shape (F,).
         """
@@ -69,7 +69,7 @@ class Sensors:
         """Mean products of the regressors of (ln K, ln B, ln M, lag) under a motion, shape (F, 4, 4) [N^2].
 
         Args:
-            surface: what is touched.
+            surface: the touched surface.
             omega: angular frequencies [rad/s], shape (F,).
             motion: phasors of the position [m], shape (F,).
         """

@@ -44,11 +44,11 @@ def optimal(
     costs: Array | None = None,
     start: Array | None = None,
 ) -> Spectrum:
-    """The powers that tell most.
+    """The optimal powers.
 
     Args:
         information: about each surface by each frequency with unit power, shape (C, F, n, n).
-        prior: known beforehand, shape (n, n).
+        prior: information, shape (n, n).
         wanted: what a deviation of each parameter is measured with, shape (n,): 1.96 sigma of this size is just good
             enough; infinite for a parameter that has to be estimated but is of no interest.
         criterion: `worst` parameter, `D`eterminant, `A`verage variance or worst direction (`E`), each of the worst

@@ -16,7 +16,7 @@ _IDENTIFIED = "identified"
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number and what it rests on.
+    """A number and its origin.
 
     Args:
         value: in SI units.

@@ -1,4 +1,4 @@
-"""One contact, one simulator: what is written, what is assumed, and what pressing it there shows."""
+"""One contact in one simulator: the file, its assumptions, and the result of a press."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Request:
         target: one of `TARGETS`.
         model: the scene's file: MJCF for MuJoCo, SDF or URDF for Drake; None if there is none.
         surface: the geom or collision that is to have the contact; a name for one where there is no scene.
-        probe: what presses on it; None for all that can (MuJoCo), or the only other (Drake).
+        probe: the body that presses; None for all that can (MuJoCo), or the only other (Drake).
     """
 
     target: str

@@ -125,7 +125,7 @@ def touch(rig: Rig) -> float | None:
 
 
 def press(rig: Rig, stiffness: float, force: float, *, inward: bool = False) -> Pressed | None:
-    """Press from the touch on with a force that swings about `force`, and fit K x + B v to what the contact does.
+    """Press from the touch on with a force that oscillates about `force`, and fit K x + B v to the contact's force.
 
     The probe is led along the normal, as far as its joints can: where a probe slides, friction is pressed too.
 
@@ -136,7 +136,7 @@ def press(rig: Rig, stiffness: float, force: float, *, inward: bool = False) -> 
         inward: fit the loadings alone.
 
     Returns:
-        What was measured; None if there was no contact, or the simulation did not stay finite.
+        The result; None if there was no contact, or the simulation did not stay finite.
     """
     path = _path(rig)
     if path is None:

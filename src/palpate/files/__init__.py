@@ -1,4 +1,4 @@
-"""Files that palpate writes: whole or not at all, and never over a file that it did not write itself."""
+"""Files that palpate writes: atomically, and never over a file of another origin."""
 
 from __future__ import annotations
 

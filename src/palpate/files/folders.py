@@ -1,4 +1,4 @@
-"""Folders of results: there whole or not at all, or kept and gone on with; never another's."""
+"""Folders of results: written atomically, or resumable; never another's."""
 
 from __future__ import annotations
 

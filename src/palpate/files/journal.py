@@ -1,4 +1,4 @@
-"""A journal: a value a line behind its checksum, on disk at once; what is torn or spoiled is passed over."""
+"""A journal: one value per line with its checksum, on disk at once; damaged lines are skipped."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Journal:
 
 
 def begin(path: Path, head: Any) -> None:
-    """Begins a journal, whole or not at all.
+    """Begins a journal, atomically.
 
     Raises:
         InputError: palpate may not write there, or the disk is full.

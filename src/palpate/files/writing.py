@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files written atomically."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text as UTF-8, whole or not at all."""
+    """Write a text as UTF-8, atomically."""
     with whole(path) as draft:
         draft.write_text(text, encoding="utf-8", newline="\n")
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as JSON, whole or not at all; an object has to be `signed`."""
+    """Write a value as JSON, atomically; an object has to be `signed`."""
     import msgspec
 
     with whole(path) as draft:

@@ -1,4 +1,4 @@
-"""The last seconds of what is shown: readers take what they have not had yet, and a slow one loses rows, not memory."""
+"""The last seconds of rows: readers take the new ones, and a slow reader loses rows, so that memory stays bounded."""
 
 from __future__ import annotations
 

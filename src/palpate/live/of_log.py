@@ -1,4 +1,4 @@
-"""A log of force and position, as it is played again; what it was found to touch stands beside it."""
+"""A replayed log of force and position, with its identification."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def read_wrench_and_pose(
         A record with `time`, `force_x` ... `torque_z` and `position_x` ... `quaternion_w`, as far as they are there.
 
     Raises:
-        InputError: whatever is wrong with the file or with these arguments, in one line.
+        InputError: a fault in the file or with these arguments, in one line.
     """
     path = Path(path)
     kind = kind_of(path)

@@ -26,7 +26,7 @@ def from_bag(
         held: role whose readings are left as they are where another topic has more of them; the others are moved.
 
     Raises:
-        InputError: whatever is wrong with the bag or with these arguments.
+        InputError: a fault in the bag or with these arguments.
     """
     if "time" in columns:
         raise InputError(f"the messages of {bag.path} have their own times; leave out --time")

@@ -26,7 +26,7 @@ def from_table(
     """The columns asked for, by role as `NAME` or `NAME:UNIT`; time from its column or from the rows per second.
 
     Raises:
-        InputError: whatever is wrong with the file or with these arguments.
+        InputError: a fault in the file or with these arguments.
     """
     places = {role: table.resolve(split_spec(spec)[0]) for role, spec in columns.items()}
     check_apart(places, {role: table.names[place] for role, place in places.items()}, table.path)

@@ -1,4 +1,4 @@
-"""The `palpate identify` command that a log asks for, as far as its names, units and values tell."""
+"""The proposed `palpate identify` command of a log, from its names, units and values."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Proposal:
     """Words after `palpate identify LOG`, and what of them is guessed.
 
     Args:
-        words: of the command line; None if the log does not tell enough.
+        words: of the command line; None if the log does not suffice.
         guesses: a sentence each.
     """
 

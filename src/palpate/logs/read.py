@@ -63,7 +63,7 @@ def read_log(
         of a bag, `facts` (how it was read), `frames` (that its headers name, by column) and `position_from` (`joints`).
 
     Raises:
-        InputError: whatever is wrong with the file or with these arguments, in one line.
+        InputError: a fault in the file or with these arguments, in one line.
     """
     path = Path(path)
     if not columns:

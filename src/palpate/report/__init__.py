@@ -1,1 +1,1 @@
-"""Plots, tables and pages: what a person looks at."""
+"""Plots, tables and pages."""

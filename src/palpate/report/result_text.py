@@ -45,7 +45,7 @@ def as_html(head: str, rows: Sequence[Sequence[str]], notes: Sequence[str] = ())
 
 
 def write_page(text: str, path: Path) -> Path:
-    """Write a page of a result, whole or not at all.
+    """Write a page of a result, atomically.
 
     Raises:
         InputError: palpate may not write there, or the name has another ending.

@@ -1,1 +1,1 @@
-"""An experiment: a TOML file, its tables, and what is said when one is refused."""
+"""An experiment: a TOML file, its tables, and the errors of a refused one."""

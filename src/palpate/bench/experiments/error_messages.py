@@ -1,4 +1,4 @@
-"""Why an experiment's file is refused, in the words of the file: which key, what it must be, what was given."""
+"""Errors of an experiment's file, in its own words: the key, the allowed value, the given one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well the force follows what is asked for."""
+"""Metrics of force tracking."""
 
 from __future__ import annotations
 

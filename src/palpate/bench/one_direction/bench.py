@@ -59,7 +59,7 @@ class OneDirectionBench:
         surface: that it touches.
         schedule: desired force, from the touch on.
         change: seconds from the touch to the surface's change; infinite for none.
-        meta: what the record is to carry along.
+        meta: additional metadata of the record.
     """
 
     gains: Gains

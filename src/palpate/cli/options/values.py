@@ -27,7 +27,7 @@ def vector(option: str, text: str | None, quantity: str) -> tuple[float, float, 
 
     Args:
         option: its name.
-        text: what was given.
+        text: the given text.
         quantity: of the unit; `number` for a direction.
     """
     if text is None:

@@ -28,7 +28,7 @@ CHANCE = 1e-3
 
 
 def free_inertia(time: Array, force: Array, place: Array, free: Rows) -> tuple[float, float] | None:
-    """The mass m of f = -m a, and its standard deviation [kg]; None where the log does not tell.
+    """The mass m of f = -m a, and its standard deviation [kg]; None if the log does not determine it.
 
     Args:
         time: of the rows [s], shape (n,).

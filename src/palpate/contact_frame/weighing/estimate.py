@@ -167,7 +167,7 @@ class PoseFit:
         poses: the orientations.
         fitted: weight, bias and drift.
         parameters: by name, with intervals.
-        means: what the model leaves in each orientation [N], shape (g, 3).
+        means: residual of the model in each orientation [N], shape (g, 3).
     """
 
     poses: Poses

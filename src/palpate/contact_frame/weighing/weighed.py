@@ -1,4 +1,4 @@
-"""From a log of free motion to a payload, or to what the log lacks for one."""
+"""From a log of free motion to a payload, or to the missing orientations."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ class Weighed(Result, shown_by="palpate.report.payload.in_python"):
     """A tool's payload, estimated from a log.
 
     Args:
-        payload: None where the poses do not tell it.
+        payload: None if the poses do not determine it.
         parameters: by name, with intervals; those that are not told have an infinite one.
-        lacking: what the poses do not tell, and how to move, a sentence each.
-        notes: what speaks against the log, as a record's meta has them.
+        lacking: the undetermined parts and the motion to add, a sentence each.
+        notes: doubts about the log, as in a record's meta.
         poses: how many orientations there are.
-        residual: root mean square of what the model leaves, of an axis and the mean of an orientation [N].
+        residual: root mean square of the model's residual, of an axis and the mean of an orientation [N].
         shown: measured and modelled force of each orientation, in the tool's axes [N], shape (g, 2, 3).
     """
 

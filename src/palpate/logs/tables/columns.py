@@ -1,4 +1,4 @@
-"""A log of columns, whatever file it is in: what the readers of tables have in common."""
+"""A log of columns in any file: common parts of the readers of tables."""
 
 from __future__ import annotations
 

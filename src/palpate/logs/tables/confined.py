@@ -1,4 +1,4 @@
-"""Readers of formats whose libraries a damaged file can crash, in a process of their own with limits.
+"""Readers for formats with crash-prone libraries, in a separate process with limits.
 
 SciPy leaves the process by a segmentation fault at some MATLAB files, polars aborts it at some of Parquet, and a small
 file may unpack to any size. What the process answers is arrays and words, never objects.

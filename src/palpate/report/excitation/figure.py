@@ -1,4 +1,4 @@
-"""The figure of an excitation: the desired force, its spectrum, and what it will tell after how long."""
+"""The figure of an excitation: the desired force, its spectrum, and the predicted uncertainty over the duration."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SHOWN = 4.0  # s of the desired force; more would be a block of ink
 
 
 def write_figure(found: Design, path: Path) -> Path:
-    """Draw a design and write it as a PNG, whole or not at all."""
+    """Draw a design and write it as a PNG, atomically."""
     return style.save(draw(found), path)
 
 

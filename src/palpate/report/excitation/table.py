@@ -1,4 +1,4 @@
-"""A designed excitation on the terminal: what it is, what it will tell about each surface, what would help."""
+"""A designed excitation on the terminal: the wave, its predicted uncertainty on each surface, the remedies."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ _SIDE = (-0.17, 0.1)
 
 
 def write_movie(record: Record, path: Path) -> Path:
-    """Writes a film of a run as GIF, whole or not at all.
+    """Writes a film of a run as GIF, atomically.
 
     Args:
         record: of a bench, at least two rows.

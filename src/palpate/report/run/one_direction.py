@@ -1,4 +1,4 @@
-"""The report of a press along one direction: what came of it, the force, and what the law knew."""
+"""The report of a press along one direction: the outcome, the force, and the law's estimate."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from palpate.report.run.words import alerts
 
 
 def tables(summary: dict[str, Any], found: Identification | None) -> list[Table]:
-    """The tables of a run: force first, then what it touched, then the thesis' columns."""
+    """The tables of a run: the force, the surface, the thesis' columns."""
     if summary["force"] is None:
         return []
     own = [surface_table(summary, found)] if found is not None else []

@@ -18,7 +18,7 @@ class StudyPage:
     Args:
         title, about: of the study.
         sentence: the answer.
-        notes: what a reader must not miss.
+        notes: warnings.
         tables: in the order to be read.
         below: tables that stand below the figures.
         charts: plain values from which the page draws; empty where there is nothing to draw.

@@ -1,4 +1,4 @@
-"""The page of a tuned force loop: what is proved, the estimate in it, the press at its ends, Nyquist's curve."""
+"""The page of a tuned force loop: proved surfaces and the estimate, the press at both ends, Nyquist's curve."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dotted paths into an experiment: what stands there, and what it becomes."""
+"""Dotted paths into an experiment: reading and setting their values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The values that a parameter takes, and what they do to an experiment."""
+"""The values of a parameter, and their effect on an experiment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A study: one TOML file that says what is varied, over which experiment, and what is measured; checked at the edge."""
+"""A study: one TOML file with its experiment, parameters and metrics; checked at the edge."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which setting is better, surface by surface: what was drawn at random is not chosen, and is the same for all.
+"""Paired comparison of settings, surface by surface: the random surfaces are the same for all settings.
 
 Where a study draws its surfaces at random, its settings (control laws, gains) are compared on the same surfaces with
 the same noise: the difficulty that they share falls out. A run that failed is worse than any that was done, so that

@@ -1,4 +1,4 @@
-"""The best settings of a study, and how far each can be told from the best."""
+"""The best settings of a study, and the significance of their differences from the best."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Mean:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A setting whose every run was done.
+    """A setting with all its runs completed.
 
     Args:
         at: the parameters' values, the seed aside.
@@ -65,7 +65,7 @@ class Ranking:
 
     @property
     def alike(self) -> tuple[Ranked, ...]:
-        """The best one, and those that cannot be told from it."""
+        """The best one, and those that do not differ significantly."""
         return tuple(s for i, s in enumerate(self.settings) if i == 0 or not s.behind.excludes_zero)
 
     def spans(self) -> dict[str, Sequence[Label]]:

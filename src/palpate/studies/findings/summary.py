@@ -41,7 +41,7 @@ class Findings:
     Args:
         summary: plain JSON values.
         tables: for terminal and page.
-        notes: what a reader must not miss.
+        notes: warnings.
     """
 
     summary: dict[str, Any]

@@ -1,4 +1,4 @@
-"""The journal of a study: every finished run is one line, appended; whatever is torn or spoiled is run again."""
+"""The journal of a study: every finished run is one appended line; runs of damaged lines are repeated."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def table(plan: Plan, rows: Iterable[Row]) -> DataFrame:
 
 
 def write(frame: DataFrame, plan: Plan, path: Path) -> None:
-    """Writes the table as Parquet, whole or not at all; units and texts of the metrics in the file's own metadata.
+    """Writes the table as Parquet, atomically; units and texts of the metrics in the file's own metadata.
 
     Raises:
         InputError: the disk is full.

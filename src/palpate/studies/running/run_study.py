@@ -1,4 +1,4 @@
-"""A study from its plan to its table: what is finished stands in the journal, and the rest is run."""
+"""A study from its plan to its table: finished runs are read from the journal, the others are run."""
 
 from __future__ import annotations
 

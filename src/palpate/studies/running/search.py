@@ -1,4 +1,4 @@
-"""A search in place of a grid: Optuna proposes settings by what the ones before came to.
+"""A search in place of a grid: Optuna proposes settings from the results of previous trials.
 
 What it proposes depends on nothing but the study and the trials before, so that a search that was killed goes on as
 if it had not been. The trials stand in a journal of Optuna's own (`JournalStorage`), for its tools.
