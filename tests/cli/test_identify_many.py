@@ -133,7 +133,7 @@ def test_an_interruption_keeps_what_was_done(presses, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "pattern"),
     [
-        ([], "identify what"),
+        ([], "no log is named"),
         (["presses/press_2.csv", "presses"], "press_2.csv is named twice"),
         (["empty"], "holds no log"),
     ],

@@ -131,7 +131,7 @@ def test_a_damping_that_is_given_is_said_to_be_given(capsys, elsewhere):
                 "--to",
                 "mjcf-spring",
             ),
-            "say one with --mass",
+            "give a small one with --mass",
         ),
         (("--to", "gazebo"), "gazebo"),
         ((*TO_MUJOCO, "--damping", "-1"), "--damping must be 0 or more"),
