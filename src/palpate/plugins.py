@@ -71,7 +71,7 @@ def look_in(folder: Path) -> None:
 
 
 def plugin(name: str) -> Plugin:
-    """Imports what a name stands for.
+    """Imports the object of a name.
 
     Modules that are installed come first, then those beside the file that names them, then the current folder's.
 

@@ -18,7 +18,7 @@ class Record(Result, shown_by="palpate.report.record"):
     Args:
         columns: signals by name, each of shape (n,), float64.
         units: the SI unit of each column; "1" for a plain number.
-        meta: whatever else is known: source, seed, command, events. Plain JSON values only.
+        meta: other metadata: source, seed, command, events. Plain JSON values only.
 
     Raises:
         InputError: columns of different lengths, or a column without a unit.

@@ -10,7 +10,7 @@ from palpate.errors import InputError, unknown
 
 @dataclass(frozen=True)
 class Unit:
-    """One unit: what it measures, its SI unit, and the factor that leads there."""
+    """One unit: its quantity, its SI unit, and the factor to it."""
 
     quantity: str
     si: str

@@ -2,8 +2,8 @@
 
 Over a cell the loop's period is a quadratic in the number, through three values of it; what that misses is measured at
 two more. A quadratic of matrices lies in the hull of its Bernstein coefficients: where all of these contract in one
-norm by more than what is missed, so does every loop of the cell. A cell is not stable where the growth of the fastest
-mode stays above 1 by more than its own quadratic misses. What is neither is cut in two. An island is missed only if
+norm by more than the error, so does every loop of the cell. A cell is not stable if the growth of the fastest mode
+stays above 1 by more than the error of its own quadratic. An undecided cell is halved. An island is missed only if
 five values of its cell show nothing of it.
 """
 

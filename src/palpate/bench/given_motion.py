@@ -184,7 +184,7 @@ def given_motion(
     """A tip on a given path, before the thesis' instruments.
 
     Args:
-        surface: what it presses: one of `palpate.environments` or a part of your own; or a list of several in turn,
+        surface: one of `palpate.environments` or your own part; or a list of several in turn,
             each with the time [s] from which on it is there, the first from 0. A surface that comes while another is
             pressed has the rest length that leaves the force as it is.
         wall: where the first surface is undeformed [m].
@@ -221,12 +221,12 @@ def _truth(surface: Any) -> dict[str, dict[str, Any]]:
 
 
 def rest_for(surface: Any, force: float, rate: float) -> float:
-    """Penetration [m] at which a surface that moves at a rate [m/s], relaxed, bears a force [N], inertia left out.
+    """Penetration [m] at which a relaxed surface moving at a rate [m/s] carries a force [N], without inertia.
 
-    Negative where the damping alone bears more than that.
+    Negative if the damping alone carries more than that.
 
     Raises:
-        InputError: no depth within metres bears it.
+        InputError: no depth within metres carries it.
     """
     from scipy.optimize import brentq
 

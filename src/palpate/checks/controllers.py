@@ -69,7 +69,7 @@ def its_torque_is_finite(controller: Any) -> None:
 
 
 def a_step_keeps_nothing_on_the_part(controller: Any) -> None:
-    """The same start and the same senses give the same torques, whatever went before."""
+    """The same state and the same measurements give the same torques."""
     first, _ = ticks(controller)
     again, _ = ticks(controller)
     require(

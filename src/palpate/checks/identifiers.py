@@ -90,7 +90,7 @@ def its_estimate_is_finite(make: Callable[[], Any]) -> None:
 
 
 def it_finds_the_foam(make: Callable[[], Any]) -> None:
-    """Two seconds of three tones tell the stiffness within a quarter, which is what "identified" means."""
+    """Two seconds of three tones identify the stiffness within a quarter."""
     phi, force = foam(2000)
     K = float(np.asarray(fed(make(), phi, force).estimate().theta)[2])
     require(

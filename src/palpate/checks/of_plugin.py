@@ -1,4 +1,4 @@
-"""The checks of a plug-in: of what its class is, or of what an experiment makes of it."""
+"""The checks of a plug-in: of its class, or of its instance in an experiment."""
 
 from __future__ import annotations
 

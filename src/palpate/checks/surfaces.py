@@ -1,4 +1,4 @@
-"""The laws that every surface obeys, whatever its model: it is passive, one-sided, and no step is too long for it."""
+"""Laws of every surface of any model: it is passive, one-sided, and stable at any step."""
 
 from __future__ import annotations
 

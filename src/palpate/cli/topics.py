@@ -64,7 +64,7 @@ def topics(
 def _table(log: Path, found: Listing) -> list[str]:
     """One line for each entry, never wrapped, so that other programs can search it."""
     begin = _begin(found.entries)
-    rows = [("name", "type", "count", "rate", "first", "last", "what")]
+    rows = [("name", "type", "count", "rate", "first", "last", "values")]
     for entry in found.entries:
         times = (_number(None if time is None else time - begin, " s") for time in (entry.first, entry.last))
         words = (entry.name, entry.kind.replace("/msg/", "/"), str(entry.count), _number(entry.rate, " Hz"))

@@ -121,7 +121,7 @@ def see(signals, x, x_before, torque):
 
 
 class NeuralController(ControllerTable, tag="neural"):
-    """The hybrid controller without integral, and a network that learns what it lacks."""
+    """The hybrid controller without integral, and a network that compensates its error."""
 
     shares_loop: ClassVar[bool] = True
 

@@ -16,7 +16,7 @@ class ProportionalIntegral(NamedTuple):
     """`Hybrid` with its integral gain per second, so that it keeps its bandwidth when the rate changes.
 
     At frequencies where surface and arm give way at once the force is the force command, so with the desired force
-    fed forward the error obeys (1 + kf) e' = -ki e: a time constant of (1 + kf)/ki, whatever the surface.
+    fed forward the error obeys (1 + kf) e' = -ki e: a time constant of (1 + kf)/ki, on any surface.
 
     Args:
         kp: position gain K_pp [1/s^2], shape (m,).

@@ -1,4 +1,4 @@
-"""A contact whose area grows as it is pressed."""
+"""A contact whose area grows with penetration."""
 
 import math
 from typing import Annotated, ClassVar, NamedTuple

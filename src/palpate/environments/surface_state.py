@@ -68,7 +68,7 @@ def contact_force(force, surface_mass, tip_mass, free_acceleration):
 
     Args:
         force: the surface's own, without inertia [N].
-        surface_mass: of what moves with the tip [kg].
+        surface_mass: mass that moves with the tip [kg].
         tip_mass: effective mass of the tip along the normal, 1/(n^T J M^-1 J^T n) of an arm [kg].
         free_acceleration: of the tip into the surface if there were no normal contact force [m/s^2].
     """

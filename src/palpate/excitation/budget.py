@@ -67,7 +67,7 @@ class Budget:
         return self.swing if self.drive is None else self.drive
 
     def share(self, peak: float, slope: float) -> float:
-        """By what a desired force must be multiplied to use up its budget.
+        """Factor of a desired force that uses up its budget.
 
         Args:
             peak: how far it departs from its mean [N].

@@ -79,9 +79,9 @@ def bound(
     Args:
         time: evenly spaced [s], shape (n,): the rows of a record or the steps of the physics.
         penetration: true, smooth on that grid [m], shape (n,).
-        truth: K [N/m], B [N s/m] and M [kg]; what is left out is 0.
+        truth: K [N/m], B [N s/m] and M [kg]; an omitted one is 0.
         chain: of the force sensor.
-        known: standard deviation of what is known beforehand, by name: 0 is known exactly, inf (or left out) not at
+        known: standard deviation of the prior, by name: 0 is known exactly, inf (or left out) not at
             all. The lag is known exactly unless it is named here; the chain's `phase_std` is open in any case.
         span: first and last instant whose samples count [s]; all of the motion when left out.
 
@@ -90,7 +90,7 @@ def bound(
         samples say nothing about an enormous one. `samples`: how many count.
 
     Raises:
-        InputError: names that are none, time that is not even, a span without samples.
+        InputError: unknown names, uneven time, a span without samples.
     """
     std = {"lag": 0.0, **(known or {})}
     for name in (*std, *truth):

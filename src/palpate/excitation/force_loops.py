@@ -25,7 +25,7 @@ _STILL = 1e-9  # m/s; friction is never divided by less
 
 
 class ForceLoop(Protocol):
-    """Any robot under force control that may be taken for linear at a given speed."""
+    """Any robot under force control that is linear at a given speed."""
 
     def transfer(self, omega: Array, impedance: Complex, speed: Array) -> Complex:
         """Force on the surface per desired force, while the tip moves at an rms speed [m/s].
@@ -114,7 +114,7 @@ class HybridLoop:
 
 @dataclass(frozen=True)
 class KnownBandwidth:
-    """A robot of which only the bandwidth of its force control is known, whatever it touches.
+    """A robot with a known bandwidth of its force control, the same on any surface.
 
     Args:
         bandwidth: where the force has fallen to 0.71 of the desired one [Hz]; a second-order Butterworth.

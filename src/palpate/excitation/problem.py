@@ -32,7 +32,7 @@ class Problem:
     Args:
         surfaces: that it shall serve, every one.
         budget: of force and frequency.
-        precision: largest 95 % half-width of each parameter, as a share of its value; what is left out is estimated
+        precision: largest 95 % half-width of each parameter, as a share of its value; an omitted one is estimated
             but may come out as it likes.
         sensors: that watch.
         loop: the robot.

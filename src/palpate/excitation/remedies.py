@@ -19,7 +19,7 @@ class Remedy:
     Args:
         change: in words.
         reached: largest half-width of each parameter on any surface with it.
-        enough: whether that is what was asked.
+        enough: whether that reaches the requested precision.
         needed: how long it must last with it [s], the change of the duration aside; may be infinite.
         limit: largest half-width per that asked for, however long it lasts.
     """

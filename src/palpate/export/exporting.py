@@ -59,7 +59,7 @@ class Request:
         return self.surface or "surface"
 
     def default_place(self) -> Path:
-        """Where the file goes if nobody says: beside the scene, from which its meshes are found."""
+        """Default path of the file: beside the scene, so that its meshes are found."""
         plain = re.sub(r"[^\w.-]+", "-", self.name)
         if self.model is not None:
             return self.model.with_name(f"{self.model.stem}-{plain}{self.model.suffix}")
@@ -108,13 +108,13 @@ class Exported:
     """A file that can be written.
 
     Args:
-        contact: what it holds.
+        contact: the exported contact.
         target: for which simulator.
         text: of the file, without a comment.
         notes: on it, a line each.
-        numbers: the engine's own, as they stand in the file.
+        numbers: the engine's own, as in the file.
         validate: reads a file as the engine does, and raises InputError where it refuses it.
-        check: presses what is in a file.
+        check: presses the contact of a file.
     """
 
     contact: Contact
@@ -126,7 +126,7 @@ class Exported:
     check: Callable[[Path], list[Checked]] = field(default=lambda _path: [], repr=False)
 
     def commented(self, mark: str) -> str:
-        """The text with a comment in it that says what it is of.
+        """The text with a comment about its origin.
 
         Args:
             mark: the comment's first line.

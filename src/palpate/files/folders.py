@@ -25,7 +25,7 @@ def fresh_folder(path: Path, *, force: bool) -> Iterator[Path]:
 
     Args:
         path: where the results shall stand.
-        force: replace the results that stand there already.
+        force: replace existing results.
 
     Raises:
         InputError: `path` is taken, and `force` is off or there is anything in it that palpate did not write; or

@@ -81,10 +81,10 @@ def made_ready() -> None:
 class Player:
     """Plays a source into a feed; started by `with`.
 
-    It stands still until somebody watches.
+    It waits until a page is open.
 
     Args:
-        source: what runs.
+        source: of the rows.
         feed: where its rows go.
         changed: called after something was changed that its loop's stability depends on.
         stability: what is known of that, as plain values; None while nothing is.
@@ -139,7 +139,7 @@ class Player:
             raise self.failure
 
     def news(self) -> None:
-        """How it stands has changed: readers are told."""
+        """Its state has changed: readers are notified."""
         self.version += 1
         self.feed.tell()
 

@@ -102,7 +102,7 @@ class Replay:
         return rows
 
     def set(self, key: str, value: float) -> None:
-        """Refused: what was measured does not change.
+        """Refused: a recording cannot change.
 
         Raises:
             InputError: always.

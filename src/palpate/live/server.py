@@ -39,7 +39,7 @@ class Address:
 
     Args:
         port: of this machine.
-        token: without which nobody is answered.
+        token: requests without it are refused.
     """
 
     port: int
@@ -54,7 +54,7 @@ def served(player: Player, port: int = 0) -> Iterator[Address]:
     """Serves a player's page within the block, by a thread of its own.
 
     Args:
-        player: what the page shows.
+        player: source of the page's rows.
         port: to listen on; 0 takes a free one.
 
     Raises:

@@ -108,10 +108,10 @@ class View:
         scene: a serial arm in space; None if there is none to draw.
         rest: joint angles at the start [rad].
         span: of a replay's time, first and last [s].
-        notes: what a reader should know, such as what the log lacks.
+        notes: for the reader, such as missing signals of the log.
         identified: what `palpate identify` says of a log, by parameter: text, verdict.
-        position: what the depth is called.
-        units: of what the charts show.
+        position: name of the depth.
+        units: of the charted columns.
     """
 
     title: str
@@ -173,7 +173,7 @@ class State:
         seed: of the noise; None for a replay.
         ended: why it goes no further; empty while it does.
         happened: the last few moments worth a mark.
-        warning: what is amiss while it goes on; empty if nothing is.
+        warning: about the running simulation; empty if there is none.
     """
 
     values: dict[str, float] = field(default_factory=dict)

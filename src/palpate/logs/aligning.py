@@ -28,7 +28,7 @@ class Aligned:
     Args:
         time: of the rows [s], shape (n,).
         values: of each stream on these rows, shape (n, k); NaN where it has no reading near by.
-        notes: what was found and done, as a record's meta has it.
+        notes: findings and corrections, as in a record's meta.
     """
 
     time: Array

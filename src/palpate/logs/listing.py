@@ -31,7 +31,7 @@ class Entry:
         count: of messages, or of rows that hold something.
         rate: a second [1/s]; None where it is not known.
         first, last: time of the first and the last [s], on the log's own clock; None likewise.
-        about: how to name it in `palpate identify`, or what its values are.
+        about: its name in `palpate identify`, or its range of values.
         fields: the numbers in a topic's messages.
     """
 
@@ -55,9 +55,9 @@ class Listing:
 
     Args:
         entries: of the log, in its order.
-        troubles: what is wrong with it, a sentence each.
+        troubles: its faults, a sentence each.
         proposal: how to identify it.
-        facts: what it states about itself.
+        facts: its statements about itself.
     """
 
     entries: list[Entry]
@@ -75,7 +75,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
         limits: of unpacked size and time; those of `read_log` when None.
 
     Raises:
-        InputError: the file is missing, or is none that can be read.
+        InputError: the file is missing or unreadable.
     """
     path = Path(path)
     kind = kind_of(path)

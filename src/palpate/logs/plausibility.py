@@ -1,4 +1,4 @@
-"""Faults that show when a log is read: swapped columns, a time that is none, values beyond all measure."""
+"""Faults found when a log is read: swapped columns, an invalid time, implausible values."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def check_range(columns: Mapping[str, Array], names: Mapping[str, str], path: Pa
 
     Args:
         columns: in SI units, by role.
-        names: what the file calls them.
+        names: their names in the file.
         path: of the log.
 
     Raises:
@@ -82,10 +82,10 @@ def implausible_times(columns: Mapping[str, Array], start: float, spec: str) -> 
     Args:
         columns: by role, in SI units.
         start: the first row's own time [s].
-        spec: what the user named the time by, NAME or NAME:UNIT.
+        spec: the user's name of the time, NAME or NAME:UNIT.
 
     Raises:
-        InputError: the time goes back again and again, so it is none.
+        InputError: the time runs backwards repeatedly.
     """
     time = columns["time"]
     step = np.diff(time)

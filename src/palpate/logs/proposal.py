@@ -55,7 +55,7 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Seen:
-    """A column as it is seen before anybody says what it is.
+    """Properties of a column before its role is known.
 
     Args:
         place: from 0.
@@ -79,7 +79,7 @@ class Seen:
 
     @cached_property
     def is_time(self) -> bool:
-        """Whether it goes on and on in even steps, as a time does."""
+        """Whether it grows in even steps, as a time does."""
         step = np.diff(self.values)
         return len(step) > 2 and bool((step > 0).all() and np.median(step) > 0.5 * np.mean(step))
 
@@ -106,7 +106,7 @@ class Seen:
         return float(high - low)
 
     def score(self, role: str, quantity: str) -> int:
-        """How much speaks for a role: its unit, then its name."""
+        """Evidence for a role: its unit, then its name."""
         own = self.unit or unit_in_name(self.name, quantity)
         fits = own is not None and known_unit(own) and unit(own).quantity == quantity
         contradicts = bool(self.unit) and not fits and self.unit != "1"
@@ -138,7 +138,7 @@ def from_columns(table: Columns, seen: Sequence[Seen], delimiter: str | None = N
 
 
 def clock_of(table: Columns, seen: Sequence[Seen]) -> Seen | None:
-    """The column of the time: one that goes on in even steps, best with the name or the unit of a time.
+    """The column of the time: one with even steps, preferably with the name or the unit of a time.
 
     One that counts rows is none, unless it is called a time; where the file states its rate, it must be called so too.
     """

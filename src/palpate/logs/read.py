@@ -59,7 +59,7 @@ def read_log(
             `TOPIC.FIELD:UNIT`.
 
     Returns:
-        A record whose `meta` holds `source`, `start_s` (the first row's own time), `notes` (what was assumed), and,
+        A record whose `meta` holds `source`, `start_s` (the first row's own time), `notes` (assumptions), and,
         of a bag, `facts` (how it was read), `frames` (that its headers name, by column) and `position_from` (`joints`).
 
     Raises:
@@ -98,7 +98,7 @@ def columns_of(path: str | Path, delimiter: str | None = None) -> list[str]:
     """Names of a log's columns; numbers from 0 if it has no header.
 
     Raises:
-        InputError: the file is missing, is none that can be read, or is a bag, which has topics.
+        InputError: the file is missing or unreadable, or is a bag, which has topics.
     """
     kind = kind_of(Path(path))
     if kind.is_bag:

@@ -1,4 +1,4 @@
-"""The perceptron for a loop of one's own: forward and on-line back-propagation, compiled."""
+"""The perceptron for your own loop: forward and on-line back-propagation, compiled."""
 
 from __future__ import annotations
 

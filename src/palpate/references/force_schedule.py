@@ -20,7 +20,7 @@ class ForceSchedule(NamedTuple):
         period: length of an interval [s].
         amplitude: of the sine [N].
         frequency: of the sine [Hz]; 4 sin(pi t) is amplitude 4, frequency 0.5.
-        restart: the sine's clock starts anew each so many seconds, as the listing's does; 0 lets it run on.
+        restart: period after which the sine's clock restarts [s], as the listing's does; 0 lets it run on.
         wave: [N], from contact on, shape (n,); zero after its end.
         rate: of the wave's samples, the loop's own [Hz].
     """

@@ -45,7 +45,7 @@ class Estimate(Compared):
         theta: the values, shape (n,), SI.
         covariance: of theta, shape (n, n): the noise found in the data included.
         samples: how many samples the data are worth (fewer than were seen when old ones are forgotten).
-        rejected: why no number of it may be trusted; empty if nothing speaks against the model.
+        rejected: the reason why none of its numbers is valid; empty if the model is not rejected.
     """
 
     names: tuple[str, ...]

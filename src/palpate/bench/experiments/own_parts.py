@@ -151,7 +151,7 @@ def role_of(name: str) -> Role:
 
 
 def check_protocol(role: Role, part: Any, name: str) -> None:
-    """Refuses what is no part of this role, before it is made.
+    """Refuses a class that is no part of this role, before it is made.
 
     Args:
         role: what it is to be.

@@ -41,7 +41,7 @@ else:
 
 
 class Run(Table):
-    """How long it goes on, and how finely."""
+    """Duration and time step."""
 
     press: Positive = 6.0
     """Seconds of contact after which the run ends."""

@@ -13,7 +13,7 @@ from palpate.plugins import plugin, reason
 
 @cache
 def own_metric(name: str) -> Metric:
-    """A metric of the user's: a `Metric`, or a function of a `Look` whose first line of documentation says what it is.
+    """A user's metric: a `Metric`, or a function of a `Look`, described by the first line of its docstring.
 
     It is asked only of a run that has samples in the study's window.
 
@@ -41,7 +41,7 @@ def tried(metric: Metric, look: Look) -> None:
     """Asks a metric once.
 
     Raises:
-        InputError: it raises, or what it returns is no number.
+        InputError: it raises, or does not return a number.
     """
     try:
         metric.measured(look)

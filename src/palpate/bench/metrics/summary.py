@@ -24,7 +24,7 @@ PARAMETERS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
 def summarise(record: Record) -> dict[str, Any]:
-    """Plain JSON values: how the run went, the force, the motor limits, what was identified, and the truth.
+    """Plain JSON values: outcome, force, motor limits, estimates, and the truth.
 
     Of a press along one direction there are neither limits of motors nor estimators that watch.
     """

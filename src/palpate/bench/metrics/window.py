@@ -31,9 +31,9 @@ class Metric:
     Args:
         name: as studies have it.
         unit: SI; "1" for a plain number.
-        text: what it is, in a line.
+        text: its description, in a line.
         of: from a look at a record; None where the run does not have it.
-        words: what its whole numbers mean, from 0 on; empty where it is a quantity.
+        words: meanings of its whole numbers, from 0 on; empty for a quantity.
         better: whether the least or the most of it is better; "" where neither is.
     """
 

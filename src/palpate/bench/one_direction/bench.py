@@ -41,7 +41,7 @@ FIRM = 0.5
 
 @law
 def wanted(schedule, tick, touch, out):
-    """Desired force at each tick, its clock starting at the touch; what is asked for first, before."""
+    """Desired force at each tick, its clock starting at the touch; before, its first value."""
     for k in range(len(out)):
         out[k] = schedule.force(max(k - touch, 0) * tick)
 
@@ -54,7 +54,7 @@ class OneDirectionBench:
     """An arm before a surface, ready to press.
 
     Args:
-        gains: of the law, as it was told.
+        gains: of the law, with its priors.
         arm: as it is.
         surface: that it touches.
         schedule: desired force, from the touch on.
@@ -78,7 +78,7 @@ class OneDirectionBench:
         progress: Callable[[float, str], None] | None = None,
         waiting: Callable[[], None] | None = None,
     ) -> Record:
-        """Runs from the air; arguments and what is recorded as of `Bench.run`.
+        """Runs from free motion; arguments and record as for `Bench.run`.
 
         Raises:
             InputError: a duration or a press of less than a tick.

@@ -47,7 +47,7 @@ class Priors(Table):
 
 
 class Duration(Table):
-    """How long it goes on."""
+    """Duration."""
 
     press: Positive = 4.0
     """Seconds from the touch on."""

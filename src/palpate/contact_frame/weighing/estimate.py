@@ -34,7 +34,7 @@ class Estimated:
     Args:
         value: shape () or (3,).
         std: standard deviation, likewise.
-        half: half-width of the 95 % interval, likewise; infinite where the log does not tell.
+        half: half-width of the 95 % interval, likewise; infinite if the log does not determine it.
         unit: SI.
     """
 
@@ -177,7 +177,7 @@ class PoseFit:
 
 
 def solve_force(poses: Poses, drift: bool) -> Array:
-    """Weight, bias and drift of a force, w, b, d; not finite where the poses do not tell them, shape (9,) or (6,)."""
+    """Weight, bias and drift of a force, w, b, d; not finite if the poses do not determine them, shape (9,) or (6,)."""
     A, r = _normal_equations(poses)
     n = 9 if drift else 6
     return _solved(A[:, :n, :n].sum(axis=0), r[:, :n].sum(axis=0))

@@ -36,11 +36,11 @@ class Columns(Protocol):
     Attributes:
         path: the file.
         names: of the columns, in the file's order.
-        stated: what the file says about them, by name.
+        stated: statements of the file about them, by name.
         rate: rows per second, where the file states it [1/s].
         clocks: the columns that hold dates and times.
-        notes: what was found and done while reading, as a record's meta has it.
-        left_out: variables that are no columns, by name, and what they are.
+        notes: findings and corrections while reading, as in a record's meta.
+        left_out: variables that are no columns, by name, with their kinds.
     """
 
     path: Path

@@ -1,4 +1,4 @@
-"""The lines of a text log: its first ones, what parts their cells, and what a cell is."""
+"""The lines of a text log: its first lines, their delimiter, and the kinds of cells."""
 
 from __future__ import annotations
 

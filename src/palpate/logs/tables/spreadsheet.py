@@ -1,4 +1,4 @@
-"""Spreadsheets: each sheet is a table with whatever stands above its rows."""
+"""Spreadsheets: each sheet is a table with the lines above its rows."""
 
 from __future__ import annotations
 

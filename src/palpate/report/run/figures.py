@@ -34,7 +34,7 @@ class Drawing:
 
     Args:
         name: of its file.
-        caption: what it shows.
+        caption: of the figure.
         draw: makes it.
     """
 

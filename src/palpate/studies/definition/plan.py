@@ -35,7 +35,7 @@ class Setting:
     Args:
         run: its number.
         at: the parameters' values as they stand in a table, the seed among them.
-        experiment: what is run; None where the values are refused.
+        experiment: to run; None if the values are refused.
         seed: of the noise.
         refused: why.
     """

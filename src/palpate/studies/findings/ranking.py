@@ -39,7 +39,7 @@ class Ranked:
     Args:
         at: the parameters' values, the seed aside.
         runs: how many seeds.
-        metric: what is ranked by.
+        metric: of the ranking.
         behind: by how much it is worse than the best one, seed by seed: the noise that they share falls out.
     """
 
@@ -55,7 +55,7 @@ class Ranking:
 
     Args:
         of: the values of the parameters that are given, [best] each.
-        settings: those whose every run was done.
+        settings: those with all runs completed.
         failed: how many settings had a run that was not.
     """
 

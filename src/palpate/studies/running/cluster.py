@@ -38,12 +38,12 @@ POLL = 1.0
 
 
 def run_batch(packed: bytes, stamp: str, plugins: Sequence[Plugin] = ()) -> list[Done]:
-    """Runs some jobs; this is what a worker does.
+    """Runs some jobs, on a worker.
 
     Args:
         packed: the jobs, as a pickle.
         stamp: of palpate's sources.
-        plugins: that the jobs need; they are imported first, so that one that is missing is told as such.
+        plugins: that the jobs need; they are imported first, so that a missing one is reported as such.
 
     Raises:
         InputError: this worker has other sources than the study, or lacks a plug-in.
@@ -83,7 +83,7 @@ class Certificates:
 class Cluster:
     """Runs jobs on the workers of a Dask scheduler.
 
-    What its workers send back is unpickled here, which may run anything: a cluster is trusted as this machine is.
+    The workers' answers are unpickled here, which can execute code: a cluster is trusted like this machine.
 
     Args:
         address: of the scheduler, such as tcp://192.168.0.10:8786, or tls://.
@@ -91,7 +91,7 @@ class Cluster:
         certificates: for tls://.
 
     Raises:
-        InputError: the extra is not installed, the address is none, or there is no scheduler at it.
+        InputError: the extra is not installed, the address is invalid, or there is no scheduler at it.
     """
 
     def __init__(self, address: str, patience: float = PATIENCE, certificates: Certificates | None = None):
@@ -236,7 +236,7 @@ class Hand:
         self._room, self._looked, self._alone = 0, -math.inf, time.monotonic()
 
     def all(self, batches: Batches) -> Iterator[Done]:
-        """Sends the batches, and takes back what is done."""
+        """Sends the batches, and receives their results."""
         more = True
         while more or self._pending:
             self._look()
@@ -252,7 +252,7 @@ class Hand:
                 yield from done
 
     def drop(self) -> None:
-        """Gives up what is still there."""
+        """Cancels the remaining batches."""
         if self._pending and self.client.status == "running":
             self.client.cancel(list(self._pending), force=True)
         self._pending.clear()

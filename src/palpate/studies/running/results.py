@@ -1,4 +1,4 @@
-"""The rows of a study as one table, in the order of the runs whatever the order in which they were finished."""
+"""The rows of a study as one table, in the order of the runs, not of their completion."""
 
 from __future__ import annotations
 

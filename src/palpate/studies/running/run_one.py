@@ -33,7 +33,7 @@ class Row(msgspec.Struct, frozen=True, array_like=True):
         result: how it ended, in a stable word.
         why: the same in a sentence.
         metrics: in the study's order; None where the run has no such number.
-        seconds: what it took.
+        seconds: its duration.
     """
 
     run: int
@@ -69,7 +69,7 @@ Done = tuple[Row, Record | None]
 def run_one(
     job: Job, stopped: Callable[[], bool] = lambda: False, waiting: Callable[[], None] | None = None
 ) -> Done:
-    """Runs a job to a row, whatever becomes of it; the record with it if it is to be kept.
+    """Runs a job to a row, for any outcome; with the record if it is to be kept.
 
     Args:
         job: to be run.

@@ -43,8 +43,8 @@ class Work:
         plan: its runs.
         source: its text.
         folder: where everything goes.
-        runner: who runs.
-        progress: told how many runs are finished.
+        runner: of the jobs.
+        progress: receives the number of finished runs.
     """
 
     plan: Plan
@@ -54,7 +54,7 @@ class Work:
     progress: Progress = lambda _: None
 
     def done(self, *, force: bool = False) -> DataFrame:
-        """Runs what is not finished, and writes the table; the table.
+        """Does the missing runs, and writes and returns the table.
 
         Raises:
             InputError: the folder holds something else and `force` is off, or the disk is full, or the cluster is gone.

@@ -31,8 +31,8 @@ class Drawn:
 
     Args:
         name: of its file.
-        caption: what is seen.
-        metric: what is drawn.
+        caption: of the figure.
+        metric: drawn.
         panels: makes its panels, all of one kind.
         figure: draws them, with what stands at their axis.
     """
