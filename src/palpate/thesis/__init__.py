@@ -1,1 +1,1 @@
-"""The thesis, measured again: one file a figure, one row a claim, and what explains them."""
+"""The thesis, measured again: one file per figure, one row per claim, and explanations."""

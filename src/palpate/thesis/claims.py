@@ -19,14 +19,14 @@ class Claim:
     """One row of claims.json.
 
     Args:
-        id: what is claimed, "least-squares-foam-level"; with a suffix where one sentence claims several things, ".K".
+        id: the claim, "least-squares-foam-level"; with a suffix, ".K", if one sentence makes several claims.
         source: where the thesis says it.
-        claim: what it says, in our words.
+        claim: its statement, in our words.
         thesis: its value, with unit; or "in words" where it gives none.
         measured: ours, with spread over the seeds, unit and seeds: see `spread`.
         tolerance: the threshold that decides, stated before looking: "within 10 % of the value at 4 s by 0.12 s".
         verdict: reproduced, differs, or not checkable.
-        note: one honest paragraph: why; what was chosen, and what follows from the choice; where it stops holding.
+        note: one paragraph: the reason, the chosen values and their effect, the range of validity.
         group: whether it only sums up the rows of its parts, and is no claim of its own when claims are counted.
     """
 
@@ -102,7 +102,7 @@ def counted(claims: Sequence[Claim]) -> Counter[str]:
 
 
 def count_in_words(claims: Sequence[Claim]) -> str:
-    """The count, the same wherever it is told: "87 claims measured: 48 reproduced, 38 differ, 1 not checkable"."""
+    """The count, the same everywhere: "87 claims measured: 48 reproduced, 38 differ, 1 not checkable"."""
     found = counted(claims)
     parts = [("reproduced", "reproduced"), ("differs", "differ"), ("not checkable", "not checkable")]
     told = ", ".join(f"{found[verdict]} {word}" for verdict, word in parts)

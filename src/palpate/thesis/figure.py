@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class Study(Protocol):
     """A module with one figure.
 
-    ``NUMBER`` is the thesis' number of the figure ("6.11"), or a name of ours for what it does not have
-    ("why-negative-mass"). ``TITLE`` is a line; ``CAPTION`` says what is seen, the claim included. ``PARAMETERS`` holds
+    ``NUMBER`` is the thesis' number of the figure ("6.11"), or our own name of an explanation
+    ("why-negative-mass"). ``TITLE`` is a line; ``CAPTION`` describes it, the claim included. ``PARAMETERS`` holds
     everything that was chosen.
     """
 

@@ -1,4 +1,4 @@
-"""Measures the thesis, study by study; what is done is on disk at once, and an interrupted run goes on from there."""
+"""Measures the thesis, study by study; each result is on disk at once, and an interrupted run resumes."""
 
 from __future__ import annotations
 

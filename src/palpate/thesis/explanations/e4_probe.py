@@ -1,4 +1,4 @@
-"""Explanation 4: what the answer of the neural identifier depends on."""
+"""Explanation 4: causes of the neural identifier's answer."""
 
 from __future__ import annotations
 

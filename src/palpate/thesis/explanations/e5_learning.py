@@ -1,4 +1,4 @@
-"""Explanation 5: what the thesis leaves open: the best learning rate, how many layers and neurons, and stability."""
+"""Explanation 5: questions left open by the thesis: the best learning rate, layers and neurons, stability."""
 
 from __future__ import annotations
 

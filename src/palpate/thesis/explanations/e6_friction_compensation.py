@@ -1,4 +1,4 @@
-"""Friction compensation: as printed it never acts; what it does where it acts; and contact lost and found again."""
+"""Friction compensation: as printed (without effect), and effective; loss and recovery of contact."""
 
 from __future__ import annotations
 

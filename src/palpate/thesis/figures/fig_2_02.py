@@ -1,4 +1,4 @@
-"""Figure 2.2: impedance control, and whether the arm is the mass, damper and spring that it is told to be."""
+"""Figure 2.2: impedance control; the arm's estimated mass, damper and spring against the target."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Data:
 
 
 def run(runs: Runs) -> Data:
-    """Jumps of the desired depth on foam and rubber, and under what is varied."""
+    """Jumps of the desired depth on foam and rubber, and under varied conditions."""
     worlds = _worlds()
     varied = by_condition(runs, worlds, lambda e, s: found_in(recorded(e, s)), _ALL)
     rough, free = (recorded(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
@@ -139,7 +139,7 @@ def _claim(data: Data, name: str) -> Claim:
 
 
 def plot(data: Data) -> Figure:
-    """The force over time, and what was found in each world."""
+    """The force over time, and the estimates under each condition."""
     drawing, grid = panels([2.6, 1.8, 1.8, 1.8])
     colors = style.SERIES[:3]
     for (name, one), color in zip(data.traces.items(), colors, strict=True):

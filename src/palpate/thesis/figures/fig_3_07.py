@@ -34,7 +34,7 @@ FREQUENCY = np.geomspace(10.0, 2000.0, 400)
 
 @dataclass(frozen=True)
 class Data:
-    """The gain and what is read from it."""
+    """The gain and its characteristic frequencies."""
 
     gain: Array  # [dB]
     low: Array  # least and most over the components' tolerances

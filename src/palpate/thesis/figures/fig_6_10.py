@@ -59,7 +59,7 @@ def run(runs: Runs) -> Data:
 
 
 def check(data: Data) -> Sequence[Claim]:
-    """At both levels the force has to stay off by more than a tenth of what is asked for."""
+    """At both levels the error has to be more than a tenth of the desired force."""
     return [
         Claim(
             id="hybrid-alone-falls-short",

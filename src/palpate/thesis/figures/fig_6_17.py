@@ -57,7 +57,7 @@ class Data:
 
 
 def run(runs: Runs) -> Data:
-    """Four cycles; the last two are what the first is compared with."""
+    """Four cycles; the last two are the reference of the first."""
     found = tracked(runs, PARAMETERS, SHOWN, JUDGED)
     away = runs.over_seeds(PARAMETERS, away_from_settled)
     times = [adapted_at(one) for one in away]

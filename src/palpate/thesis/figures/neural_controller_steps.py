@@ -42,7 +42,7 @@ class Steps:
         return tracked(runs, self.PARAMETERS, self.shown, JUDGED)
 
     def check(self, data: Tracked) -> Sequence[Claim]:
-        """The force has to follow from 10 to 15 s, by the same limits whatever is asked for."""
+        """The force has to follow from 10 to 15 s, by the same limits for every desired force."""
         share = 100 * float(np.median([one.saturated for one in data.nominal]))
         limited = f"; motor 2 at its limit {share:.0f} % of the time" if self.limited else ""
         return [

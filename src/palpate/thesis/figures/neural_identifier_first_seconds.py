@@ -32,7 +32,7 @@ class FirstSeconds:
         return figure.run(runs, self.PARAMETERS, self.surface)
 
     def check(self, data: figure.Data) -> Sequence[Claim]:
-        """When K, B and M are there, and what they are."""
+        """Settling times and values of K, B and M."""
         return claims.claims(data.grounds, self.expected, self.claim, f"fig. {self.NUMBER}, sec. 6.2")
 
     def plot(self, data: figure.Data) -> Figure:

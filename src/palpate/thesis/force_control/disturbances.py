@@ -1,4 +1,4 @@
-"""Runs in whose middle something changes: the surface, where it is, or the pose that the arm is to take."""
+"""Runs with a change in the middle: of the surface, its position, or the desired pose."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def dots_panel(
     label: str,
     title: str = "",
 ) -> None:
-    """A run each, by variation: a dot where what is claimed holds, a cross where it does not."""
+    """One mark per run, by variation: a dot if the claim is true, a cross if not."""
     for at, runs in enumerate(found.values()):
         spot = at + np.linspace(-0.22, 0.22, max(2, len(runs)))[: len(runs)]
         for good, mark in ((True, HELD), (False, FAILED)):

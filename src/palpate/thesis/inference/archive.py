@@ -1,4 +1,4 @@
-"""Every laboratory that was tried, one line each: what is done is on disk at once, and is not done again."""
+"""Every tried laboratory, one line each, on disk at once, so that none is computed twice."""
 
 from __future__ import annotations
 

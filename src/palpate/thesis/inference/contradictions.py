@@ -49,7 +49,7 @@ class Together:
 
     @property
     def excluded(self) -> bool:
-        """Whether they exclude each other, beyond what chance makes of so many laboratories."""
+        """Whether they exclude each other significantly, given so many laboratories."""
         return self.expected >= self.enough
 
 

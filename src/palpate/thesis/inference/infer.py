@@ -1,4 +1,4 @@
-"""The whole inference: two searches, what they found judged anew, and what follows; each piece on disk at once."""
+"""The whole inference: two searches, new judgements of their results, and the findings; each piece on disk at once."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class Inference:
         folder: where everything goes.
         settings: of the sampler.
         runner: who tries laboratories.
-        command: that is told in the files.
-        threads: for what is looked at over ten seeds.
+        command: that is written into the files.
+        threads: for the judgements over ten seeds.
         half: only the half that calibrates is searched for; the shorter of both searches.
-        told: how far it is.
+        told: receives the progress.
     """
 
     folder: Path

@@ -38,7 +38,7 @@ def calibration() -> tuple[Sentence, ...]:
 
 
 def validation() -> tuple[Sentence, ...]:
-    """The half that was held out."""
+    """The validation half."""
     return tuple(s for s in sentences() if not s.calibrates)
 
 

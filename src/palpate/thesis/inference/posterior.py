@@ -33,7 +33,7 @@ class Marginal:
 
     @property
     def verdict(self) -> str:
-        """Whether the thesis tells it, in a word."""
+        """Whether the thesis determines it, in a word."""
         if self.unknown.prior == "any seed":
             return "not told"
         if self.unknown.choices:

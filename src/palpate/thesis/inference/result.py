@@ -27,7 +27,7 @@ NOT_FOUND, EXCLUDED, IMPOSSIBLE = "not found", "exclude each other", "impossible
 
 @dataclass(frozen=True)
 class Contradiction:
-    """Sentences that were never true together, and what a search for just them came to."""
+    """Sentences that were never true together, and the result of a search for just them."""
 
     together: Together
     bred: Bred
@@ -55,12 +55,12 @@ class Result:
     """Results of the inference.
 
     Args:
-        half: the posterior by the half that calibrates.
+        half: the posterior by the calibration half.
         all: by all sentences; None where only the half was asked for.
         bench: the hand-chosen laboratory, judged.
         by_half, by_all: the best laboratory of each posterior, by the sentences it was inferred from, over ten seeds.
         judged: all laboratories that were looked at over ten seeds.
-        predictive: what laboratories drawn make of the sentences.
+        predictive: shares of true sentences in drawn laboratories.
         sets: sentences never true together, each set searched for by itself.
         table: verdicts of all laboratories that were tried.
     """
@@ -82,19 +82,19 @@ class Result:
 
     @property
     def cross_validation(self) -> tuple[int, int]:
-        """Sentences of the half held out that are true only in the laboratory by half, and only on the bench."""
+        """Sentences of the validation half that are true only in the laboratory by half, and only on the bench."""
         there, here = ({s.id for s in judge.validation() if j.true(s)} for j in (self.by_half, self.bench))
         return len(there - here), len(here - there)
 
     @property
     def by_chance(self) -> float:
-        """How probable so good a laboratory is on the half held out, were it no better than the bench: a sign test."""
+        """Probability of so good a result on the validation half under equal quality of the bench: a sign test."""
         there, here = self.cross_validation
         return sum(math.comb(there + here, k) for k in range(there, there + here + 1)) / 2.0 ** (there + here)
 
     @property
     def better(self) -> bool:
-        """Whether the laboratory by half is better than the bench on the half held out, beyond chance."""
+        """Whether the laboratory by half is significantly better than the bench on the validation half."""
         return self.by_chance <= CHANCE
 
     @property

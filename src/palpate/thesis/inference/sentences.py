@@ -1,4 +1,4 @@
-"""The sentences by which the thesis tells of its laboratory, each with the threshold of its claim in one trial."""
+"""The thesis' sentences about its laboratory, each with the threshold of its claim in one trial."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST = 0.5
 
 @dataclass(frozen=True)
 class Sentence:
-    """A claim of the thesis about what its laboratory showed.
+    """A claim of the thesis about a result of its laboratory.
 
     Args:
         id: of the claim.

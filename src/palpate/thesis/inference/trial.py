@@ -53,7 +53,7 @@ class Pressed:
 
 @dataclass(eq=False)
 class Trial:
-    """One laboratory and one seed of the noise; what becomes of each experiment there, None where contact was lost.
+    """One laboratory and one seed of the noise, with the result of each experiment; None if contact was lost.
 
     Args:
         laboratory: in which.

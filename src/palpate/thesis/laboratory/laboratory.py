@@ -1,4 +1,4 @@
-"""A laboratory: what the thesis does not tell of its own, as one frozen value, and what it makes of an experiment."""
+"""A laboratory: the thesis' unstated parameters, as one frozen value, and their effect on an experiment."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ def level_claim(data: Data, id_: str, source: str, name: str, level: float, why:
 
 
 def damping_claim(data: Data, id_: str, source: str, why: str) -> Claim:
-    """Whether B_e is plausible: what the thesis could only say, the bench can measure."""
+    """Whether B_e is plausible, which the thesis could only state and the bench can measure."""
     return found_claim(
         data,
         (id_, source, "B_e is plausible.", "in words"),

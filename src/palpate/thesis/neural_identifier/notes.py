@@ -22,7 +22,7 @@ class Grounds:
     Args:
         surface: "foam" or "rubber".
         nominal: every start on the press of every noise seed.
-        swept: what the thesis does not give about the network.
+        swept: variations of the network's unstated parameters.
         varied: friction, pose, surface.
         perfect: what K would come out as, over f/x, if the network knew the surface without error.
         starts: how many there are for each noise seed in `nominal`, in order.

@@ -1,4 +1,4 @@
-"""The figure of explanation 4: what the networks know, how K and M follow from it, and every change."""
+"""The figure of explanation 4: the learned force, K and M from it, and every variation."""
 
 from __future__ import annotations
 
