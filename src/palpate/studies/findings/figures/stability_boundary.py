@@ -24,7 +24,7 @@ LOOKED_AT = 8
 """Places along a row that are looked at first; what changes twice between two of them is not seen."""
 EXACT = 5e-3
 """Of a place found, as a share of the row."""
-LABEL = "linear model: stability boundary"
+LABEL = "linear model: stability lost"
 
 Growing = Callable[[float], float | None]
 
