@@ -109,5 +109,5 @@ def _precision(axis: Axes, found: Design) -> None:
     axis.axvline(found.seconds, color=style.MEASURED, linewidth=0.9)
     for which in "xy":
         style.logarithmic(axis, which)
-    axis.set(xlabel="seconds of it", ylabel="95 % half-width [%]")
+    axis.set(xlabel="duration [s]", ylabel="95 % half-width [%]")
     style.legend(axis, title="worst surface; dashed: requested", title_fontsize=8.5)
