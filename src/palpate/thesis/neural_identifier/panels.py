@@ -90,7 +90,7 @@ def _known(force: Axes, stiffness: Axes, surface: Surface, kinds: Mapping[str, t
     for axis in (force, stiffness):
         axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.MEASURED, alpha=0.12, linewidth=0)
         axis.axvline(asked, color=style.FAIL, linewidth=0.9, linestyle=":")
-        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; shaded: learned; dotted: asked")
+        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; shaded: learned; dotted: probe")
     force.set(ylim=(-2.0, 40.0), ylabel="force [N]")
     stiffness.set(ylim=(0.0, 3.0), ylabel="K over f/x")
     force.legend(fontsize=7, frameon=False, ncols=2, loc="lower right")
