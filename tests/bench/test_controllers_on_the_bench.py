@@ -19,7 +19,9 @@ VISCOELASTIC = {
 }
 RUBBER = {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}
 STEPS = {"first": 20.0, "second": 10.0, "period": 2.5}
-surfaces = pytest.mark.parametrize("surface", [FOAM, RUBBER], ids=["foam", "rubber"])
+surfaces = pytest.mark.parametrize(
+    "surface", [pytest.param(FOAM, id="foam"), pytest.param(RUBBER, id="rubber", marks=pytest.mark.long)]
+)
 
 
 def pressed(controller, press=8.0, seed=1, friction=1.0, **tables):

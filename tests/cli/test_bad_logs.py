@@ -78,7 +78,7 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("command", ["identify", "topics"])
+@pytest.mark.parametrize("command", ["identify", pytest.param("topics", marks=pytest.mark.long)])
 @pytest.mark.parametrize("kind", FILES)
 def test_a_file_that_is_none(tmp_path, capsys, kind, command):
     make, pattern = FILES[kind]

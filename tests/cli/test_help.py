@@ -134,7 +134,9 @@ def test_other_suggestions_stay(capsys):
     assert "--force" in capsys.readouterr().err  # of identify it is a column
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+@pytest.mark.parametrize(
+    "shell", ["bash", *(pytest.param(s, marks=pytest.mark.long) for s in ("zsh", "fish"))]
+)
 def test_completion_knows_commands_and_options(capsys, shell):
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out

@@ -75,7 +75,7 @@ def walk_on_arrays(controller, sense, task, model, ticks=5):
     return np.array(torques)
 
 
-ONES_OF_A_KIND = ("hybrid", "proportional-integral", "decoupled", "impedance")
+ONES_OF_A_KIND = ("hybrid", "proportional-integral")
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def test_mujoco_whatever_presses(tmp_path, mass, joint):
     assert error < 1e-4  # the impedance: the largest share that a contact of this softness loses
 
 
-@pytest.mark.parametrize("dimensions", [1, 3, 4, 6])
+@pytest.mark.parametrize("dimensions", [3, 6, *(pytest.param(d, marks=pytest.mark.long) for d in (1, 4))])
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
 def test_mujoco_whatever_cone(tmp_path, cone, dimensions):
     scene = scenes.mjcf(tmp_path, options=f'cone="{cone}" timestep="0.001"', foam=f'condim="{dimensions}"')

@@ -20,7 +20,7 @@ def walk(n, samples, random, noise=0.6, drift=DRIFT):
     return phi, (phi * path).sum(axis=1) + random.normal(0.0, noise, samples), path[-1]
 
 
-@pytest.mark.parametrize("n", [pytest.param(2, marks=pytest.mark.long), 3, 4])
+@pytest.mark.parametrize("n", [3, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 4))])
 def test_it_is_the_textbooks_filter(n):
     phi, force, _ = walk(n, 400, np.random.default_rng(n))
     P = P0[:n, :n] + 3.0

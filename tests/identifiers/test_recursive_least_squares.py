@@ -103,7 +103,14 @@ POLICIES = [Exponential(0.99), Directional(0.98), SIFt(0.98)]
 
 @pytest.mark.parametrize(
     ("n", "policy"),
-    [(n, policy) for n in (3, 4) for policy in POLICIES] + [(5, POLICIES[0])],  # seconds to compile, each
+    [
+        *((3, policy) for policy in POLICIES),
+        (4, POLICIES[0]),
+        (5, POLICIES[0]),
+        *(
+            pytest.param(4, policy, marks=pytest.mark.long) for policy in POLICIES[1:]
+        ),  # seconds to compile, each
+    ],
     ids=lambda p: p if isinstance(p, int) else type(p).__name__,
 )
 def test_laws_mean_the_same_on_values_and_arrays(n, policy):

@@ -9,6 +9,7 @@ import weakref
 import polars
 import pytest
 
+from palpate.bench import Bench
 from palpate.errors import InputError
 from palpate.logs import read_record
 from palpate.studies.running import run_one as one_run
@@ -154,15 +155,15 @@ def test_records_are_kept_where_they_are_asked_for(tmp_path):
 
 def test_records_are_not_kept_in_memory(tmp_path, monkeypatch):
     """Of many runs, no more than the few in hand are alive; the journal has the rest."""
-    made, alive, record = [], [], one_run._record
+    made, alive, run = [], [], Bench.run
 
-    def counted(*words):
-        found = record(*words)
+    def counted(*words, **more):
+        found = run(*words, **more)
         made.append(weakref.ref(found))
         alive.append(sum(one() is not None for one in made))
         return found
 
-    monkeypatch.setattr(one_run, "_record", counted)
+    monkeypatch.setattr(Bench, "run", counted)
     work(SMALL.replace("seeds = 2", "seeds = 4"), tmp_path / "out", Local(2)).done()
     assert len(made) == 24
     assert max(alive) <= 4
