@@ -152,7 +152,7 @@ def test_no_contact_is_an_answer_and_exit_code_1(mine, capsys):
     mine.write_text(text_of(x=0.5) + "\n", encoding="utf-8")
     mine.write_text(mine.read_text().replace("press = 0.3", "press = 0.3\nduration = 0.5"), encoding="utf-8")
     assert main(["run", "mine.toml", "--out", "results"]) == 1
-    assert "no surface" in capsys.readouterr().out
+    assert "no contact was detected" in capsys.readouterr().out
     nothing_but(mine.parent / "results", *(FILES - {"force.png", "identification.png"}))
     summary = json.loads((mine.parent / "results" / "summary.json").read_text())
     assert summary["end"] == "no contact"
