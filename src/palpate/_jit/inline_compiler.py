@@ -59,7 +59,7 @@ def _flags() -> tuple[Any, type]:
 def _link_below(library: Any, module: Any) -> None:
     """Links into a library's module all that it calls, directly or not, each once.
 
-    A function comes after one that calls it: LLVM leaves out what nobody has asked for.
+    A function comes after its caller: LLVM omits functions that are not requested.
     """
     order: dict[Any, None] = {}
 

@@ -122,7 +122,7 @@ class LinearLoop:
         return moving(self.transition, self.motion.steps)
 
     def _frequency(self, value: complex, v: Complex) -> float:
-        """Of a mode [Hz]: a period tells its phase but for whole turns; what is seen within it tells the turns."""
+        """Of a mode [Hz]: a period gives its phase modulo whole turns; the ticks within it give the turns."""
         exponent = np.log(value) / self.period
         seen = (self.seen @ v) / np.array(list(SHOWN.values()))
         seen *= np.exp(-exponent * np.arange(self.period))[:, None]

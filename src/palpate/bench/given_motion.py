@@ -215,7 +215,7 @@ def _in_turn(surface: Any | list[tuple[float, Any]]) -> tuple[tuple[float, Any],
 
 
 def _truth(surface: Any) -> dict[str, dict[str, Any]]:
-    """{name: {"value", "unit"}}; empty of a part that does not tell."""
+    """{name: {"value", "unit"}}; empty for a part without `truth`."""
     truth = surface.truth() if hasattr(surface, "truth") else {}
     return {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
 

@@ -65,7 +65,7 @@ def answers(identifier: Any) -> Array:
 
 
 def _same(one: Array, other: Array) -> bool:
-    """Bit for bit; what is not known is as good as what is not."""
+    """Bit for bit; NaN equals NaN."""
     return np.array_equal(one, other, equal_nan=True)
 
 

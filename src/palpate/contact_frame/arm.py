@@ -90,7 +90,7 @@ def _without_tool(mass: Parameter, arm: Arm, tolerance: float) -> Parameter:
 
 
 def _of_swing(mass: Parameter, arm: Arm) -> Parameter:
-    """M below zero, as it is seen where the arm's own mass swings and nobody has told it."""
+    """M below zero, as caused by an undeclared swinging mass of the arm."""
     if arm.stiffness is None or arm.mass is not None or "below zero" not in mass.reason:
         return mass
     why = "the arm's mass m swings on its own stiffness k and counts as -K m/k: give --robot-mass"

@@ -84,7 +84,7 @@ def _noted(record: Record, inertia: tuple[float, float]) -> Record:
 
 
 def _untouched(found: Identification) -> Identification:
-    """Where the force has no direction, what was fitted along one of them is chance."""
+    """If the force has no direction, a fit along any direction is chance."""
     reason = "the force has no direction, so there seems to be no contact"
     refused = {
         name: Parameter(None, None, None, p.unit, Verdict.NOT_IDENTIFIABLE, reason)
@@ -95,7 +95,7 @@ def _untouched(found: Identification) -> Identification:
 
 
 def _mistaken(found: Identification) -> Identification:
-    """A mass taken off with the wrong sign is told from a lag and a damping by nothing that a contact shows."""
+    """A contact alone cannot separate a mass compensated with the wrong sign from a lag and a damping."""
     reason = "the tool's inertia is in the force with the wrong sign (tool-inertia), which a damping and a lag hide"
     refused = {
         name: replace(p, verdict=Verdict.REJECTED, value=None, std=None, ci95=None, reason=reason)

@@ -77,7 +77,7 @@ def _in_contact(signals: Signals, freed: Unloaded) -> tuple[Array, Array]:
 def _oriented(
     signals: Signals, freed: Unloaded, normal: Normal, frame: ContactFrame
 ) -> tuple[float, Normal, list[dict[str, Any]]]:
-    """The sign that makes the force what the tool exerts, and the normal turned into the surface."""
+    """The sign that makes the force act from the tool on the surface, and the normal into the surface."""
     together = _correlation(signals, freed, normal.direction)
     sign = {"action": 1.0, "reaction": -1.0, None: -1.0 if together < 0 else 1.0}[frame.force_sign]
     if frame.force_sign is not None and freed.free.any() and sign * together < -_FOLLOWS:
@@ -142,7 +142,7 @@ def _inertia_in_air(
 ) -> tuple[float, float] | None:
     """The mass by which the force follows the acceleration before the touch, and its std [kg].
 
-    What the tool exerts on its sensor is m (g - a), and less what it exerts on the surface: the reaction.
+    The tool's force on its sensor is m (g - a) minus its force on the surface: the reaction.
     """
     payload = frame.payload
     centre = payload.centre if payload is not None and payload.centre is not None else (0.0, 0.0, 0.0)

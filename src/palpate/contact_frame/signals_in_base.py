@@ -92,7 +92,7 @@ def _check_without_orientation(frame: ContactFrame) -> None:
 
 
 def _wrench_frame(record: Record, frame: ContactFrame, turned: bool) -> tuple[str, str | None]:
-    """The axes that the wrench is given in; and how that was concluded, if nobody said it."""
+    """The axes of the wrench; and the reason for them, if they were not declared."""
     if frame.wrench_frame is not None:
         return frame.wrench_frame, None
     if not turned:

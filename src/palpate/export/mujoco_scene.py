@@ -191,7 +191,7 @@ def _check_pairs(scene: Scene) -> None:
 def _reach(scene: Scene, probe: str | None) -> tuple[dict[str, tuple[int, tuple[float, ...]]], int]:
     """Dimensions and friction of the contact with each geom that can touch the surface; and how many have no name.
 
-    MuJoCo itself tells, when the surface reaches as far as the scene is large.
+    Measured in MuJoCo, with a surface as large as the scene.
     """
     own = scene.geom(scene.surface)
     wide = copy.copy(scene.model)

@@ -124,6 +124,6 @@ def _decoded(line: bytes, kind: type[T]) -> T | None:
 
 
 def _cut(path: Path, size: int) -> None:
-    """Takes off what stands behind the last whole line; a torn line that stays is passed over when it is read."""
+    """Removes the text after the last complete line; a damaged line that remains is skipped when read."""
     with suppress(OSError):
         os.truncate(path, size)

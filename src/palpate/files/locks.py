@@ -42,7 +42,7 @@ def locking(path: Path, flags: int = os.O_RDONLY) -> Iterator[int | None]:
 
 
 def _stands(handle: int, path: Path) -> bool:
-    """Whether what was opened is still what stands there, and was not moved to its place in the meantime."""
+    """Whether the opened file is still the one at its path, and was not replaced in the meantime."""
     try:
         there = os.lstat(path)
     except FileNotFoundError:

@@ -72,7 +72,7 @@ def viewers(player: Player, port: int) -> Iterator[tuple[str, ...]]:
 
 
 class _Sender(threading.Thread):
-    """Sends what is new, in a thread of its own."""
+    """Sends new rows, in its own thread."""
 
     def __init__(self, player: Player, context: Any):
         import foxglove

@@ -189,7 +189,7 @@ class Player:
             self.news()
 
     def _obey(self) -> None:
-        """Does what was asked, of each slider only the last."""
+        """Applies the requests; of each slider only the last."""
         waiting: list[Request] = []
         while True:
             try:

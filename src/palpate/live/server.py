@@ -156,7 +156,7 @@ class _Server:
             reader.set()
 
     def _asked(self, connection: ServerConnection, asked: Asked) -> Response | None:
-        """Answers whatever is no reader of the stream; nobody without the token, nor by another name of this host."""
+        """Answers requests other than the stream; refuses those without the token, or by another host name."""
         hosts = asked.headers.get_all("Host")
         if len(hosts) != 1 or not _OWN_HOST.match(hosts[0]):
             return connection.respond(HTTPStatus.FORBIDDEN, "this page is for this machine only\n")

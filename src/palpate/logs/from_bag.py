@@ -89,7 +89,7 @@ def _steady(stream: Stream, roles: Sequence[str]) -> None:
 def _guessed_units(
     columns: Mapping[str, str], fields: Mapping[str, tuple[str, str]], bag: Bag
 ) -> list[dict[str, str]]:
-    """A JointState does not tell whether a joint turns or slides."""
+    """A JointState does not state whether a joint turns or slides."""
     notes = []
     for role, (topic, _) in fields.items():
         if _of_joints(bag, topic) and split_spec(columns[role])[1] is None:

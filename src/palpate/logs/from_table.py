@@ -58,7 +58,7 @@ def _from_first(table: Columns, places: Mapping[str, int], arrays: Mapping[str, 
     """Take the first row's time off before it is scaled, in whole numbers where floats would lose some.
 
     Returns:
-        What was taken off, in the file's own unit; 0 where there is no time.
+        The subtracted start, in the file's own unit; 0 without a time.
     """
     if "time" not in places or not np.isfinite(arrays["time"][0]):
         return 0.0
@@ -129,7 +129,7 @@ def _other_unit(role: str, name: str) -> str | None:
 
 
 def _missing(role: str, values: Array, name: str, given: bool) -> list[dict[str, Any]]:
-    """Turn what means "no reading" into NaN, and say so."""
+    """Turn values that mean "no reading" into NaN, and note it."""
     notes = []
     sentinel = None if given or role not in {"position", "force"} else find_sentinel(values)
     if sentinel is not None:

@@ -44,7 +44,7 @@ def read_run(path: Path, **options: Any) -> Record:
 
 
 def _arm(path: Path, known: Any) -> dict[str, Any]:
-    """What gives way and swings on both sides of the force sensor, with standard deviations, as far as it is known."""
+    """Compliances and masses on both sides of the force sensor, with standard deviations, if known."""
     if not isinstance(known, dict):
         return {}
     try:

@@ -229,7 +229,7 @@ def _roughness(own: Seen) -> float:
 
 
 def _with_unit(table: Columns, own: Seen, quantity: str, guesses: list[str]) -> str:
-    """A column's name and unit; a unit that nothing tells is guessed from the size of its values."""
+    """A column's name and unit; an unstated unit is guessed from the size of its values."""
     call = _call(table, own)
     symbol = own.unit or unit_in_name(own.name, quantity)
     if symbol:

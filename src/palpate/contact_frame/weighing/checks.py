@@ -126,7 +126,7 @@ def _by_noise(force: Array, poses: Poses) -> float:
 
 
 def _misfit(poses: Poses, whole: Array) -> float:
-    """Mean square of what is left of the orientations' means [N^2]."""
+    """Mean square of the residuals of the orientations' means [N^2]."""
     left = poses.signal - np.einsum("gji,j->gi", poses.turns, whole[:3]) - whole[3:6]
     if len(whole) > 6:
         left = left - poses.times[:, :1] * whole[6:]
@@ -140,7 +140,7 @@ def _inverted(poses: Poses) -> Poses:
 
 
 def _in_other_axes(record: Record, frame: ContactFrame, poses: Poses) -> dict[str, Poses]:
-    """The wrench read in the base's axes where it was told to be in the tool's, and the other way round."""
+    """The wrench read in the base's axes if declared in the tool's, and the other way round."""
     found = {}
     for axes in ("base", "tool"):
         if axes == (frame.wrench_frame or "tool"):
@@ -154,7 +154,7 @@ def _in_other_axes(record: Record, frame: ContactFrame, poses: Poses) -> dict[st
 
 
 def _turned(poses: Poses) -> tuple[Array, float] | None:
-    """Roll, pitch and yaw [rad] by which the wrench's axes would have to be turned, and what is left then [N^2]."""
+    """Roll, pitch and yaw [rad] of the best rotation of the wrench's axes, and the residual [N^2]."""
     from scipy.optimize import least_squares
     from scipy.spatial.transform import Rotation
 
@@ -182,7 +182,7 @@ def _turned(poses: Poses) -> tuple[Array, float] | None:
 
 
 def _in_axes(poses: Poses, turn: Array) -> Poses:
-    """The wrench taken to be in axes that are turned against those told."""
+    """The wrench in axes that are rotated against the declared ones."""
     signal = poses.signal @ turn.T
     in_base = np.einsum("gij,gj->gi", poses.turns, signal)
     return replace(poses, signal=signal, signal_t=poses.signal_t @ turn.T, in_base=in_base)

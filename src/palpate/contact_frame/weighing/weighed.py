@@ -146,7 +146,7 @@ def _fit(signals: Signals, there: Mask, tolerance: float) -> PoseFit:
 def _at_rest(
     signals: Signals, fitted: Fitted, parameters: dict[str, Estimated], frame: ContactFrame
 ) -> Signals:
-    """Force and torque without what the tool's acceleration does to them; as they are where that is not told."""
+    """Force and torque without the tool's inertia; unchanged if it is not determined."""
     from scipy.signal import savgol_filter
 
     side, inertia = side_of(fitted.whole[:3]), parameters.get("inertia")
@@ -166,14 +166,14 @@ def _at_rest(
 
 
 def _centre_of(signals: Signals, parameters: dict[str, Estimated], frame: ContactFrame) -> Array:
-    """Where the centre of mass is, in the base [m], shape (n, 3); the sensor where it is not told."""
+    """Where the centre of mass is, in the base [m], shape (n, 3); the sensor if it is not determined."""
     at = np.array(frame.wrench_at) + (parameters["centre"].value if "centre" in parameters else 0.0)
     place: Array = signals.place + signals.rotations @ at
     return place
 
 
 def _fitted(poses: Poses, tolerance: float) -> Fitted:
-    """With a drift where the poses tell one beside the weight, without one where they only do so then."""
+    """With a drift if the poses determine it beside the weight, without one otherwise."""
     if len(poses.count) < _FEWEST:
         return fit_force(poses, drift=False)
     with_drift, without = fit_force(poses, drift=True), fit_force(poses, drift=False)
@@ -194,7 +194,7 @@ def _modelled(time: Array, turns: Array, fitted: Fitted) -> Array:
 
 
 def _lacking(poses: Poses, fitted: Fitted, tolerance: float) -> list[str]:
-    """Which direction the poses do not tell, and how to move."""
+    """The undetermined direction, and the motion to add."""
     if _determines(fitted, tolerance) and poses.effective > 2.0:
         return []
     angles = np.degrees(np.sqrt(np.minimum(fitted.information, 1.0)))

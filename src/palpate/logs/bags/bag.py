@@ -105,7 +105,7 @@ class Bag:
             yield Topic(name, " and ".join(kinds), count, known, times)
 
     def _add_frames(self) -> None:
-        """A topic for each frame that a topic of transforms tells of."""
+        """A topic for each frame of a topic of transforms."""
         lists = [
             topic
             for topic in self.topics.values()
@@ -210,7 +210,7 @@ class Bag:
 class _Rows:
     """The messages of a topic: times of recording and of their headers [ns], numbers row by row, the first frame.
 
-    A stamp of 0 is none.
+    A stamp of 0 means no stamp.
     """
 
     received: array[int] = field(default_factory=lambda: array("q"))

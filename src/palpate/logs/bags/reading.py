@@ -155,7 +155,7 @@ class _About(msgspec.Struct, frozen=True):
 
 
 def _metadata(folder: Path) -> tuple[_About, list[str]]:
-    """The bag's metadata.yaml, and what is wrong with it."""
+    """The bag's metadata.yaml, and its fault."""
     path = folder / "metadata.yaml"
     if not path.is_file() or path.stat().st_size > _METADATA:
         return _About(), [f"{folder} has no metadata.yaml; its files are read one by one"]

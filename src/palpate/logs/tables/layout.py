@@ -136,7 +136,7 @@ def _block(lines: Sequence[Line], parting: Parting) -> _Block | None:
 def _is_row(kinds: Sequence[int], width: int, numeric: Sequence[int]) -> bool:
     """Whether a line is a row as the others are: as wide, with numbers in half of the places where they have some.
 
-    A line that begins with a word where they begin with a number is a label and what it labels.
+    A line that begins with a word, among lines that begin with a number, is a label and its value.
     """
     labelled = numeric[0] == 0 and bool(kinds) and kinds[0] < 0
     there = len(kinds) == width and not labelled

@@ -86,7 +86,7 @@ def _labview(rows: dict[str, list[str]], names: Sequence[str]) -> dict[str, Stat
 
 
 def _scaled(rows: dict[str, list[str]], lines: Sequence[str], names: Sequence[str]) -> dict[str, Stated]:
-    """Channels recorded in volts, with what a volt means."""
+    """Channels recorded in volts, with their scales."""
     labels = {label.split()[0].strip(":"): cells for label, cells in rows.items() if label.split()}
     if not {"channel", "units", "scale"} <= set(labels):
         return {}

@@ -110,7 +110,7 @@ def _head(found: Design) -> list[str]:
 
 
 def _rows(found: Design) -> list[list[dict[str, Any]]]:
-    """Each surface: its numbers, how well they will be known, and what it will feel."""
+    """Each surface: its parameters, their predicted uncertainty, and its force."""
     rows = []
     for one in found.predictions:
         widths = one.half_widths(found.seconds)

@@ -98,7 +98,7 @@ def _frames(record: Record, rows: NDArray[np.intp], pace: float) -> Any:
 
 
 def _scene(record: Record, rows: NDArray[np.intp], pace: float) -> tuple[Figure, Any]:
-    """The figure, and what puts a row's moment into it."""
+    """The figure, and the function that draws a row into it."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(_WIDE, _HIGH), dpi=_DPI, layout="constrained", facecolor="white")

@@ -255,7 +255,7 @@ def _loaded(name: str, folder: Path) -> AnyExperiment:
 
 
 def _fixed(base: AnyExperiment, fixed: Mapping[str, Any], name: str) -> AnyExperiment:
-    """An experiment with what does not vary."""
+    """An experiment with its constants."""
     tables = tables_of(base)
     try:
         for path, value in fixed.items():

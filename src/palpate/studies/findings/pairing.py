@@ -129,7 +129,7 @@ Rows = dict[str, tuple[dict[str, Label], "DataFrame"]]
 
 
 def _groups(frame: DataFrame, plan: Plan, conditions: Sequence[str]) -> list[tuple[dict[str, Label], Rows]]:
-    """The rows of each setting, by the values of what is given."""
+    """The rows of each setting, by the given values."""
     import polars
 
     found: dict[tuple[tuple[str, Label], ...], Rows] = {}
