@@ -94,7 +94,7 @@ class FreeMotion:
     noise: float
 
     def drift(self, rows: Array) -> Array:
-        """What the force in the air is at some rows above its middle [N]: straight lines from stay to stay."""
+        """Drift of the free-motion force at some rows, relative to its middle [N]: straight lines between stays."""
         found: Array = np.interp(rows, self.stays, self.levels) - self.rest
         return found
 

@@ -1,4 +1,4 @@
-"""What lies between the position sensor and the surface, and gives way with it: taken out of what was identified.
+"""Compliance and mass between position sensor and surface, removed from the identified parameters.
 
 An arm of stiffness k in series with a surface of impedance Z is seen as Z k / (Z + k), and as Z k / (Z + k + m s^2)
 where a tip of mass m swings between the two. Both channels pass through the same filters first, and the surface is

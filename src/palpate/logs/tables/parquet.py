@@ -43,7 +43,7 @@ class About(msgspec.Struct, frozen=True):
 
 
 class Head(msgspec.Struct, frozen=True, array_like=True):
-    """What a Parquet file says about itself.
+    """Statements of a Parquet file about itself.
 
     Args:
         rows: how many.
@@ -158,7 +158,7 @@ def stored_about(path: Path, limits: Limits | None = None) -> About | None:
 
 
 def head(path: Path, limits: Limits | None = None) -> Head:
-    """What a Parquet file says about itself.
+    """Read the statements of a Parquet file about itself.
 
     Raises:
         InputError: there is no such file, or it cannot be read as Parquet.
