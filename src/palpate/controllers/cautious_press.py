@@ -82,7 +82,7 @@ class CautiousController(ControllerTable, tag="cautious"):
     force: Positive = 20.0
     """The smallest that is asked for [N]."""
     cap: Positive = 4e5
-    """The stiffest surface that there may be [N/m]."""
+    """The largest possible stiffness [N/m]."""
     room: Positive = 80.0
     """Farthest that the spring is drawn beyond what is felt [N]."""
 
@@ -99,7 +99,7 @@ def cautious_on_bench(tick, spring, damping, force, cap, room):
         spring: K_p, K_y, K_phi [N/m, N/m, N m/rad].
         damping: of the three.
         force: smallest that is asked for [N].
-        cap: stiffest surface that there may be [N/m].
+        cap: largest possible stiffness [N/m].
         room: force by which the spring may be drawn beyond what is felt [N].
     """
     gains = gains_on_bench(tick, spring, damping, force, cap)
