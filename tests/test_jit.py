@@ -215,13 +215,14 @@ class Workshop:
         return subprocess.Popen(
             [sys.executable, "-B", str(self.user / main)],
             env={"PYTHONPATH": str(self.package.parent), "PATH": ""},
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         )
 
     def finished(self, process):
-        printed, said = process.communicate()
+        printed, said = process.communicate(timeout=60)
         assert process.returncode == 0, said
         value, cached = printed.split()
         return float(value), cached == "True"
@@ -242,6 +243,30 @@ def runs(workshop, *, factor, offset, more):
     """What a process of its own gives with these numbers in the files, and whether the kernel was cached."""
     workshop.write(factor=factor, offset=offset, more=more)
     return workshop.run()
+
+
+LEAVING = """
+import sys
+
+from mine import Mine
+from palpate._vector import Vec3
+from palpate.entry import entry
+
+try:
+    entry.compiled(Vec3(1.0, 2.0, 3.0), 5.0)  # no part that has a step
+except Exception as error:
+    print("refused", flush=True)
+    sys.stdin.read()
+print(1.0, False)
+"""
+
+
+def test_who_fails_to_compile_keeps_nobody_waiting(workshop):
+    (workshop.user / "leaving.py").write_text(LEAVING)
+    failed = workshop.started("leaving.py")
+    assert failed.stdout.readline() == "refused\n"
+    assert runs(workshop, factor=5.0, offset=0.0, more=0.0) == (75.0, False)
+    workshop.finished(failed)
 
 
 def test_the_cache_is_used_and_never_stale(workshop):

@@ -30,7 +30,6 @@ class Kernel:
         self.plain, self._superword = function, superword
         self._waiting: Callable[[], None] | None = None
         self._dispatcher: Any = None
-        self._lock = CompileLock(home_of(function))
         functools.update_wrapper(self, function)
 
     @property
@@ -38,7 +37,7 @@ class Kernel:
         """The Numba dispatcher, made when first asked for; by one thread, or each would compile its own."""
         with _MAKING:
             if self._dispatcher is None:
-                self._dispatcher = _dispatcher(self.plain, self._superword, self._wait, self._lock)
+                self._dispatcher = _dispatcher(self.plain, self._superword, self._wait)
         return self._dispatcher
 
     def __call__(self, *args: Any) -> Any:
@@ -46,8 +45,7 @@ class Kernel:
         with uninterrupted():
             try:
                 return self.compiled(*args)
-            except BaseException as error:
-                self._lock.release()
+            except Exception as error:
                 if type(error).__module__.startswith("numba."):
                     raise NotCompiled(error) from error
                 raise
@@ -86,12 +84,20 @@ def kernel(function: Callable[..., Any], superword: bool = False) -> Kernel:
     return Kernel(function, superword)
 
 
-def _dispatcher(
-    function: Callable[..., Any], superword: bool, wait: Callable[[], None], lock: CompileLock
-) -> Any:
+def _dispatcher(function: Callable[..., Any], superword: bool, wait: Callable[[], None]) -> Any:
     import numba
 
-    dispatcher = numba.njit(**entry(superword))(function)
+    dispatcher, lock = numba.njit(**entry(superword))(function), CompileLock(home_of(function))
+    compiling = dispatcher._compiler.compile
+
+    def compiled(*words: Any) -> Any:
+        try:
+            return compiling(*words)
+        except BaseException:
+            lock.release()
+            raise
+
+    dispatcher._compiler.compile = compiled
     try:
         dispatcher._cache = _cache(function, wait, lock)
     except RuntimeError:  # nowhere to write: every process compiles anew
