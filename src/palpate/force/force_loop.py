@@ -40,7 +40,8 @@ FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED, PULLED = 0.0, 1.0, 2.0,
 TROUBLES = {
     FINE: "",
     BLIND: "a reading was no number: the tip was held",
-    STALE: "the force reading has not changed for longer than the loop's lag: the tip was held",
+    STALE: "the force reading has not changed for longer than the loop's lag: the tip was held; "
+    "the sensor, or what reads it, stands still (a simulated one needs noise)",
     SATURATED: "the force sensor is at the end of its scale: the tip withdrew",
     LIMITED: "the force is above its limit: the tip withdrew",
     LATE: "ticks were missed: nothing was learned from them",
