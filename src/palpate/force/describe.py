@@ -1,4 +1,4 @@
-"""What a certificate says, in words and as plain JSON values."""
+"""A certificate in words and as plain JSON values."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from palpate.force.claims import Claim
 UNCOVERED = (
     "the backstop, the feed-forward of dF_d/dt",
     "limits of speed and torque",
-    "contact lost while the gain changes, or within a tick; loss of contact of a torque arm",
-    "a reading taken between ticks: its age is counted in whole ticks",
-    "the arm's own compliance between its encoders and the tip beside damping of the surface; the tip's mass on it",
-    "a surface that curves, but by the range of its tangent stiffness",
-    "the peak where a surface becomes stiffer under the tip: for a lag the gain is that of the one before",
+    "loss of contact while the gain changes or within a tick, and of a torque arm",
+    "readings between ticks (their age counts in whole ticks)",
+    "the arm's compliance between encoders and tip together with damping of the surface; the tip's mass on it",
+    "a surface that curves, except by the range of its tangent stiffness",
+    "the peak on a surface that stiffens under the tip: the gain is the old one for a lag",
 )
 
 
@@ -25,23 +25,24 @@ def sentence(claim: Claim, gains_kind: str) -> str:
     if claim.kind == "held":
         factor = f", or up to {claim.shares[1]:g} times that gain" if claim.shares[1] > 1.0 else ""
         return (
-            f"with the gain held at K_u = cap{factor}: every surface whose K + B/theta, as the measured position feels "
-            f"it, is {claim.low:.4g} to {claim.high:.4g} N/m, {times}; K and B may change within a cell every tick"
+            f"constant gain of K_u = cap{factor}: K + B/theta at the measured position from {claim.low:.4g} to "
+            f"{claim.high:.4g} N/m, {times}; K and B may change every tick within a cell"
         )
     if claim.kind == "one-sided":
         return (
-            f"with the gain held at K_u = cap: every surface up to {claim.high:.4g} N/m (K + B/theta, felt), {times}, "
-            f"also where contact is lost and found again at ticks, over gaps of up to F_d/({claim.low:.3g} N/m)"
+            f"constant gain of K_u = cap, with loss of contact at ticks over gaps of up to F_d/({claim.low:.3g} N/m): "
+            f"K + B/theta at the measured position up to {claim.high:.4g} N/m, {times}"
         )
     which = (
         "every constant stiffness"
         if gains_kind == "position"
         else f"every constant stiffness from {claim.low:.4g} to {claim.high:.4g} N/m"
     )
-    jitter = f", a reading's age changing by up to {claim.jitter} ticks" if claim.jitter else ""
+    ticks = f"{claim.jitter} tick{'s' * (claim.jitter > 1)}"
+    jitter = f", the age of a reading changing by up to {ticks}" if claim.jitter else ""
     return (
-        f"whatever the estimator does while g theta K_eff/alpha stays within {claim.shares[0]:g} to {claim.shares[1]:g}"
-        f"{jitter}: {which}, {times}"
+        f"adapting gain, for any estimate while g theta K_eff/alpha is within {claim.shares[0]:g} to "
+        f"{claim.shares[1]:g}{jitter}: {which}, {times}"
     )
 
 

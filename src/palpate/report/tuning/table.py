@@ -26,15 +26,15 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
         ("gain on it", f"{1e3 * gains.gain:.4g} mm/s per N"),
         ("approach", f"at most {1e3 * gains.approach:.3g} mm/s"),
         ("peak at touch", _peak(told)),
-        ("settling", f"{slowest:.3g} s, stiffness known" if isfinite(slowest) else "-"),
-        ("overshoot", f"{100 * told.overshoot:.2g} %, stiffness known"),
+        ("settling", f"{slowest:.3g} s with known stiffness" if isfinite(slowest) else "-"),
+        ("overshoot", f"{100 * told.overshoot:.2g} % with known stiffness"),
         (
             "margins",
             f"gain {at.gain:.3g}, phase {at.phase:.3g} deg, delay {1e3 * at.delay:.3g} ms",
         ),
-        ("stable, exact", f"{low:.4g} to {high:.4g} N/m, gain held, B = 0"),
+        ("stable, exact", f"{low:.4g} to {high:.4g} N/m with constant gain, B = 0"),
     ]
-    found += [("first touches", _domain(told)), ("stiffer in a press", _stiffening(told))]
+    found += [("first touches", _domain(told)), ("stiffening", _stiffening(told))]
     if told.known is not None:
         a, b = told.known.stiffness
         found.append(("surface", f"{a:.4g} to {b:.4g} N/m ({told.known.source})"))
@@ -48,16 +48,16 @@ def _domain(told: Tuning) -> str:
     low, high = told.domain
     seconds = settling_bound(told.gains, high)
     return (
-        f"{low:.4g} to {high:.4g} N/m: 99.9 % below {100.0 * OVERSHOOT:g} % over, 99 % settle in {seconds:.3g} s "
-        "+ F/(K v_max) + 4 B/K; softer ones take longer to rise out of the noise"
+        f"{low:.4g} to {high:.4g} N/m: overshoot below {100.0 * OVERSHOOT:g} % in 99.9 %, settling below "
+        f"{seconds:.3g} s + F/(K v_max) + 4 B/K in 99 %; softer surfaces are detected later"
     )
 
 
 def _stiffening(told: Tuning) -> str:
     near, half = (stiffening(told.gains, told.steps[1], e) for e in STIFFENING_AT)
     return (
-        f"over {100.0 * OVERSHOOT:g} % beyond {near:.2g} times (as felt) while the force is "
-        f"{100.0 * STIFFENING_AT[0]:g} % off, or {half:.2g} times half-way up: it rises so far before a reading tells"
+        f"a surface that stiffens in a press by more than {near:.2g} times while the force error is "
+        f"{100.0 * STIFFENING_AT[0]:g} %, or {half:.2g} times half-way up, overshoots by over {100.0 * OVERSHOOT:g} %"
     )
 
 
@@ -65,7 +65,7 @@ def _peak(told: Tuning) -> str:
     bound = told.peak_bound
     if bound is None:
         return f"{told.peak:.4g} N predicted (no bound)"
-    return f"{told.peak:.4g} N predicted; at most {bound:.4g} N while K_u >= K, without noise and damping"
+    return f"{told.peak:.4g} N predicted; at most {bound:.4g} N for K_u >= K, without noise and damping"
 
 
 def show(told: Tuning, console: Console) -> None:
