@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.files import check_place, write_text
+
 
 def same(one: object, other: object) -> bool:
     """Whether two values are equal, arrays by their elements, and no number equal to no number."""
@@ -83,6 +85,8 @@ class Result(Compared):
         Raises:
             InputError: it holds nothing that can be drawn; palpate may not write there.
         """
+        if path is not None:
+            check_place(Path(path))
         figure = self._looks().draw(self)
         if path is not None:
             import_module("palpate.report.style").save(figure, Path(path))
@@ -94,6 +98,7 @@ class Result(Compared):
         Raises:
             InputError: palpate may not write there, or the name has another ending.
         """
-        return Path(
-            import_module("palpate.report.result_text").write_page(self._looks().page(self), Path(path))
-        )
+        path = Path(path)
+        check_place(path, ending=".html")
+        write_text(path, self._looks().page(self))
+        return path

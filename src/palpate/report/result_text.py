@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from html import escape
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from palpate.files import check_place, write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -42,17 +40,6 @@ def as_html(head: str, rows: Sequence[Sequence[str]], notes: Sequence[str] = ())
     table = [_row(row, "th" if i == 0 else "td") for i, row in enumerate(rows)]
     parts = [f"<p><b>{_safe(head)}</b></p>", f"<table>{''.join(table)}</table>" if rows else ""]
     return "<div>" + "".join([*parts, *(f"<p>{_safe(note)}</p>" for note in notes)]) + "</div>"
-
-
-def write_page(text: str, path: Path) -> Path:
-    """Write a page of a result, atomically.
-
-    Raises:
-        InputError: palpate may not write there, or the name has another ending.
-    """
-    check_place(path, ending=".html")
-    write_text(path, text)
-    return path
 
 
 def _row(cells: Sequence[str], tag: str) -> str:
