@@ -75,7 +75,6 @@ def tune(
         cap=surface.cap,
         peak=press.highest,
         surface_speed=surface.surface_speed,
-        prove_adapting=one.kind == "position" and inner is None,
     )
     written = _written(told, output.out, report)
     _print(told, inner, written, output.json)

@@ -187,7 +187,7 @@ def tune(
         cap: stiffest surface that there may be, K + B/theta [N/m]; by default what is known, or the arm's limit.
         peak: highest force that is allowed at the touch [N].
         surface_speed: of a surface that moves by itself [m/s].
-        prove_adapting: prove the adapting law too, which takes a torque arm a minute.
+        prove_adapting: prove the adapting law too, which takes a torque arm some two seconds.
 
     Raises:
         InputError: numbers that cannot be met, with what can.

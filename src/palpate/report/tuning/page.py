@@ -38,7 +38,7 @@ def page(told: Tuning, command: str = "palpate tune") -> str:
         ],
         **shown_in(
             [
-                _figure("Proved stable surfaces, and the surface of the log", one(_intervals, told, 1.6)),
+                _figure("Proved stable surfaces, and the surface to press on", one(_intervals, told, 1.6)),
                 _figure("The press at both ends, with known stiffness", one(steps, told, 2.6)),
                 _figure("Nyquist's curve on the stiffest surface", one(_nyquist, told, 4.0)),
             ]
@@ -71,7 +71,7 @@ def _intervals(axis: Axes, told: Tuning) -> None:
         if found is not None:
             spans.append((name, found, style.OK if kind == "held" else style.SERIES[0]))
     if told.known is not None:
-        spans.append(("surface of the log", told.known.stiffness, style.K))
+        spans.append(("surface", told.known.stiffness, style.K))
     for i, (_, (low, high), colour) in enumerate(spans):
         ends = [max(low, _SHOWN[0]), min(max(high, 1.02 * low), _SHOWN[1])]
         axis.plot(ends, [i, i], color=colour, linewidth=9, solid_capstyle="butt")
