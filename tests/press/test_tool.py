@@ -150,7 +150,7 @@ def test_a_sensor_that_meets_the_end_of_its_scale_under_way_is_named():
     shown = np.where(record["force_sampled"] > 19.0, scale - record.meta["tare_N"], record["force_sampled"])
     summary = summarise(replace(record, columns={**record.columns, "force_sampled": shown}), press.asked)
     assert summary["sensor_saturated"] == pytest.approx(np.mean(record["force_sampled"] > 19.0))
-    assert any("end of its scale" in note for note in notes(summary))
+    assert any("sensor was saturated" in note for note in notes(summary))
 
 
 def test_a_tool_that_is_too_heavy_and_a_model_that_is_mujocos_are_refused(tmp_path):
