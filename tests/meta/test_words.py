@@ -47,14 +47,12 @@ def test_names_are_those_of_the_field(sources):
     assert not found, "\n".join(f"{path}: {', '.join(names)}" for path, names in found.items())
 
 
-ROOMS_TO_COME = {"force", "press", "robots", "wires"}
-"""Rooms whose docstrings still begin so."""
-
-
 def test_a_docstring_names_the_thing(sources):
-    some = [(path, text) for path, text, _ in sources if path.parts[2] not in ROOMS_TO_COME]
     found = [
-        f"{path}: {line.strip()}" for path, text in some for line in text.splitlines() if '"""What ' in line
+        f"{path}: {line.strip()}"
+        for path, text, _ in sources
+        for line in text.splitlines()
+        if '"""What ' in line
     ]
     assert not found, "\n".join(found)
 

@@ -1,4 +1,4 @@
-"""What a force loop has to know of an arm: how its tip follows a command, what its sensor does, what limits it."""
+"""Model of an arm for a force loop: response of the tip to a command, sensor, and limits."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class Sensor(Table):
 
 
 class Limits(Table):
-    """What the arm may do."""
+    """Limits of the arm."""
 
     speed: Positive
     """Of the tip along the normal [m/s]."""
@@ -277,7 +277,7 @@ def from_toml(text: str, where: str, kind: type[T]) -> T:
 
 
 def _remedy(error: str) -> str:
-    """What to do about a number that is missing."""
+    """Remedy of a missing number."""
     name = error.partition("missing required field `")[2].partition("`")[0]
     return f"; {_REMEDIES[name]}" if name in _REMEDIES else ""
 

@@ -23,7 +23,7 @@ _LARGEST = 1 << 26
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a check found.
+    """Result of a check.
 
     Args:
         holds: whether every cell contracts and the cells leave no gap.
@@ -41,7 +41,7 @@ class Verdict:
 
 
 class Certificate(Table):
-    """What is proved of a tuned loop.
+    """Proof of a tuned loop.
 
     Args:
         form: of the file.

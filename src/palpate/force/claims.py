@@ -1,4 +1,4 @@
-"""What is claimed of a tuned loop: kinds of statements, the surfaces each is of, and the cells that prove it."""
+"""Claims about a tuned loop: kinds of statements, the surfaces of each, and the cells that prove it."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Claim(Table):
     cells: tuple[ProvedCell, ...] = ()
 
     def boxes(self, gains: Gains) -> list[Box]:
-        """What its cells have to cover: the surfaces, for each part of the inner loop and each delay it may have."""
+        """Set that its cells have to cover: the surfaces, for each part of the inner loop and each possible delay."""
         losses = range(gains.arm.unsure_ticks + 1) if self.kind != "adapting" else (0,)
         return [
             Box(self.low, self.high, self.least, self.most, part, loss)
@@ -81,7 +81,7 @@ class Claim(Table):
         ]
 
     def prover(self, gains: Gains) -> Prover:
-        """What has to contract."""
+        """Prover of the claim: the loops that have to contract."""
         own = gains.seen_cap if gains.arm.kind == "position" else _between(gains)
         loop = SampledLoop(gains.arm, self.jitter, own)
         unit = gains.alpha if self.kind == "adapting" else gains.gain

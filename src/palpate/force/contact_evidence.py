@@ -11,7 +11,7 @@ AIR = 0.0
 CONTACT = 7.0
 """Evidence of a contact, a cumulative sum, that a touch begins with, and with none of which it ends."""
 EVIDENT = 32.0
-"""What a line through the readings has to explain, in variances of a reading, for a contact.
+"""Evidence of a line through the readings, in variances of a reading, from which there is contact.
 
 Measured by benchmarks/force/false_alarms.py: white noise comes to it in one of some six thousand approaches of ten
 seconds, to 28 five times as often; a ramp comes to it 5 % later.

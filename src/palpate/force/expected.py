@@ -1,4 +1,4 @@
-"""What presses are expected to come to: how long a touch takes, what noise hides, which surfaces change too much."""
+"""Predictions for presses: duration of a touch, effect of noise, largest change of a surface."""
 
 from __future__ import annotations
 

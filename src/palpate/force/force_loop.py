@@ -99,7 +99,7 @@ def safe_step(numbers, state, desired, force, position, missed):
 
 @law
 def in_vain(control, state, after, desired, speed):
-    """What the command would have added to the force since that last came nearer to F_d [N]."""
+    """Force that the command would have added since the error last fell [N]."""
     stiffness = control.cap * max(after.known.found.x, 0.0)
     low = after.watch.mean < (1.0 - NEAR) * desired and after.stage.phase != AIR
     if not low or abs(after.watch.mean - state[_FROM]) > NEAR * desired:
@@ -122,7 +122,7 @@ _step = kernel(safe_step)
 
 @dataclass(frozen=True)
 class SurfaceEstimate:
-    """What the loop knows of the surface.
+    """Estimate of the surface.
 
     Args:
         stiffness: K as the measured position feels it [N/m].
@@ -221,7 +221,7 @@ class ForceLoop:
 
     @property
     def estimate(self) -> SurfaceEstimate | None:
-        """What is known of the surface; None in the air and until there is something."""
+        """Estimate of the surface; None in free motion and until there is one."""
         s, cap, theta = self._state, self.gains.seen_cap, self.gains.theta
         if s[PHASE] == AIR or s[STD] == 0.0:
             return None
@@ -240,7 +240,7 @@ class ForceLoop:
 
     @property
     def trouble(self) -> str:
-        """What was wrong at the last tick, in words; empty if nothing was."""
+        """Fault of the last tick, in words; empty if there was none."""
         return TROUBLES[float(self._state[_TROUBLE])]
 
     @property

@@ -1,4 +1,4 @@
-"""What an arm's inner loop is, from a log of commanded and measured position: w, z and delay, with intervals."""
+"""Identification of an inner loop from a log of commanded and measured position: w, z and delay, with intervals."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ class _Log:
 
     @property
     def behind(self) -> Array:
-        """What the position lags behind, offset and gain apart [m]."""
+        """Lag of the position behind the command, without offset and gain [m]."""
         columns = np.column_stack([self.command, np.ones(len(self.command))])
         fit = np.linalg.lstsq(columns, self.position, rcond=None)[0]
         return np.asarray((columns @ fit - self.position) / (fit[0] if fit[0] > 0.0 else 1.0))

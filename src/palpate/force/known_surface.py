@@ -1,4 +1,4 @@
-"""What is known of the surface before the first press: a range, or what an identification found."""
+"""Prior of the surface before the first press: a range, or an identification."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _OF_IDENTIFY = " (to palpate identify, whose --json palpate tune takes)"
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of the surface.
+    """Prior of the surface.
 
     Args:
         stiffness: K, lowest and highest [N/m].
@@ -34,7 +34,7 @@ class Known:
 
 
 def known_from(found: Mapping[str, Any], source: str) -> Known:
-    """What an identification says of the surface, from the object that `palpate identify --json` prints.
+    """The surface of an identification, from the object that `palpate identify --json` prints.
 
     Raises:
         InputError: no such object, or one without a stiffness in N/m that can be bounded.
@@ -76,7 +76,7 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
 
 
 def _warned(warnings: object) -> tuple[tuple[str, str], ...]:
-    """What an identification warns of, as far as it is in words."""
+    """Warnings of an identification, as far as they are text."""
     given = warnings if isinstance(warnings, list) else []
     return tuple(
         (w["code"], w["text"] + (_OF_IDENTIFY if "--" in w["text"] else ""))

@@ -1,4 +1,4 @@
-"""What is known of the surface: least squares since the touch, and over the last theta alone."""
+"""Estimate of the surface: least squares since the touch, and over the last theta alone."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from palpate.force.stage import LEARNING, LOCKED
 
 @part
 class Learned(NamedTuple):
-    """What is known of the surface."""
+    """Estimate of the surface."""
 
     slow: Fit  # since the touch
     fast: Fit  # over theta
@@ -25,7 +25,7 @@ class Learned(NamedTuple):
 
 @law
 def begun(law, known, before, stage, w, f, starts, air):
-    """What is known as this stage begins: in the air nothing, at a touch what its start tells, after a step a quarter.
+    """Estimate at the begin of this stage: none in free motion, that of the start at a touch, a quarter after a step.
 
     A stiff contact begins where the force last was within the noise: there it is at rest, but for the noise and for
     what comes between two readings.
@@ -59,7 +59,7 @@ def begun(law, known, before, stage, w, f, starts, air):
 
 @law
 def taken(law, known, state, stage, w, f, force):
-    """What is known with this tick's reading."""
+    """Estimate with this tick's reading."""
     since = known.since + 1.0
     if w.age > 0.0 or since * law.tick < law.blind:
         return Learned(known.slow, known.fast, since, known.origin, known.shown, known.found, known.std)

@@ -42,7 +42,7 @@ class Line(NamedTuple):
         return slope, level, slope * self.uf + level * self.f
 
     def shown(self, behind):
-        """What it explains beside a rest that is the mean of so many readings: its own error explains as much."""
+        """Explained variance beside a rest that is the mean of so many readings, whose own error explains as much."""
         return self.solved()[2] / (1.0 + self.n / behind)
 
 
@@ -89,7 +89,7 @@ def later(starts, every, x, force):
 
 @law
 def explained(starts, behind):
-    """What the likeliest line explains of the sum of squares [N^2], see `Line.shown`."""
+    """Sum of squares that the likeliest line explains [N^2], see `Line.shown`."""
     _, _, a, b, c, d, old = starts
     return max(a.shown(behind), b.shown(behind), c.shown(behind), d.shown(behind), old.shown(behind))
 

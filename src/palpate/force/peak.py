@@ -57,7 +57,7 @@ def peak_bound(gains: Gains, share: float = 1.0, lags: float = LAGS) -> float | 
 
 
 def answers(loop: SampledLoop, stiffness: float, n: int) -> tuple[Array, Array, float]:
-    """What is read in the n ticks after a step of the command, and after a touch, the command standing still.
+    """Readings in the n ticks after a step of the command, and after a touch with a constant command.
 
     Both in units of the force that the step, or a tick of the approach, comes to in the end.
 

@@ -44,7 +44,7 @@ class Fit(NamedTuple):
 
 @law
 def fit_of(line, unit, origin, pace, rest, variance):
-    """What a line through even motion told, see `Line`: its step is damping, or a start that is late, or both.
+    """Prior from a line through even motion, see `Line`: its step is damping, or a late start, or both.
 
     Args:
         line: sums over the readings.
@@ -67,7 +67,7 @@ def fit_of(line, unit, origin, pace, rest, variance):
 
 @law
 def fit_through(x, force, std):
-    """What is known where the force at x, in units of the cap, is this +- std [N], and nothing else."""
+    """Prior from one force at x, in units of the cap, of this value +- std [N]."""
     phi, w = Vec3(x, 0.0, 1.0), 1.0 / (std * std)
     return Fit(PRIOR + w * outer(phi, phi), (w * force) * phi)
 

@@ -15,7 +15,7 @@ from palpate.signals.low_pass import LowPass
 
 @dataclass(frozen=True)
 class Law:
-    """What the law is at a tick, as far as it is linear.
+    """Linear part of the law at a tick.
 
     Args:
         gain: g [m/(s N)].

@@ -1,4 +1,4 @@
-"""What the linear loop does after a touch, and how far from growing it is."""
+"""Response of the linear loop to a touch, and its stability margins."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def from_slow(law, known):
 
 @law
 def highest(law, p, alone, both):
-    """What K_u has to be for an estimate with room for K alone, and for K + B/theta [N/m]."""
+    """K_u of an estimate with room for K alone, and for K + B/theta [N/m]."""
     return max(law.cap * (p.x + alone), least_for(law, max(law.cap * (p.x + p.y + both), 0.0)))
 
 

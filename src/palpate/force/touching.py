@@ -12,7 +12,7 @@ from palpate._vector import ZERO3, Mat3, Vec3, cos, sin
 
 @part
 class Surface(NamedTuple):
-    """What is touched: f = K p^n + B p^(n-1) pdot, one-sided.
+    """A one-sided surface: f = K p^n + B p^(n-1) pdot.
 
     Args:
         stiffness: K [N/m^n].

@@ -22,7 +22,7 @@ from palpate.force.steps import Margins, Step, margins, step_of
 from palpate.results import Result
 
 RIGID = 1e9
-"""What is stiffer is said to be this stiff [N/m]."""
+"""Largest stiffness that is printed [N/m]; stiffer surfaces are shown as this."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -52,7 +52,7 @@ class Reading(NamedTuple):
 
 @part
 class HeldTool(NamedTuple):
-    """What hangs beyond the force sensor, as the sensor shows it: the sign is that of a press.
+    """The tool beyond the force sensor, as the sensor shows it: the sign is that of a press.
 
     Args:
         weight: in the base's axes, less what a driver takes off [N].
@@ -124,7 +124,7 @@ class Body(NamedTuple):
 
 @part
 class Touch(NamedTuple):
-    """What surface and sensor remember, and what was felt."""
+    """State of surface and sensor, and the last force."""
 
     surface: SurfaceState
     reading: Reading

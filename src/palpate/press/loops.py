@@ -73,7 +73,7 @@ def check_mode(gains: Gains, mode: str | None) -> str:
 
 
 def mass_note(gains: Gains, mass: float | None = None) -> str | None:
-    """What to add where gains take the tip of an arm of positions for one without mass; None where nothing is lacking.
+    """Remedy where gains assume a position arm's tip without mass; None where nothing is missing.
 
     Args:
         gains: of the loop.

@@ -30,7 +30,7 @@ _GIVING = 2000.0
 
 
 class Acted(NamedTuple):
-    """What was done at a tick."""
+    """The command of a tick."""
 
     phase: float
     speed: float  # asked of the tip along the normal [m/s]

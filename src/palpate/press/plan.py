@@ -1,4 +1,4 @@
-"""What is asked of a press, from the touch on: a force, lowered now and then so that the surface shows what it is."""
+"""Plan of a press from the touch on: a force, lowered now and then so that the surface is identifiable."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PATIENCE = 3.0
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked for.
+    """The plan's numbers.
 
     Args:
         force: [N].

@@ -31,7 +31,7 @@ _UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked for, as it is typed but in SI.
+    """The request as typed, but in SI.
 
     Args:
         arm: a name, or the path of a file that ends in .toml, .xml, .mjcf or .urdf.

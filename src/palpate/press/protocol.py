@@ -1,4 +1,4 @@
-"""What a force loop asks of an arm, simulated or real: to be read, and to be told how to move."""
+"""Interface between a force loop and an arm, simulated or real: readings and commands."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from palpate.arrays import Array
 
 
 class Sense(NamedTuple):
-    """What an arm says at a tick, everything in its base's axes."""
+    """Readings of an arm at a tick, all in its base's axes."""
 
     time: float  # of the reading [s]
     force: Array  # wrench that the tip exerts on the environment: force [N], moment about the tip [N m], shape (6,)
@@ -27,7 +27,7 @@ class Wire(Protocol):
     """An arm on the other end of a wire, or in a simulation."""
 
     def read(self) -> Sense:
-        """What the arm says at this tick; waits for the tick where the arm has a clock of its own."""
+        """The readings at this tick; waits for the tick if the arm has its own clock."""
         ...
 
     def write(self, command: Command) -> None:

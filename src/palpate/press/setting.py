@@ -1,4 +1,4 @@
-"""What is to be pressed with what, checked: an arm at a pose before a surface."""
+"""Setting of a press, checked: an arm at a pose before a surface."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ _SPARE = 5.0
 
 @dataclass(frozen=True)
 class Truth:
-    """What only a simulation knows, of the last tick.
+    """True values of the last tick, known to the simulation only.
 
     Args:
         q: joint positions [rad, m], shape (n,).
@@ -98,7 +98,7 @@ class SimulatedArm:
         self._line = deque([rest] * loop.delay_ticks)
 
     def read(self) -> Sense:
-        """What the arm says at this tick."""
+        """The readings at this tick."""
         force = np.zeros(6)
         force[:3] = (self._touch.reading.value - self.zero) * np.array(self.cell.normal)
         seen = self._seen
@@ -152,7 +152,7 @@ class SimulatedArm:
 
     @property
     def truth(self) -> Truth:
-        """What only a simulation knows."""
+        """True values, known to the simulation only."""
         body, touch = self._body, self._touch
         return Truth(
             body.q.copy(), body.qd.copy(), touch.mean, touch.depth, touch.surface.contact == 1.0,

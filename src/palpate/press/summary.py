@@ -1,4 +1,4 @@
-"""What a press comes to, in numbers: the keys of `palpate run`, for an arm of any number of joints."""
+"""Summary of a press in numbers: the keys of `palpate run`, for an arm of any number of joints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from palpate.robots.serial.serial_arm import SerialArm
 
 @dataclass(frozen=True)
 class Asked:
-    """What was pressed with what, for the record.
+    """Arm, surface and loop of a press, for the record.
 
     Args:
         arm: what moved.
@@ -50,7 +50,7 @@ class Asked:
     payload: Payload | None = None
 
     def meta(self, record: Record) -> dict[str, Any]:
-        """What the record carries along, plain values."""
+        """Metadata of the record, plain values."""
         loop = self.gains.arm
         known: dict[str, tuple[float, str]] = self.surface.truth()  # type: ignore[no-untyped-call]
         truth = {name: {"value": value, "unit": unit} for name, (value, unit) in known.items()}
@@ -72,7 +72,7 @@ class Asked:
 
     @property
     def between(self) -> dict[str, Any]:
-        """What gives way and swings between encoders and surface, as `palpate identify` reads it: value and std."""
+        """Compliance and mass between encoders and surface, as `palpate identify` reads them: value and std."""
         tool = {} if self.payload is None else self.payload.meta
         inner = self.gains.arm.inner
         if not isinstance(inner, PositionLoop):
@@ -150,7 +150,7 @@ def summarise(record: Record, asked: Asked) -> dict[str, Any]:
 
 
 def identified(record: Record, asked: Asked) -> dict[str, Any]:
-    """What `palpate identify` finds on the record's measured columns, told what measured them."""
+    """Identification of the record's measured columns, with the known instruments."""
     loop = asked.gains.arm
     log = Record(
         {"time": record["t"], "position": record["x_measured"], "force": record["force_sampled"]},

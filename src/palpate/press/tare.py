@@ -1,4 +1,4 @@
-"""What a force sensor shows in the air, and whether it can still read the forces to come."""
+"""Tare of a force sensor in free motion, and a check that it can still read the forces to come."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from palpate.robots.serial.serial_arm import SerialArm
 
 
 def held_tool(payload: Payload | None) -> HeldTool:
-    """What a sensor shows of a tool, with the sign of a press.
+    """A tool as a sensor shows it, with the sign of a press.
 
     A weight that points down is that of a sensor that shows what the tool exerts on it: the opposite of a press.
     """

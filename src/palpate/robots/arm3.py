@@ -27,7 +27,7 @@ def absolute(q):
 
 @law
 def onto_joints(e):
-    """What acts on each link's absolute angle, per joint: the transpose of `absolute`."""
+    """Torque on each link's absolute angle from torques of the joints: the transpose of `absolute`."""
     e2 = e.y + e.z
     return Vec3(e.x + e2, e2, e.z)
 
@@ -116,7 +116,7 @@ def carry_inward(link, c, s, w, dw, ax, ay, fx, fy, n):
 
 @part
 class ArmModel(NamedTuple):
-    """What a controller knows of the arm at one state: tau = M qdd + h + J^T w, xdd = J qdd + Jdqd."""
+    """The arm's laws at one state, for a controller: tau = M qdd + h + J^T w, xdd = J qdd + Jdqd."""
 
     J: Mat3
     Jdqd: Vec3

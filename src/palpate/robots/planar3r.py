@@ -53,7 +53,7 @@ class Planar3R:
 
     @property
     def torque_limits(self) -> Array:
-        """What each motor may give [N m], shape (3,)."""
+        """Limit of each motor [N m], shape (3,)."""
         return _frozen(self.arm.limits)
 
     @property

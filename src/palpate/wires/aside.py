@@ -1,4 +1,4 @@
-"""What a maker's library says on standard output goes to standard error: this program's output may be JSON."""
+"""Redirects a maker's library from standard output to standard error: this program's output may be JSON."""
 
 from __future__ import annotations
 

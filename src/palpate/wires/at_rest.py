@@ -1,4 +1,4 @@
-"""What an arm shows at rest before a press: rate, bias and noise; and what no press should begin with."""
+"""An arm at rest before a press: rate, bias and noise, and the faults with which no press should begin."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PATIENCE = 10.0
 
 @dataclass(frozen=True)
 class AtRest:
-    """What the arm shows at rest, the surface untouched.
+    """Readings of the arm at rest, before contact.
 
     Args:
         position: [m], shape (3,).

@@ -70,12 +70,12 @@ class FrankaWire:
 
     @property
     def title(self) -> str:
-        """What it leads to."""
+        """Its far end."""
         return f"a Franka at {self._address}, over its control interface"
 
     @property
     def watchdog(self) -> str:
-        """What stops it if this process dies."""
+        """Its stop if this process dies."""
         return (
             "a second process holds the connection and brings the arm to rest; if that dies too, the controller stops"
             " it when 20 commands in a row are missing (20 ms)"

@@ -19,7 +19,7 @@ _MOST = 20
 
 
 def robot_of(arm: OneDirection) -> Any:
-    """What franky-sim's server asks of a robot, with the arm of one direction behind it."""
+    """Robot for franky-sim's server, with the arm of one direction behind it."""
     try:
         from franky_sim import BaseRobot
         from franky_sim.base_simulator import InnerRobotState

@@ -96,7 +96,7 @@ class Stopwatch:
             self._n += 1
 
     def summary(self) -> Lateness:
-        """What was seen."""
+        """The measured lateness."""
         ages = self._ages[: self._n] if self._n else np.zeros(1)
         a, b, c = (float(v) for v in np.percentile(ages, SHARES))
         return Lateness(self._n, (a, b, c, float(ages.max())), self._missed, self._jumps, self._allowed)

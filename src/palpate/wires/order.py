@@ -1,4 +1,4 @@
-"""What is asked of a press over a wire, and within which limits; checked against the gains before anything moves."""
+"""Order of a press over a wire, with its limits; checked against the gains before anything moves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from palpate.wires.protocol import Triple, triple
 
 @dataclass(frozen=True)
 class Limits:
-    """What ends a press; all are asked of the user.
+    """Limits that end a press; the user gives all of them.
 
     Args:
         force: of any component [N].
@@ -46,7 +46,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Task:
-    """What to do.
+    """The order.
 
     Args:
         force: F_d [N].
@@ -103,7 +103,7 @@ class Order:
 
 
 def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
-    """What was asked as an order, its direction of unit length; refused where it does not fit the gains.
+    """The request as an order, its direction of unit length; refused where it contradicts the gains.
 
     Raises:
         InputError: what does not fit, and what to do.

@@ -1,4 +1,4 @@
-"""What a force loop asks of a wire to an arm: a reading at a time, a command at a time, and rest."""
+"""Interface of a wire to an arm: one reading at a time, one command at a time, and rest."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ class Wire(Protocol):
 
     @property
     def title(self) -> str:
-        """What it leads to, in words."""
+        """Its far end, in words."""
         ...
 
     @property
     def watchdog(self) -> str:
-        """What stops the arm if this process dies, in words."""
+        """The arm's own stop if this process dies, in words."""
         ...
 
     def read(self, timeout: float) -> Sense:

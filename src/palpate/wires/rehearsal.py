@@ -1,4 +1,4 @@
-"""What the simulated arms that speak for real ones share: an arm of one direction, its words, its pace."""
+"""Common parts of the simulated arms that stand in for real ones: an arm of one direction, its messages, its pace."""
 
 from __future__ import annotations
 

@@ -24,11 +24,11 @@ SENT = {
     "array": "std_msgs/msg/Float64MultiArray",
     "joint-speeds": "std_msgs/msg/Float64MultiArray",
 }
-"""What is sent, by what `as` says."""
+"""Messages to send, by the option `as`."""
 
 
 class Topics(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a wire to ROS 2 has to be told; nothing of it is guessed.
+    """Options of a wire to ROS 2; none of them is guessed.
 
     Args:
         wrench: topic of a WrenchStamped.
@@ -84,7 +84,7 @@ def topics_of(where: str) -> tuple[int, Topics]:
 
 @dataclass
 class _Ends:
-    """What a participant reads and writes."""
+    """Readers and writers of a participant."""
 
     wrench: Any
     place: Any
@@ -121,13 +121,13 @@ class Ros2Wire:
 
     @property
     def title(self) -> str:
-        """What it leads to."""
+        """Its far end."""
         t = self._topics
         return f"an arm in ROS domain {self._domain}, {t.wrench} and {t.place} in, {t.kind} to {t.command}"
 
     @property
     def watchdog(self) -> str:
-        """What stops it if this process dies."""
+        """Its stop if this process dies."""
         return (
             f"only what the controller at {self._topics.command} does when commands stop: look up its timeout"
         )

@@ -47,7 +47,7 @@ class Joints:
 
 
 class Node:
-    """What is published, and what is heard.
+    """Publishers and subscribers.
 
     Args:
         domain: ROS_DOMAIN_ID.

@@ -46,12 +46,12 @@ class SimWire:
 
     @property
     def title(self) -> str:
-        """What it leads to."""
+        """Its far end."""
         return f"a simulated arm at {self._where}, {self.rate:g} readings a second"
 
     @property
     def watchdog(self) -> str:
-        """What stops it if this process dies."""
+        """Its stop if this process dies."""
         return "the simulated arm rests after 10 ticks without a command"
 
     def _greeted(self) -> float:

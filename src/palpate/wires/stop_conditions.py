@@ -1,4 +1,4 @@
-"""What ends a press over a wire before it is done, each with the sentence that says so."""
+"""Conditions that end a press over a wire early, each with its sentence."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ _SURE = 3.0
 
 
 def notes_on(tool: Payload, rest: AtRest) -> list[str]:
-    """What a user should know before the arm moves.
+    """Notes for the user before the arm moves.
 
     Args:
         tool: from `palpate payload`.

@@ -73,12 +73,12 @@ class UrWire:
 
     @property
     def title(self) -> str:
-        """What it leads to."""
+        """Its far end."""
         return f"a UR at {self._address}, over RTDE, moved by {'servoL' if self._servo else 'speedL'}"
 
     @property
     def watchdog(self) -> str:
-        """What stops it if this process dies."""
+        """Its stop if this process dies."""
         return f"the controller stops it when no command came for {1e3 / _WATCHDOG:g} ms (ur-rtde's watchdog)"
 
     def read(self, timeout: float) -> Sense:
@@ -189,7 +189,7 @@ class _Calls:
                 self._answers.put(error)
 
     def do(self, act: Callable[[], Any]) -> Any:
-        """What the call returns, or raises.
+        """Result of the call, or its error.
 
         Raises:
             LostError: it hangs, as ur-rtde does while it waits for a controller that has gone.
@@ -217,7 +217,7 @@ def _check_protocol(address: str) -> None:
 
 
 def _in_time(made: Callable[[], Any], what: str, seconds: float) -> Any:
-    """What a library makes, which may wait for ever for another protocol; an InputError where it does not."""
+    """Connection of a library that may wait for ever on a wrong protocol; an InputError then."""
     found: list[Any] = []
 
     def run() -> None:

@@ -37,12 +37,8 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
     found += [("first touches", _domain(told)), ("stiffening", _stiffening(told))]
     if told.known is not None:
         a, b = told.known.stiffness
-        found.append(
-            (
-                "surface",
-                f"{a:.4g} to {b:.4g} N/m ({'given' if told.known.source == 'told' else told.known.source})",
-            )
-        )
+        source = "given" if told.known.source == "told" else told.known.source
+        found.append(("surface", f"{a:.4g} to {b:.4g} N/m ({source})"))
     found += [("proved", sentence(c, arm.kind)) for c in told.certificate.claims] or [("proved", "nothing")]
     return found
 

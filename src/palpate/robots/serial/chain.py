@@ -146,7 +146,7 @@ def axis_of(room, i):
 
 @law
 def load_of(room, i):
-    """What moving link i takes."""
+    """Wrench that moves link i."""
     f = room.loads
     return Wrench(Vec3(f[i, 0], f[i, 1], f[i, 2]), Vec3(f[i, 3], f[i, 4], f[i, 5]))
 

@@ -12,7 +12,7 @@ from palpate.robots.serial.chain import Room, Tip, chain_model, jacobian_rate, r
 
 @part
 class Found(NamedTuple):
-    """What the laws say of one state, in arrays."""
+    """The laws at one state, in arrays."""
 
     room: Room
     Jdot: Array  # shape (6, n)

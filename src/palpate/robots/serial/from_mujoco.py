@@ -227,7 +227,7 @@ def _home(model: Any, positions: NDArray[np.int64]) -> Array:
 
 
 def _left_out(model: Any, joints: list[int], dofs: NDArray[np.int64]) -> list[str]:
-    """What of the model the arm's own laws do not know."""
+    """Parts of the model that the arm's own laws do not include."""
     notes = []
     others = [model.joint(j).name or str(j) for j in range(model.njnt) if j not in joints]
     if others:

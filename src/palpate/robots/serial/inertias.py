@@ -12,7 +12,7 @@ _ROUNDING = 1e-12
 
 
 def check_inertia(name: str, mass: float, moment: Array) -> str:
-    """What is odd about a link's inertia, in a sentence; "" if nothing is.
+    """Defect of a link's inertia, in a sentence; "" if there is none.
 
     A body of positive density has principal moments of which none exceeds the sum of the others. Makers publish links
     that break this (Franka's link 4): an arm with such a link still moves by the same laws, so it is taken as it is.

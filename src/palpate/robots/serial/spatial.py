@@ -71,7 +71,7 @@ class Wrench(NamedTuple):
 
 @law
 def load_at(mass, centre, moment, V, A):
-    """What moving a body takes (Newton and Euler), of its inertia about its centre of mass, its twist and its rate."""
+    """Wrench that moves a body (Newton and Euler), from its inertia about its centre of mass, twist and rate."""
     w, dw = V.w, A.w
     f = mass * (A.at(centre) + cross(w, V.at(centre)))
     return Wrench(moment @ dw + cross(w, moment @ w) + cross(centre, f), f)

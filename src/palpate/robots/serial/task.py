@@ -67,7 +67,7 @@ class ApparentInertia(NamedTuple):
 
 @part
 class TaskModel(NamedTuple):
-    """What a controller knows: F = M xdd + h + f, told in the task's axes."""
+    """The arm's laws for a controller: F = M xdd + h + f, in the task's axes."""
 
     J: Identity
     Jdqd: Vec6
