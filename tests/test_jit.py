@@ -234,9 +234,15 @@ def workshop(tmp_path_factory):
 
 
 def test_of_processes_that_start_together_one_compiles(workshop):
+    """And each lets the next one in, also one that lives on."""
     workshop.write(factor=3.0, offset=0.0, more=0.0)
-    together = [workshop.started() for _ in range(2)]
-    assert sorted(workshop.finished(one) for one in together) == [(45.0, False), (45.0, True)]
+    (workshop.user / "staying.py").write_text(MAIN + "sys.stdout.flush()\nsys.stdin.read()\n")
+    together = [workshop.started("staying.py") for _ in range(3)]
+    first = sorted(process.stdout.readline() for process in together)
+    assert first == ["45.0 False\n", "45.0 True\n", "45.0 True\n"]
+    for process in together:
+        process.communicate()
+        assert process.returncode == 0
 
 
 def runs(workshop, *, factor, offset, more):

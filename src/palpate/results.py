@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from palpate.files import check_place, write_text
-
 
 def same(one: object, other: object) -> bool:
     """Whether two values are equal, arrays by their elements, and no number equal to no number."""
@@ -85,12 +83,9 @@ class Result(Compared):
         Raises:
             InputError: it holds nothing that can be drawn; palpate may not write there.
         """
-        if path is not None:
-            check_place(Path(path))
-        figure = self._looks().draw(self)
-        if path is not None:
-            import_module("palpate.report.style").save(figure, Path(path))
-        return figure
+        if path is None:
+            return self._looks().draw(self)
+        return import_module("palpate.report.result_text").write_figure(self, self._looks().draw, Path(path))
 
     def report(self, path: str | Path) -> Path:
         """Write a page with everything, an HTML file that opens without a network.
@@ -98,7 +93,6 @@ class Result(Compared):
         Raises:
             InputError: palpate may not write there, or the name has another ending.
         """
-        path = Path(path)
-        check_place(path, ending=".html")
-        write_text(path, self._looks().page(self))
-        return path
+        return Path(
+            import_module("palpate.report.result_text").write_page(self, self._looks().page, Path(path))
+        )

@@ -139,8 +139,11 @@ def test_what_cannot_be_written_is_one_line(found, record, tmp_path):
         record.report(tmp_path / "it.pdf")
     with pytest.raises(InputError, match="a figure ends in"):
         record.plot(tmp_path / "it.bmp")
+    bare = palpate.Record({"time": np.arange(3.0)}, {"time": "s"})
     with pytest.raises(InputError, match="nothing to draw"):
-        palpate.Record({"time": np.arange(3.0)}, {"time": "s"}).plot()
+        bare.plot()
+    with pytest.raises(InputError, match="palpate did not write it"):  # before anything is drawn
+        bare.plot(tmp_path / "mine.html")
     with pytest.raises(InputError, match="no traces"):
         replace(found, traces=None).plot()
 

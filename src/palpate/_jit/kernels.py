@@ -5,7 +5,7 @@ import gc
 import importlib
 import threading
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Any
 
 from palpate._jit.compile_lock import CompileLock
@@ -123,14 +123,19 @@ def _cache(function: Callable[..., Any], wait: Callable[[], None], lock: Compile
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             # Without what Numba imports to compile, which takes as long again as importing Numba.
             rtsys.initialize(target_context)
-            found = self._kept(sig, target_context)
-            if found is None:
-                wait()
-                lock.wait()
+            return self._kept(sig, target_context) or self._waited_for(sig, target_context)
+
+        def _waited_for(self, sig: Any, target_context: Any) -> Any:
+            """What another process has made meanwhile; or nothing, with the lock held until it is made here."""
+            wait()
+            lock.wait()
+            with ExitStack() as undone:
+                undone.callback(lock.release)
                 found = self._kept(sig, target_context)
-            if found is None:
-                target_context.refresh()
-                _hand_over()
+                if found is None:
+                    target_context.refresh()
+                    _hand_over()
+                    undone.pop_all()
             return found
 
         def _kept(self, sig: Any, target_context: Any) -> Any:
@@ -142,10 +147,12 @@ def _cache(function: Callable[..., Any], wait: Callable[[], None], lock: Compile
             return None
 
         def save_overload(self, sig: Any, data: Any) -> None:
-            if stamp_of(function, sig) is not None:
-                with suppress(OSError):  # where there is no room, every process compiles anew
-                    super().save_overload(sig, data)
-            lock.release()
+            try:
+                if stamp_of(function, sig) is not None:
+                    with suppress(OSError):  # where there is no room, every process compiles anew
+                        super().save_overload(sig, data)
+            finally:
+                lock.release()
 
     return PackageCache(function)
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from palpate.files import check_place, write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import Console
 
 _WIDTH = 100
@@ -40,6 +43,31 @@ def as_html(head: str, rows: Sequence[Sequence[str]], notes: Sequence[str] = ())
     table = [_row(row, "th" if i == 0 else "td") for i, row in enumerate(rows)]
     parts = [f"<p><b>{_safe(head)}</b></p>", f"<table>{''.join(table)}</table>" if rows else ""]
     return "<div>" + "".join([*parts, *(f"<p>{_safe(note)}</p>" for note in notes)]) + "</div>"
+
+
+def write_page(result: Any, page: Callable[[Any], str], path: Path) -> Path:
+    """Make and write a page of a result, atomically; a place that will not do is refused before.
+
+    Raises:
+        InputError: palpate may not write there, or the name has another ending.
+    """
+    check_place(path, ending=".html")
+    write_text(path, page(result))
+    return path
+
+
+def write_figure(result: Any, draw: Callable[[Any], Figure], path: Path) -> Figure:
+    """Draw and write a figure of a result in the same way.
+
+    Raises:
+        InputError: palpate may not write there, or the name has another ending.
+    """
+    from palpate.report.style import save
+
+    check_place(path)
+    drawn = draw(result)
+    save(drawn, path)
+    return drawn
 
 
 def _row(cells: Sequence[str], tag: str) -> str:
