@@ -140,10 +140,10 @@ def identify(
     Parameters
     ----------
     logs
-        Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the record.parquet
-        of a run; a folder of logs.
+        Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the folder
+        of a run or a press, or its record.parquet; a folder of logs.
     """
-    from palpate.logs.gathered import gathered, is_folder_of_logs
+    from palpate.logs.gathered import gathered, is_folder_of_logs, log_of
 
     output, cell = output or OutputOptions(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
@@ -157,7 +157,7 @@ def identify(
             "no log is named; name a log, several, or a folder of them (see: palpate identify --help)"
         )
     if len(logs) == 1 and not is_folder_of_logs(logs[0]):
-        return _one(logs[0], asked, output)
+        return _one(log_of(logs[0]), asked, output)
     from palpate.cli._many_logs import many
 
     return many(gathered(logs), asked, output.png("pooled"), output.page(), json=output.json, dpi=output.dpi)

@@ -15,9 +15,15 @@ ENDINGS = {
 """Of the files that are taken for logs in a folder."""
 
 
+def log_of(path: Path) -> Path:
+    """The record in the folder of a run or a press; of another path, the path itself."""
+    record = path / "record.parquet"
+    return record if record.is_file() and (path / "summary.json").is_file() else path
+
+
 def is_folder_of_logs(path: Path) -> bool:
-    """Whether a path is a folder, and not itself one log as a ROS 2 bag is."""
-    if not path.is_dir():
+    """Whether a path is a folder, and not itself one log, as a ROS 2 bag or the folder of a run is."""
+    if not path.is_dir() or log_of(path) != path:
         return False
     return not any((path / "metadata.yaml").is_file() or file.suffix in STORAGES for file in path.iterdir())
 
@@ -30,7 +36,7 @@ def gathered(paths: Sequence[Path]) -> tuple[Path, ...]:
     """
     found: list[Path] = []
     for path in paths:
-        found.extend(_of_folder(path) if is_folder_of_logs(path) else [path])
+        found.extend(_of_folder(path) if is_folder_of_logs(path) else [log_of(path)])
     seen: dict[Path, Path] = {}
     for path in found:
         if path.resolve() in seen:
@@ -41,7 +47,7 @@ def gathered(paths: Sequence[Path]) -> tuple[Path, ...]:
 
 def _of_folder(folder: Path) -> list[Path]:
     logs = [
-        path
+        log_of(path)
         for path in sorted(folder.iterdir(), key=_by_number)
         if not path.name.startswith(".")
         and (
@@ -52,8 +58,8 @@ def _of_folder(folder: Path) -> list[Path]:
     ]
     if not logs:
         raise InputError(
-            f"{folder} is a folder and no ROS 2 bag, and holds no log; logs are recognised by their endings: "
-            f"{', '.join(sorted(ENDINGS))}"
+            f"{folder} is a folder, but no ROS 2 bag and no run, and holds no log; logs are recognised by their"
+            f" endings: {', '.join(sorted(ENDINGS))}"
         )
     return logs
 

@@ -35,8 +35,10 @@ class Source:
 
     @property
     def title(self) -> str:
-        """The log's own name, with nothing in it that a page or a terminal would obey."""
-        return printable(Path(self.file).name or self.file)
+        """The log's own name, a run's with its folder, without characters that a page or a terminal would obey."""
+        path = Path(self.file)
+        own = f"{path.parent.name}/{path.name}" if path.name == "record.parquet" else path.name
+        return printable(own.removeprefix("/") or self.file)
 
 
 def as_json(found: Identification, source: Source) -> dict[str, Any]:
