@@ -126,7 +126,7 @@ def _cache(function: Callable[..., Any], wait: Callable[[], None], lock: Compile
             return self._kept(sig, target_context) or self._waited_for(sig, target_context)
 
         def _waited_for(self, sig: Any, target_context: Any) -> Any:
-            """What another process has made meanwhile; or nothing, with the lock held until it is made here."""
+            """The kernel that another process has compiled; None, with the lock held, to compile it here."""
             wait()
             lock.wait()
             with ExitStack() as undone:
