@@ -18,7 +18,8 @@ ENDINGS = {
 def log_of(path: Path) -> Path:
     """The record in the folder of a run or a press; of another path, the path itself."""
     record = path / "record.parquet"
-    return record if record.is_file() and (path / "summary.json").is_file() else path
+    beside = ("summary.json", "press.json")  # of a run or a simulated press; of a press over a wire
+    return record if record.is_file() and any((path / name).is_file() for name in beside) else path
 
 
 def is_folder_of_logs(path: Path) -> bool:
