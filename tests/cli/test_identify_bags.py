@@ -176,7 +176,7 @@ def test_only_free_motion(tmp_path, capsys):
     assert not {"contact-at-start", "normal-uncertain"} & set(codes(found))
     main(["identify", "press", "--wrench-frame", "tool", "--no-figure"])
     shown = capsys.readouterr().out
-    assert "nothing is touched" in shown
+    assert "free motion only" in shown
     assert "no free motion" not in shown
 
 

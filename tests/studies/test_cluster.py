@@ -76,7 +76,7 @@ def test_a_cluster_that_goes_away_loses_nothing(cluster, tmp_path, here, monkeyp
             cluster.scheduler.kill()
 
     runner = Cluster(cluster.address)
-    with pytest.raises(InputError, match="went away") as gone:
+    with pytest.raises(InputError, match="disappeared") as gone:
         Work(planned(source), source, folder, runner, leave).done()
     runner.close()
     assert "the same command resumes" in str(gone.value)

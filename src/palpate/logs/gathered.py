@@ -59,7 +59,7 @@ def _of_folder(folder: Path) -> list[Path]:
     ]
     if not logs:
         raise InputError(
-            f"{folder} is a folder, but no ROS 2 bag and no run, and holds no log; logs are recognised by their"
+            f"{folder} is a folder and no ROS 2 bag, no run, and holds no log; logs are recognised by their"
             f" endings: {', '.join(sorted(ENDINGS))}"
         )
     return logs

@@ -337,8 +337,8 @@ class Hand:
     def _gone(self, error: Exception | None) -> InputError:
         what = f" ({_line(error)})" if error is not None else ""
         return InputError(
-            f"the cluster at {self.address} disappeared{what}; the finished runs are saved, and the same command "
-            "from there"
+            f"the cluster at {self.address} disappeared{what}; the finished runs are saved, and the same "
+            "command resumes"
         )
 
 
