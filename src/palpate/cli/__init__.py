@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 
 
@@ -20,6 +21,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         _interrupts.keep()
         _streams.prepare()
+        os.environ.setdefault(
+            "OPENBLAS_NUM_THREADS", "1"
+        )  # the matrices are many and small: more threads only spin
     import sys
 
     from palpate.cli._edge import guarded

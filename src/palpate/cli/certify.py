@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import console, print_lines
 from palpate.cli.options.flags import FLAG, SIGNED
-from palpate.cli.options.force import ColumnOptions, OutputOptions, inner_loop, one_thread
+from palpate.cli.options.force import ColumnOptions, OutputOptions, inner_loop
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -107,7 +107,6 @@ def certify(
     check
         A certificate to check.
     """
-    one_thread()
     proof, output = proof or ProofOptions(), output or OutputOptions()
     if check is not None:
         return _checked(check, gains, output.json)

@@ -15,7 +15,6 @@ from palpate.cli.options.force import (
     OutputOptions,
     PressOptions,
     SurfaceOptions,
-    one_thread,
 )
 from palpate.cli.options.log import LogOptions
 from palpate.cli.options.written import ReportOption
@@ -60,7 +59,6 @@ def tune(
     found
         The output of palpate identify --json, as a .json file; or a log.
     """
-    one_thread()
     surface, columns = surface or SurfaceOptions(), columns or ColumnOptions()
     output, page = output or OutputOptions(), page or ReportOption()
     output.check_new(output.out, ending=".toml")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -144,11 +143,6 @@ class OutputOptions(FileOptions):
     """
 
     out: Path | None = None
-
-
-def one_thread() -> None:
-    """Limit NumPy to one thread: for the many small matrices of a proof its threads cost ten times their gain."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def inner_loop(log: Path, columns: ColumnOptions) -> InnerLoop:
