@@ -27,7 +27,8 @@ _SHAPE = ("n", "tau", "x0")
 _NUISANCE = ("x0", "y0")
 """Where the surface is, and how a branch was stretched when the log began: found, not asked for."""
 _IN_TIME = ("B", "M", "K1", "tau")
-"""Parameters that a shift of the force in time is taken for."""
+"""Parameters that are seen in time: a shift of the force looks like them."""
+_BELOW = "below zero: no passive surface does that"
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
 
     positive = name in found.fit.model.positive
     if positive and interval[1] < 0:
-        reason = f"the fit gives {_digits(value)} {_shown(unit)}, below zero: no passive surface does that"
+        reason = f"the fit gives {_digits(value)} {_shown(unit)}, {_BELOW}"
         return said(Verdict.REJECTED, " ".join(reason.split()), number=False)
     if half > _NOTHING * max(abs(value), 1e-300):
         return said(Verdict.NOT_IDENTIFIABLE, f"the log does not show it: {NOISE.remedy}", number=False)
@@ -187,17 +188,23 @@ def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Te
 
 
 def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Parameter]:
-    """Where one of B and M is below zero for sure, a force that the model has not is in both.
+    """A parameter that is certainly below zero refuses those that the same missing force may be in.
+
+    All that is seen in time shares a force that depends on the motion. A stiffness below zero leaves no model at all.
 
     Args:
         parameters: as found.
-        weighed: a tool's inertia was found in the air and taken out: it is not that, and K rests on the same fit.
+        weighed: a tool's inertia was found in the air and removed: it is not that, and K rests on the same fit.
     """
-    negative = [name for name in ("B", "M") if name in parameters and "below zero" in parameters[name].reason]
-    if len(negative) != 1:
+    negative = [name for name, p in parameters.items() if _BELOW in p.reason]
+    if "K" in negative:
+        reason, touched = "K is certainly below zero: the model does not hold", (*parameters,)
+    elif len({"B", "M"} & {*negative}) == 1:
+        name = next(name for name in ("B", "M") if name in negative)
+        reason = f"{name} is certainly below zero: the model lacks a force that depends on the motion"
+        touched = ("K", *_IN_TIME) if weighed else _IN_TIME
+    else:
         return parameters
-    reason = f"{negative[0]} is certainly below zero: the model lacks a force that depends on the motion"
-    touched = ("B", "M", "K") if weighed else ("B", "M")
     return parameters | {
         name: replace(_refused(p, reason), verdict=Verdict.REJECTED)
         for name, p in parameters.items()
@@ -233,7 +240,9 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
     damping = parameters.get("B")
     if damping is not None and damping.verdict is not Verdict.IDENTIFIED:
         if "below zero" in damping.reason:
-            text = f"B: {damping.reason}; a lag T of the force adds -K T to it: calibrate it and give --lag"
+            text = (
+                f"B: {damping.reason}; a lag T of the force adds -K T to it: calibrate the lag and give --lag"
+            )
             warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
         elif not lag.known and damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
             reach = 1.96 * lag.std * abs(found["K"]) if "K" in found.names else 0.0
@@ -243,7 +252,7 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
             )
             warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
     stiffness = parameters.get("K")
-    if stiffness is not None and "below zero" in stiffness.reason:
+    if stiffness is not None and _BELOW in stiffness.reason:
         text = f"K: {stiffness.reason}; a channel's sign or column may be wrong (--force-sign)"
         warnings.append(Warn(Code.NEGATIVE_STIFFNESS, text))
     low_names = [
