@@ -13,7 +13,7 @@ from palpate.cli._terminal import console, place, print_lines, show_answer
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.press import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
-from palpate.files import fresh_folder, signed, write_json
+from palpate.files import RECORD, fresh_folder, signed, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
 
     record = changed(record, meta={**record.meta, "command": printable(command())})
     summary = signed({"command": printable(command()), **summarise(record, pressing.asked)})
-    write_record(record, folder / "record.parquet")
+    write_record(record, folder / RECORD)
     write_json(folder / "summary.json", summary)
     if len(record):
         write_report(record, pressing.asked, summary, folder)

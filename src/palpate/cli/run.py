@@ -19,7 +19,7 @@ from palpate.cli.options.figures import DRAWN, FigureOptions
 from palpate.cli.options.flags import FLAG, WHOLE
 from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
-from palpate.files import fresh_folder, signed, write_json, write_text
+from palpate.files import RECORD, fresh_folder, signed, write_json, write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -120,9 +120,9 @@ def _run(
         command = printable(f"palpate run {shlex.quote(name)} --seed {seed}")
         record = _record(console(stderr=output.json), name, experiment, seed, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
-        write_record(record, fresh / "record.parquet")
+        write_record(record, fresh / RECORD)
         alone = isinstance(experiment, OneDirection)  # nothing excites it, and no estimator watches
-        found, why = (None, "") if alone else _identified(fresh / "record.parquet")
+        found, why = (None, "") if alone else _identified(fresh / RECORD)
         said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
         about = {"experiment": printable(Path(name).stem), "command": command}
         summary = signed({**about, **summarise(record), **said})
@@ -156,7 +156,7 @@ def _draw(
     from palpate.report.run.page import Content, run_page
 
     draw(record, folder, drawn.endings, drawn.dpi)
-    sha256, why = sha256_of(folder / "record.parquet"), summary["not_identified"]
+    sha256, why = sha256_of(folder / RECORD), summary["not_identified"]
     content = Content(about["title"], about["about"], source, summary, found, why, sha256)
     write_text(folder / "report.html", run_page(record, content))
     if drawn.movie:

@@ -12,6 +12,8 @@ from palpate.errors import InputError
 from palpate.files.locks import HIDDEN, hidden, locking
 from palpate.files.ownership import ours
 
+RECORD = "record.parquet"
+"""Name of the record in the folder of a run or a press."""
 _OLD = ".palpate-old"
 
 

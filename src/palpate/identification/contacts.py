@@ -15,6 +15,7 @@ from palpate.identification.options import NOTHING_SAID, Options
 from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.warning_codes import Code, Warn
+from palpate.signals.runs import runs
 from palpate.signals.spectral import detrended
 
 ONSET = 0.05
@@ -299,14 +300,12 @@ def _spans(force: Array, rest: float, peak: float, threshold: float, chain: Chai
 
     Two are one if the force between them stays above half of the onset.
     """
-    above = force > threshold
-    edges = np.diff(np.r_[0, above.astype(np.int8), 0])
     spans: list[tuple[int, int]] = []
-    for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+    for begin, end in runs(force > threshold):
         if spans and force[spans[-1][1] : begin].mean() > (rest + threshold) / 2:
-            spans[-1] = (spans[-1][0], int(end))
+            spans[-1] = (spans[-1][0], end)
         else:
-            spans.append((int(begin), int(end)))
+            spans.append((begin, end))
     return [(b, e) for b, e in _long(spans, chain) if force[b:e].max() > rest + _REACHED * (peak - rest)]
 
 
@@ -343,12 +342,12 @@ def _between_losses(
     delay, found = round(chain.delay / chain.dt), []
     for begin, end in spans:
         slope = (peak - rest) / (float(np.ptp(position[begin:end])) or np.inf)
-        edges = np.diff(np.r_[0, (force[begin:end] < rest + _CLEAR * noise).astype(np.int8), 0])
         first = begin
-        for off, on in zip(np.flatnonzero(edges > 0) + begin, np.flatnonzero(edges < 0) + begin, strict=True):
+        for a, b in runs(force[begin:end] < rest + _CLEAR * noise):
+            off, on = begin + a, begin + b
             moved = float(np.ptp(position[off:on]))
             if begin < off and on < end and on - off >= _SEVERAL and moved * slope > 2 * _CLEAR * noise:
-                found.append((first, int(off)))
-                first = int(on) + delay
+                found.append((first, off))
+                first = on + delay
         found.append((first, end))
     return found

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.state_variable import block_means, white_noise
 from palpate.identification.least_squares import Noise, noise_of, quantile
+from palpate.signals.runs import runs
 
 Rows = Mask
 
@@ -233,9 +234,7 @@ def _quiet(force: Array, position: Array, share: float) -> bool:
 
 def stays_in(inside: Rows) -> list[tuple[int, int]]:
     """First and past-the-last row of each unbroken stretch that is long enough."""
-    edges = np.diff(np.r_[0, inside.astype(np.int8), 0])
-    pairs = zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True)
-    return [(a, b) for a, b in pairs if b - a >= _FEWEST]
+    return [(a, b) for a, b in runs(inside) if b - a >= _FEWEST]
 
 
 def _rows_of(stays: list[tuple[int, int]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

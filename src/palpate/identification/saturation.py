@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from palpate.arrays import Array, Mask
+from palpate.signals.runs import runs
 
 Rows = Mask
 
@@ -36,8 +37,7 @@ def at_limit(force: Array, place: Array, levels: Iterable[float], among: Rows | 
     resolution = float(np.percentile(step[step > 0], 5))
     far = _STEPS * resolution * _travel(place) / max(float(np.ptp(force[rows])), 1e-300)
     for level in levels:
-        edges = np.diff(np.r_[0, (force[rows] == level).astype(np.int8), 0])
-        for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        for begin, end in runs(force[rows] == level):
             own = rows[begin:end]
             if len(own) >= _RUN and _travel(place[own[0] : own[-1] + 1]) > far:
                 stuck[own] = True

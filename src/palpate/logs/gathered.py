@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from palpate.errors import InputError
+from palpate.files import RECORD
 from palpate.logs.kinds import STORAGES
 
 ENDINGS = {
@@ -17,7 +18,7 @@ ENDINGS = {
 
 def log_of(path: Path) -> Path:
     """The record in the folder of a run or a press; of another path, the path itself."""
-    record = path / "record.parquet"
+    record = path / RECORD
     beside = ("summary.json", "press.json")  # of a run or a simulated press; of a press over a wire
     return record if record.is_file() and any((path / name).is_file() for name in beside) else path
 

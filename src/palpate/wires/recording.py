@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.files import check_place, signed, write_json
+from palpate.files import RECORD, check_place, signed, write_json
 from palpate.logs import write_record
 from palpate.records import Record
 
@@ -33,7 +33,7 @@ UNITS = {
     **{f"quaternion_{axis}": "1" for axis in "xyzw"},
 }
 """Columns of a row. The first columns are along the direction of the press, the force without its bias in the air."""
-_ROWS, _HEAD, RECORD, TOLD = "rows.f64", "press.json", "record.parquet", "press.json"
+_ROWS, _HEAD, TOLD = "rows.f64", "press.json", "press.json"
 
 
 class Rows:

@@ -17,6 +17,7 @@ from palpate.identification.prior import LAG, NOTHING, Lag, Prior
 _ROUNDS = 30
 _CONVERGED = 1e-6
 _ROUNDING = 1e-9
+"""Steps at most; relative gains of the cost below which the search ends, and which are rounding."""
 
 
 @dataclass(frozen=True)

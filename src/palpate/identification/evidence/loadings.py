@@ -10,6 +10,7 @@ from palpate.arrays import Array, Mask
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.filters.state_variable import ORDER, Chain
 from palpate.identification.problem import Problem
+from palpate.signals.runs import runs
 
 _MET = 0.15
 """Share of the force above which its bend over the depth is looked for: the lowest that a slope is taken of."""
@@ -115,9 +116,7 @@ def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> 
     A press in steps rests between them, and what the surface does meanwhile is no slope.
     """
     moves = speed[begin:top] > STILL * float(np.percentile(np.abs(speed[begin:top]), 98))
-    edges = np.diff(np.r_[0, moves.astype(np.int8), 0])
-    runs = zip(np.flatnonzero(edges > 0) + begin, np.flatnonzero(edges < 0) + begin, strict=True)
-    kept = [(int(a), int(b)) for a, b in runs if b - a >= FEWEST]
+    kept = [(begin + a, begin + b) for a, b in runs(moves) if b - a >= FEWEST]
     first, last = max(kept, key=lambda run: depth[run[1] - 1] - depth[run[0]], default=(begin, top))
     return (first, last) if depth[last - 1] - depth[first] >= 0.5 * reach else (begin, top)
 

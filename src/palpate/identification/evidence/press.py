@@ -21,8 +21,10 @@ from palpate.identification.result import Press, Tangent
 _LEVELS = (0.3, 0.5, 0.7, 0.9)
 
 _WIDE = 0.15
+"""Half of the share of the force about a level over which its slope is taken: the levels lie .2 apart."""
 
 _SHOWN = 400
+"""Points of a curve that are kept at most, to be drawn."""
 
 
 def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | None:

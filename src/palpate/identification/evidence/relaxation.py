@@ -11,6 +11,7 @@ from palpate.identification.evidence.slope import Slope
 from palpate.identification.least_squares import noise_of
 from palpate.identification.problem import Problem
 from palpate.identification.result import Relaxation
+from palpate.signals.runs import runs
 
 
 def relaxation(
@@ -22,10 +23,9 @@ def relaxation(
     still = np.abs(speed) < STILL * float(np.percentile(np.abs(speed), 98))
     best: tuple[int, int] | None = None
     for s in segments:
-        edges = np.diff(np.r_[0, still[s.first : s.last].astype(np.int8), 0])
-        for a, b in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        for a, b in runs(still[s.first : s.last]):
             if b - a >= 4 * FEWEST and a > 0 and (best is None or b - a > best[1] - best[0]):
-                best = (s.first + int(a), s.first + int(b))
+                best = (s.first + a, s.first + b)
     if best is None:
         return None
     rows = slice(*best)

@@ -14,10 +14,12 @@ from palpate.identification.filters.state_variable import Chain, white_noise
 from palpate.identification.models import Motion
 from palpate.identification.options import Options
 from palpate.identification.prior import lag_prior
-from palpate.identification.problem.seen import FREE_ROWS, Rows, Seen, ends, numbered, stretches
+from palpate.identification.problem.seen import FREE_ROWS, Rows, Seen, ends, numbered
 from palpate.identification.sampling import Channels
+from palpate.signals.runs import runs
 
 _LONG = 0.05
+"""Share of a contact that waiting until a filter has forgotten all may cost."""
 
 
 def behind_filter(channels: Channels, chain: Chain, contacts: Contacts, options: Options) -> Seen:
@@ -57,6 +59,7 @@ def behind_filter(channels: Channels, chain: Chain, contacts: Contacts, options:
         lag=lag,
         read=force_raw if contacts.payload is None else None,
         filtered=filtered,
+        rounding=channels.rounding[1],
     )
 
 
@@ -107,7 +110,7 @@ def _free(force: Array, channels: Channels, chain: Chain, contacts: Contacts) ->
     for begin, end in contacts.spans:
         out[max(begin - guard, 0) : end + guard] = False
     step = _step(chain)
-    return tuple(force[a + guard : b : step] for a, b in stretches(out) if b - a - guard >= FREE_ROWS * step)
+    return tuple(force[a + guard : b : step] for a, b in runs(out) if b - a - guard >= FREE_ROWS * step)
 
 
 def _noise(position: Array, rows: Rows, spans: Rows, rounding: float) -> PositionNoise:

@@ -12,10 +12,11 @@ from palpate.identification.filters.state_variable import Chain
 from palpate.identification.models import Motion
 from palpate.identification.options import Options
 from palpate.identification.prior import lag_prior
-from palpate.identification.problem.seen import FREE_ROWS, Rows, Seen, ends, numbered, stretches
+from palpate.identification.problem.seen import FREE_ROWS, Rows, Seen, ends, numbered
 from palpate.identification.sample_clock import SampleClock, sample_clock_of
 from palpate.identification.sampling import Channels
 from palpate.signals.low_pass import LowPass
+from palpate.signals.runs import runs
 
 _COARSEST = 4.0
 """Readings in a period of a sensor's cut-off below which its own path is not used: the position would not show it."""
@@ -109,4 +110,4 @@ def _free(
     for begin, end in contacts.spans:
         first = np.searchsorted(time, channels.start + begin * channels.dt - guard)
         free[first : np.searchsorted(time, channels.start + end * channels.dt + guard, side="right")] = False
-    return tuple(force[a:b] for a, b in stretches(free) if b - a >= FREE_ROWS)
+    return tuple(force[a:b] for a, b in runs(free) if b - a >= FREE_ROWS)

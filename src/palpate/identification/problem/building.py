@@ -27,10 +27,8 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     low_pass = options.force_filter
     if low_pass is not None and shown(low_pass, channels.raw.dt):
         seen = behind_sensor(channels, low_pass, chain, contacts, options)
-        rounding = 0.0  # the sensor's readings are as white as their noise
     else:
         seen = behind_filter(channels, chain, contacts, options)
-        rounding = channels.rounding[1]
     free_standing = not contacts.bonded
     return Problem(
         motion=seen.motion,
@@ -43,6 +41,6 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
         origin=seen.origin,
         contacts=contacts,
         read=seen.read,
-        rounding=rounding,
+        rounding=seen.rounding,
         filtered=seen.filtered,
     )

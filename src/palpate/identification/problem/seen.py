@@ -39,6 +39,8 @@ class Seen:
         lag: prior of the force's.
         read: the force before any filter, at the samples of the position; None if it is another's.
         filtered: part of the force's lag that the position was sent through beforehand [s].
+        rounding: deviation of a sample of the force by the last digit of the log [N]; 0 behind a sensor, whose readings
+            are as white as their noise.
     """
 
     motion: Motion
@@ -52,6 +54,7 @@ class Seen:
     lag: Lag
     read: Array | None = None
     filtered: float = 0.0
+    rounding: float = 0.0
 
 
 def numbered(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
@@ -88,9 +91,3 @@ def ends(channels: Channels, contacts: Contacts) -> list[int]:
         middle = begin + (end - begin) // 2
         found.append(max(begin + int(above[-1]) + 1, middle) if len(above) else end)
     return found
-
-
-def stretches(inside: Mask) -> list[tuple[int, int]]:
-    """First and last, exclusive, of each run of rows."""
-    edges = np.diff(np.r_[0, inside.astype(np.int8), 0])
-    return list(zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True))

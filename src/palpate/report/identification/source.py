@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from palpate.files import RECORD
 from palpate.identification.result import Identification
 from palpate.text import printable
 
@@ -37,7 +38,7 @@ class Source:
     def title(self) -> str:
         """The log's own name, a run's with its folder, without characters that a page or a terminal would obey."""
         path = Path(self.file)
-        own = f"{path.parent.name}/{path.name}" if path.name == "record.parquet" else path.name
+        own = f"{path.parent.name}/{path.name}" if path.name == RECORD else path.name
         return printable(own.removeprefix("/") or self.file)
 
 
