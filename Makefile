@@ -4,6 +4,7 @@
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
+THESIS := packages/palpate-thesis
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PIP_INSTALL := $(PIP) install --only-binary :all: --no-warn-script-location
 # Bytecode is kept whatever the environment says: tests start many processes, which would compile the sources each.
@@ -20,7 +21,7 @@ help: ## list the targets
 demo: .venv/run.stamp ## set up, identify a small log, press on foam, and say where the report is
 	@mkdir -p runs
 	$(BIN)/palpate identify examples/data/press.csv --time time_s --position position_mm:mm --force force_N:N --figure runs/press.png
-	$(BIN)/palpate run foam-hybrid --out $(OUT) --force
+	$(BIN)/palpate run foam-hybrid --out $(OUT) --replace
 	@echo "The report is $(CURDIR)/$(OUT)/report.html"
 
 test: .venv/dev.stamp ## set up and run the tests, on all cores
@@ -34,6 +35,7 @@ lint: .venv/dev.stamp ## lint, format, types, direction of imports
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/lint-imports --config $(THESIS)/pyproject.toml
 
 format: .venv/dev.stamp ## wrap the code, sort the imports, mend what ruff can mend
 	$(BIN)/ruff check --fix
@@ -54,11 +56,14 @@ bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold s
 live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a second, and slider to picture
 	$(BIN)/python benchmarks/live/measure.py
 
-attack: .venv/dev.stamp ## thousands of spoiled files, kills, full disks, an hour of each experiment; into docs/reliability.md
+attack: .venv/dev.stamp ## 10,000 hostile inputs, faults of the disk, kills, an hour of each experiment, faults in mid-press; into docs/reliability.md, docs/wires.md
 	$(BIN)/python benchmarks/attack/run.py --write
+	$(BIN)/python benchmarks/arms/faults.py --page docs/wires.md
 
-soak: .venv/dev.stamp ## feed each on-line estimator 5e7 samples, and put what it took into docs/reliability.md; ten minutes
+soak: .venv/dev.stamp ## feed each on-line estimator 5e7 samples and 2e7 hostile ones, for docs/reliability.md; hours
 	$(BIN)/python benchmarks/online/soak.py --write
+	$(BIN)/python benchmarks/force/hostile.py
+	$(BIN)/python benchmarks/online/soak.py --hostile 2e7 --write
 
 trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
 	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md
@@ -72,25 +77,26 @@ force-figures: .venv/dev.stamp ## make every figure of the force law that is mis
 
 laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and put what was found into docs/laboratory.md; resumable
 	$(BIN)/palpate laboratory --particles 128 --seed 1 --out runs/laboratory
-	cp runs/laboratory/inferred.toml src/palpate/thesis/laboratory/shipped/inferred.toml
-	$(BIN)/palpate thesis --laboratory inferred --out runs/thesis-inferred --force
-	$(BIN)/python benchmarks/laboratory/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
+	cp runs/laboratory/inferred.toml $(THESIS)/src/palpate_thesis/laboratory/shipped/inferred.toml
+	$(BIN)/palpate thesis --laboratory inferred --out runs/thesis-inferred --replace
+	$(BIN)/python $(THESIS)/benchmarks/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
 
 claims: .venv/dev.stamp ## measure the whole thesis again, say which claims changed, and keep what they are now for the tests
-	$(BIN)/palpate thesis --out runs/claims --force
-	$(BIN)/python tests/thesis/frozen.py runs/claims
+	$(BIN)/palpate thesis --out runs/claims --replace
+	$(BIN)/python $(THESIS)/tests/frozen.py runs/claims
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean --strict
 
-pictures: .venv/run.stamp ## make the pictures of the README again
-	$(BIN)/palpate run foam-rls --seed 1 --out build/foam-rls --force
+pictures: .venv/dev.stamp ## make the film and the pictures of the README again; a Chromium takes them
+	$(BIN)/palpate run foam-rls --seed 1 --out build/foam-rls --replace
 	cp build/foam-rls/identification.png docs/foam-rls.png
+	$(BIN)/python benchmarks/pictures.py
 
 lock: .venv/python.stamp ## resolve the dependencies again and pin them with hashes
 	$(BIN)/python -m venv --clear build/lock
 	build/lock/bin/python -m pip --disable-pip-version-check --quiet install uv
-	build/lock/bin/uv $(LOCK) pyproject.toml --group build -o requirements/run.txt
+	build/lock/bin/uv $(LOCK) pyproject.toml --group build --extra live -o requirements/run.txt
 	build/lock/bin/uv $(LOCK) pyproject.toml --group dev -c requirements/run.txt -o requirements/dev.txt
 
 LOCK := pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
@@ -98,7 +104,7 @@ LOCK := pip compile --quiet --upgrade --universal --python-version 3.11 --genera
 	--no-header --no-annotate --no-emit-index-url --no-emit-find-links --only-binary :all:
 
 clean: ## remove the environment and everything that is made
-	rm -rf .venv build dist site .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv build dist site $(THESIS)/build $(THESIS)/dist .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
 .venv/python.stamp:
 	@test -n "$(PYTHON)" || { echo "palpate needs Python 3.11 or newer on the PATH; or say which: make PYTHON=/path/to/python3" >&2; exit 1; }
@@ -108,9 +114,9 @@ clean: ## remove the environment and everything that is made
 	$(PYTHON) -m venv --clear .venv
 	@touch $@
 
-.venv/run.stamp: requirements/run.txt pyproject.toml .venv/python.stamp
+.venv/run.stamp: requirements/run.txt pyproject.toml $(THESIS)/pyproject.toml .venv/python.stamp
 	$(PIP_INSTALL) --require-hashes -r requirements/run.txt
-	$(PIP) install --no-deps --no-build-isolation --editable .
+	$(PIP) install --no-deps --no-build-isolation --editable . --editable $(THESIS)
 	@touch $@
 
 .venv/dev.stamp: requirements/dev.txt .venv/run.stamp

@@ -1,7 +1,8 @@
 """Plug-ins: code of the user's that an experiment's or a study's file names as ``module:Name``.
 
-Who names it wants it run: naming it in a file or a flag imports the module. A record, a journal or a folder of results
-never does: they hold its name as a text, and nothing that reads them comes here.
+A file is data, and may be a stranger's: a name in it is imported only if the user permits that, by `permit`, within
+`consent`, or by ``--plugins``. A record, a journal or a folder of results never names code to run: they hold its name
+as a text, and nothing that reads them comes here.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import importlib.util
 import sys
 import threading
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -21,13 +22,17 @@ from types import ModuleType
 from typing import Any
 
 from palpate._jit.registry import PACKAGE, foreign_files
-from palpate.errors import InputError
+from palpate.errors import InputError, PluginError
 
 _FOLDERS: dict[Path, None] = {}
 """Where the files lie that named plug-ins in this process; modules are the process' own, and so are these."""
 _IMPORTING = threading.RLock()
 _STAMPS: dict[str, str] = {}
 """Sources of each module when it was imported."""
+_PERMITTED: set[str] = set()
+"""Names that may be imported."""
+_ASKS: list[Callable[[str], bool]] = []
+"""Functions that are asked about any other name; the last one answers, and without one the answer is no."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,7 @@ class Plugin:
         Raises:
             InputError: it cannot be imported here, or has other sources here.
         """
+        permit(self.name)  # a value of this class comes from `plugin`, here or where this process was sent it
         if self.folder:
             look_in(Path(self.folder))
         here = plugin(self.name)
@@ -70,20 +76,51 @@ def look_in(folder: Path) -> None:
     _FOLDERS[folder.resolve()] = None
 
 
+def permit(*names: str) -> None:
+    """Lets files name this code, ``module:Name``, from now on: its import runs it with the rights of this process."""
+    _PERMITTED.update(names)
+
+
+@contextmanager
+def consent(ask: Callable[[str], bool]) -> Iterator[None]:
+    """Within the block, in every thread, a name that is not permitted may run if `ask` of it is true; asked once."""
+    before = set(_PERMITTED)
+    _ASKS.append(ask)
+    try:
+        yield
+    finally:
+        _ASKS.pop()
+        _PERMITTED.intersection_update(before)
+
+
 def plugin(name: str) -> Plugin:
     """Imports the object of a name.
 
     Modules that are installed come first, then those beside the file that names them, then the current folder's.
 
     Raises:
+        PluginError: the user has not permitted it.
         InputError: no such module, no such name in it, or it raises when it is imported.
     """
     module_name, attribute = _parts(name)
+    with _IMPORTING:
+        _check_permitted(name)
     with _IMPORTING, _findable():
         module = _imported(module_name, name)
         _attribute(module_name, attribute)
     file = Path(getattr(module, "__file__", None) or "").resolve()
     return Plugin(name, str(_top(module_name, file)), _STAMPS[module_name])
+
+
+def _check_permitted(name: str) -> None:
+    if name in _PERMITTED:
+        return
+    if not (_ASKS and _ASKS[-1](name)):
+        raise PluginError(
+            f"{name!r} names code, which would run with your rights: read the module, then add --plugins "
+            f"(in a script: palpate.plugins.permit({name!r}))"
+        )
+    permit(name)
 
 
 def where_it_fails(error: BaseException) -> str:

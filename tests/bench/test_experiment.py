@@ -147,7 +147,7 @@ def test_names_that_are_none():
 def test_files_that_are_none(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         load(str(tmp_path / "mine.toml"))
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="is a folder"):
         load(str(tmp_path))
     binary = tmp_path / "mine.toml"
     binary.write_bytes(b"\xff\xfe\x00\x81")

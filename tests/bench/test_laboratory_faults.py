@@ -14,9 +14,10 @@ from palpate.environments import KelvinVoigt, StickSlip, join
 from palpate.errors import InputError
 from palpate.friction import LuGre
 from palpate.robots.arm3 import Arm3
-from palpate.thesis.conditions import SHORT
 
-FOAM = changed(load("foam-hybrid"), {**SHORT, "run.press": 2.0})
+SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3, "run.press": 2.0}
+"""An approach of a few steps, and a short press."""
+FOAM = changed(load("foam-hybrid"), SHORT)
 DT = 5e-5
 
 

@@ -157,3 +157,13 @@ def test_the_integral_gain_of_an_integrator():
 def test_numbers_that_are_none_are_no_metrics():
     assert of("force_rms", record(np.full(10, np.nan))) is None
     assert of("force_rms", record(np.full(10, 1e200))) is None
+
+
+def test_a_ring_that_the_rms_passes_is_an_outcome_of_its_own():
+    """1.7 N at 40 Hz about 20 N: an RMS of 1.2 N, less than what follows may have."""
+    one = record(20.0 + 1.7 * np.sin(2 * np.pi * 40.0 * np.arange(5000) * TICK))
+    assert METRICS["outcome"].words[int(of("outcome", one))] == "rings"
+    assert of("settles", one) == 0.0
+    assert of("ring_amplitude", one) == pytest.approx(1.7, rel=0.02)
+    assert of("ring_frequency", one) == pytest.approx(40.0, abs=0.5)
+    assert of("ring_amplitude", record(np.full(5000, 20.0))) == 0.0

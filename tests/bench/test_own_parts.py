@@ -15,6 +15,8 @@ from palpate.cli import main
 from palpate.errors import InputError, PartError
 from palpate.logs import read_log, write_record
 
+pytestmark = pytest.mark.usefixtures("permitted")
+
 EXPERIMENT = """
 title = "Mine"
 [surface]
@@ -184,7 +186,7 @@ def test_the_command_refuses_in_one_line_and_leaves_nothing(module, tmp_path, ca
         "ki = 2\nhold = [0.0, 1500.0, 2.0]\n", ""
     )
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    assert main(["run", "mine.toml", "--out", "out"]) == 2
+    assert main(["run", "mine.toml", "--plugins", "--out", "out"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not (tmp_path / "out").exists()
 

@@ -8,6 +8,7 @@ import pytest
 
 from bench.quick import quick
 from palpate.bench import build, summarise
+from palpate.bench.metrics.summary import settling_time
 from palpate.bench.row import COLUMNS
 from palpate.records import Record
 
@@ -118,3 +119,42 @@ def test_y_and_angle_are_held_where_the_arm_starts():
     assert abs(tip["y_error_mm"]) < 4.0
     assert abs(tip["phi_error_deg"]) < 2.0
     assert (r["phase"] == 1.0).any()
+
+
+def swinging(amplitude, hertz, *, decay=0.0):
+    t = record()["t"]
+    since = np.clip(t - 1.0, 0.0, None)
+    return record()["force"] + amplitude * np.exp(-decay * since) * np.sin(2 * np.pi * hertz * t) * (t >= 1.0)
+
+
+@pytest.mark.parametrize(("amplitude", "hertz"), [(1.7, 40.0), (3.0, 7.0), (0.8, 120.0)])
+def test_a_ringing_force_is_called_ringing_with_its_amplitude_and_frequency(amplitude, hertz):
+    force = summarise(record(force=swinging(amplitude, hertz)))["force"]
+    assert force["ringing"]["amplitude_N"] == pytest.approx(
+        amplitude, rel=0.05
+    )  # of seven periods a part looks like a trend
+    assert force["ringing"]["frequency_Hz"] == pytest.approx(hertz, abs=0.5)
+    assert (force["settling_s"] is None) == (amplitude > 1.0)  # 5 % of 20 N
+
+
+def test_a_decayed_swing_a_slow_rise_and_noise_do_not_ring():
+    assert summarise(record(force=swinging(5.0, 20.0, decay=5.0)))["force"]["ringing"] is None
+    t, phase = record()["t"], record()["phase"]
+    assert summarise(record(force=(15.0 + 2.0 * (t - 1.0)) * phase))["force"]["ringing"] is None
+    noise = np.random.default_rng(0).normal(0.0, 2.0, TICKS)
+    assert summarise(record(force=(20.0 + noise) * phase))["force"]["ringing"] is None
+
+
+def test_a_force_that_is_inside_only_at_the_end_by_chance_did_not_settle():
+    """It leaves the band 0.4 s before the end of 3 s; 0.6 s before is long enough."""
+    for before, settles in ((0.4, False), (0.6, True)):
+        force = record()["force"].copy()
+        force[TICKS - round(1e3 * before)] = 22.0
+        assert (summarise(record(force=force))["force"]["settling_s"] is not None) == settles
+
+
+def test_of_a_long_press_a_tenth_is_asked():
+    since = np.arange(20_000) * 1e-3
+    for left, settles in ((1.0, False), (3.0, True)):
+        outside = since < 20.0 - left
+        assert (settling_time(since, outside) is not None) == settles

@@ -7,9 +7,10 @@ from typing import TypeAlias
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
 from palpate.bench.experiments.tables import Experiment, converted, parse
-from palpate.bench.experiments.toml_files import TomlFiles, decoded
+from palpate.bench.experiments.toml_files import TomlFiles
 from palpate.bench.one_direction.bench import OneDirectionBench, build_one_direction
 from palpate.bench.one_direction.tables import OneDirection
+from palpate.files import read_toml
 
 AnyExperiment: TypeAlias = Experiment | OneDirection
 ARM = "arm"
@@ -28,7 +29,7 @@ def load_any(name: str) -> AnyExperiment:
 
 def parse_any(text: str, where: str) -> AnyExperiment:
     """An experiment from TOML; `where` names the text in errors."""
-    tables = decoded(text, where)
+    tables = read_toml(text, where)
     return converted(tables, where, OneDirection) if ARM in tables else parse(text, where)
 
 

@@ -19,6 +19,7 @@ from palpate.bench.tick import Loop, start_at
 from palpate.controllers.controller import controller
 from palpate.errors import InputError
 from palpate.records import Record
+from palpate.results import Readable
 
 CHUNK = 500
 """Ticks between two looks at the progress."""
@@ -27,7 +28,7 @@ Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
-class Bench:
+class Bench(Readable):
     """A closed loop, ready to run.
 
     Args:
@@ -163,8 +164,22 @@ class Bench:
             except KeyboardInterrupt:  # wherever in a round it comes
                 end = Ending(INTERRUPTED, f"interrupted at {done * self.loop.tick:.3f} s")
         if end is None and simulation.contact is None:
-            end = Ending(NO_CONTACT, "no contact was detected")
+            end = Ending(NO_CONTACT, self._no_contact(chunks, total * self.loop.tick))
         return chunks, end or Ending(DONE, "as asked for")
+
+    def _no_contact(self, chunks: list[Array], seconds: float) -> str:
+        """Why nothing was touched: how far the tip is from the surface, and how long the approach takes."""
+        gap = -float(chunks[-1][-1, list(COLUMNS).index("penetration")])
+        if not gap > 0.0:
+            return f"no contact was detected in {seconds:g} s: the force stays below that of a contact"
+        told = f"no contact was detected: after {seconds:g} s the tip is still {1e3 * gap:.3g} mm before the surface"
+        approach, wall = (self.meta.get("experiment", {}).get(name, {}) for name in ("approach", "wall"))
+        if not (approach.get("step", 0.0) > 0.0 and "x" in wall):
+            return told
+        needed = approach["hold"] + approach["period"] * (wall["x"] - approach["first"]) / approach["step"]
+        if needed < seconds:
+            return told
+        return f"{told}; the approach takes {needed:.3g} s: extend [run] duration, or begin nearer ([approach] first)"
 
 
 def _column(rows: list[Array], i: int) -> Array:

@@ -11,10 +11,11 @@ from msgspec import Meta
 
 from palpate.bench.experiments.error_messages import explained, not_finite
 from palpate.bench.experiments.own_parts import ROLES, table_of
-from palpate.bench.experiments.toml_files import TomlFiles, decoded
+from palpate.bench.experiments.toml_files import TomlFiles
 from palpate.controllers import ControllerTable, HybridController
 from palpate.environments import SurfaceTable
 from palpate.errors import InputError, PluginError
+from palpate.files import read_toml
 from palpate.identifiers import IdentifierTable
 from palpate.plugins import is_plugin, look_in
 from palpate.signals.tables import (
@@ -239,7 +240,7 @@ def parse(text: str, where: str) -> Experiment:
     """An experiment from TOML; `where` names the text in errors, and parts of the user's lie beside it."""
     if where.endswith(".toml"):
         look_in(Path(where).parent)
-    return converted(decoded(text, where), where, Experiment)
+    return converted(read_toml(text, where), where, Experiment)
 
 
 def changed(experiment: T, changes: Mapping[str, Any]) -> T:

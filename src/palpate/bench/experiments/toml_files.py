@@ -2,55 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
 
 from palpate.errors import InputError, unknown
-
-LARGEST, DEEPEST = 1_000_000, 20
-"""Letters of a file, and tables within tables; palpate's own files have some thousand, and four."""
-
-
-def decoded(text: str, where: str) -> dict[str, Any]:
-    """The tables of a TOML text.
-
-    Args:
-        text: of the file.
-        where: names it in errors.
-
-    Raises:
-        InputError: it is no TOML, or larger or deeper than any that a person writes.
-    """
-    import msgspec
-
-    if len(text) > LARGEST:
-        raise InputError(f"{where}: {len(text)} letters; give a file of at most {LARGEST}")
-    try:
-        tables = dict(msgspec.toml.decode(text))
-    except (msgspec.DecodeError, ValueError) as error:
-        raise InputError(f"{where}: not TOML: {error}") from error
-    except RecursionError:
-        raise _too_deep(where) from None
-    level: list[Any] = [tables]
-    for _ in range(DEEPEST):
-        level = [inner for outer in level for inner in _inner(outer)]
-    if level:
-        raise _too_deep(where)
-    return tables
-
-
-def _inner(value: Any) -> Iterable[Any]:
-    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-
-
-def _too_deep(where: str) -> InputError:
-    return InputError(
-        f"{where}: more than {DEEPEST} tables or lists within each other; give a plainer TOML file"
-    )
+from palpate.files import read_text
 
 
 @dataclass(frozen=True)
@@ -90,13 +48,6 @@ class TomlFiles:
         path = Path(name)
         if path.suffix != ".toml" and not path.exists():
             raise unknown(self.kind, name, self.names())
-        if not path.is_file():
+        if not path.exists():
             raise InputError(f"{name}: no such file; give {self.article} {self.kind}'s name or a TOML file")
-        if path.stat().st_size > 4 * LARGEST:
-            raise InputError(
-                f"{name}: {path.stat().st_size} bytes; give a TOML file of at most {LARGEST} letters"
-            )
-        try:
-            return path.read_text("utf-8")
-        except UnicodeDecodeError as error:
-            raise InputError(f"{name}: not a text file ({error.reason}); give a TOML file") from error
+        return read_text(path, f"{self.article} {self.kind}")

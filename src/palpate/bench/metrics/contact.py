@@ -77,8 +77,8 @@ CONTACT_METRICS = (
         Metric(f"saturation{j}", "1", f"share of the time that motor {j} is at its limit", _saturated(j))
         for j in JOINTS
     ),
-    Metric("y_error", "m", "mean of the tip's y less the desired one", _off("y", 1.0)),
-    Metric("phi_error", "rad", "mean of the tip's angle less the desired one", _off("phi", 1.0)),
+    Metric("y_error", "m", "mean of the tip's y less the desired one", _off("y", 1.0), signed=True),
+    Metric("phi_error", "rad", "mean of the tip's angle less the desired one", _off("phi", 1.0), signed=True),
     Metric(
         "hidden_weights",
         "1",

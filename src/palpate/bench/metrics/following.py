@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 
+from palpate.bench.metrics.summary import BAND
 from palpate.bench.metrics.window import SETTLE, Look, Metric, Value, rms
 
 LIMIT = 1.5
@@ -38,7 +40,7 @@ def _of_force(key: str) -> Metric:
     unit, text = {
         "settling_s": (
             "s",
-            "time from the switch until the force stays within 5 % of its first desired value",
+            "time from the switch until the force stays within 5 % of its first desired value, 0.5 s at least",
         ),
         "overshoot_N": ("N", "overshoot of the force over its first desired value, before the next"),
     }[key]
@@ -61,6 +63,21 @@ def _overshoot_share(look: Look) -> Value:
     if force is None or force["overshoot_N"] is None:
         return None
     return float(force["overshoot_N"]) / float(look.record["force_desired"][look.pressing][0])
+
+
+def _ringing(key: str) -> Callable[[Look], Value]:
+    def of(look: Look) -> Value:
+        force = look.summary["force"]
+        return None if force is None else (force["ringing"] or {}).get(key, 0.0 if "_N" in key else None)
+
+    return of
+
+
+def rings(look: Look) -> bool:
+    """Whether the force oscillates at the end by more than the band within which it counts as settled."""
+    force = look.summary["force"]
+    found = force and force["ringing"]
+    return bool(found and found["amplitude_N"] > BAND * abs(force["desired_N"]))
 
 
 def _peak(look: Look) -> Value:
@@ -92,7 +109,7 @@ FOLLOWING = (
         settled_rms,
         better=LEAST,
     ),
-    Metric("force_error", "N", "mean error of the true force", _mean_error),
+    Metric("force_error", "N", "mean error of the true force", _mean_error, signed=True),
     Metric("force_std", "N", "standard deviation of that error", _std, better=LEAST),
     Metric(
         "interval_error",
@@ -111,6 +128,14 @@ FOLLOWING = (
         _settles,
         ("no", "yes"),
     ),
+    Metric(
+        "ring_amplitude",
+        "N",
+        "amplitude of the force's oscillation in the last second; 0 where it is steady or has no period",
+        _ringing("amplitude_N"),
+        better=LEAST,
+    ),
+    Metric("ring_frequency", "Hz", "frequency of that oscillation", _ringing("frequency_Hz")),
     Metric("overshoot_share", "1", "overshoot as a share of the first desired force", _overshoot_share),
     Metric(
         "integral_gain",

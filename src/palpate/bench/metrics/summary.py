@@ -12,8 +12,16 @@ from palpate.records import Record
 
 BAND = 0.05
 """Settled: within this share of the desired force."""
+TICK_ROUNDING = 5e-7
+"""Times are multiples of a tick but for rounding: they count as so much longer [s]."""
+SHORTEST = 64
+"""Samples from which on a spectrum tells a period from a trend."""
 WINDOW = 1.0
 """Steady figures are means over the last so many seconds [s]."""
+STAY, STAY_FRACTION = 0.5, 0.1
+"""Settled: inside the band until the end, for so long [s], and for this fraction of the press at least."""
+STEADY = 0.02
+"""Steady: a standard deviation of at most this fraction of the desired force."""
 JOINTS = (1, 2, 3)
 JOINED = "saturated1"
 """A column that only the thesis' arm has, with its pose and its estimators: an arm of one direction has no joints."""
@@ -86,9 +94,6 @@ def force_figures(record: Record, pressing: Mask, last: Mask) -> dict[str, Any]:
     since, force = record["t"][pressing][steady] - record["t"][pressing][0], record["force"][pressing][steady]
     target = float(desired[0])
     outside = np.abs(force - target) > BAND * abs(target)
-    settled = (
-        None if outside[-1] or not stepped else float(since[np.max(np.nonzero(outside)[0], initial=-1) + 1])
-    )
     return {
         "desired_N": float(desired[-1]),
         "mean_N": float(np.mean(record["force"][last])),
@@ -96,8 +101,55 @@ def force_figures(record: Record, pressing: Mask, last: Mask) -> dict[str, Any]:
         "std_N": float(np.std(record["force"][last])),
         "measured_std_N": float(np.std(record["force_measured"][last])),
         "rms_error_N": float(np.sqrt(np.mean(error[pressing] ** 2))),
-        "settling_s": settled,
+        "settling_s": settling_time(since, outside) if stepped else None,
         "overshoot_N": max(0.0, float(np.max(force)) - target) if stepped else None,
+        "ringing": ringing(record["t"][last], record["force"][last], record["force_desired"][last]),
+    }
+
+
+def settling_time(since: Array, outside: Mask) -> float | None:
+    """From when on a force stays inside its band [s]; None if it leaves it too near to the end to be called settled.
+
+    Args:
+        since: time since the touch [s], shape (n,).
+        outside: whether the force is outside the band, shape (n,).
+    """
+    if not len(since) or outside[-1]:
+        return None
+    settled = float(since[np.max(np.nonzero(outside)[0], initial=-1) + 1])
+    stay = max(STAY, STAY_FRACTION * float(since[-1]))
+    return settled if since[-1] - settled >= stay - TICK_ROUNDING else None
+
+
+def ringing(t: Array, force: Array, desired: Array) -> dict[str, float] | None:
+    """The oscillation of a force that is to be constant; None where it is steady, or varies without a period.
+
+    It rings if more than half of the variance about its trend lies within an octave around one frequency, of which
+    the samples hold two periods or more. The amplitude is half of the range of 95 % of the samples.
+
+    Args:
+        t: time [s], shape (n,), at one rate.
+        force: shape (n,) [N].
+        desired: the desired force, shape (n,) [N].
+    """
+    n = len(t)
+    if n < SHORTEST or np.any(desired != desired[-1]):
+        return None
+    from scipy.signal import detrend
+
+    swing = detrend(force)
+    if not np.std(swing) > STEADY * abs(desired[-1]):
+        return None
+    power = np.abs(np.fft.rfft(swing * np.hanning(n))) ** 2
+    power[:2] = 0.0
+    peak = int(np.argmax(power))
+    octave = slice(int(np.ceil(peak / np.sqrt(2.0))), int(np.sqrt(2.0) * peak) + 1)
+    if power[octave].sum() <= 0.5 * power.sum():
+        return None
+    low, high = np.quantile(swing, (0.025, 0.975))
+    return {
+        "amplitude_N": float(high - low) / 2.0,
+        "frequency_Hz": peak * (n - 1) / (n * float(t[-1] - t[0])),
     }
 
 

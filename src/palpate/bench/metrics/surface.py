@@ -43,7 +43,11 @@ def _pair(front: str, parameter: str, unit: str) -> tuple[Metric, Metric]:
     return (
         Metric(f"{parameter}_{name}", unit, f"{parameter} by {TOLD[front]}", estimate(front, parameter)),
         Metric(
-            f"{parameter}_error_{name}", "1", "its error, as a share of the truth", error(front, parameter)
+            f"{parameter}_error_{name}",
+            "1",
+            "its error, as a share of the truth",
+            error(front, parameter),
+            signed=True,
         ),
     )
 

@@ -6,27 +6,25 @@ from collections.abc import Callable
 
 import numpy as np
 
-from palpate.bench.metrics.following import LIMIT, SHARE, interval_error, settled_rms
-from palpate.bench.metrics.summary import losses
+from palpate.bench.metrics.following import LIMIT, SHARE, interval_error, rings, settled_rms
+from palpate.bench.metrics.summary import STEADY, losses
 from palpate.bench.metrics.surface import QUOTIENT, estimate
 from palpate.bench.metrics.window import Look, Metric, Value
 
 APART = 0.10
 """How far two numbers for the stiffness may be apart, as a share, to be called the same."""
-QUIET = 0.02
-"""Largest standard deviation of the true force's error where it is at rest, as a share of the desired force."""
 YES_OR_NO = ("no", "yes")
 OUTCOMES = ("follows", "slow", "rings")
 
 
 def outcome(look: Look) -> Value:
-    """0 if the force follows; 1 if it is still on its way at the ends of intervals; 2 if it shakes too much."""
+    """0 if the force follows; 1 if it is still on its way at the ends of intervals; 2 if it shakes or rings."""
     off, shaking = interval_error(look), settled_rms(look)
     if off is None or shaking is None:
         return None
     if off > SHARE:
         return 1.0
-    return 0.0 if shaking <= LIMIT else 2.0
+    return 0.0 if shaking <= LIMIT and not rings(look) else 2.0
 
 
 def _follows(look: Look) -> Value:
@@ -34,8 +32,8 @@ def _follows(look: Look) -> Value:
         return None
     if look.ended or losses(look.record):
         return 0.0
-    found = outcome(look)
-    return None if found is None else float(found == 0.0)
+    off, shaking = interval_error(look), settled_rms(look)
+    return None if off is None or shaking is None else float(off <= SHARE and shaking <= LIMIT)
 
 
 def _steady(look: Look) -> Value:
@@ -44,7 +42,7 @@ def _steady(look: Look) -> Value:
     error = look.error
     if not len(error) or losses(look.record):
         return 0.0
-    return float(np.std(error) <= QUIET * abs(np.mean(look["force_desired"])))
+    return float(np.std(error) <= STEADY * abs(np.mean(look["force_desired"])))
 
 
 def adaptation_time(look: Look) -> Value:
@@ -94,14 +92,15 @@ CLAIMS = (
     Metric(
         "outcome",
         "1",
-        "follows; slow: still an error at the end of an interval; rings: no error there, but oscillation",
+        "follows; slow: still an error at the end of an interval; rings: no error there, but oscillation, of more than "
+        f"{LIMIT:g} N RMS or with an amplitude of more than 5 % of the force at the end",
         outcome,
         OUTCOMES,
     ),
     Metric(
         "steady",
         "1",
-        f"whether contact is kept and the force's standard deviation is at most {100 * QUIET:.0f} % of the desired one",
+        f"whether contact is kept and the force's standard deviation is at most {100 * STEADY:.0f} % of the desired",
         _steady,
         YES_OR_NO,
         "most",

@@ -13,13 +13,11 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.bench.ending import DIVERGED, LOST_CONTACT
-from palpate.bench.metrics.summary import summarise
+from palpate.bench.metrics.summary import TICK_ROUNDING, summarise
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 
 Value = float | None
-HALF_TICK = 5e-7
-"""Times are multiples of a tick but for rounding: windows and intervals are opened this much early [s]."""
 LATE = 1.0
 """A force is judged over the last second of each interval between two steps [s]."""
 
@@ -43,6 +41,18 @@ class Metric:
     of: Callable[[Look], Value]
     words: tuple[str, ...] = ()
     better: Literal["", "least", "most"] = ""
+    signed: bool = False
+    """Whether it is an error with a sign: the better of two is the nearer to 0."""
+
+    @property
+    def side(self) -> Literal["", "least", "most"]:
+        """Whether the least or the most of it is better; of an error the least by magnitude."""
+        return "least" if self.signed else self.better
+
+    @property
+    def called(self) -> str:
+        """Its name in a sentence."""
+        return f"{self.name} by magnitude" if self.signed else self.name
 
     def measured(self, look: Look) -> Value:
         """The number, or None where there is none or it is not finite."""
@@ -90,7 +100,7 @@ class Look:
         last = self.since[-1]
         if self.window is not None and self.ended and last < high - 2e-3:
             return np.zeros_like(self.pressing)
-        return self.pressing & (self.since >= low - HALF_TICK) & (self.since < high - HALF_TICK)
+        return self.pressing & (self.since >= low - TICK_ROUNDING) & (self.since < high - TICK_ROUNDING)
 
     @cached_property
     def ended(self) -> bool:
@@ -106,7 +116,7 @@ class Look:
     def intervals(self) -> Sequence[tuple[Array, Array]]:
         """Error and desired force [N] in the last second of each interval between two steps, within the window."""
         period = float(self.record.meta["experiment"]["force"]["period"])
-        t = self.since[self.inside] + HALF_TICK
+        t = self.since[self.inside] + TICK_ROUNDING
         number = np.floor(t / period)
         late = t - period * number >= max(0.0, period - LATE)
         desired = self["force_desired"]
@@ -118,7 +128,7 @@ class Look:
     def after_steps(self) -> Array:
         """Error [N] within the window, but for the first half second after each step of the desired force."""
         period = float(self.record.meta["experiment"]["force"]["period"])
-        t = self.since[self.inside] + HALF_TICK
+        t = self.since[self.inside] + TICK_ROUNDING
         return self.error[t - period * np.floor(t / period) >= SETTLE]
 
     @cached_property

@@ -1,0 +1,1 @@
+"""The commands that palpate lists when this distribution is installed."""

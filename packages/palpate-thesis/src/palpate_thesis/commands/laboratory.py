@@ -1,0 +1,154 @@
+"""`palpate laboratory`: the laboratory under which most of the thesis' own sentences are true at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter, validators
+
+from palpate.cli._answer import print_answer
+from palpate.cli._progress import counted
+from palpate.cli._terminal import console, place, say, show_table
+from palpate.cli.options.flags import FLAG
+from palpate.cli.options.known import FolderOptions
+
+if TYPE_CHECKING:
+    from palpate_thesis.inference.result import Result
+    from palpate_thesis.inference.search import Runner
+
+
+def _within(least: int, most: int) -> Parameter:
+    return Parameter(validator=validators.Number(gte=least, lte=most))
+
+
+@Parameter(name="*", group=Group("The search", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class SearchOptions:
+    """Size of the search.
+
+    Parameters
+    ----------
+    particles
+        Points of the posterior; it begins with four times as many of the prior.
+    moves
+        Of each particle at each temperature; three times as many at the last.
+    seed
+        Of everything drawn.
+    half
+        Search by the calibration half alone, in a third of the time; the result is judged by all.
+    """
+
+    particles: Annotated[int, _within(8, 100_000)] = 128
+    moves: Annotated[int, _within(1, 1000)] = 2
+    seed: Annotated[int, _within(0, 2**31 - 1)] = 1
+    half: Annotated[bool, FLAG] = False
+
+    @property
+    def command(self) -> str:
+        """The command line of a search of this size."""
+        half = " --half" if self.half else ""
+        return (
+            f"palpate laboratory --particles {self.particles} --moves {self.moves} --seed {self.seed}{half}"
+        )
+
+
+@Parameter(name="*", group=Group("Who tries", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class RunnerOptions:
+    """Cores or a cluster for the search.
+
+    Parameters
+    ----------
+    cores
+        That try laboratories in parallel; all when left out.
+    scheduler
+        Address of a Dask scheduler whose workers try them, tcp://HOST:PORT. Their answers can execute code here:
+        name only a cluster that you trust as this machine.
+    """
+
+    cores: Annotated[int | None, _within(1, 1024)] = None
+    scheduler: str | None = None
+
+
+@Parameter(name="*", group=Group("Output", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class InferredOptions(FolderOptions):
+    """Files to write.
+
+    Parameters
+    ----------
+    out
+        Folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there is
+        resumed.
+    """
+
+    out: Path = Path("runs/laboratory")
+
+
+def laboratory(
+    *,
+    search: SearchOptions | None = None,
+    who: RunnerOptions | None = None,
+    output: InferredOptions | None = None,
+) -> int:
+    """Infer the thesis' laboratory from its own sentences; resumable.
+
+    Its unstated parameters are inferred once from half of its figures, once from all.
+
+    palpate laboratory --particles 32 --half --out runs/laboratory
+    """
+    from palpate.bench.speed import cores as all_cores
+    from palpate_thesis.inference.infer import Inference
+    from palpate_thesis.inference.result import as_json as numbers
+    from palpate_thesis.inference.sampler import Settings
+
+    search, who, output = search or SearchOptions(), who or RunnerOptions(), output or InferredOptions()
+    command, out, threads = search.command, output.out, who.cores or all_cores()
+    settings = Settings(search.particles + search.particles % 2, moves=search.moves, seed=search.seed)
+    try:
+        with _runner(who.scheduler, threads) as runner, counted(console(stderr=True)) as told:
+            inference = Inference(out, settings, runner, command, threads, search.half, told)
+            result = inference.run(replace=output.replace)
+    except KeyboardInterrupt:
+        say(f"interrupted; the tried laboratories are saved in {out}; the same command resumes")
+        return 130
+    _show(result, out, {"seed": search.seed, **numbers(result, command)} if output.json else None)
+    return 0
+
+
+@contextmanager
+def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
+    from palpate_thesis.inference.search import Threads, Workers
+
+    if scheduler is None:
+        yield Threads(threads)
+        return
+    from palpate.studies.running.cluster import Cluster
+
+    cluster = Cluster(scheduler)
+    try:
+        yield Workers(cluster)
+    finally:
+        cluster.close()
+
+
+def _show(result: Result, folder: Path, found: Mapping[str, Any] | None) -> None:
+    from palpate.report.page import Table
+    from palpate_thesis.inference.findings import PAGE
+    from palpate_thesis.inference.result import halves, laboratories
+
+    if found is not None:
+        print_answer(found)
+        return
+    screen = console()
+    rows = [
+        (name, *(f"{one.count(of)} of {len(of)}" for of in halves().values()))
+        for name, one in laboratories(result).items()
+    ]
+    show_table(screen, Table("", ("laboratory", "calibration", "validation", "all"), rows))
+    place(screen, "laboratory:", folder / "inferred.toml")
+    place(screen, "page:", folder / PAGE)

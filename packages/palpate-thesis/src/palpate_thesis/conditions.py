@@ -1,0 +1,87 @@
+"""Worlds that the figures are tried in: other surfaces, other friction, other poses; as changes of an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, TypeVar
+
+from palpate.bench import Experiment
+from palpate_thesis.claims import often
+from palpate_thesis.runs import Runs
+
+T = TypeVar("T")
+W = TypeVar("W")
+
+VARIED_SEEDS = 3
+"""Runs of each variation; the nominal case has all seeds."""
+
+SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3}
+"""The last millimetres of the approach: the rest of it takes sixteen seconds and moves errors in contact by 4 %."""
+RELAXING_FOAM = {
+    "surface": {
+        "kind": "standard-linear-solid",
+        "stiffness": 5600.0,
+        "damping": 13.0,
+        "mass": 0.02,
+        "branch_stiffness": 6900.0,
+        "branch_time": 0.23,
+    }
+}
+RUBBER_SURFACE = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
+
+
+def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
+    """Changes that bring start, approach and wall together to a wall at x [m]."""
+    by = x - experiment.wall.x
+    start = experiment.robot.start
+    return {
+        "wall.x": x,
+        "robot.start": (start[0] + by, *start[1:]),
+        "approach.first": experiment.approach.first + by,
+    }
+
+
+def rougher(experiment: Experiment, factor: float) -> Mapping[str, Any]:
+    """Changes that multiply the joints' friction."""
+    f = experiment.friction
+    names = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
+    return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names}
+
+
+def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
+    """Variations of every force-control figure: half and double friction, the wall nearer and farther."""
+    return {
+        "friction\nhalf": rougher(experiment, 0.5),
+        "friction\ndouble": rougher(experiment, 2.0),
+        "wall at\n0.40 m": move_wall(experiment, 0.40),
+        "wall at\n0.49 m": move_wall(experiment, 0.49),
+    }
+
+
+def by_condition(
+    runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
+) -> dict[str, list[T]]:
+    """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
+    cases = [
+        (name, world, seed)
+        for name, world in worlds.items()
+        for seed in (runs.seeds if name in full else runs.seeds[:VARIED_SEEDS])
+    ]
+    found: dict[str, list[T]] = {}
+    for (name, _, _), one in zip(cases, runs.map(lambda case: work(*case[1:]), cases), strict=True):
+        found.setdefault(name, []).append(one)
+    return found
+
+
+def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:
+    """A sentence: under which variations a conclusion holds, and under which it does not."""
+    broken, kept = [], []
+    for name, runs in found.items():
+        told = name.replace("\n", " ")
+        if often(map(holds, runs)):
+            kept.append(told)
+        else:
+            broken.append(f"{told} ({sum(map(holds, runs))} of {len(runs)} runs)")
+    parts = [f"holds with: {', '.join(kept)}"] if kept else []
+    parts += [f"does not with: {', '.join(broken)}"] if broken else ["and under every variation tried"]
+    return f"It {'; it '.join(parts) if broken else ', '.join(parts)}."

@@ -1,0 +1,388 @@
+"""Why M_e comes out negative: every fault of the signals switched on, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import changed
+from palpate.bench.sequence import CONTACT
+from palpate.records import Record
+from palpate.report import style
+from palpate.signals.filters import Biquad, butterworth2, butterworth3
+from palpate_thesis.claims import Claim, claim, spread, texts
+from palpate_thesis.least_squares import panels, press_runs
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+CAUSES = {
+    "offset": "displacement from the 5 N point",
+    "lag": "the sensor's lag",
+    "filter": "120 Hz on the force",
+    "acceleration": "35 Hz on the acceleration",
+    "counts": "encoder counts",
+    "noise": "noise of the force",
+}
+"""Signal faults between the surface and the thesis' estimator, in the order of the waterfall."""
+BEFORE, PRESS = 1.5, 4.0
+TICK = 1e-3
+START, COVARIANCE = (0.0, 0.0, 2e5), 1e10
+
+
+@dataclass(frozen=True)
+class Window:
+    """A press with what came before it, so that filters have settled; true and measured."""
+
+    x: Array  # true [m]
+    counts: Array  # as the encoders have it [m]
+    force: Array  # true [N]
+    sampled: Array  # [N]
+    x0: float  # measured x at the change-over [m]
+    wall: float  # [m]
+    first: int  # sample of the change-over
+    sensor: tuple[float, float]  # cut-off and sampling of the force sensor [Hz]
+    cutoffs: tuple[float, float]  # of force and acceleration [Hz]
+    matched: Array  # M, B, K of the matched front-end at the end of the window
+
+
+def window(record: Record) -> Window:
+    """The first press of a run."""
+    at = int(np.argmax(record["phase"] == CONTACT))
+    first = min(at, round(BEFORE / TICK))
+    rows = slice(at - first, at + round(PRESS / TICK))
+    e = record.meta["experiment"]
+    # A row's force is that of the physics step before its tick; at 500 N s/m those 50 us would be 25 g.
+    step = 1.0 / (e["run"]["rate"] * e["run"]["steps"])
+    return Window(
+        x=record["x"][rows],
+        counts=record["x_measured"][rows],
+        force=late(record["force"][rows], -step),
+        sampled=record["force_sampled"][rows],
+        x0=float(record["x_measured"][at]),
+        wall=float(e["wall"]["x"]),
+        first=first,
+        sensor=(float(e["force_sensor"]["cutoff"]), float(e["force_sensor"]["sampling"])),
+        cutoffs=(float(e["filters"]["force"]), float(e["filters"]["motion"])),
+        matched=np.array([record[f"{key}_matched"][rows][-1] for key in "MBK"]),
+    )
+
+
+def estimate(press: Window, causes: Collection[str], lag: float = 0.0) -> Array:
+    """(M, B, K) by least squares over the press, with these causes on and the force late by another `lag` [s]."""
+    x, v, a = _motion(press, causes)
+    force = late(_force(press, causes), lag)
+    phi = np.column_stack([a, v, x])[press.first :]
+    scale = np.sqrt((phi**2).sum(axis=0))
+    unit = phi / scale
+    prior = np.diag(1.0 / (COVARIANCE * scale**2))
+    right = prior @ (np.array(START) * scale) + unit.T @ force[press.first :]
+    return np.asarray(np.linalg.solve(prior + unit.T @ unit, right) / scale)
+
+
+def _motion(press: Window, causes: Collection[str]) -> tuple[Array, Array, Array]:
+    position = press.counts if "counts" in causes else press.x
+    if "counts" in causes:
+        v = np.diff(position, prepend=position[0]) / TICK
+        a = np.diff(v, prepend=0.0) / TICK
+    else:
+        v = np.gradient(position, TICK)
+        a = np.gradient(v, TICK)
+    if "acceleration" in causes:
+        a = filter_signal(butterworth2(press.cutoffs[1], 1.0 / TICK), a)
+    return position - (press.x0 if "offset" in causes else press.wall), v, a
+
+
+def _force(press: Window, causes: Collection[str]) -> Array:
+    sensed = through_sensor(press.force, *press.sensor)
+    force = sensed if "lag" in causes else press.force
+    if "noise" in causes:
+        force = force + (press.sampled - sensed)
+    return filter_signal(butterworth2(press.cutoffs[0], 1.0 / TICK), force) if "filter" in causes else force
+
+
+def through_sensor(force: Array, cutoff: float = 120.0, sampling: float = 480.0) -> Array:
+    """The force as the sensor gives it without noise: its filter, one cycle of computing, half a cycle of holding."""
+    analog = butterworth3(cutoff, 1.0 / TICK)
+    return late(filter_signal(analog.second, filter_signal(analog.first, force)), 1.5 / sampling)
+
+
+def filter_signal(section: Biquad, signal: Array) -> Array:
+    """A signal through a filter that has seen its first value for ever."""
+    from scipy.signal import lfilter, lfilter_zi
+
+    b, a = (section.b0, section.b1, section.b2), (1.0, section.a1, section.a2)
+    return np.asarray(lfilter(b, a, signal, zi=lfilter_zi(b, a) * signal[0])[0])
+
+
+def late(signal: Array, seconds: float) -> Array:
+    """A signal so many seconds late; linear between samples."""
+    k = np.arange(len(signal), dtype=float)
+    return signal if seconds == 0.0 else np.interp(k - seconds / TICK, k, signal)
+
+
+def delayed_fit(M: float, B: float, K: float, lag: float) -> tuple[float, float]:
+    """M and B estimated from a force that lags by `lag`, to second order: x(t - T) = x - T v + T^2/2 a."""
+    return M - B * lag + K * lag**2 / 2.0, B - K * lag
+
+
+NUMBER = "why-negative-mass"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = {
+    name: changed(e, {"run.press": 4.2})
+    for name, e in {
+        "plain foam": press_runs.PLAIN,
+        "rubber": press_runs.RUBBER,
+        "relaxing foam": press_runs.RELAXING,
+    }.items()
+}
+LAGS = 1e-3 * np.arange(0.0, 11.0)
+SENSOR_LAG = 5.6e-3
+"""[s]; of the force sensor alone, for the lag formula's test."""
+CHAINS = {
+    "perfect signals": (),
+    "only the force's lag": ("lag", "filter"),
+    "all but the force's lag": ("offset", "acceleration", "counts", "noise"),
+    "as in the thesis": tuple(CAUSES),
+}
+NEAR_FORMULA = 0.25
+NEAR_TRUTH = {"K": 0.02, "B": 0.05, "M": 0.25}
+"""Shares of K and B; kilograms."""
+
+
+@dataclass(frozen=True)
+class Press:
+    """Least-squares estimates of one press, each (M, B, K)."""
+
+    steps: Array  # with perfect signals, then with one cause more each, shape (7, 3)
+    alone: Array  # with one cause each, shape (6, 3)
+    chains: Array  # of `CHAINS`, shape (4, 3)
+    lags: Array  # perfect signals, the force late by `LAGS`, shape (11, 3)
+    sensor: Array  # late by the sensor's lag, shape (3,)
+    matched: Array
+
+
+@dataclass(frozen=True)
+class Data:
+    """Presses on each surface, as chosen and varied."""
+
+    presses: dict[str, list[Press]]
+    varied: dict[str, dict[str, list[Press]]]
+    truth: dict[str, tuple[float, float, float]]  # M, B, K
+
+    def middle(self, surface: str, what: str) -> Array:
+        """The median over the seeds."""
+        return np.median([getattr(p, what) for p in self.presses[surface]], axis=0)
+
+
+def run(runs: Runs) -> Data:
+    """One press a seed on each surface; conditions varied on the two that the model fits."""
+    few = list(runs.seeds)[: press_runs.SWEPT_SEEDS]
+    plain = {name: PARAMETERS[name] for name in ("plain foam", "rubber")}
+    varied = {
+        name: {
+            condition: runs.over([(e, seed) for seed in few], _press)
+            for condition, e in press_runs.conditions(one).items()
+        }
+        for name, one in plain.items()
+    }
+    truth = {name: (e.surface.mass, e.surface.damping, e.surface.stiffness) for name, e in PARAMETERS.items()}
+    return Data({name: runs.over_seeds(e, _press) for name, e in PARAMETERS.items()}, varied, truth)
+
+
+def _press(record: Record) -> Press:
+    seen = window(record)
+    names = list(CAUSES)
+    return Press(
+        steps=np.array([estimate(seen, names[:i]) for i in range(len(names) + 1)]),
+        alone=np.array([estimate(seen, [name]) for name in names]),
+        chains=np.array([estimate(seen, causes) for causes in CHAINS.values()]),
+        lags=np.array([estimate(seen, (), lag) for lag in LAGS]),
+        sensor=estimate(seen, (), SENSOR_LAG),
+        matched=seen.matched,
+    )
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """The thesis' own reason, the lag, the wrong model, and the cure."""
+    return [_smallness(data), _lag(data), _wrong_model(data), _matched_claim(data)]
+
+
+def _masses(data: Data, surface: str, chain: str) -> list[float]:
+    at = list(CHAINS).index(chain)
+    return [float(p.chains[at, 0]) for p in data.presses[surface]]
+
+
+def _smallness(data: Data) -> Claim:
+    surfaces = ("plain foam", "rubber")
+    perfect = {s: _masses(data, s, "perfect signals") for s in surfaces}
+    right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in surfaces)
+    told = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in surfaces)
+    return claim(
+        "negative-mass.small",
+        not right,
+        masses=told,
+        foam_added=_contributions(data, "plain foam"),
+        rubber_added=_contributions(data, "rubber"),
+        filter=data.middle("rubber", "alone")[list(CAUSES).index("acceleration"), 0],
+        foam_without=np.median(_masses(data, "plain foam", "all but the force's lag")),
+        rubber_without=np.median(_masses(data, "rubber", "all but the force's lag")),
+        signs=_signs(data),
+    )
+
+
+def _contributions(data: Data, surface: str) -> str:
+    """Contribution of each cause, in words."""
+    steps = data.middle(surface, "steps")[:, 0]
+    added = zip(CAUSES.values(), np.diff(steps), strict=True)
+    return (
+        f"{steps[0]:.2f} kg, then {', '.join(f'{n} {s:+.2f}' for n, s in added)}, in all {steps[-1]:.2f} kg"
+    )
+
+
+def _signs(data: Data) -> str:
+    """Under which conditions the signs are others."""
+    told = []
+    for what, chain in (("The lag alone", "only the force's lag"), ("The whole chain", "as in the thesis")):
+        at = list(CHAINS).index(chain)
+        where = [
+            f"{surface} with {condition}"
+            for surface, by in data.varied.items()
+            for condition, some in by.items()
+            if np.median([p.chains[at, 0] for p in some]) >= 0.0
+        ]
+        told.append(f"{what} makes the mass negative under {'all' if not where else 'all but these'} of them")
+        told[-1] += f": {', '.join(where)}." if where else "."
+    return f"Friction, pose, mass and damping were varied. {' '.join(told)}"
+
+
+def _lag(data: Data) -> Claim:
+    parts, worst = [], 0.0
+    for surface in ("plain foam", "rubber"):
+        M, B, K = data.truth[surface]
+        predicted = np.array(delayed_fit(M, B, K, SENSOR_LAG))
+        fitted = data.middle(surface, "sensor")[:2]
+        apart = np.abs(fitted - predicted) / np.abs(predicted - np.array([M, B]))
+        worst = max(worst, float(apart.max()))
+        parts.append(
+            f"{surface}: M {fitted[0]:.2f} ({predicted[0]:.2f}) kg, B {fitted[1]:.0f} ({predicted[1]:.0f}) N s/m"
+        )
+    return claim(
+        "negative-mass.lag",
+        worst < NEAR_FORMULA,
+        sensor_lag=1e3 * SENSOR_LAG,
+        surfaces="; ".join(parts),
+        reach=_reach(data),
+    )
+
+
+def _reach(data: Data) -> str:
+    """Up to which lag the formula is right."""
+    parts = []
+    for surface in ("plain foam", "rubber"):
+        truth = data.truth[surface]
+        fits = data.middle(surface, "lags")
+        good = [
+            abs(fit[0] - delayed_fit(*truth, lag)[0])
+            < NEAR_FORMULA * abs(delayed_fit(*truth, lag)[0] - truth[0])
+            for fit, lag in zip(fits[1:], LAGS[1:], strict=True)
+        ]
+        upto = len(good) if all(good) else int(np.argmin(good))
+        parts.append(f"{1e3 * LAGS[upto]:g} ms on {surface}")
+    return f"For M it is within a quarter of the shift up to {' and '.join(parts)} (tried up to {1e3 * LAGS[-1]:g} ms)."
+
+
+def _wrong_model(data: Data) -> Claim:
+    masses = _masses(data, "relaxing foam", "perfect signals")
+    return claim("negative-mass.model", max(masses) < 0.0, masses=masses)
+
+
+def _matched_claim(data: Data) -> Claim:
+    parts, good = [], True
+    for surface in ("plain foam", "rubber"):
+        truth = dict(zip("MBK", data.truth[surface], strict=True))
+        found = dict(zip("MBK", np.transpose([p.matched for p in data.presses[surface]]), strict=True))
+        middle = {key: float(np.median(found[key])) for key in "MBK"}
+        good &= all(abs(middle[key] / truth[key] - 1.0) < NEAR_TRUTH[key] for key in "BK")
+        good &= abs(middle["M"] - truth["M"]) < NEAR_TRUTH["M"]
+        parts.append(
+            f"{surface}: K {spread(1e-3 * found['K'], 'kN/m')}, true {1e-3 * truth['K']:g}; "
+            f"B {spread(found['B'], 'N s/m')}, true {truth['B']:g}; "
+            f"M {spread(found['M'], 'kg', 2)}, true {truth['M']:g}"
+        )
+    return claim("negative-mass.matched", bool(good), surfaces="; ".join(parts))
+
+
+def plot(data: Data) -> Figure:
+    """Waterfalls of M and B on three surfaces, the lag formula, and conditions."""
+    drawing, axes = panels.grid(5)
+    for row, surface in enumerate(PARAMETERS):
+        for column, (index, label) in enumerate((((0), "$M_e$ [kg]"), ((1), "$B_e$ [N s/m]"))):
+            axis = axes[2 * row + column]
+            panels.set_title(axis, "abcdef"[2 * row + column], f"{label.split(' ')[0]} on {surface}")
+            _waterfall(axis, data, surface, index)
+            axis.set_xlabel(label)
+            if column:
+                axis.set_yticklabels([])
+    for index, axis in enumerate(axes[6:8]):
+        _lag_panel(axis, data, index)
+    for surface, axis, letter in zip(data.varied, axes[8:10], "ij", strict=True):
+        _conditions(axis, data, surface, letter)
+    handles, names = axes[8].get_legend_handles_labels()
+    drawing.legend(handles, names, loc="outside lower center", ncols=4)
+    return drawing
+
+
+def _waterfall(axis: Axes, data: Data, surface: str, index: int) -> None:
+    steps = data.middle(surface, "steps")[:, index]
+    seeds = np.array([p.steps[:, index] for p in data.presses[surface]])
+    labels = ["perfect signals", *(f"+ {name}" for name in CAUSES.values()), "channels matched"]
+    for i, value in enumerate(steps):
+        before = steps[i - 1] if i else 0.0
+        color = style.MEASURED if i == 0 else (style.FAIL if value < before else style.SERIES[0])
+        axis.barh(i, value - before, left=before, color=color, height=0.62)
+        axis.plot(seeds[:, i], np.full(len(seeds), i), "o", color=style.INK, markersize=1.8, alpha=0.5)
+        if i:
+            axis.plot([before, before], [i - 1, i], color=style.MEASURED, linewidth=0.8)
+    matched = [float(p.matched[index]) for p in data.presses[surface]]
+    axis.barh(len(steps), float(np.median(matched)), color=style.OK, height=0.62)
+    axis.plot(matched, np.full(len(matched), len(steps)), "o", color=style.INK, markersize=1.8, alpha=0.5)
+    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
+    if surface != "relaxing foam":
+        axis.axvline(data.truth[surface][index], color=style.OK, linewidth=1.1, linestyle="--")
+    axis.set_yticks(range(len(labels)), labels)
+    axis.invert_yaxis()
+
+
+def _lag_panel(axis: Axes, data: Data, index: int) -> None:
+    panels.set_title(
+        axis, "gh"[index], f"{('$M_e$', '$B_e$')[index]} of perfect signals, the force late by T"
+    )
+    fine = np.linspace(0.0, float(LAGS[-1]), 100)
+    for surface in ("plain foam", "rubber"):
+        color = panels.COLORS[surface]
+        axis.plot(
+            1e3 * LAGS, data.middle(surface, "lags")[:, index], "o", color=color, markersize=4, label=surface
+        )
+        predicted = [delayed_fit(*data.truth[surface], lag)[index] for lag in fine]
+        axis.plot(1e3 * fine, predicted, "--", color=color, linewidth=1.1)
+    axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.set(xlabel="T [ms]", ylabel=("$M_e$ [kg]", "$B_e$ [N s/m]")[index])
+    axis.legend()
+
+
+def _conditions(axis: Axes, data: Data, surface: str, letter: str) -> None:
+    panels.set_title(axis, letter, f"$M_e$ under varied conditions, {surface}")
+    colors = dict(zip(CHAINS, style.SERIES[:4], strict=True))
+    groups = {
+        chain: {
+            condition: [float(p.chains[i, 0]) for p in some]
+            for condition, some in {"as chosen": data.presses[surface], **data.varied[surface]}.items()
+        }
+        for i, chain in enumerate(CHAINS)
+    }
+    panels.dots(axis, groups, colors)
+    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.set_xlabel("$M_e$ [kg]")

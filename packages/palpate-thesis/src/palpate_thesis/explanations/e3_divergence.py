@@ -1,0 +1,335 @@
+"""Explanation 3: the neural controller's delayed divergence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import Experiment, changed
+from palpate.controllers.neural import NeuralState
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.conditions import RELAXING_FOAM, move_wall, rougher
+from palpate_thesis.explanations.e2_integrator import PI
+from palpate_thesis.force_control.panels import across, legend_inside, panels
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE, since_contact
+from palpate_thesis.force_control.weights import HOLD, POSES, TORQUE1, TORQUES, Look, hold, layers, watch
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+DURATION = 240.0
+"""Seconds of contact that count as steady [s]."""
+PARTS = (
+    "hidden, from torques",
+    "hidden, from poses",
+    "hidden thresholds",
+    "output of the force",
+    "output thresholds",
+)
+
+
+@dataclass(frozen=True)
+class Course:
+    """A long run: once a second the sizes of the weights, and the gains from the torques to the force."""
+
+    t: Array  # (n,) [s]
+    sizes: Array  # (n, 5), in the order of `PARTS`
+    gains: Array  # (n, 3) [N per N m]
+    lost: float | None  # when contact was lost [s]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Signals in the last moments before the loss of contact."""
+
+    t: Array  # before the loss [s]
+    force: Array  # the network's [N]
+    velocity: Array  # of the tip along x [m/s]
+    true: Array  # contact force [N]
+
+
+def weights_panel(axis: Axes, course: Course, name: str) -> None:
+    """Sizes of the weights over a run."""
+    colors = style.SERIES[:5]
+    for sizes, part, color in zip(course.sizes.T, PARTS, colors, strict=True):
+        axis.plot(course.t, sizes, color=color, linewidth=1.2, label=part)
+    if course.lost is not None:
+        axis.axvline(course.lost, color=style.INK, linestyle="--", linewidth=1)
+    axis.set(xlabel="time since contact [s]", ylabel="size of the weights", ylim=(0.0, 1.05))
+    axis.set_title(f"{name}, eta 5e-5")
+
+
+def gains_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[Course]]]) -> None:
+    """Gain from the torques to the force, on each surface."""
+    for (name, found), color in zip(courses.items(), style.SERIES[:3], strict=True):
+        course = found[5e-5][0]
+        axis.plot(course.t, np.linalg.norm(course.gains, axis=1), color=color, linewidth=1.2, label=name)
+        if course.lost is not None:
+            axis.plot(
+                course.t[-1],
+                np.linalg.norm(course.gains[-1]),
+                "x",
+                color=color,
+                markersize=9,
+                markeredgewidth=2,
+            )
+    axis.set(xlabel="time since contact [s]", ylabel="gain [N per N m]", ylim=(0.0, 2.9))
+    axis.set_title("from the torques to the network's force, eta 5e-5")
+    legend_inside(axis, loc="upper right", ncols=3)
+
+
+def loss_panel(axis: Axes, loss: Loss | None) -> None:
+    """The last moments before a loss."""
+    if loss is None:
+        axis.set_axis_off()
+        return
+    axis.plot(loss.t, loss.force, color=style.SERIES[0], linewidth=1.4, label="network's force")
+    axis.plot(loss.t, loss.true, color=style.F, linewidth=1.4, label="contact force")
+    axis.plot(loss.t, 200 * loss.velocity, color=style.INK, linewidth=1.1, label="velocity along x")
+    axis.set(xlabel="time before the loss [s]", ylabel="[N], [5 mm/s]", xlim=(loss.t[0], 0.0))
+    axis.set_title("the loss: foam that relaxes, eta 5e-5")
+    legend_inside(axis, loc="upper left")
+
+
+def times_panel(axis: Axes, found_on: Mapping[str, Mapping[float, Sequence[Course]]]) -> None:
+    """Times of loss over the learning rate, on each surface."""
+    for (name, found), color, shift in zip(
+        found_on.items(), style.SERIES[:3], (1.0, 0.94, 1.06), strict=True
+    ):
+        for rate, courses in found.items():
+            _mark_losses(axis, [rate * shift] * len(courses), [c.lost for c in courses], color)
+        axis.plot([], [], "o", color=color, markersize=4, label=name)
+    axis.plot([], [], "^", color=style.MEASURED, markersize=5, label=f"kept for {DURATION:g} s, as with PI")
+    axis.set(
+        xscale="log", xlabel="learning rate eta", ylabel="contact lost after [s]", ylim=(0.0, DURATION * 1.08)
+    )
+    legend_inside(axis, loc="center right", bbox_to_anchor=(1.0, 0.62))
+
+
+def _mark_losses(axis: Axes, at: Sequence[float], times: Sequence[float | None], color: str) -> None:
+    for x, lost in zip(at, times, strict=True):
+        axis.plot(
+            x, DURATION if lost is None else lost, "^" if lost is None else "o", color=color, markersize=5
+        )
+
+
+def steps_panel(axis: Axes, found: Mapping[float, Sequence[Course]]) -> None:
+    """Growth of the output weights of the force over the steps asked for, at each learning rate."""
+    for (rate, courses), color in zip(found.items(), style.SERIES[:5], strict=True):
+        one = courses[0]
+        axis.plot(one.t / 2.5, one.sizes[:, 3], color=color, linewidth=1.5, label=f"{rate:g}")
+    axis.set(xlabel="steps of the desired force", ylabel="force's output weights", yscale="log")
+    axis.set_title("growth by steps, foam that relaxes")
+    legend_inside(axis, loc="lower right", title="eta")
+
+
+def causes_panel(axis: Axes, causes: Mapping[str, Sequence[float | None]]) -> None:
+    """Times of loss with one thing changed at a time."""
+    for i, (name, times) in enumerate(causes.items()):
+        for lost in times:
+            marker, color = (">", style.OK) if lost is None else ("o", style.FAIL)
+            axis.plot(DURATION if lost is None else lost, i, marker, color=color, markersize=6)
+        last = max(DURATION if lost is None else lost for lost in times)
+        side = "right" if last > 0.8 * DURATION else "left"
+        axis.text(last + (-4 if side == "right" else 4), i, name, va="center", ha=side)
+    axis.set_yticks([])
+    axis.invert_yaxis()
+    axis.set(
+        xlim=(0.0, DURATION * 1.02),
+        xlabel=f"contact lost after [s]; at the right edge: kept for {DURATION:g} s",
+    )
+    axis.set_title("foam that relaxes, eta 5e-5, one thing changed at a time")
+
+
+NUMBER = "delayed-divergence"
+TITLE, CAPTION = texts(NUMBER)
+RELAXING = changed(FOAM, RELAXING_FOAM)
+PARAMETERS: Mapping[str, Experiment] = {"foam that relaxes": RELAXING, "foam": FOAM, "rubber": RUBBER}
+RATES = (1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
+FEW_RATES = (1e-4, 5e-5, 1e-5)
+"""For the surfaces where runs are long."""
+CAUSES: Mapping[str, Mapping[str, Any]] = {
+    "as chosen": {},
+    "constant force": {"force.second": None},
+    "no noise": {"force_sensor.noise": 0.0},
+    "steps and sine": SINE,
+    "foam damped by 60 N s/m": {"surface.damping": 60.0},
+    "foam damped by 200 N s/m": {"surface.damping": 200.0},
+    "K_fp = 0": {"controller.kf": 0.0},
+    "K_pv halved": {"controller.kv": 40.0},
+    "random weights": {"controller.weights": "random", "controller.weights_seed": 1},
+    "8 hidden neurons": {
+        "controller.weights": "random",
+        "controller.weights_seed": 1,
+        "controller.layers": (8,),
+    },
+    "friction half": rougher(FOAM, 0.5),
+    "friction double": rougher(FOAM, 2.0),
+    "wall at 0.40 m": move_wall(FOAM, 0.40),
+    "wall at 0.49 m": move_wall(FOAM, 0.49),
+    "PI, K_i = 5 per second": PI,
+}
+HELD: Mapping[str, slice] = {
+    "weights from poses held at zero": POSES,
+    "weights from motor 1's torque held at zero": TORQUE1,
+    "weights from all torques held at zero": TORQUES,
+}
+"""Hidden weights that are not allowed to grow."""
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    courses: dict[str, dict[float, list[Course]]]  # by surface and learning rate
+    pi: dict[str, list[float | None]]  # times of loss under the PI, by surface
+    causes: dict[str, list[float | None]]  # times of loss
+    loss: Loss | None
+
+
+def run(runs: Runs) -> Data:
+    """All the long runs."""
+    courses: dict[str, dict[float, list[Course]]] = {}
+    for name, e in PARAMETERS.items():
+        rates, seeds = (RATES, runs.seeds[:5]) if e is RELAXING else (FEW_RATES, runs.seeds[:1])
+        cases = [(changed(e, {"controller.learning_rate": r}), s) for r in rates for s in seeds]
+        found = runs.map(lambda case: _course(runs, *case), cases)
+        courses[name] = {r: found[i * len(seeds) : (i + 1) * len(seeds)] for i, r in enumerate(rates)}
+    plain = {name: _losses(runs, changed(e, PI), 1) for name, e in PARAMETERS.items()}
+    causes = {name: _losses(runs, changed(RELAXING, change), 1) for name, change in CAUSES.items()}
+    held = runs.map(
+        lambda columns: watch(RELAXING, runs.seeds[0], DURATION, hold(columns), runs.waiting, HOLD),
+        list(HELD.values()),
+    )
+    causes.update((name, [lost]) for name, lost in zip(HELD, held, strict=True))
+    return Data(courses, plain, causes, _loss(runs, courses["foam that relaxes"][5e-5][0].lost))
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """A loss at every rate where the PI is steady; and, apart from that, on every surface."""
+    relaxing = data.courses["foam that relaxes"]
+    times = [c.lost for found in relaxing.values() for c in found]
+    steady = all(lost is None for found in data.pi.values() for lost in found)
+    others = [c.lost for name in ("foam", "rubber") for found in data.courses[name].values() for c in found]
+    gone = sum(lost is not None for lost in others)
+    return [
+        claim(
+            "neural-diverges.loss",
+            all(lost is not None for lost in times) and steady,
+            cases=_table(relaxing),
+            steady="steady" if steady else "lost",
+            duration=DURATION,
+            kept=_keeps_contact(data.causes, "weights from all torques held at zero"),
+            negative_damping=_negative_damping(data.loss),
+        ),
+        claim(
+            "neural-diverges.everywhere",
+            gone == len(others),
+            gone=gone,
+            others=len(others),
+            duration=DURATION,
+            causes=_times_by_cause(data.causes),
+        ),
+    ]
+
+
+def plot(data: Data) -> Figure:
+    """Weights, gains, the loss, times, growth by steps, causes."""
+    drawing, grid = panels([2.2, 2.2, 2.2, 3.5], columns=2, width=11.0)
+    for axis, name in zip(grid[0], ("foam that relaxes", "foam"), strict=True):
+        weights_panel(axis, data.courses[name][5e-5][0], name)
+    legend_inside(grid[0][1], loc="upper right", ncols=2)
+    gains_panel(grid[1][0], data.courses)
+    loss_panel(grid[1][1], data.loss)
+    times_panel(grid[2][0], data.courses)
+    steps_panel(grid[2][1], data.courses["foam that relaxes"])
+    causes_panel(across(grid[3]), data.causes)
+    return drawing
+
+
+def _course(runs: Runs, experiment: Experiment, seed: int) -> Course:
+    t: list[float] = []
+    sizes: list[Array] = []
+    gains: list[Array] = []
+
+    def look(one: Look) -> None:
+        assert one.neural is not None
+        t.append(one.t)
+        sizes.append(sizes_of(one.neural))
+        gains.append(torque_gains_of(one.neural))
+
+    lost = watch(experiment, seed, DURATION, look, runs.waiting)
+    return Course(np.array(t), np.array(sizes), np.array(gains), lost)
+
+
+def sizes_of(state: NeuralState) -> Array:
+    """Root of the sum of squares of each of `PARTS`, shape (5,)."""
+    hidden, output = layers(state)
+    parts = (hidden[:, 7:], hidden[:, 1:7], hidden[:, 0], output[0, 1:], output[:, 0])
+    return np.array([np.sqrt(np.sum(part**2)) for part in parts])
+
+
+def torque_gains_of(state: NeuralState) -> Array:
+    """Change of the network's force for a change of each torque among its inputs [N per N m], shape (3,)."""
+    hidden, output = layers(state)
+    inside, out = state.network.signals[9:21], state.network.signals[21]
+    through = output[0, 1:] * 0.5 * (1.0 - inside**2)
+    return np.array(20.0 * 0.5 * (1.0 - out**2) * through @ hidden[:, 7:])
+
+
+def _losses(runs: Runs, experiment: Experiment, seeds: int) -> list[float | None]:
+    return runs.map(
+        lambda seed: watch(experiment, seed, DURATION, lambda _: None, runs.waiting), list(runs.seeds[:seeds])
+    )
+
+
+def _loss(runs: Runs, lost: float | None) -> Loss | None:
+    """The last 0.4 s before the loss of the first seed, at the text's learning rate."""
+    if lost is None:
+        return None
+    record = runs.one(changed(RELAXING, {"run.press": lost, "run.duration": DURATION + 60.0}))
+    t = since_contact(record) - lost
+    last = (t >= -0.4) & (t < 0.0)
+    columns = (record[name][last] for name in ("memory_fx", "vx_measured", "force"))
+    return Loss(t[last], *columns)
+
+
+def _table(found: Mapping[float, Sequence[Course]]) -> str:
+    """Times of loss by learning rate."""
+    return ", ".join(f"{rate:g} after {_range([c.lost for c in courses])}" for rate, courses in found.items())
+
+
+def _keeps_contact(causes: Mapping[str, Sequence[float | None]], name: str) -> str:
+    lost = _range(causes[name])
+    return f"not kept beyond {lost}" if lost != "never" else f"kept for {DURATION:g} s"
+
+
+def _range(times: Sequence[float | None]) -> str:
+    lost = [one for one in times if one is not None]
+    if not lost:
+        return "never"
+    text = (
+        f"{min(lost):.0f} s"
+        if round(min(lost)) == round(max(lost))
+        else f"{min(lost):.0f} to {max(lost):.0f} s"
+    )
+    return text if len(lost) == len(times) else f"{text} (in {len(lost)} of {len(times)} runs)"
+
+
+def _times_by_cause(causes: Mapping[str, Sequence[float | None]]) -> str:
+    return ", ".join(f"{name} {_range(times)}" for name, times in causes.items())
+
+
+def _negative_damping(loss: Loss | None) -> str:
+    """A sentence on what the network's force does to the motion before the loss."""
+    if loss is None:
+        return ""
+    slope = float(np.polyfit(loss.velocity, loss.force, 1)[0])
+    return (
+        f"Before the loss the network's force is in phase with the velocity, by {slope:.0f} N s/m over the last 0.4 "
+        "s: a negative damper."
+    )

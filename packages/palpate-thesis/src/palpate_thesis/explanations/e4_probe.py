@@ -1,0 +1,471 @@
+"""Explanation 4: causes of the neural identifier's answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import changed
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, often, spread, texts
+from palpate_thesis.least_squares import panels
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.neural_identifier import network
+from palpate_thesis.neural_identifier.claims import share_of_starts
+from palpate_thesis.neural_identifier.network import STARTS, Answer, Choice, Press
+from palpate_thesis.runs import Runs
+
+if TYPE_CHECKING:
+    from matplotlib.gridspec import GridSpec
+
+SHOWN_STARTS = STARTS[:6]
+TITLES = (
+    "Force as the network knows it, at rest, foam",
+    "K from that, by the probe's displacement",
+    "K by probing, slope at rest, over f/x: foam",
+    "The same: rubber",
+    "M of each start: foam",
+    "The same: rubber",
+    "K over f/x as contact lasts, foam: five starts",
+    "K over f/x, varied conditions",
+)
+
+
+def causes(data: Mapping[str, Surface], fixed: Choice, straight: Choice) -> Figure:
+    """Eight panels; `fixed` and `straight` are shown beside the networks as chosen in (a) and (b)."""
+    drawing, axes = panels.grid(5)
+    tall = _merge(drawing, axes)
+    eight = [axes[0], axes[1], *tall, axes[6], axes[7], axes[8], axes[9]]
+    for axis, letter, title in zip(eight, "abcdefgh", TITLES, strict=True):
+        panels.set_title(axis, letter, title)
+    foam = data["foam"]
+    kinds = {
+        "as chosen": (Choice(), style.SERIES[0]),
+        "thresholds at zero": (fixed, style.SERIES[1]),
+        "zero, 200 N, 0.1": (straight, style.SERIES[2]),
+    }
+    _draw_known_force(eight[0], eight[1], foam, kinds)
+    for axis, surface in zip(eight[2:4], data.values(), strict=True):
+        _toggles(axis, surface, named=surface is foam)
+    for axis, surface in zip(eight[4:6], data.values(), strict=True):
+        _masses(axis, surface)
+    _lasting(eight[6], foam)
+    _draw_conditions(eight[7], data)
+    return drawing
+
+
+def _merge(drawing: Figure, axes: list[Axes]) -> list[Axes]:
+    """The second and third row made one, for the long list of changes."""
+    grid = cast("GridSpec", axes[2].get_gridspec())
+    for axis in axes[2:6]:
+        axis.remove()
+    tall = [drawing.add_subplot(grid[1:3, column]) for column in (0, 1)]
+    for axis in tall:
+        axis.grid(visible=True, axis="x", color=style.GRID, linewidth=0.8)
+        axis.set_axisbelow(True)
+        axis.spines[["top", "right"]].set_visible(False)
+    return tall
+
+
+def _draw_known_force(
+    force: Axes, stiffness: Axes, surface: Surface, kinds: Mapping[str, tuple[Choice, str]]
+) -> None:
+    press = surface.press
+    x = np.linspace(0.0, 2.0 * press.rest, 80)
+    truth = press.force[-500:].mean() + surface.stiffness * (x - press.rest)
+    for label, (choice, color) in kinds.items():
+        for start in SHOWN_STARTS:
+            probe, _ = network.learn(press, choice, start)
+            known = np.array([probe.force((d, 0.0, 0.0)) for d in x])
+            force.plot(
+                1e3 * x, known, color=color, linewidth=0.9, alpha=0.8, label=label if start == 0 else None
+            )
+            stiffness.plot(
+                1e3 * x[1:], known[1:] / x[1:] / press.ratio, color=color, linewidth=0.9, alpha=0.8
+            )
+    force.plot(1e3 * x, truth, color=style.INK, linewidth=1.3, linestyle="--", label="the surface")
+    stiffness.plot(
+        1e3 * x[1:], truth[1:] / x[1:] / press.ratio, color=style.INK, linewidth=1.3, linestyle="--"
+    )
+    stiffness.axhline(1.0, color=style.MEASURED, linewidth=0.8)
+    asked = 1e3 * Choice().probe(press.surface, 0).values[0]
+    for axis in (force, stiffness):
+        axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.MEASURED, alpha=0.12, linewidth=0)
+        axis.axvline(asked, color=style.FAIL, linewidth=0.9, linestyle=":")
+        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; shaded: learned; dotted: probe")
+    force.set(ylim=(-2.0, 40.0), ylabel="force [N]")
+    stiffness.set(ylim=(0.0, 3.0), ylabel="K over f/x")
+    force.legend(ncols=2, loc="lower right")
+
+
+def _toggles(axis: Axes, surface: Surface, *, named: bool) -> None:
+    names = list(surface.toggled)
+    for i, name in enumerate(names):
+        some = surface.toggled[name]
+        warned = all(look.warned for look in some)
+        over, slopes = [look.over for look in some], [look.tangent for look in some]
+        _strip(axis, over, i - 0.16, style.FAIL if warned else style.SERIES[0])
+        _strip(axis, slopes, i + 0.16, style.SERIES[1])
+    axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
+    axis.axvline(surface.perfect, color=style.SERIES[0], linewidth=0.9, linestyle="--")
+    axis.axvline(
+        surface.stiffness / surface.press.ratio, color=style.SERIES[1], linewidth=0.9, linestyle="--"
+    )
+    axis.set_yticks(range(len(names)), names if named else [""] * len(names))
+    axis.set(xlim=(-0.6, 3.0), ylim=(len(names) - 0.5, -0.5))
+    axis.set_xlabel("above: K; below: slope; dashed: no error")
+
+
+def _strip(axis: Axes, values: Sequence[float], y: float, color: str) -> None:
+    axis.plot(values, np.full(len(values), y), ".", color=color, markersize=3.5, alpha=0.55)
+    axis.plot(np.median(values), y, "|", color=style.INK, markersize=9, markeredgewidth=1.4)
+
+
+def _masses(axis: Axes, surface: Surface) -> None:
+    order = np.argsort(np.median(surface.masses, axis=0))
+    rows = np.arange(len(MANY_STARTS))
+    axis.plot(
+        rows, surface.before[order], "o", color=style.MEASURED, markersize=4, fillstyle="none", label="before"
+    )
+    for seed in surface.masses[:, order]:
+        axis.plot(rows, seed, ".", color=style.SERIES[0], markersize=3)
+    axis.axhline(0.0, color=style.INK, linewidth=0.8)
+    axis.set(xlabel="start, by its M", ylabel="$M_e$ [kg]")
+    handles = [axis.lines[0], axis.lines[1]]
+    axis.legend(handles, ["untrained", "after 4 s, each noise seed"], loc="upper left")
+
+
+def _lasting(axis: Axes, surface: Surface) -> None:
+    press = surface.long
+    t = (np.arange(len(press.force)) + 1) * network.TICK
+    for start in SHOWN_STARTS[:5]:
+        _, curve = network.learn(press, Choice(), start)
+        axis.plot(t, curve[:, 0] / press.ratio, color=style.SERIES[0], linewidth=0.9)
+    axis.plot(t, press.squares[:, 2] / press.ratio, color=style.MEASURED, linewidth=1.0, linestyle="--")
+    axis.axhline(surface.perfect, color=style.SERIES[0], linewidth=0.9, linestyle="--")
+    axis.axhline(1.0, color=style.MEASURED, linewidth=0.8)
+    axis.set(
+        xscale="log", xlim=(0.01, t[-1]), ylim=(0.0, 2.0), xlabel="time since 5 N [s]; dashed: least squares"
+    )
+    axis.set_ylabel("K over f/x")
+
+
+def _draw_conditions(axis: Axes, data: Mapping[str, Surface]) -> None:
+    names = list(dict.fromkeys(name for s in data.values() for name in s.varied))
+    for shift, (surface, color) in enumerate(zip(data.values(), style.SERIES[:2], strict=True)):
+        for i, name in enumerate(names):
+            if name in surface.varied:
+                _strip(axis, [a.over for a in surface.varied[name]], i - 0.15 + 0.3 * shift, color)
+    axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
+    axis.set_yticks(range(len(names)), names)
+    axis.set(ylim=(len(names) - 0.5, -0.5), xlabel="K over f/x; above: foam, below: rubber")
+
+
+LONG = 20.0
+"""Seconds of contact for one of the toggles; everything else stops at the thesis' four [s]."""
+PARAMETERS = {
+    "foam": changed(network.FOAM, {"run.press": LONG}),
+    "rubber": changed(network.RUBBER, {"run.press": LONG}),
+}
+FEW = 2
+"""Noise seeds for the toggles, with ten starts on each."""
+MANY_STARTS = tuple(range(30))
+STRAIGHT = Choice(200.0, 0.1, thresholds=False)
+
+
+CHOSEN = Choice()
+
+
+@dataclass(frozen=True)
+class Toggle:
+    """One change against the networks as chosen."""
+
+    choice: Choice = CHOSEN
+    displacement: float | None = 1.0  # of the probe, in multiples of the thesis'; None: where the press rests
+    duration: float = network.PRESS  # of contact [s]
+
+
+TOGGLES = {
+    "as chosen": Toggle(),
+    "thresholds at zero": Toggle(Choice(thresholds=False)),
+    "zero, 200 N, weights 0.1": Toggle(STRAIGHT),
+    "weights to 0.01": Toggle(Choice(weights=0.01)),
+    "weights to 2": Toggle(Choice(weights=2.0)),
+    "amplitude 25 N": Toggle(Choice(amplitude=25.0)),
+    "amplitude 100 N": Toggle(Choice(amplitude=100.0)),
+    "rate 1e-5": Toggle(Choice(rate=1e-5)),
+    "rate 1e-3": Toggle(Choice(rate=1e-3)),
+    "inputs not scaled": Toggle(Choice(scale=(1.0, 1.0, 1.0))),
+    "probe at half": Toggle(displacement=0.5),
+    "probe where it rests": Toggle(displacement=None),
+    "probe at twice": Toggle(displacement=2.0),
+    "1 s of contact": Toggle(duration=1.0),
+    "20 s of contact": Toggle(duration=LONG),
+}
+
+
+@dataclass(frozen=True)
+class Looked:
+    """One network after one press, asked at a probe of one's own."""
+
+    over: float  # K by probing over f/x
+    tangent: float  # slope of its force where it rests, over f/x
+    warned: bool
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Results on one surface."""
+
+    press: Press  # of the first noise seed, 4 s
+    long: Press  # the same, gone on with
+    stiffness: float  # of the surface [N/m]
+    perfect: float  # K over f/x of a network that knows the surface without error
+    toggled: dict[str, list[Looked]]
+    nominal: list[Answer]  # every start of MANY_STARTS on the press of every noise seed
+    before: Array  # M of each start before it has learned anything [kg]
+    far: list[
+        tuple[float, bool]
+    ]  # at twice the largest displacement: force over the surface's, whether warned
+    near: list[float]  # at the thesis' probe: force over the surface's
+    gap: tuple[
+        float, float
+    ]  # from the probes for K and for M to the nearest sample, in the network's scaled inputs
+    varied: dict[str, list[Answer]]
+
+    @property
+    def masses(self) -> Array:
+        """M by noise seed and start, shape (seeds, starts) [kg]."""
+        return np.array([a.M for a in self.nominal]).reshape(-1, len(MANY_STARTS))
+
+
+Data = dict[str, Surface]
+
+
+def run(runs: Runs) -> Data:
+    """One long press a noise seed on each surface."""
+    return {name: _surface(runs, name) for name in PARAMETERS}
+
+
+def _surface(runs: Runs, name: str) -> Surface:
+    experiment = PARAMETERS[name]
+    whole = network.presses(runs, experiment, name, list(runs.seeds)[:FEW])
+    some = network.presses(runs, changed(experiment, {"run.press": network.PRESS}), name)
+    cases = [(t, p, s) for t in TOGGLES.values() for p in whole for s in network.STARTS]
+    looked = iter(runs.map(lambda case: look(*case), cases))
+    x = Choice().probe(name, 0).values[0]
+    switch, stiffness = experiment.approach.switch, experiment.surface.stiffness
+    far, near = _truths(runs, some, switch, stiffness, float(x))
+    return Surface(
+        press=some[0],
+        long=whole[0],
+        stiffness=stiffness,
+        perfect=float((switch / x + stiffness) / np.median([press.ratio for press in some])),
+        toggled={t: [next(looked) for _ in range(len(whole) * len(network.STARTS))] for t in TOGGLES},
+        nominal=network.answers(runs, some, Choice(), MANY_STARTS),
+        before=np.array([Choice().probe(name, start).probe().mass for start in MANY_STARTS]),
+        far=far,
+        near=near,
+        gap=gap(some[0]),
+        varied=network.answers_under_conditions(
+            runs, network.FOAM if name == "foam" else network.RUBBER, name
+        ),
+    )
+
+
+def look(toggle: Toggle, press: Press, start: int) -> Looked:
+    """Lets a network learn for as long as the toggle says, and asks it."""
+    seen = network.cut(press, toggle.duration)
+    probe, _ = network.learn(seen, toggle.choice, start)
+    at = seen.rest if toggle.displacement is None else toggle.displacement * probe.values[0]
+    asked = probe.probe(displacement=at)
+    slope = network.tangent(probe, seen.rest)
+    return Looked(asked.stiffness / seen.ratio, slope / seen.ratio, bool(asked.warnings))
+
+
+def _truths(
+    runs: Runs, some: Sequence[Press], switch: float, stiffness: float, x: float
+) -> tuple[list[tuple[float, bool]], list[float]]:
+    """The network's force over the surface's, at twice the largest displacement and at the probe; a start a press."""
+
+    def work(case: tuple[int, Press]) -> tuple[tuple[float, bool], float]:
+        start, press = case
+        probe, _ = network.learn(press, Choice(), start)
+        far = 2.0 * float(probe.learned[1, 0])
+        at_far, at_probe = (probe.force((d, 0.0, 0.0)) / (switch + stiffness * d) for d in (far, x))
+        return (at_far, bool(probe.probe(displacement=far).warnings)), at_probe
+
+    found = runs.map(work, list(enumerate(some)))
+    return [f for f, _ in found], [n for _, n in found]
+
+
+def gap(press: Press) -> tuple[float, float]:
+    """How far the nearest sample is from where K and M are asked, in the units that the network sees."""
+    probe = Choice().probe(press.surface, 0)
+    seen = press.inputs * probe.scale
+    asked = probe.values * probe.scale
+    for_stiffness, for_mass = (
+        np.linalg.norm(seen - asked * np.array(m), axis=1).min() for m in ((1, 0, 0), (1, 1, 1))
+    )
+    return float(for_stiffness), float(for_mass)
+
+
+__all__ = ["CAPTION", "NUMBER", "PARAMETERS", "TITLE", "check", "plot", "run"]
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NUMBER = "what-the-probe-depends-on"
+TITLE, CAPTION = texts(NUMBER)
+STUDY = (1.3, 2.3)
+"""K over f/x with learning thresholds, from an earlier study of ours."""
+FAR = 0.10
+"""A force is wrong when it is off by more than this share of the surface's."""
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """Results of an earlier study, and the statements of sections 5.2 and 6.2 on dummy values and scaling."""
+    return [_stiffness(data), _mass(data), _outside(data), _scaling(data)]
+
+
+def _stiffness(data: Data) -> Claim:
+    inside = {name: [STUDY[0] <= a.over <= STUDY[1] for a in s.nominal] for name, s in data.items()}
+    foam, rubber = data["foam"], data["rubber"]
+    chosen = [a.over for s in data.values() for a in s.nominal]
+    large = [look.over for s in data.values() for look in s.toggled["weights to 2"]]
+    medians = {
+        f"{condition} ({name})": float(np.median([a.over for a in some]))
+        for name, s in data.items()
+        for condition, some in s.varied.items()
+    }
+    low, high = min(medians, key=lambda m: medians[m]), max(medians, key=lambda m: medians[m])
+    return claim(
+        "network-probe.K",
+        all(often(i) for i in inside.values()),
+        surfaces="; ".join(
+            f"{name} {_spread([a.over for a in s.nominal], 'times f/x')}" for name, s in data.items()
+        ),
+        perfect=foam.perfect,
+        fixed=_median(foam, "thresholds at zero"),
+        straight=_median(foam, "zero, 200 N, weights 0.1"),
+        half=_median(foam, "probe at half"),
+        rest=_median(foam, "probe where it rests"),
+        short=_median(foam, "1 s of contact"),
+        foam_slope=np.median([a.tangent / a.ratio for a in foam.nominal]),
+        foam_true=foam.stiffness / foam.press.ratio,
+        rubber_slope=np.median([a.tangent / a.ratio for a in rubber.nominal]),
+        rubber_true=rubber.stiffness / rubber.press.ratio,
+        least=min(chosen),
+        most=max(chosen),
+        large_least=min(large),
+        large_most=max(large),
+        conditions=len(medians),
+        low=medians[low],
+        low_with=low,
+        high=medians[high],
+        high_with=high,
+    )
+
+
+def _mass(data: Data) -> Claim:
+    firm = {name: firm_signs(s.masses) for name, s in data.items()}
+    both = all((s.masses > 0).any() and (s.masses < 0).any() for s in data.values())
+    holds = both and all(often(f) for f in firm.values())
+    kept = {
+        name: float(np.mean(np.sign(s.before) == np.sign(np.median(s.masses, axis=0))))
+        for name, s in data.items()
+    }
+    steady, total = _steady_conditions(data)
+    return claim(
+        "network-probe.M",
+        holds,
+        surfaces="; ".join(
+            f"{name}: sign the same over all noise seeds for {int(f.sum())} of {len(f)} starts, "
+            f"positive for {int((np.median(data[name].masses, axis=0) > 0).sum())}"
+            for name, f in firm.items()
+        ),
+        foam_starts=_percent(data["foam"]),
+        rubber_starts=_percent(data["rubber"]),
+        foam_kept=kept["foam"],
+        rubber_kept=kept["rubber"],
+        foam_gap=data["foam"].gap[1],
+        rubber_gap=data["rubber"].gap[1],
+        total=total,
+        steady=steady,
+    )
+
+
+def firm_signs(values: Array) -> Array:
+    """For each start, a column, whether the sign is the same in all rows."""
+    return np.all(values > 0, axis=0) | np.all(values < 0, axis=0)
+
+
+def _steady_conditions(data: Data) -> tuple[int, int]:
+    """Under how many conditions the starts keep the signs that they have as chosen, and of how many."""
+    kept = []
+    for surface in data.values():
+        usual = np.sign(np.median(surface.masses, axis=0))[: network.VARIED_STARTS]
+        for some in surface.varied.values():
+            found = np.sign(np.array([a.M for a in some]).reshape(-1, network.VARIED_STARTS))
+            kept.append(often((found == usual).ravel()))
+    return sum(map(bool, kept)), len(kept)
+
+
+def _outside(data: Data) -> Claim:
+    wrong = [abs(force - 1.0) > FAR and warned for s in data.values() for force, warned in s.far]
+    near = [force for s in data.values() for force in s.near]
+    return claim(
+        "network-probe.outside",
+        often(wrong),
+        surfaces="; ".join(
+            f"{name}: {spread([f for f, _ in s.far], 'of the force that the surface would give')} at twice the "
+            f"largest displacement, warned in {sum(w for _, w in s.far)} of {len(s.far)}"
+            for name, s in data.items()
+        ),
+        middle=np.median(near),
+        least=min(near),
+        most=max(near),
+    )
+
+
+def _scaling(data: Data) -> Claim:
+    slopes = {
+        name: [[abs(look.tangent) for look in s.toggled[t]] for t in ("as chosen", "inputs not scaled")]
+        for name, s in data.items()
+    }
+    holds = all(np.median(without) < 0.1 * np.median(scaled) for scaled, without in slopes.values())
+    K = {name: _median(s, "inputs not scaled") for name, s in data.items()}
+    return claim(
+        "network-probe.scale",
+        holds,
+        surfaces="; ".join(
+            f"{name}: slope over displacement {np.median(without):.2g} times f/x without, "
+            f"{np.median(scaled):.2g} with"
+            for name, (scaled, without) in slopes.items()
+        ),
+        foam_K=K["foam"],
+        rubber_K=K["rubber"],
+    )
+
+
+def _median(surface: Surface, toggle: str) -> float:
+    return float(np.median([look.over for look in surface.toggled[toggle]]))
+
+
+def _percent(surface: Surface) -> str:
+    part = share_of_starts([a.M for a in surface.nominal], len(MANY_STARTS))
+    return "over 99 %" if part > 0.99 else f"{100 * part:.0f} %"
+
+
+def _spread(values: Sequence[float], unit: str) -> str:
+    seeds = len(values) // len(MANY_STARTS)
+    return spread(values, unit).replace(f"{len(values)} seeds", f"{seeds} seeds x {len(MANY_STARTS)} starts")
+
+
+def plot(data: Data) -> Figure:
+    """Learned force, K by probing, every variation, and M by initial weights."""
+    return causes(data, replace(Choice(), thresholds=False), STRAIGHT)

@@ -1,0 +1,173 @@
+"""Explanation 5: questions left open by the thesis: the best learning rate, layers and neurons, stability."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.bench import Experiment, changed
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.conditions import RELAXING_FOAM
+from palpate_thesis.force_control.panels import legend_inside, panels
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, Tracking, tracking
+from palpate_thesis.force_control.weights import watch
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "rate-layers-neurons"
+TITLE, CAPTION = texts(NUMBER)
+RATES = (5e-6, 2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 5e-4, 1e-3)
+SIZES = ((1,), (2,), (4,), (12,), (30,), (60,), (12, 12), (12, 12, 12))
+SURFACES: Mapping[str, Experiment] = {
+    name: changed(e, {"run.press": 15.0, "controller.weights": "random"})
+    for name, e in (("foam", FOAM), ("rubber", RUBBER), ("foam that relaxes", changed(FOAM, RELAXING_FOAM)))
+}
+PARAMETERS = SURFACES
+JUDGED = (10.0, 15.0)
+LONG = 120.0
+"""Seconds of contact over which a network's size is tried for a loss [s]."""
+PER_RATE, PER_SIZE, PER_LOSS = 3, 3, 2
+"""Runs of each."""
+GONE = 3.8
+"""Where runs that lost contact are drawn [N]."""
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    network: dict[str, dict[float, list[Tracking]]]  # by surface and rate
+    pi: dict[str, dict[float, Tracking]]
+    sizes: dict[tuple[int, ...], list[Tracking]]  # on foam
+    losses: dict[tuple[int, ...], list[float | None]]  # on the foam that relaxes [s]
+
+
+def run(runs: Runs) -> Data:
+    """A sweep over rates on three surfaces, and one over sizes on both foams."""
+    measure = tracking(*JUDGED)
+    network: dict[str, dict[float, list[Tracking]]] = {}
+    pi: dict[str, dict[float, Tracking]] = {}
+    for name, e in SURFACES.items():
+        cases = [(_from(e, seed, rate), seed) for rate in RATES for seed in runs.seeds[:PER_RATE]]
+        found = runs.over(cases, measure)
+        network[name] = {rate: found[i * PER_RATE : (i + 1) * PER_RATE] for i, rate in enumerate(RATES)}
+        plain = [(changed(e, _pi(rate)), runs.seeds[0]) for rate in RATES]
+        pi[name] = dict(zip(RATES, runs.over(plain, measure), strict=True))
+    sized = [(_with_layers(SURFACES["foam"], size, s), s) for size in SIZES for s in runs.seeds[:PER_SIZE]]
+    errors = runs.over(sized, measure)
+    pressed = [
+        (_with_layers(SURFACES["foam that relaxes"], size, s), s)
+        for size in SIZES
+        for s in runs.seeds[:PER_LOSS]
+    ]
+    lost = runs.map(lambda case: watch(case[0], case[1], LONG, lambda _: None, runs.waiting), pressed)
+    return Data(
+        network,
+        pi,
+        {size: errors[i * PER_SIZE : (i + 1) * PER_SIZE] for i, size in enumerate(SIZES)},
+        {size: lost[i * PER_LOSS : (i + 1) * PER_LOSS] for i, size in enumerate(SIZES)},
+    )
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """A question of the thesis, not a claim: it gets an answer and no verdict."""
+    best = {name: min(found, key=lambda rate: _error(found[rate])) for name, found in data.network.items()}
+    errors = [_rms(found) for found in data.sizes.values()]
+    losses = [lost for found in data.losses.values() for lost in found]
+    times = [lost for lost in losses if lost is not None]
+    least = ", ".join(
+        f"{name} {rate:g} ({_error(data.network[name][rate]):.2f} N)" for name, rate in best.items()
+    )
+    gone = f"{min(times):.0f} to {max(times):.0f} s" if times else "never"
+    return [
+        claim(
+            "open-questions",
+            "not checkable",
+            least=least,
+            small=min(errors),
+            large=max(errors),
+            gone=gone,
+            times=len(times),
+            losses=len(losses),
+            rising=_rising(data),
+        )
+    ]
+
+
+def plot(data: Data) -> Figure:
+    """Errors over the rate, and over the size."""
+    drawing, grid = panels([2.6, 2.6], columns=2, width=11.0)
+    for axis, names in zip(grid[0], (("foam", "rubber"), ("foam that relaxes",)), strict=True):
+        for name, color in zip(names, style.SERIES[:2], strict=False):
+            _rates(axis, data, name, style.FAIL if name == "foam that relaxes" else color)
+        axis.set(
+            xscale="log",
+            xlabel="learning rate eta",
+            ylabel="RMS error [N]",
+            ylim=(0.0, 4.1),
+            xlim=(4e-6, 1.3e-3),
+        )
+        legend_inside(axis, loc="upper center", ncols=len(names), bbox_to_anchor=(0.42, 0.97))
+    labels = ["-".join(map(str, size)) for size in SIZES]
+    for i, found in enumerate(data.sizes.values()):
+        grid[1][0].plot(
+            [i] * len(found), [one.rms for one in found], "o", color=style.SERIES[0], markersize=4
+        )
+    grid[1][0].set(ylabel="RMS error, foam [N]", ylim=(0.0, 2.5))
+    for i, times in enumerate(data.losses.values()):
+        for lost in times:
+            marker, color = ("^", style.OK) if lost is None else ("o", style.FAIL)
+            grid[1][1].plot(i, LONG if lost is None else lost, marker, color=color, markersize=5)
+    grid[1][1].set(ylabel="contact lost after [s]", ylim=(0.0, LONG * 1.08))
+    grid[1][1].set_title(f"foam that relaxes; at the upper edge: kept for {LONG:g} s")
+    for axis in grid[1]:
+        axis.set_xticks(range(len(SIZES)), labels)
+        axis.set_xlabel("neurons of each hidden layer")
+    return drawing
+
+
+def _rates(axis: Axes, data: Data, name: str, color: str) -> None:
+    for rate, found in data.network[name].items():
+        kept = [one.rms for one in found if one.kept]
+        axis.plot([rate] * len(kept), kept, "o", color=color, markersize=4)
+        gone = [GONE] * sum(not one.kept for one in found)
+        axis.plot([rate] * len(gone), gone, "x", color=color, markersize=7, markeredgewidth=2)
+    steady = {rate: one.rms for rate, one in data.pi[name].items() if one.kept}
+    axis.plot(list(steady), list(steady.values()), color=color, linewidth=1, alpha=0.6, label=f"{name}: PI")
+    axis.plot([], [], "o", color=color, markersize=4, label=f"{name}: network")
+    axis.plot([], [], "x", color=color, markersize=7, label=f"{name}: contact lost")
+
+
+def _from(experiment: Experiment, seed: int, rate: float) -> Experiment:
+    return changed(experiment, {"controller.learning_rate": rate, "controller.weights_seed": seed})
+
+
+def _with_layers(experiment: Experiment, size: tuple[int, ...], seed: int) -> Experiment:
+    return changed(experiment, {"controller.layers": size, "controller.weights_seed": seed})
+
+
+def _pi(rate: float) -> dict[str, object]:
+    return {"controller": {"kind": "proportional-integral", "kf": 0.25, "ki": rate * 1e5}}
+
+
+def _rms(found: Sequence[Tracking]) -> float:
+    return float(np.median([one.rms for one in found]))
+
+
+def _error(found: Sequence[Tracking]) -> float:
+    """The median RMS error; infinite where a run lost contact."""
+    return _rms(found) if all(one.kept for one in found) else float("inf")
+
+
+def _rising(data: Data) -> str:
+    """A sentence: from which rate on runs lose contact within 15 s, for network and PI."""
+    parts = []
+    for name, found in data.network.items():
+        network = [rate for rate, runs in found.items() if not all(one.kept for one in runs)]
+        plain = [rate for rate, one in data.pi[name].items() if not one.kept]
+        told = (f"{min(rates):g}" if rates else f"none up to {max(RATES):g}" for rates in (network, plain))
+        parts.append("{}: {} (PI: {})".format(name, *told))
+    return f"Lowest rate tried at which contact is lost within 15 s: {'; '.join(parts)}."

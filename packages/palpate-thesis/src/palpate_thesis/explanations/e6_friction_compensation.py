@@ -1,0 +1,307 @@
+"""Friction compensation: as printed (without effect), and effective; loss and recovery of contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate._vector import Vec3
+from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.following import SHARE
+from palpate.bench.metrics.summary import losses
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.instruments import Encoder
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.conditions import (
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    VARIED_SEEDS,
+    by_condition,
+    friction_and_pose,
+    stops_holding,
+)
+from palpate_thesis.force_control.disturbances import Disturbance, run_with, surface_back
+from palpate_thesis.force_control.panels import across, dots_panel, panels
+from palpate_thesis.force_control.tracking import since_contact, slot
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+LOSS = changed(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
+GONE, BACK, FOUND = 2.5, 0.005, 10.0
+"""When the surface goes [s after contact], how far [m], and within what time it has to be felt again [s]."""
+AGAIN, PEAK = 3.0, 1.25
+"""Seconds from regain to the desired force; largest force on the way, over the desired one."""
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """Outcome of a lost contact."""
+
+    took: float  # from loss to contact [s]; infinite if never
+    off: float  # of the force, `AGAIN` seconds later, as a share of the desired one
+    peak: float  # largest true force after the loss, over the desired one
+    times: int  # losses
+
+    @property
+    def well(self) -> bool:
+        """Whether it came back in time, and gently."""
+        return self.times == 1 and self.took <= FOUND and self.off <= SHARE and self.peak <= PEAK
+
+
+def found_again(found: Sequence[Recovery]) -> Claim:
+    """Whether contact comes back in time, and gently."""
+    return claim(
+        "contact-regained",
+        often(r.well for r in found),
+        took=[r.took for r in found],
+        off=[100 * r.off for r in found],
+        again=AGAIN,
+        peak=[r.peak for r in found],
+        within=FOUND,
+        share=SHARE,
+        limit=PEAK,
+    )
+
+
+def loss_panel(axis: Axes, one: Record) -> None:
+    """The true force, and when there was no contact."""
+    axis.plot(one["t"], one["force"], color=style.F, linewidth=1.1, label="true force")
+    shade: dict[str, Any] = {"transform": axis.get_xaxis_transform(), "color": style.GRID, "linewidth": 0}
+    lost = one["phase"] != CONTACT
+    axis.fill_between(one["t"], 0.0, 1.0, where=lost, label="lost, waiting, looking", **shade)
+    axis.set(
+        xlabel="time since contact [s]",
+        ylabel="true force [N]",
+        xlim=(0.0, LOSS.run.press),
+        ylim=(-0.5, 24.0),
+    )
+    style.legend(axis)
+
+
+def drawn_back(seed: int) -> Record:
+    """A press whose surface goes."""
+    return run_with(LOSS, seed, [Disturbance(GONE, surface_back(BACK))])
+
+
+def recovery_of(record: Record) -> Recovery:
+    """Outcome of the contact after its first loss."""
+    t, phase, force = since_contact(record), record["phase"], record["force"]
+    lost = np.flatnonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT)) + 1
+    if not len(lost):
+        return Recovery(np.inf, np.inf, np.inf, 0)
+    after = np.flatnonzero((phase == CONTACT) & (t > t[lost[0]]))
+    if not len(after):
+        return Recovery(np.inf, np.inf, np.inf, len(lost))
+    back = t[after[0]]
+    late = (t >= back + AGAIN - 0.1) & (t < back + AGAIN + 0.1)
+    off = abs(float(force[late].mean()) / 20.0 - 1.0) if late.any() else np.inf
+    return Recovery(float(back - t[lost[0]]), off, float(force[lost[0] :].max()) / 20.0, len(lost))
+
+
+NUMBER = "friction-compensation"
+TITLE, CAPTION = texts(NUMBER)
+LEVEL = (3.0, 0.25, 0.03)
+"""Compensated levels [N m]: the Coulomb levels of the bench; the listing's own are doubtful, see the errata."""
+PLAIN = changed(load("foam-hybrid"), {**SHORT, "controller.ki": 0.0, "run.press": 4.0})
+PARAMETERS = changed(PLAIN, {"compensation.level": LEVEL, "compensation.blend": (0.05, 0.05, 0.05)})
+PRINTED_BLEND = 0.002
+"""[rad/s]"""
+BLENDS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2)
+HALF, SHAKES = 0.5, 5.0
+"""Largest share of the error that is left where compensation works; least ratio of shaking that is called a hammer."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """The last second of a press."""
+
+    error: float  # of the true force, absolute mean [N]
+    shaking: float  # standard deviation of the true force [N]
+    factor: float  # largest share of the Coulomb level that the listing's rule would have applied
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """With compensation, over without, in the same world."""
+
+    error: float
+    lost: bool
+
+    @property
+    def helps(self) -> bool:
+        """Whether enough of the error is gone, and contact kept."""
+        return not self.lost and self.error <= HALF
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    traces: dict[str, Record]
+    plain: list[Held]
+    printed_blend: list[Held]
+    sweep: list[list[Held]]  # over BLENDS
+    varied: dict[str, list[Ratio]]
+    regains: list[Recovery]
+    regain: Record
+
+
+def run(runs: Runs) -> Data:
+    """Presses without compensation, over blends, in other worlds; and presses whose surface goes."""
+    plain = runs.over_seeds(PLAIN, held_in)
+    hammer = runs.over_seeds(with_blend(PARAMETERS, PRINTED_BLEND), held_in)
+    few = runs.seeds[:VARIED_SEEDS]
+    cases = [(with_blend(PARAMETERS, b), seed) for b in BLENDS for seed in few]
+    swept = runs.over(cases, held_in)
+    sweep = [swept[i * len(few) : (i + 1) * len(few)] for i in range(len(BLENDS))]
+    traces = {
+        "as printed: never acts": slot(runs.one(PLAIN)),
+        "blend 0.002 rad/s, acting": slot(runs.one(with_blend(PARAMETERS, PRINTED_BLEND))),
+        "blend 0.05 rad/s": slot(runs.one(PARAMETERS)),
+    }
+    regains = runs.map(lambda seed: recovery_of(drawn_back(seed)), list(runs.seeds))
+    return Data(traces, plain, hammer, sweep, _ratios(runs), regains, slot(drawn_back(runs.seeds[0])))
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """The listing's rule; a blend that acts; the blend of the listing, acting; loss and regain."""
+    return [_never(data), _acting(data), _hammer(data), found_again(data.regains)]
+
+
+def _never(data: Data) -> Claim:
+    factors = [h.factor for h in data.plain]
+    return claim("friction-compensation.printed", often(f >= 0.9 for f in factors), factors=factors)
+
+
+def _acting(data: Data) -> Claim:
+    nominal = data.varied["foam"]
+    wide = [np.median([h.error for h in found]) for found in data.sweep]
+    best = BLENDS[int(np.argmin(wide))]
+    return claim(
+        "friction-compensation.blend",
+        often(r.helps for r in nominal),
+        error=[100 * r.error for r in nominal],
+        plain=[h.error for h in data.plain],
+        half=HALF,
+        best=best,
+        where=stops_holding(data.varied, lambda r: r.helps),
+    )
+
+
+def _hammer(data: Data) -> Claim:
+    still = [h.shaking for h in data.plain]
+    shares = [h.shaking / p for h, p in zip(data.printed_blend, still, strict=True)]
+    return claim(
+        "friction-compensation.hammer",
+        often(s >= SHAKES for s in shares),
+        shaking=[h.shaking for h in data.printed_blend],
+        still=still,
+        error=[h.error for h in data.printed_blend],
+        shakes=SHAKES,
+    )
+
+
+def plot(data: Data) -> Figure:
+    """The press, the blends, the worlds, the loss."""
+    drawing, grid = panels([2.3, 2.4, 1.9, 2.2], 2, 11.0)
+    wide = [across(grid[i]) for i in (0, 2, 3)]
+    for (name, one), color in zip(data.traces.items(), style.SERIES[:3], strict=True):
+        wide[0].plot(one["t"], one["force"], color=color, linewidth=1.0, label=name)
+    wide[0].axhline(20.0, **style.KNOWN)
+    wide[0].set(
+        xlabel="time since contact [s]",
+        ylabel="true force [N]",
+        xlim=(0.0, PLAIN.run.press),
+        ylim=(14.0, 23.0),
+    )
+    style.legend(wide[0])
+    _blend_panel(grid[1][0], data, lambda h: h.error, "force error [N]")
+    _blend_panel(grid[1][1], data, lambda h: h.shaking, "shaking of the force [N]")
+    dots_panel(
+        wide[1],
+        data.varied,
+        lambda r: 100 * r.error,
+        lambda r: r.helps,
+        limit=100 * HALF,
+        label="error left [%]",
+        title="with a blend of 0.05 rad/s over without; each dot a run; dashed: half",
+    )
+    loss_panel(wide[2], data.regain)
+    return drawing
+
+
+def _blend_panel(axis: Axes, data: Data, value: Callable[[Held], float], label: str) -> None:
+    for blend, found in zip(BLENDS, data.sweep, strict=True):
+        axis.plot([blend] * len(found), [value(h) for h in found], "o", color=style.SERIES[0], markersize=4)
+    axis.axhline(
+        np.median([value(h) for h in data.plain]), color=style.MEASURED, linewidth=1.2, label="without"
+    )
+    for i, quantum in enumerate(_quanta()[:2]):
+        axis.axvline(
+            quantum,
+            color=style.MEASURED,
+            linewidth=0.9,
+            linestyle=":",
+            label="one count a tick" if i == 0 else None,
+        )
+    axis.set_xscale("log")
+    axis.set_ylim(bottom=0.0)
+    axis.set(xlabel="blend [rad/s]", ylabel=label)
+    style.legend(axis)
+
+
+def _quanta() -> list[float]:
+    """One count a tick [rad/s], by motor."""
+    encoder = Encoder(Vec3(*PLAIN.encoders.counts))
+    return [float(r) * PLAIN.run.rate for r in encoder.resolution]
+
+
+def with_blend(experiment: Experiment, blend: float) -> Experiment:
+    """The experiment with another blend for all motors [rad/s]."""
+    return changed(experiment, {"compensation.blend": (blend, blend, blend)})
+
+
+def _worlds() -> dict[str, Mapping[str, Any]]:
+    return {
+        "foam": {},
+        "rubber": RUBBER_SURFACE,
+        "relaxing\nfoam": RELAXING_FOAM,
+        **friction_and_pose(PLAIN),
+    }
+
+
+def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
+    def ratio(world: Mapping[str, Any], seed: int) -> Ratio:
+        without = held_in(runs.one(changed(PLAIN, world), seed))
+        compensated = runs.one(changed(PARAMETERS, world), seed)
+        return Ratio(held_in(compensated).error / without.error, losses(compensated) > 0)
+
+    return by_condition(runs, _worlds(), ratio, {"foam"})
+
+
+def held_in(record: Record) -> Held:
+    """The last second of a press of `PLAIN.run.press` seconds."""
+    late = since_contact(record) >= PLAIN.run.press - 1.0
+    force, desired = record["force"][late], record["force_desired"][late]
+    if not late.any():
+        return Held(np.nan, np.nan, listing_factor(record))
+    return Held(abs(float((force - desired).mean())), float(force.std()), listing_factor(record))
+
+
+def listing_factor(record: Record) -> float:
+    """Largest share of the level that the listing's rule comes to, over motors 1 and 2 and all ticks."""
+    encoder = Encoder(Vec3(*PLAIN.encoders.counts), Vec3(*(float(record[f"q{i}"][0]) for i in (1, 2, 3))))
+    largest = 0.0
+    for i in range(2):
+        counts, offset = encoder.counts[i], encoder.offset[i]
+        angle = np.round((record[f"q{i + 1}"] - offset) * counts / (2 * np.pi)) * (2 * np.pi / counts)
+        speed = np.abs(np.diff(angle)) * PLAIN.run.rate
+        inside = speed[speed <= PRINTED_BLEND]  # elsewhere the factor stays what it was
+        largest = max(largest, float(inside.max(initial=0.0)) / PRINTED_BLEND)
+    return largest

@@ -1,0 +1,69 @@
+"""Interface of a file under `figures/` or `explanations/`, and the discovery of these files."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType
+from typing import Any, Protocol, cast
+
+from palpate.errors import unknown
+from palpate_thesis import explanations, figures
+from palpate_thesis.claims import Claim
+from palpate_thesis.look import Figure
+from palpate_thesis.runs import Runs
+
+
+class Study(Protocol):
+    """A module with one figure.
+
+    ``NUMBER`` is the thesis' number of the figure ("6.11"), or our own name of an explanation
+    ("why-negative-mass"). ``TITLE`` is a line; ``CAPTION`` describes it, the claim included. ``PARAMETERS`` holds
+    everything that was chosen.
+    """
+
+    NUMBER: str
+    TITLE: str
+    CAPTION: str
+    PARAMETERS: Any
+
+    def run(self, runs: Runs) -> Any:
+        """Measured values for `check` and `plot`, and no others."""
+        ...
+
+    def check(self, data: Any) -> Sequence[Claim]:
+        """A row for each claim that this figure decides."""
+        ...
+
+    def plot(self, data: Any) -> Figure:
+        """The figure, with labels and units."""
+        ...
+
+
+def studies() -> list[Study]:
+    """All figures in the thesis' order, then all explanations."""
+    return [*sorted(_of(figures), key=_place), *_of(explanations)]
+
+
+def _place(figure: Study) -> tuple[int, ...]:
+    return tuple(map(int, figure.NUMBER.split(".")))
+
+
+def study(number: str) -> Study:
+    """One of them.
+
+    Raises:
+        InputError: there is no such figure; the error lists those there are.
+    """
+    known = {s.NUMBER: s for s in studies()}
+    if number not in known:
+        raise unknown("figure", number, known)
+    return known[number]
+
+
+def _of(package: ModuleType) -> list[Study]:
+    """Each module of a package is a study, or has several as `STUDIES`."""
+    names = sorted(m.name for m in pkgutil.iter_modules(package.__path__))
+    modules = [import_module(f"{package.__name__}.{name}") for name in names]
+    return [cast("Study", study) for module in modules for study in getattr(module, "STUDIES", (module,))]

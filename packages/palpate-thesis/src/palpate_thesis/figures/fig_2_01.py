@@ -1,0 +1,227 @@
+"""Figure 2.1: Raibert and Craig's hybrid controller, without dynamics, beside the one with dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate._vector import Vec3
+from palpate.arrays import Array, Mask
+from palpate.bench import changed, load
+from palpate.bench.metrics.summary import losses
+from palpate.controllers import RaibertCraig
+from palpate.controllers.raibert_craig import growth_rate
+from palpate.records import Record
+from palpate.report import style
+from palpate.robots.arm3 import Arm3
+from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.conditions import (
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_condition,
+    friction_and_pose,
+    stops_holding,
+)
+from palpate_thesis.force_control.panels import across, dots_panel, panels
+from palpate_thesis.force_control.tracking import since_contact, slot
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "2.1"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = changed(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
+DYNAMIC = {"controller": {"kind": "proportional-integral", "kp": 400.0, "kv": 80.0, "kf": 1.0, "ki": 3.0}}
+"""(4.13) with the thesis' gains on foam; the original: the same for the force, 400 and 80 inertias for its joints."""
+STEPS = (2.5, 5.0, 7.5)
+WORSE = 1.5
+"""Least ratio of the original's overshoot, and of its angle's stray, to those with dynamics."""
+GROWS = 1.0
+"""Growth that counts as unstable [1/s]."""
+XS, YS = np.linspace(0.10, 0.53, 65), np.linspace(-0.35, 0.35, 51)
+LAWS = ("without dynamics", "with dynamics")
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """How a run answered its steps of force."""
+
+    overshoot: float  # over the size of the step, mean over the steps
+    phi: float  # largest stray within a second of a step, mean over the steps [deg]
+    lost: int
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both laws in the same world."""
+
+    original: Pressed
+    dynamic: Pressed
+
+    @property
+    def phi(self) -> float:
+        """How far the tip turns under the original, over that under (4.13)."""
+        return self.original.phi / self.dynamic.phi
+
+    @property
+    def worse(self) -> bool:
+        """Whether the original is worse in both, by enough."""
+        more = self.original.overshoot > 0.0 and self.original.overshoot >= WORSE * self.dynamic.overshoot
+        return self.original.lost > 0 or (more and self.phi >= WORSE)
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    traces: dict[str, Record]
+    varied: dict[str, list[Pair]]
+    growth: Array  # of the original over the workspace, shape (y, x) [1/s]; NaN out of reach
+    any_gain: Array  # the same with a tenth and ten times the gains: the least of the three
+
+
+def run(runs: Runs) -> Data:
+    """Both laws in each world; the original's growth at each posture."""
+    surfaces = {"foam": {}, "rubber": RUBBER_SURFACE, "relaxing\nfoam": RELAXING_FOAM}
+    worlds = {n: changed(PARAMETERS, c) for n, c in {**surfaces, **friction_and_pose(PARAMETERS)}.items()}
+    original = by_condition(runs, worlds, lambda e, s: _measure(runs.one(e, s)), {"foam"})
+    dynamic = by_condition(runs, worlds, lambda e, s: _measure(runs.one(changed(e, DYNAMIC), s)), {"foam"})
+    varied = {n: [Pair(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
+    traces = {LAWS[0]: slot(runs.one(PARAMETERS)), LAWS[1]: slot(runs.one(changed(PARAMETERS, DYNAMIC)))}
+    growth = growth_over(1.0, np.ones((len(YS), len(XS)), dtype=bool))
+    others = [growth_over(gain, growth > GROWS) for gain in (0.1, 10.0)]
+    return Data(traces, varied, growth, np.fmin.reduce([growth, *others]))
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """Problems of the original, and what leaving out the dynamics does."""
+    return [_problems(data), _dynamics(data)]
+
+
+def _problems(data: Data) -> Claim:
+    reach = np.isfinite(data.growth)
+    share = float((data.growth[reach] > GROWS).mean())
+    always = float((data.any_gain[reach] > GROWS).mean())
+    line = data.growth[np.argmin(np.abs(YS))]
+    return claim(
+        "original-hybrid.problems",
+        always > 0.0,
+        share=share,
+        postures=reach.sum(),
+        always=always,
+        fastest=np.nanmax(data.growth),
+        grows=GROWS,
+        occurs="it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too",
+    )
+
+
+def _losses_in_words(data: Data) -> str:
+    """Where contact was lost, in words."""
+    told = [
+        f"{name} ({sum(p.original.lost > 0 for p in v)} of {len(v)} runs of the original, "
+        f"{sum(p.dynamic.lost > 0 for p in v)} of (4.13))"
+        for name, v in ((n.replace(chr(10), " "), v) for n, v in data.varied.items())
+        if any(p.original.lost or p.dynamic.lost for p in v)
+    ]
+    return f"Contact was lost with {', '.join(told)}." if told else "Contact was never lost."
+
+
+def _dynamics(data: Data) -> Claim:
+    foam = data.varied["foam"]
+    return claim(
+        "original-hybrid.dynamics",
+        often(p.worse for p in foam),
+        original_overshoot=[100 * p.original.overshoot for p in foam],
+        dynamic_overshoot=[100 * p.dynamic.overshoot for p in foam],
+        original_phi=[p.original.phi for p in foam],
+        dynamic_phi=[p.dynamic.phi for p in foam],
+        worse=WORSE,
+        lost=_losses_in_words(data),
+        where=stops_holding(data.varied, lambda p: p.worse),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """Force and angle over time, the map, and the runs."""
+    drawing, grid = panels([2.5, 1.7, 3.0], 2, 11.0)
+    for row, name in zip(grid[:2], ("force", "phi"), strict=True):
+        _over_time(across(row), data, name)
+    _map_panel(drawing, grid[2][0], data)
+    dots_panel(
+        grid[2][1],
+        data.varied,
+        lambda p: 100 * p.phi,
+        lambda p: p.worse,
+        limit=100 * WORSE,
+        label="ratio [%]",
+        title="stray of the angle; a dot: worse in this and in overshoot",
+    )
+    return drawing
+
+
+def _over_time(axis: Axes, data: Data, name: str) -> None:
+    for (law, trace), color in zip(data.traces.items(), style.SERIES[:2], strict=True):
+        values = np.degrees(trace["phi"]) if name == "phi" else trace[name]
+        axis.plot(trace["t"], values, color=color, linewidth=1.1, label=law)
+    axis.set_xlim(0.0, PARAMETERS.run.press)
+    if name == "force":
+        first = next(iter(data.traces.values()))
+        axis.plot(first["t"], first["force_desired"], **style.KNOWN, label="desired")
+        axis.set_ylabel("true force [N]")
+        style.legend(axis)
+    else:
+        axis.set(ylabel="angle [°]", xlabel="time since contact [s]")
+
+
+def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
+    shown = np.where(np.isfinite(data.growth), np.clip(data.growth, 0.0, 20.0), np.nan)
+    mesh = axis.pcolormesh(XS, YS, shown, cmap="OrRd", vmin=0.0, vmax=20.0, shading="nearest")
+    drawing.colorbar(mesh, ax=axis, pad=0.02, label="[1/s], up to 20 and more")
+    axis.plot([0.40, 0.49], [0.0, 0.0], color=style.SERIES[0], linewidth=2.5)
+    axis.annotate(
+        "experiments",
+        (0.40, 0.0),
+        (-22, -14),
+        textcoords="offset points",
+        fontsize=8.5,
+        color=style.SERIES[0],
+    )
+    axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axis.set_title("growth of the original")
+
+
+def growth_over(gain: float, where: Mask) -> Array:
+    """Of the original's position loop, its stiffness times `gain`, over YS and XS [1/s]; NaN elsewhere."""
+    arm: Any = Arm3()
+    into = Vec3(1.0, 0.0, 0.0)
+    table: Any = PARAMETERS.controller
+    stiffness, damping = (
+        k * Vec3(*map(float, v)) for k, v in ((gain, table.stiffness), (np.sqrt(gain), table.damping))
+    )
+    law = RaibertCraig(stiffness, damping, 0.0 * damping, table.kf, table.ki, table.feed_forward, 1e-3)
+    found = np.full((len(YS), len(XS)), np.nan)
+    for i, y in enumerate(YS):
+        for j, x in enumerate(XS):
+            pose = Vec3(float(x), float(y), 0.0)
+            q = arm.inverse(pose, 1.0)
+            if where[i, j] and arm.beyond_reach(pose) <= 0.0 and abs(np.sin(q.y)) > 0.02:
+                found[i, j] = growth_rate(law, arm.model(q, 0.0 * q), into)
+    return found
+
+
+def _measure(record: Record) -> Pressed:
+    t, force, phi = since_contact(record), record["force"], record["phi"]
+    over, strays = [], []
+    for at in STEPS:
+        after = (t >= at) & (t < at + 1.0)
+        before = (t >= at - 0.1) & (t < at - 5e-7)
+        if not after.any():
+            return Pressed(np.nan, np.nan, losses(record))
+        desired, was = record["force_desired"][after][0], record["force_desired"][before][0]
+        beyond = (force[after] - desired) * np.sign(desired - was)
+        over.append(max(0.0, float(beyond.max())) / abs(desired - was))
+        strays.append(float(np.abs(phi[after] - phi[before].mean()).max()))
+    return Pressed(float(np.mean(over)), float(np.degrees(np.mean(strays))), losses(record))

@@ -1,0 +1,196 @@
+"""Figure 2.2: impedance control; the arm's estimated mass, damper and spring against the target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate._vector import Vec3
+from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.summary import losses
+from palpate.bench.tick import Loop, LoopState
+from palpate.controllers import Impedance
+from palpate.controllers.any_controller import AnyController
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.conditions import (
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_condition,
+    friction_and_pose,
+    rougher,
+    stops_holding,
+)
+from palpate_thesis.force_control.disturbances import Change, Disturbance, run_with
+from palpate_thesis.force_control.panels import dots_panel, panels
+from palpate_thesis.force_control.tracking import since_contact, slot
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "2.2"
+TITLE, CAPTION = texts(NUMBER)
+DEPTHS = (0.0090, 0.0050, 0.0080, 0.0040, 0.0095, 0.0060, 0.0085, 0.0045)
+"""Of the desired x beyond the wall [m], a second each; within what motor 2 can press on rubber."""
+PARAMETERS = changed(
+    load("foam-impedance"), {**SHORT, "run.press": float(len(DEPTHS)), "controller.beyond": DEPTHS[0]}
+)
+FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
+TOLERANCES = {"K": 0.10, "B": 0.25, "M": 0.25}
+WORDS = {"K": "spring", "B": "damper", "M": "mass"}
+TARGET = {"K": 2000.0, "B": 600.0, "M": 5.0}
+"""In x; the same numbers as in PARAMETERS [N/m, N s/m, kg]."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Estimated impedance of the arm over its target."""
+
+    K: float  # slope of force over displacement at the ends of the intervals
+    B: float  # least squares on the motion
+    M: float
+    lost: int
+
+    def within(self, name: str) -> bool:
+        """Whether one of them is as asked for."""
+        return self.lost == 0 and abs(getattr(self, name) - 1.0) <= TOLERANCES[name]
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    traces: dict[str, Record]
+    varied: dict[str, list[Found]]
+
+
+def run(runs: Runs) -> Data:
+    """Jumps of the desired depth on foam and rubber, and under varied conditions."""
+    worlds = _worlds()
+    varied = by_condition(runs, worlds, lambda e, s: found_in(record_jumps(e, s)), _ALL)
+    rough, free = (record_jumps(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
+    traces = {
+        "with friction": slot(rough),
+        "hardly any friction": slot(free),
+        "target impedance": ideal_trace(),
+    }
+    return Data(traces, varied)
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """Spring, damper and mass, each by itself, on foam and rubber."""
+    return [_claim(data, name) for name in TARGET]
+
+
+def _claim(data: Data, name: str) -> Claim:
+    foam, rubber = (data.varied[surface] for surface in _ALL)
+    return claim(
+        f"impedance-holds.{name}",
+        all(often(f.within(name) for f in found) for found in (foam, rubber)),
+        foam=[100 * getattr(f, name) for f in foam],
+        rubber=[100 * getattr(f, name) for f in rubber],
+        free=[100 * getattr(f, name) for f in data.varied["hardly any\nfriction"]],
+        tolerance=TOLERANCES[name],
+        where=stops_holding(data.varied, lambda f: f.within(name)),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """The force over time, and the estimates under each condition."""
+    drawing, grid = panels([2.6, 1.8, 1.8, 1.8])
+    colors = style.SERIES[:3]
+    for (name, one), color in zip(data.traces.items(), colors, strict=True):
+        grid[0][0].plot(one["t"], one["force"], color=color, linewidth=1.2, label=name)
+    grid[0][0].set(xlabel="time since contact [s]", ylabel="force [N]", xlim=(0.0, len(DEPTHS)))
+    style.legend(grid[0][0])
+    for name, (axis,) in zip(("K", "B", "M"), grid[1:], strict=True):
+        _share_panel(axis, data, name)
+    return drawing
+
+
+def _share_panel(axis: Axes, data: Data, name: str) -> None:
+    dots_panel(
+        axis,
+        data.varied,
+        lambda f: 100 * getattr(f, name),
+        lambda f: f.within(name),
+        limit=100.0,
+        label=f"{name} [%]",
+        title=(
+            f"{WORDS[name]} found, over the target's; a dot: within {TOLERANCES[name]:.0%}; dashed: the "
+            "target"
+        ),
+    )
+    values = [100 * getattr(f, name) for runs in data.varied.values() for f in runs]
+    axis.set_ylim(min(0.0, 1.1 * min(values)), 1.1 * max(120.0, *values))
+
+
+_ALL = ("foam", "rubber")
+
+
+def _worlds() -> dict[str, Experiment]:
+    return {
+        "foam": PARAMETERS,
+        "rubber": changed(PARAMETERS, RUBBER_SURFACE),
+        "hardly any\nfriction": changed(PARAMETERS, FREE),
+        **{name: changed(PARAMETERS, by) for name, by in friction_and_pose(PARAMETERS).items()},
+        "relaxing\nfoam": changed(PARAMETERS, RELAXING_FOAM),
+    }
+
+
+def drawn_to(x: float) -> Change:
+    """The impedance's desired x becomes another one [m]."""
+
+    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
+        return loop._replace(controller=_aim_at(loop.controller, x)), state
+
+    return change
+
+
+def _aim_at(controller: Any, x: float) -> Any:
+    if isinstance(controller, Impedance):
+        return controller._replace(target=Vec3(x, 0.0, 0.0))
+    if not isinstance(controller, AnyController):
+        return controller
+    return controller._replace(first=_aim_at(controller.first, x), second=_aim_at(controller.second, x))
+
+
+def record_jumps(experiment: Experiment, seed: int) -> Record:
+    """A run whose desired depth jumps each second to the next of `DEPTHS`."""
+    disturbances = [Disturbance(float(i), drawn_to(experiment.wall.x + d)) for i, d in enumerate(DEPTHS) if i]
+    return run_with(experiment, seed, disturbances)
+
+
+def found_in(record: Record) -> Found:
+    """Spring from the ends of the intervals; damper and mass by least squares on the true motion between the jumps."""
+    t, f, x = since_contact(record), record["force"], record["x"]
+    interval = np.clip(np.floor(t + 5e-7).astype(int), 0, len(DEPTHS) - 1)
+    away = record.meta["experiment"]["wall"]["x"] + np.array(DEPTHS)[interval] - x
+    ends = [(t >= i + 0.8) & (t < i + 1.0) for i in range(len(DEPTHS))]
+    if losses(record) or not all(e.any() for e in ends):
+        return Found(np.nan, np.nan, np.nan, losses(record))
+    K = np.polyfit([away[e].mean() for e in ends], [f[e].mean() for e in ends], 1)[0]
+    v = np.gradient(x, record["t"])
+    a = np.gradient(v, record["t"])
+    used = (t >= 0.5) & (np.mod(t, 1.0) >= 0.004) & (np.mod(t, 1.0) < 0.996)
+    _, B, M = np.linalg.lstsq(np.column_stack([away, -v, -a])[used], f[used])[0]
+    return Found(K / TARGET["K"], B / TARGET["B"], M / TARGET["M"], 0)
+
+
+def ideal_trace() -> Record:
+    """The target impedance itself on the foam, from rest at the first depth."""
+    from scipy.signal import StateSpace, lsim
+
+    s = PARAMETERS.surface
+    m, b, k = TARGET["M"] + s.mass, TARGET["B"] + s.damping, TARGET["K"] + s.stiffness
+    A, G = [[0.0, 1.0], [-k / m, -b / m]], [[0.0], [TARGET["K"] / m]]
+    force = [s.stiffness - s.mass * k / m, s.damping - s.mass * b / m]  # of the surface, its mass included
+    system = StateSpace(A, G, [force], [[s.mass * TARGET["K"] / m]])
+    t = 1e-3 * np.arange(len(DEPTHS) * 1000, dtype=np.float64)
+    depth = np.repeat(DEPTHS, 1000)
+    _, out, _ = lsim(system, depth, t, X0=[TARGET["K"] * DEPTHS[0] / k, 0.0], interp=False)
+    return Record({"t": t, "force": np.asarray(out)}, {"t": "s", "force": "N"})

@@ -1,0 +1,246 @@
+"""Figures 2.3 and 2.4: one joint under a neural network alone, the direct scheme."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench.metrics.following import LIMIT, SHARE
+from palpate.bench.metrics.window import SETTLE, rms
+from palpate.controllers.direct_neural import DirectIntegral, DirectNeural, direct_neural
+from palpate.environments import KelvinVoigt, StandardLinearSolid
+from palpate.friction import LuGre
+from palpate.records import Record
+from palpate.references import ForceSchedule
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, often, spread, texts
+from palpate_thesis.conditions import VARIED_SEEDS, stops_holding
+from palpate_thesis.force_control.panels import across, dots_panel, panels
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.one_joint import JOINT_FRICTION, Link, one_joint
+from palpate_thesis.runs import Runs
+
+NUMBER = "2.4"
+TITLE, CAPTION = texts(NUMBER)
+
+
+@dataclass(frozen=True)
+class World:
+    """The joint's surface and friction."""
+
+    surface: KelvinVoigt | StandardLinearSolid
+    friction: LuGre = JOINT_FRICTION
+    noise: float = 0.6
+    force: float = 20.0
+    """Scale of the forces at the network's inputs [N]."""
+
+
+FOAM, RUBBER = World(KelvinVoigt(5200.0, 200.0, 0.10)), World(KelvinVoigt(34500.0, 480.0, 0.05))
+RATE = 5e-5
+_RUBS: Any = JOINT_FRICTION
+PARAMETERS = {
+    "rate": RATE,
+    "hidden": 6,
+    "schedule": ForceSchedule(20.0, 10.0, 2.5, 0.0, 0.5, 0.0),
+    "worlds": {
+        "foam": FOAM,
+        "rubber": RUBBER,
+        "relaxing\nfoam": World(StandardLinearSolid(5600.0, 13.0, 0.02, 6900.0, 0.23)),
+        "friction\nhalf": World(FOAM.surface, _RUBS.scaled(0.5)),
+        "friction\ndouble": World(FOAM.surface, _RUBS.scaled(2.0)),
+        "noise\ndouble": World(FOAM.surface, noise=1.2),
+        "inputs\nin N": World(FOAM.surface, force=1.0),
+    },
+}
+"""Other noise and other weights in each run; lever, inertia and motor are joint 2's, see `one_joint`."""
+RATES = (5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3)
+DURATION, FROM = 15.0, 10.0
+SAME = 0.10
+"""How near the integral's error has to be to the network's."""
+FOLLOWS = (
+    f"in 9 of 10 runs on each surface, from {FROM:g} to {DURATION:g} s: RMS of the true force's error at "
+    f"most {LIMIT:g} N outside the first {SETTLE:g} s after each step, mean error in the last second of each "
+    f"interval at most {SHARE:.0%}"
+)
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """How a run went from `FROM` on."""
+
+    settled: float  # RMS error outside the steps [N]
+    rms: float  # steps included [N]
+    off: float  # largest mean error at an interval's end, as a share of the desired force
+    gain: float  # integral gain on the force: torque per newton and second, over the lever [1/s]
+
+    @property
+    def follows(self) -> bool:
+        """Whether the force keeps to the desired one."""
+        return self.settled <= LIMIT and self.off <= SHARE
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    record: dict[str, Array]
+    worlds: dict[str, list[Pressed]]
+    integral: dict[str, list[Pressed]]  # with the gain that the network had, run by run
+    rates: dict[str, list[list[Pressed]]]  # by surface, then by rate
+
+
+def run(runs: Runs) -> Data:
+    """All worlds at one rate, all rates on two surfaces, and the plain integral of the same gain."""
+    worlds: dict[str, World] = PARAMETERS["worlds"]  # type: ignore[assignment]
+    two = {"foam": FOAM, "rubber": RUBBER}
+    pressed = {
+        name: runs.map(partial(by_network, world, RATE), _seeds(runs, name)) for name, world in worlds.items()
+    }
+    integral = {
+        name: runs.map(partial(_integral, world), list(zip(pressed[name], runs.seeds, strict=True)))
+        for name, world in two.items()
+    }
+    rates = {
+        name: [runs.map(partial(by_network, world, rate), runs.seeds[:VARIED_SEEDS]) for rate in RATES]
+        for name, world in two.items()
+    }
+    record = one_joint(FOAM.surface, _network(FOAM, RATE, runs.seeds[0]), _schedule()).run(
+        DURATION, runs.seeds[0]
+    )
+    return Data(dict(record.columns), pressed, integral, rates)
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """That it follows; and that it is an integral."""
+    return [_follows(data), _is_integral(data)]
+
+
+def _follows(data: Data) -> Claim:
+    both = {n: data.worlds[n] for n in ("foam", "rubber")}
+    told = "; ".join(
+        f"{n}: RMS {spread([p.settled for p in v], 'N')}, interval ends off by "
+        f"{spread([100 * p.off for p in v], '%', 2)}"
+        for n, v in both.items()
+    )
+    slow = _span(data)
+    return claim(
+        "network-alone",
+        all(often(p.follows for p in v) for v in both.values()),
+        surfaces=told,
+        follows=FOLLOWS,
+        foam_slow=slow[0],
+        rubber_slow=slow[1],
+        where=stops_holding(data.worlds, lambda p: p.follows),
+    )
+
+
+def _is_integral(data: Data) -> Claim:
+    shares = {
+        n: [b.rms / a.rms for a, b in zip(data.worlds[n], data.integral[n], strict=True)]
+        for n in data.integral
+    }
+    gains = [p.gain for n in data.integral for p in data.worlds[n]]
+    return claim(
+        "network-alone.integrator",
+        all(often(abs(s - 1) <= SAME for s in v) for v in shares.values()),
+        surfaces="; ".join(
+            (f"{n}: {spread([100 * s for s in v], '%', 3)} of the network's RMS" for n, v in shares.items())
+        ),
+        gains=gains,
+        start=FROM,
+        same=SAME,
+    )
+
+
+def plot(data: Data) -> Figure:
+    """The force and the gain over time; the error over rates and worlds."""
+    drawing, grid = panels([2.6, 2.6], 2, 11.0)
+    force = across(grid[0])
+    c = data.record
+    force.plot(c["t"], c["force"], color=style.F, linewidth=1.1, label="true force")
+    force.plot(c["t"], c["force_desired"], **style.KNOWN, label="desired")
+    force.plot(
+        c["t"], 1e4 * c["gain"], color=style.MEASURED, linewidth=0.9, label="gain [0.1 mN m per N and ms]"
+    )
+    force.set(xlabel="time [s]", ylabel="force [N]", xlim=(0.0, DURATION), ylim=(0.0, 27.0))
+    style.legend(force)
+    _rate_panel(grid[1][0], data)
+    dots_panel(
+        grid[1][1],
+        data.worlds,
+        lambda p: p.settled,
+        lambda p: p.follows,
+        limit=LIMIT,
+        label="RMS error [N]",
+        title="at the chosen rate; a dot follows, a cross does not",
+    )
+    return drawing
+
+
+def _rate_panel(axis: Axes, data: Data) -> None:
+    for (name, found), color in zip(data.rates.items(), style.SERIES[:2], strict=True):
+        axis.loglog(
+            RATES, [np.median([p.settled for p in v]) for v in found], color=color, linewidth=1.2, label=name
+        )
+        for rate, v in zip(RATES, found, strict=True):
+            axis.plot([rate] * len(v), [p.settled for p in v], "o", color=color, markersize=3)
+    axis.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
+    axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle=":")
+    axis.set(xlabel="learning rate", ylabel="RMS error [N]")
+    axis.legend()
+    axis.set_title("outside the steps; dashed: the limit, dotted: the chosen rate")
+
+
+def _span(data: Data) -> tuple[float, float]:
+    """The first and the last of the rates that follow on both surfaces; NaN if none does."""
+    good = [
+        rate
+        for i, rate in enumerate(RATES)
+        if all(p.follows for found in data.rates.values() for p in found[i])
+    ]
+    return (min(good), max(good)) if good else (float("nan"), float("nan"))
+
+
+def _seeds(runs: Runs, name: str) -> list[int]:
+    return list(runs.seeds if name in ("foam", "rubber") else runs.seeds[:VARIED_SEEDS])
+
+
+def _schedule() -> ForceSchedule:
+    return PARAMETERS["schedule"]  # type: ignore[return-value]
+
+
+def _network(world: World, rate: float, seed: int) -> DirectNeural:
+    return direct_neural(rate, hidden=6, force=world.force, seed=seed)
+
+
+def by_network(world: World, rate: float, seed: int) -> Pressed:
+    """The network alone on one joint, at a learning rate."""
+    link = Link(world.friction)
+    bench = one_joint(world.surface, _network(world, rate, seed), _schedule(), link=link, noise=world.noise)
+    return _measure(bench.run(DURATION, seed), bench.loop.joint.lever)
+
+
+def _integral(world: World, case: tuple[Pressed, int]) -> Pressed:
+    (network, seed), link = case, Link(world.friction)
+    controller = DirectIntegral(network.gain * 1e-3 * link.lever)
+    bench = one_joint(world.surface, controller, _schedule(), link=link, noise=world.noise)
+    return _measure(bench.run(DURATION, seed), link.lever)
+
+
+def _measure(record: Record, lever: float) -> Pressed:
+    if record.meta["end"] != "done":
+        return Pressed(np.nan, np.nan, np.inf, np.nan)
+    t, desired = record["t"], record["force_desired"]
+    late = t >= FROM - 5e-7
+    error = record["force"] - desired
+    since = np.mod(t + 5e-7, _schedule().period)
+    interval = np.floor((t + 5e-7) / _schedule().period)
+    ends = [late & (interval == i) & (since >= _schedule().period - 1.0) for i in np.unique(interval[late])]
+    off = max(abs(float(error[e].mean())) / float(desired[e].mean()) for e in ends)
+    gain = float(record["gain"][late].mean()) / 1e-3 / lever
+    return Pressed(rms(error[late & (since >= SETTLE)]), rms(error[late]), off, gain)

@@ -1,0 +1,196 @@
+"""Figure 2.5: the indirect scheme, a network that tunes the gains of a PID on the force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.following import LIMIT
+from palpate.environments import KelvinVoigt
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, often, spread, texts
+from palpate_thesis.conditions import (
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    by_condition,
+    move_wall,
+    rougher,
+    stops_holding,
+)
+from palpate_thesis.force_control.disturbances import Disturbance, other_surface, run_with
+from palpate_thesis.force_control.panels import dots_panel, force_panel, panels
+from palpate_thesis.force_control.tracking import (
+    FOLLOWS,
+    Tracking,
+    describe,
+    following,
+    slot,
+    tracking,
+)
+from palpate_thesis.look import Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "2.5"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = changed(
+    load("foam-self-tuning"),
+    {**SHORT, "run.press": 12.5, "force.first": 20.0, "force.second": 10.0, "force.period": 2.5},
+)
+UNDER = KelvinVoigt(34500.0, 480.0, 0.05)
+TURN = 6.0
+"""When the foam becomes rubber [s after contact]."""
+SHOWN, JUDGED = (2.0, 12.5), (7.5, 12.5)
+FIXED = {"controller.learning_rate": 1e-12}
+BETTER = 0.9
+"""Largest share of the untaught loop's error that counts as better."""
+
+Case = tuple[Experiment, int]
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    shown: Record
+    tuned: dict[str, list[Tracking]]
+    fixed: dict[str, list[Tracking]]
+    turned: list[Tracking]
+
+
+def run(runs: Runs) -> Data:
+    """Each world with the network learning and without; and the turn from foam to rubber."""
+    worlds = _worlds()
+    measure = tracking(*JUDGED)
+    full = {*_SURFACES, *_POSES}
+    tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
+    fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
+    turned = runs.map(lambda seed: measure(turned_into_rubber(seed)), list(runs.seeds))
+    return Data(slot(turned_into_rubber(runs.seeds[0]), *SHOWN), tuned, fixed, turned)
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """Surfaces, poses, a surface that changes, and whether it is the network that does it."""
+    return [_environment(data), _configuration(data), _network(data)]
+
+
+def _environment(data: Data) -> Claim:
+    found = {"foam into\nrubber": data.turned, **{n: data.tuned[n] for n in _SURFACES}}
+    return claim(
+        "self-tuning-robust.environment",
+        all(following(f) for f in found.values()),
+        described=describe(data.turned),
+        others=_how_many_follow(found),
+        follows=FOLLOWS,
+        fixed_kept=_count_following(data.fixed),
+        surfaces=len(data.fixed),
+        tuned_kept=_count_following(data.tuned),
+        where=stops_holding({**data.tuned, **found}, lambda f: f.follows),
+    )
+
+
+def _configuration(data: Data) -> Claim:
+    found = {n: data.tuned[n] for n in _POSES}
+    reach = spread([100 * f.saturated for f in data.tuned["wall at\n0.40 m"]], "%", 2)
+    return claim(
+        "self-tuning-robust.configuration",
+        all(following(f) for f in found.values()),
+        poses=_how_many_follow(found),
+        follows=FOLLOWS,
+        reach=reach,
+        where=stops_holding(found, lambda f: f.follows),
+    )
+
+
+def _network(data: Data) -> Claim:
+    shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
+    return claim(
+        "self-tuning-robust.tuning",
+        all(often(s <= BETTER for s in v) for v in shares.values()),
+        surfaces="; ".join((f"{_name(n)} {spread([100 * s for s in v], '%', 2)}" for n, v in shares.items())),
+        better=BETTER,
+        where=stops_holding({n: [*_shares(data, n)] for n in data.tuned}, lambda s: s <= BETTER),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """The turn, the gains, and the runs."""
+    drawing, ((force,), (gains,), (dots,)) = panels([2.8, 1.8, 2.2])
+    force_panel(force, data.shown)
+    c = PARAMETERS.controller
+    names, colors = ("K_fp", "K_fi", "K_fd"), (*style.SERIES[:2], style.OK)
+    for i, (name, middle, color) in enumerate(zip(names, (c.kf, c.ki, c.kd), colors, strict=True), start=1):
+        gains.plot(
+            data.shown["t"], data.shown[f"adapted{i}"] / middle, color=color, linewidth=1.2, label=name
+        )
+    gains.set(xlabel="time since contact [s]", ylabel="gain over middle", xlim=SHOWN, ylim=(0.0, 2.0))
+    style.legend(gains)
+    for axis in (force, gains):
+        axis.axvline(TURN, color=style.INK, linewidth=1, linestyle=":")
+    dots_panel(
+        dots,
+        {"foam into\nrubber": data.turned, **data.tuned},
+        lambda f: f.settled,
+        lambda f: f.follows,
+        limit=LIMIT,
+        label="RMS error [N]",
+        title=(
+            "outside the steps; a dot follows, a cross does not; small: the gains of the start, left alone; "
+            "dashed: the limit"
+        ),
+    )
+    for at, runs in enumerate(data.fixed.values(), start=1):
+        spot = at + np.linspace(-0.22, 0.22, len(runs))
+        dots.plot(spot, [f.settled for f in runs], "o", color=style.MEASURED, markersize=2.5, zorder=1)
+    dots.set_ylim(0.0, max(4.0, 1.1 * _largest(data)))
+    return drawing
+
+
+_SURFACES = ("foam", "rubber")
+_POSES = ("foam", "wall at\n0.40 m", "wall at\n0.49 m")
+
+
+def _worlds() -> dict[str, Experiment]:
+    by: dict[str, Mapping[str, Any]] = {
+        "foam": {},
+        "rubber": RUBBER_SURFACE,
+        "wall at\n0.40 m": move_wall(PARAMETERS, 0.40),
+        "wall at\n0.49 m": move_wall(PARAMETERS, 0.49),
+        "relaxing\nfoam": RELAXING_FOAM,
+        "friction\nhalf": rougher(PARAMETERS, 0.5),
+        "friction\ndouble": rougher(PARAMETERS, 2.0),
+        "other\nweights": {"controller.weights_seed": 1},
+        "rate ten\ntimes": {"controller.learning_rate": 1e-2},
+    }
+    return {name: changed(PARAMETERS, changes) for name, changes in by.items()}
+
+
+def turned_into_rubber(seed: int) -> Record:
+    """A run on foam that becomes rubber at `TURN`."""
+    return run_with(PARAMETERS, seed, [Disturbance(TURN, other_surface(UNDER))])
+
+
+def _shares(data: Data, name: str) -> list[float]:
+    return [a.settled / b.settled for a, b in zip(data.tuned[name], data.fixed[name], strict=True)]
+
+
+def _count_following(found: Mapping[str, Sequence[Tracking]]) -> int:
+    return sum(map(following, found.values()))
+
+
+def _name(name: str) -> str:
+    return name.replace("\n", " ")
+
+
+def _how_many_follow(found: Mapping[str, Sequence[Tracking]]) -> str:
+    return "; ".join(f"{_name(n)} {sum(f.follows for f in v)} of {len(v)} follow" for n, v in found.items())
+
+
+def _largest(data: Data) -> float:
+    every = [f.settled for runs in (*data.tuned.values(), data.turned) for f in runs]
+    return float(np.nanmax(every))

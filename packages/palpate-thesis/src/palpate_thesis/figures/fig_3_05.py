@@ -1,0 +1,181 @@
+"""Figure 3.5: spectra of the force signal with and without the 190 Hz analog filter before the sampling."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import Experiment, changed, load
+from palpate.bench.sequence import CONTACT
+from palpate.instruments import analog_filter_190
+from palpate.records import Record
+from palpate.report import style
+from palpate.signals.filters import Biquad
+from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.least_squares.press_runs import conditions, nearer
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "3.5"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = changed(nearer(load("foam-hybrid")), {"run.press": 14.0})
+STEADY = 12.0
+"""Seconds at the end of the press that are looked at [s]."""
+SEGMENT = 500
+"""Samples of a Welch segment: 2 Hz a line, some 50 segments."""
+BAND = 120.0
+ALMOST = 1.0
+"""Almost the same [dB]; well under what an eye sees on a graph of 60 dB."""
+TONES = (480.0, 960.0)
+AMPLITUDE = 0.5
+PHYSICS = 20000.0
+
+
+@dataclass(frozen=True)
+class Data:
+    """Spectra, their differences, and tones."""
+
+    frequency: Array  # [Hz]
+    plain: Array  # spectrum of the first seed, unfiltered [N^2/Hz]
+    filtered: Array
+    apart: list[float]  # largest difference below 120 Hz of each seed [dB]
+    varied: dict[str, float]  # the same under varied conditions
+    lines: dict[str, Array]  # amplitudes of what a tone becomes at 1 kHz, by line [N]
+    bins: Array  # their frequencies [Hz]
+
+
+def run(runs: Runs) -> Data:
+    """Two runs a seed, alike but for the filter."""
+    spectra = _pairs(runs, [(PARAMETERS, seed) for seed in runs.seeds])
+    cases = conditions(PARAMETERS)
+    others = _pairs(runs, [(e, runs.seeds[0]) for e in cases.values()])
+    bins, lines = tones_sampled()
+    return Data(
+        frequency=_frequency(),
+        plain=spectra[0][0],
+        filtered=spectra[0][1],
+        apart=[_apart(*pair) for pair in spectra],
+        varied={name: _apart(*pair) for name, pair in zip(cases, others, strict=True)},
+        lines=lines,
+        bins=bins,
+    )
+
+
+def _pairs(runs: Runs, cases: list[tuple[Experiment, int]]) -> list[tuple[Array, Array]]:
+    """Spectra without and with the filter of each case."""
+    both = [
+        (changed(e, {"force_sensor.analog_filter": on}), seed) for e, seed in cases for on in (False, True)
+    ]
+    spectra = runs.over(both, _spectrum)
+    return list(zip(spectra[::2], spectra[1::2], strict=True))
+
+
+def _spectrum(record: Record) -> Array:
+    from scipy.signal import welch
+
+    t = record["t"]
+    steady = (record["phase"] == CONTACT) & (t > t[-1] - STEADY)
+    _, power = welch(record["force_sampled"][steady], fs=1000.0, nperseg=SEGMENT)
+    return np.asarray(power)
+
+
+def _frequency() -> Array:
+    """Of the spectra's lines [Hz]."""
+    return np.arange(SEGMENT // 2 + 1, dtype=float) * (1000.0 / SEGMENT)
+
+
+def _apart(plain: Array, filtered: Array) -> float:
+    """Largest difference of a line below 120 Hz, steady force aside [dB]."""
+    frequency = _frequency()
+    inside = (frequency > 0.0) & (frequency < BAND)
+    return float(np.max(np.abs(10.0 * np.log10(filtered[inside] / plain[inside]))))
+
+
+def tones_sampled() -> tuple[Array, dict[str, Array]]:
+    """A tone of 480 Hz and one of 960 Hz, sampled at 1 kHz, through the filter and past it."""
+    from scipy.signal import lfilter
+
+    t = np.arange(round(PHYSICS)) / PHYSICS
+    filter_190: Biquad = analog_filter_190(PHYSICS)
+    b, a = (filter_190.b0, filter_190.b1, filter_190.b2), (1.0, filter_190.a1, filter_190.a2)
+    lines = {}
+    for tone in TONES:
+        line = AMPLITUDE * np.sin(2.0 * np.pi * tone * t + 0.3)
+        lines[f"{tone:g} Hz"] = _amplitudes(line)
+        lines[f"{tone:g} Hz, filtered"] = _amplitudes(np.asarray(lfilter(b, a, line)))
+    return _frequency(), lines
+
+
+def _amplitudes(line: Array) -> Array:
+    sampled = line[:: round(PHYSICS / 1e3)][-SEGMENT:]
+    return 2.0 * np.abs(np.fft.rfft(sampled)) / SEGMENT
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """Agreement below 120 Hz; where 480 Hz goes."""
+    return [_agreement(data), _folding(data)]
+
+
+def _agreement(data: Data) -> Claim:
+    worst = max(data.varied, key=lambda name: data.varied[name])
+    return claim(
+        "anti-alias-spectra",
+        float(np.median(data.apart)) <= ALMOST,
+        apart=data.apart,
+        almost=ALMOST,
+        varied=data.varied[worst],
+        worst=worst,
+    )
+
+
+def _folding(data: Data) -> Claim:
+    stays = _peak(data, "480 Hz")
+    folds, past = _peak(data, "960 Hz"), _peak(data, "960 Hz, filtered")
+    loss = 20.0 * np.log10(past[1] / folds[1])
+    return claim("anti-alias-spectra.aliasing", stays[0] < BAND, stays=stays[0], folds=folds[0], gain=-loss)
+
+
+def _peak(data: Data, line: str) -> tuple[float, float]:
+    at = int(np.argmax(data.lines[line]))
+    return float(data.bins[at]), float(data.lines[line][at])
+
+
+def plot(data: Data) -> Figure:
+    """Both spectra, and the tones."""
+    drawing, (left, right) = style.grid((9.0, 4.1), 1, 2, width_ratios=(1.6, 1.0))
+    _spectra(left, data)
+    _draw_folding(right, data)
+    return drawing
+
+
+def _spectra(axis: Axes, data: Data) -> None:
+    shown = data.frequency > 0.0
+    for power, color, label in (
+        (data.plain, style.MEASURED, "without filter"),
+        (data.filtered, style.SERIES[0], "with the 190 Hz filter"),
+    ):
+        axis.plot(
+            data.frequency[shown], 10.0 * np.log10(power[shown]), color=color, linewidth=1.2, label=label
+        )
+    axis.axvspan(0.0, BAND, color=style.OK, alpha=0.08, linewidth=0.0)
+    axis.text(5.0, -53.0, "below 120 Hz", color=style.OK)
+    axis.set(xlabel="frequency [Hz]", ylabel="power density [dB re 1 N²/Hz]", xlim=(0.0, 500.0))
+    style.legend(axis)
+
+
+def _draw_folding(axis: Axes, data: Data) -> None:
+    colors = {"480": style.SERIES[1], "960": style.FAIL}
+    for line in data.lines:
+        frequency, amplitude = _peak(data, line)
+        weak = "filtered" in line
+        where = frequency + (8.0 if weak else 0.0)
+        color = colors[line[:3]]
+        axis.vlines(
+            where, 0.0, amplitude, color=color, linewidth=3.5, alpha=0.45 if weak else 1.0, label=line
+        )
+    axis.axvspan(0.0, BAND, color=style.OK, alpha=0.08, linewidth=0.0)
+    axis.set(xlabel="read at [Hz]", ylabel="amplitude [N]", xlim=(0.0, 500.0), ylim=(0.0, 0.6))
+    axis.legend(loc="upper center")

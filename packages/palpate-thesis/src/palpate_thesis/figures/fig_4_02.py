@@ -1,0 +1,167 @@
+"""Figure 4.2: the force through the switch from position to hybrid control."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import changed, load
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.least_squares import press_runs
+from palpate_thesis.least_squares.panels import set_title
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "4.2"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = {
+    "foam": press_runs.nearer(changed(load("foam-hybrid"), {"run.press": 4.0})),
+    "rubber": press_runs.nearer(changed(load("rubber-hybrid"), {"run.press": 4.0})),
+}
+THRESHOLDS = (0.8, 1.2, 1.6, 2.0, 3.0, 5.0)
+CHOSEN = 5.0
+DESIRED, NEAR, OVERSHOOT = 20.0, 1.0, 0.25
+BEFORE, AFTER = 0.6, 1.5
+
+
+@dataclass(frozen=True)
+class Switch:
+    """The switch of one run."""
+
+    true_force: float  # at the change-over [N]
+    lost: bool  # whether the contact was lost afterwards
+    last: float  # mean force of the last second [N]
+    most: float  # largest force [N]
+
+    @property
+    def clean(self) -> bool:
+        """Contact kept, no large overshoot, and the desired force reached."""
+        reached = abs(self.last - DESIRED) <= NEAR and self.most <= (1.0 + OVERSHOOT) * DESIRED
+        return self.true_force > 0.0 and not self.lost and reached
+
+
+@dataclass(frozen=True)
+class Data:
+    """The force around the switch, and what became of each run."""
+
+    shown: dict[str, tuple[Array, Array]]  # time from the switch [s], measured force [N]
+    switches: dict[str, list[Switch]]  # at 5 N, over the seeds
+    by_threshold: dict[float, list[Switch]]  # on foam
+    varied: dict[str, list[Switch]]  # on foam
+
+
+def run(runs: Runs) -> Data:
+    """One run a seed on each surface; thresholds and conditions varied on foam."""
+    few = list(runs.seeds)[: press_runs.SWEPT_SEEDS]
+    foam = PARAMETERS["foam"]
+    thresholds = {
+        f: changed(foam, {"approach.switch": f, "run.press": 0.5, "run.duration": 20.0}) for f in THRESHOLDS
+    }
+    varied = {name: [(e, s) for s in few] for name, e in press_runs.conditions(foam).items()}
+    return Data(
+        shown={name: _around(runs.one(e)) for name, e in PARAMETERS.items()},
+        switches={name: runs.over_seeds(e, switch_of) for name, e in PARAMETERS.items()},
+        by_threshold={f: runs.over_seeds(e, switch_of) for f, e in thresholds.items()},
+        varied={name: runs.over(cases, switch_of) for name, cases in varied.items()},
+    )
+
+
+def _start(record: Record) -> int:
+    return int(np.argmax(record["phase"] == CONTACT))
+
+
+def _around(record: Record) -> tuple[Array, Array]:
+    t = record["t"] - record["t"][_start(record)]
+    shown = (t >= -BEFORE) & (t <= AFTER)
+    return t[shown], record["force_measured"][shown]
+
+
+def switch_of(record: Record) -> Switch:
+    """The change-over of a run."""
+    force = record["force_measured"]
+    return Switch(
+        true_force=float(record["force"][_start(record)]),
+        lost=bool((record["phase"] == LOST).any()),
+        last=float(force[-1000:].mean()),
+        most=float(force.max()),
+    )
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """The switch is clean, and 5 N is a threshold that noise does not reach."""
+    return [_clean(data), _threshold(data)]
+
+
+def _clean(data: Data) -> Claim:
+    good = {name: sum(s.clean for s in some) for name, some in data.switches.items()}
+    fails = [name for name, some in data.varied.items() if 2 * sum(s.clean for s in some) <= len(some)]
+    foam, rubber = data.switches["foam"], data.switches["rubber"]
+    return claim(
+        "switch-at-5N",
+        all((2 * count > len(data.switches[name]) for name, count in good.items())),
+        last=[s.last for s in foam],
+        most=[s.most for s in foam],
+        last_rubber=[s.last for s in rubber],
+        most_rubber=[s.most for s in rubber],
+        where=press_runs.where_it_fails(fails, len(data.varied)),
+        nearer=press_runs.median([s.last for s in data.varied["wall at 0.40 m"]]),
+    )
+
+
+def _false(some: Sequence[Switch]) -> float:
+    """Share of the runs that were switched before anything was touched."""
+    return sum(s.true_force <= 0.0 for s in some) / len(some)
+
+
+def _threshold(data: Data) -> Claim:
+    early = max((f for f, some in data.by_threshold.items() if _false(some) > 0.0), default=0.0)
+    enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
+    chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
+    return claim(
+        "switch-at-5N.threshold",
+        _false(chosen) == 0.0,
+        chosen=100 * _false(chosen),
+        listing=100 * _false(listing),
+        early=early,
+        enough=enough,
+    )
+
+
+def plot(data: Data) -> Figure:
+    """The force around the switch; below, the thresholds."""
+    drawing, (upper, lower) = style.grid((9.0, 5.9), 2, height_ratios=(1.5, 1.0))
+    _force(upper, data)
+    _thresholds(lower, data)
+    return drawing
+
+
+def _force(axis: Axes, data: Data) -> None:
+    set_title(axis, "a", "Force through the switch")
+    for (name, (t, force)), color in zip(data.shown.items(), style.SERIES[:2], strict=True):
+        axis.plot(t, force, color=color, linewidth=1.0, label=name)
+    axis.plot([0.0, AFTER], [DESIRED, DESIRED], **style.KNOWN, label="desired")
+    axis.axvspan(-BEFORE, 0.0, color=style.MEASURED, alpha=0.10, linewidth=0.0)
+    axis.text(-0.98 * BEFORE, 21.0, "position control", color=style.INK)
+    axis.text(0.02, 23.2, "hybrid control", color=style.INK)
+    axis.axhline(CHOSEN, color=style.FAIL, linewidth=0.9, linestyle=":")
+    axis.set(xlabel="time since 5 N [s]", ylabel="force [N]", xlim=(-BEFORE, AFTER), ylim=(-2.5, 25.0))
+    style.legend(axis)
+
+
+def _thresholds(axis: Axes, data: Data) -> None:
+    set_title(axis, "b", "Thresholds, foam; above: share of the runs that noise switched in the air")
+    for f, some in data.by_threshold.items():
+        axis.plot(
+            np.full(len(some), f), [s.true_force for s in some], "o", color=style.SERIES[0], markersize=3.5
+        )
+        axis.annotate(f"{100 * _false(some):.0f} %", (f, 5.6), ha="center", color=style.FAIL)
+    axis.plot([0.0, 5.5], [0.0, 5.5], color=style.MEASURED, linewidth=0.9, linestyle="--")
+    axis.set(
+        xlabel="threshold of the measured force [N]", ylabel="true force at the switch [N]", ylim=(-0.5, 6.3)
+    )

@@ -1,0 +1,336 @@
+"""Figure 4.3: the loop of the hybrid controller's block diagram, and how stiff a surface it bears."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.summary import losses
+from palpate.records import Record
+from palpate.report import style
+from palpate.signals.filters import butterworth2
+from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.conditions import SHORT, VARIED_SEEDS, rougher
+from palpate_thesis.force_control.panels import across, panels
+from palpate_thesis.force_control.tracking import since_contact
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+TICK = 1e-3
+"""[s]"""
+
+
+@dataclass(frozen=True)
+class ForceLoop:
+    """Parameters that decide the stability, besides the surface's stiffness.
+
+    Args:
+        kf: K_fp.
+        ki: K_fi [per sample].
+        damping: B_e of the surface [N s/m].
+        tip: mass along the force [kg].
+        mass: M_e of the surface [kg].
+        cutoff: of the sensor's analog low-pass, of third order [Hz].
+        late: how long the sensor computes and holds [s].
+        smoothing: cut-off of the controller's own filter [Hz].
+    """
+
+    kf: float
+    ki: float
+    damping: float
+    tip: float
+    mass: float = 0.05
+    cutoff: float = 120.0
+    late: float = 1.5 / 480.0
+    smoothing: float = 120.0
+
+    def radius(self, stiffness: Array) -> Array:
+        """Spectral radius of one tick on surfaces of these stiffnesses [N/m], shape (n,); above 1 it is unstable."""
+        return np.asarray(np.abs(np.linalg.eigvals(self._ticks(np.atleast_1d(stiffness)))).max(axis=-1))
+
+    def limit(self, low: float = 1e3, high: float = 3e6) -> float:
+        """The stiffness from which it is unstable [N/m]; NaN if it is so at `low`, infinite if not below `high`."""
+        for _ in range(2):
+            grid = np.geomspace(low, high, 40)
+            unstable = self.radius(grid) > 1.0 + 1e-9
+            first = int(np.argmax(unstable))
+            if not unstable[first]:
+                return float("inf")
+            if first == 0:
+                return float("nan")
+            low, high = float(grid[first - 1]), float(grid[first])
+        return float(np.sqrt(low * high))
+
+    def _ticks(self, stiffness: Array) -> Array:
+        """Transition of the state by one tick: tip and analog filter, delay line of readings, filter, integral."""
+        A, b, c = self._zero_order_hold(stiffness)
+        n, line = 5, int(self.late / TICK) + 1
+        share = self.late / TICK + 1 - line
+        s1, s2, total = n + line, n + line + 1, n + line + 2
+        one = np.eye(total + 1)
+        past = [np.pad(c, (0, total + 1 - n)), *one[n : n + line]]
+        smooth = butterworth2(self.smoothing, 1.0 / TICK)
+        reading = (1.0 - share) * past[line - 1] + share * past[line]
+        measured = smooth.b0 * reading + one[s1]
+        F = np.zeros((len(stiffness), total + 1, total + 1))
+        F[:, :n, :n] = A
+        F[:, n : n + line] = past[:line]
+        F[:, s1] = smooth.b1 * reading - smooth.a1 * measured + one[s2]
+        F[:, s2] = smooth.b2 * reading - smooth.a2 * measured
+        F[:, total] = one[total] - self.ki * measured
+        F[:, :n] += b[:, :, None] * (F[:, total] - self.kf * measured)[:, None, :]
+        return F
+
+    def _zero_order_hold(self, stiffness: Array) -> tuple[Array, Array, Array]:
+        """Tip and analog filter over one tick of constant force: x' = A x + b u for each stiffness, reading c x."""
+        Af, Bf, Cf = _analog(self.cutoff)
+        whole = self.tip + self.mass
+        A = np.zeros((len(stiffness), 6, 6))
+        A[:, 0, 1] = 1.0
+        A[:, 1, 0], A[:, 1, 1], A[:, 1, 5] = -stiffness / whole, -self.damping / whole, 1.0 / whole
+        A[:, 2:5, 2:5] = Af
+        A[:, 2:5, 0], A[:, 2:5, 1] = stiffness[:, None] * Bf, self.damping * Bf
+        step = _exponential(TICK * A)
+        return step[:, :5, :5], step[:, :5, 5], np.concatenate([[0.0, 0.0], Cf])
+
+
+@cache
+def _analog(cutoff: float) -> tuple[Array, Array, Array]:
+    """The sensor's low-pass in state space."""
+    from scipy.signal import butter, tf2ss
+
+    A, B, C, _ = tf2ss(*butter(3, 1.0, analog=True))
+    w = 2.0 * np.pi * cutoff
+    return w * A, w * B[:, 0], C[0]
+
+
+def _exponential(A: Array) -> Array:
+    """exp of each matrix, by Taylor's series and squaring; scipy's takes its time over many small ones."""
+    halvings = 12
+    small = A / 2.0**halvings
+    total = term = np.broadcast_to(np.eye(A.shape[-1]), A.shape)
+    for order in range(1, 9):
+        term = term @ small / order
+        total = total + term
+    for _ in range(halvings):
+        total = total @ total
+    return total
+
+
+NUMBER = "4.3"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = changed(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
+TIP = 8.2
+"""Effective mass of the arm along x at the wall, rotors included [kg]."""
+GAINS = {"K_fp 1, K_fi 0.003 (foam)": (1.0, 0.003), "K_fp 0.25, K_fi 0.0015 (rubber)": (0.25, 0.0015)}
+STUDY = {(60.0, 1.0): 12e3, (60.0, 0.25): 31e3, (480.0, 1.0): 95e3, (480.0, 0.25): 410e3}
+"""Limits [N/m] that an earlier study of ours found, by damping [N s/m] and K_fp."""
+NEAR = 0.15
+BELOW, ABOVE = 0.8, 1.25
+"""Shares of the limit at which the whole arm has to be stable, and unstable."""
+SHAKES = 1.0
+"""Standard deviation of the true force in the third second of a press that counts as unstable [N]."""
+FREE, FREE_SIDE = 0.02, {"wall.side_friction": 0.0}
+STIFFER = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
+"""Multiples of the limit that the arm with its friction is put on."""
+DAMPINGS = np.geomspace(20.0, 1000.0, 18)
+CUTOFFS = np.geomspace(8.0, 300.0, 16)
+KFS, KIS = np.linspace(0.1, 2.0, 15), np.linspace(0.0, 0.006, 11)
+SURFACES = {"foam": (200.0, 5.2e3), "rubber": (480.0, 34.5e3)}
+"""As chosen for the bench: damping [N s/m], stiffness [N/m]."""
+
+Case = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    limits: dict[Case, float]  # linear, by damping and K_fp [N/m]
+    curves: dict[str, Array]  # by gains, over DAMPINGS [N/m]
+    filtered: dict[str, Array]  # by gains, over CUTOFFS, on the damping of the foam [N/m]
+    gains: Array  # over KIS and KFS, damping 60 [N/m]
+    below: dict[Case, list[bool]]  # whether the arm was stable, a run each
+    above: dict[Case, list[bool]]
+    rough: dict[Case, list[float]]  # largest multiple of the limit that the arm bore with its friction
+
+
+def run(runs: Runs) -> Data:
+    """The linear loop over damping, gains and cut-off; the whole arm next to its limits."""
+    limits = {(b, kf): loop(kf, ki, b).limit() for b, kf, ki in _cases()}
+    return Data(
+        limits,
+        {name: np.array([loop(*g, b).limit() for b in DAMPINGS]) for name, g in GAINS.items()},
+        {
+            name: np.array([loop(*g, 200.0, smoothing=c).limit() for c in CUTOFFS])
+            for name, g in GAINS.items()
+        },
+        np.array([[loop(kf, ki, 60.0).limit() for kf in KFS] for ki in KIS]),
+        _stable(runs, limits, BELOW),
+        _stable(runs, limits, ABOVE),
+        _rough(runs, limits),
+    )
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """The linear limits against earlier ones; the arm against the linear limits; a low cut-off against a high one."""
+    return [_linear(data), _whole(data), _slow(data)]
+
+
+def _linear(data: Data) -> Claim:
+    told = ", ".join(f"{data.limits[case] / 1e3:.3g}" for case in STUDY)
+    return claim(
+        "force-loop-stable",
+        all((abs(data.limits[c] / k - 1.0) <= NEAR for c, k in STUDY.items())),
+        limits=told,
+        near=NEAR,
+        tip=TIP,
+        needed=_least_damping(data),
+    )
+
+
+def _whole(data: Data) -> Claim:
+    kept = {c: sum(data.below[c]) for c in data.below}
+    lost = {c: len(data.above[c]) - sum(data.above[c]) for c in data.above}
+    holds = all(often(data.below[c]) and often(not a for a in data.above[c]) for c in kept)
+    n = len(next(iter(data.below.values())))
+    friction = ", ".join(f"{min(v):.2g} to {max(v):.2g}" for v in data.rough.values())
+    return claim(
+        "force-loop-stable.whole-arm",
+        holds,
+        below=BELOW,
+        stable=", ".join(map(str, kept.values())),
+        runs=n,
+        above=ABOVE,
+        lost=", ".join(map(str, lost.values())),
+        shakes=SHAKES,
+        friction=friction,
+        stiffer=STIFFER[-1],
+    )
+
+
+def _slow(data: Data) -> Claim:
+    slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
+    return claim(
+        "low-pass-destabilises",
+        all((s <= 0.5 * f for s, f in zip(slow, fast, strict=True))),
+        foam_slow=_text(slow[0]),
+        foam_fast=_text(fast[0]),
+        rubber_slow=_text(slow[1]),
+        rubber_fast=_text(fast[1]),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """Limits against damping and cut-off, and over the gains."""
+    drawing, grid = panels([3.4, 2.6], 2, 11.0)
+    _damping_panel(grid[0][0], data)
+    _cutoff_panel(grid[0][1], data)
+    wide = across(grid[1])
+    limits = np.log10(data.gains / 1e3)
+    shown = wide.contourf(KFS, 1e3 * KIS, limits, levels=12, cmap="YlGnBu")
+    bar = drawing.colorbar(shown, ax=wide, pad=0.01)
+    lowest, highest = limits.min(), limits.max()
+    ticks = [k for k in (5, 10, 20, 50, 100, 200) if lowest <= np.log10(k) <= highest]
+    bar.set_ticks([float(np.log10(k)) for k in ticks], labels=[f"{k}" for k in ticks])
+    bar.set_label("stable up to [kN/m]")
+    for name, (kf, ki) in GAINS.items():
+        wide.plot(kf, 1e3 * ki, "o", color=style.SERIES[1], markersize=6)
+        wide.annotate(name.split("(")[1].rstrip(")"), (kf, 1e3 * ki), (6, 4), textcoords="offset points")
+    wide.set(xlabel="K_fp", ylabel="K_fi [1e-3 per sample]")
+    wide.set_title("over both gains, damping 60 N s/m; dots: the thesis' gains")
+    return drawing
+
+
+def _damping_panel(axis: Axes, data: Data) -> None:
+    colors = style.SERIES[:2]
+    for (name, (kf, _)), color in zip(GAINS.items(), colors, strict=True):
+        axis.loglog(DAMPINGS, data.curves[name] / 1e3, color=color, label=name)
+        for case, limit in data.limits.items():
+            if case[1] == kf:
+                for share, found in ((BELOW, data.below), (ABOVE, data.above)):
+                    stable = often(found[case])
+                    face = color if stable else "white"
+                    axis.plot(
+                        case[0], share * limit / 1e3, "o", color=color, markerfacecolor=face, markersize=6
+                    )
+    for name, (damping, stiffness) in SURFACES.items():
+        axis.plot(damping, stiffness / 1e3, "s", color=style.MEASURED, markersize=5)
+        axis.annotate(name, (damping, stiffness / 1e3), (5, -10), textcoords="offset points")
+    axis.set(xlabel="damping of the surface [N s/m]", ylabel="stable up to [kN/m]")
+    axis.legend(loc="upper left")
+    axis.set_title("against the surface's damping; squares: the bench's surfaces")
+
+
+def _cutoff_panel(axis: Axes, data: Data) -> None:
+    for name, color in zip(GAINS, style.SERIES[:2], strict=True):
+        axis.loglog(CUTOFFS, data.filtered[name] / 1e3, color=color)
+    axis.axvline(PARAMETERS.filters.force, color=style.INK, linewidth=1, linestyle="--")
+    axis.set(xlabel="cut-off of the controller's force filter [Hz]")
+    axis.set_title("against the force filter, damping 200 N s/m; dashed: as used")
+
+
+def loop(kf: float, ki: float, damping: float, smoothing: float = 120.0) -> ForceLoop:
+    """The linear loop of the bench's arm."""
+    return ForceLoop(kf, ki, damping, TIP, smoothing=smoothing)
+
+
+def _cases() -> list[tuple[float, float, float]]:
+    return [(b, kf, ki) for b in (60.0, 480.0) for kf, ki in GAINS.values()]
+
+
+def _at(data: Data, cutoff: float) -> list[float]:
+    return [
+        float(np.exp(np.interp(np.log(cutoff), np.log(CUTOFFS), np.log(v)))) for v in data.filtered.values()
+    ]
+
+
+def _text(limit: float) -> str:
+    return f"{limit / 1e3:.3g} kN/m" if np.isfinite(limit) else "none below 3 MN/m"
+
+
+def _least_damping(data: Data) -> float:
+    """The damping from which the foam's gains bear 44 kN/m [N s/m]."""
+    curve = next(iter(data.curves.values()))
+    return float(np.exp(np.interp(np.log(44e3), np.log(curve), np.log(DAMPINGS))))
+
+
+def press_of(case: tuple[float, float, float], stiffness: float, friction: float) -> Experiment:
+    """A press with this damping and these gains on a surface of this stiffness [N/m], the friction times a share."""
+    damping, kf, ki = case
+    surface = {"surface.stiffness": stiffness, "surface.damping": damping, "surface.mass": 0.05}
+    return changed(
+        PARAMETERS,
+        {**rougher(PARAMETERS, friction), **surface, "controller.kf": kf, "controller.ki": ki},
+    )
+
+
+def stays_quiet(record: Record) -> bool:
+    """Whether contact is kept and the true force rests from two seconds on."""
+    late = since_contact(record) >= 2.0
+    return losses(record) == 0 and bool(late.any()) and float(record["force"][late].std()) <= SHAKES
+
+
+def _stable(runs: Runs, limits: dict[Case, float], share: float) -> dict[Case, list[bool]]:
+    found = {}
+    for case in _cases():
+        experiment = changed(press_of(case, share * limits[case[:2]], FREE), FREE_SIDE)
+        found[case[:2]] = runs.over_seeds(experiment, stays_quiet)
+    return found
+
+
+def _rough(runs: Runs, limits: dict[Case, float]) -> dict[Case, list[float]]:
+    """Largest of STIFFER, seed by seed, up to which the arm with its own friction stays quiet; 0 if at none."""
+    seeds = runs.seeds[:VARIED_SEEDS]
+    found: dict[Case, list[float]] = {}
+    for case in _cases():
+        tried = [(press_of(case, k * limits[case[:2]], 1.0), seed) for seed in seeds for k in STIFFER]
+        quiet = np.array(runs.over(tried, stays_quiet)).reshape(len(seeds), len(STIFFER))
+        borne = [int(np.argmin(row)) if not row.all() else len(row) for row in quiet]
+        found[case[:2]] = [STIFFER[n - 1] if n else 0.0 for n in borne]
+    return found

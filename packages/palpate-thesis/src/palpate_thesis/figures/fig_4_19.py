@@ -1,0 +1,319 @@
+"""Equations 4.19-4.21: decoupled hybrid control with the identified stiffness, as printed and corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from palpate._vector import Vec3
+from palpate.arrays import Array
+from palpate.bench import Experiment, changed, load
+from palpate.bench.metrics.following import SHARE
+from palpate.bench.metrics.summary import losses
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.conditions import (
+    RELAXING_FOAM,
+    RUBBER_SURFACE,
+    SHORT,
+    VARIED_SEEDS,
+    friction_and_pose,
+    rougher,
+    stops_holding,
+)
+from palpate_thesis.force_control.disturbances import Disturbance, desired_pose, run_with
+from palpate_thesis.force_control.panels import across, dots_panel, panels
+from palpate_thesis.force_control.tracking import since_contact, slot
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+COUPLED = {"controller": {"kind": "proportional-integral", "kf": 1.0, "ki": 3.0}}
+"""(4.13) with the thesis' gains on foam: 0.003 per sample is 3 per second."""
+STEPS, JUMPS = (2.5, 5.0), (1.2, 6.2)
+"""When the force steps, and when y jumps, after contact [s]; y at 10 N, where motor 2 has torque to spare."""
+JUMP = 0.005
+"""Of the desired y, there and back [m]."""
+PRINTED = {"controller.form": "printed", "controller.kf": 1.0}
+
+
+@dataclass(frozen=True)
+class Stray:
+    """How far one loop's steps carry the other; means over the steps of the largest within a second."""
+
+    y: float  # after a step of force [mm]
+    phi: float  # likewise [deg]
+    force: float  # after a jump of y, as a share of the desired force
+    lost: int  # losses of contact
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The coupled law and the decoupled one, in the same world."""
+
+    coupled: Stray
+    decoupled: Stray
+    stiffness: float  # as identified, which the decoupled law uses [N/m]
+
+    @property
+    def angle(self) -> float:
+        """How far the tip turns under the decoupled law, over that under the coupled one."""
+        return self.decoupled.phi / self.coupled.phi
+
+    @property
+    def side(self) -> float:
+        """Stray of y under the decoupled law, over that under the coupled one."""
+        return self.decoupled.y / self.coupled.y
+
+
+def pair_of(case: tuple[Experiment, int, Mapping[str, Any]]) -> Pair:
+    """Both laws in a world, with a seed, after K_e was identified there; changes of the decoupled law, if any."""
+    world, seed, law = case
+    stiffness = identify_stiffness(world, seed)
+    used = stiffness * law.get("wrong", 1.0)
+    changes = {"controller.stiffness": used, **{k: v for k, v in law.items() if k != "wrong"}}
+    coupled, decoupled = changed(world, COUPLED), changed(world, changes)
+    return Pair(stray(press_with_jumps(coupled, seed)), stray(press_with_jumps(decoupled, seed)), stiffness)
+
+
+def as_printed(case: tuple[Pair, Experiment, int]) -> Pair:
+    """A pair with the law as printed in place of the corrected one."""
+    pair, world, seed = case
+    law = {"controller.stiffness": pair.stiffness, **PRINTED}
+    return replace(pair, decoupled=stray(press_with_jumps(changed(world, law), seed)))
+
+
+def identify_stiffness(world: Experiment, seed: int) -> float:
+    """K_e [N/m] by the matched estimator, after two seconds under the coupled law."""
+    record = run_with(changed(world, {**COUPLED, "run.press": 2.0}), seed, [])
+    return float(record["K_matched"][-1])
+
+
+def press_with_jumps(experiment: Experiment, seed: int) -> Record:
+    """A press in whose course the desired y jumps."""
+    jumps = [
+        Disturbance(at, desired_pose(Vec3(0.0, sign * JUMP, 0.0)))
+        for at, sign in zip(JUMPS, (1, -1), strict=True)
+    ]
+    return run_with(experiment, seed, jumps)
+
+
+def stray(record: Record) -> Stray:
+    """How far the record's steps of force and jumps of y carry the other loop."""
+    t, force = since_contact(record), record["force"]
+    begun = record["t"][0] - t[0]
+    y = [furthest(t, record["y"], at) for at in STEPS]
+    phi = [furthest(t, record["phi"], at) for at in STEPS]
+    pushed = [furthest(t, force, at - begun) / 10.0 for at in record.meta["disturbances"]]
+    return Stray(
+        1e3 * float(np.mean(y)), float(np.degrees(np.mean(phi))), float(np.mean(pushed)), losses(record)
+    )
+
+
+def furthest(t: Array, signal: Array, at: float) -> float:
+    """How far the signal strays within a second, from its mean over the tenth of a second before."""
+    before = signal[(t >= at - 0.1) & (t < at - 5e-7)].mean()
+    return float(np.abs(signal[(t >= at - 5e-7) & (t < at + 1.0)] - before).max())
+
+
+NUMBER = "4.19"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = changed(
+    load("foam-decoupled"), {**SHORT, "run.press": 7.5, "force.first": 10.0, "force.second": 20.0}
+)
+FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
+HALF = 0.5
+"""Largest share of what the coupled law lets through."""
+
+SIGNALS = {"force": 1.0, "y": 1e3, "phi": float(np.degrees(1.0))}
+"""Drawn columns, and their factors to N, mm and degrees."""
+LAWS = ("(4.13), coupled", "(4.19) corrected", "(4.19) as printed")
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    traces: list[dict[str, Record]]  # as chosen, and with hardly any friction
+    nominal: list[Pair]
+    printed: list[Pair]
+    varied: dict[str, list[Pair]]
+
+
+def run(runs: Runs) -> Data:
+    """Both laws in each world, after the stiffness was identified there."""
+    nominal = runs.map(pair_of, [(PARAMETERS, seed, {}) for seed in runs.seeds])
+    printed = runs.map(
+        as_printed, [(pair, PARAMETERS, seed) for pair, seed in zip(nominal, runs.seeds, strict=True)]
+    )
+    named = [
+        (name, (e, seed, law))
+        for seed in runs.seeds[:VARIED_SEEDS]
+        for name, (e, law) in _variations().items()
+    ]
+    varied: dict[str, list[Pair]] = {"as\nchosen": nominal}
+    for (name, _), pair in zip(named, runs.map(pair_of, [case for _, case in named]), strict=True):
+        varied.setdefault(name, []).append(pair)
+    k = nominal[0].stiffness
+    traces = [_traces(PARAMETERS, runs.seeds[0], k), _traces(changed(PARAMETERS, FREE), runs.seeds[0], k)]
+    return Data(traces, nominal, printed, varied)
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """As printed all has to hold at once; corrected, each direction by itself."""
+    same = {
+        "source": "eq. 4.19-4.21, sec. 4.4",
+        "thesis": "the position and force control loops are decoupled",
+    }
+    return [_as_printed(data, same), _angle(data, same), _side(data, same), _force(data, same)]
+
+
+def _as_printed(data: Data, same: Mapping[str, Any]) -> Claim:
+    return claim(
+        "decoupled-control",
+        often(map(_all, data.printed)),
+        decoupled_lost=[p.decoupled.lost for p in data.printed],
+        decoupled_phi=[p.decoupled.phi for p in data.printed],
+        jump=1e3 * JUMP,
+        share=SHARE,
+    )
+
+
+def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
+    free = data.varied["hardly any\nfriction"]
+    return claim(
+        "decoupled-control.angle",
+        often(map(angle_kept, data.nominal)),
+        angle=[100 * p.angle for p in data.nominal],
+        coupled_phi=[p.coupled.phi for p in data.nominal],
+        stiffness=[p.stiffness / 1e3 for p in data.nominal],
+        angle_free=[100 * p.angle for p in free],
+        where=stops_holding(data.varied, angle_kept),
+    )
+
+
+def _side(data: Data, same: Mapping[str, Any]) -> Claim:
+    free = data.varied["hardly any\nfriction"]
+    return claim(
+        "decoupled-control.y",
+        often(map(_side_kept, data.nominal)),
+        side=[100 * p.side for p in data.nominal],
+        coupled_y=[p.coupled.y for p in data.nominal],
+        side_free=[100 * p.side for p in free],
+        coupled_y_free=[p.coupled.y for p in free],
+        where=stops_holding(data.varied, _side_kept),
+    )
+
+
+def _force(data: Data, same: Mapping[str, Any]) -> Claim:
+    free = data.varied["hardly any\nfriction"]
+    return claim(
+        "decoupled-control.force",
+        often(map(force_kept, data.nominal)),
+        decoupled_force=[100 * p.decoupled.force for p in data.nominal],
+        coupled_force=[100 * p.coupled.force for p in data.nominal],
+        decoupled_force_free=[100 * p.decoupled.force for p in free],
+        coupled_force_free=[100 * p.coupled.force for p in free],
+        jump=1e3 * JUMP,
+        share=SHARE,
+        where=stops_holding(data.varied, force_kept),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """Three signals in two worlds, and the angle's stray in all worlds."""
+    drawing, grid = panels([2.3, 1.6, 1.9, 2.0], 2, 11.0)
+    for column, traces in enumerate(data.traces):
+        _column([row[column] for row in grid[:3]], traces)
+    grid[0][0].set_title("friction as chosen")
+    grid[0][1].set_title("hardly any friction")
+    grid[0][0].set_ylabel("true force [N]")
+    grid[1][0].set_ylabel("y [mm]")
+    grid[2][0].set_ylabel("angle [°]")
+    handles, labels = grid[0][0].get_legend_handles_labels()
+    drawing.legend(handles, labels, loc="outside upper right", ncols=4)
+    dots = across(grid[3])
+    dots_panel(
+        dots,
+        data.varied,
+        lambda p: 100 * p.angle,
+        angle_kept,
+        limit=100 * HALF,
+        label="share [%]",
+        title=(
+            "the angle's stray after a step of force, corrected against coupled; each dot a run; dashed: half"
+        ),
+    )
+    return drawing
+
+
+def _column(axes: Sequence[Axes], traces: Mapping[str, Record]) -> None:
+    colors = dict(zip(LAWS, style.SERIES[:3], strict=True))
+    for name in reversed(LAWS):
+        one, pale = traces[name], name == LAWS[2]
+        options: dict[str, Any] = {
+            "color": colors[name],
+            "linewidth": 0.7 if pale else 1.1,
+            "alpha": 0.35 if pale else 1.0,
+        }
+        for axis, (signal, scale) in zip(axes, SIGNALS.items(), strict=True):
+            axis.plot(one["t"], scale * one[signal], label=name, **options)
+    shown = traces[LAWS[0]]
+    axes[0].plot(shown["t"], shown["force_desired"], **style.KNOWN, label="desired")
+    for axis, signal in zip(axes[1:], ("y", "phi"), strict=True):
+        axis.set_ylim(*_limits([SIGNALS[signal] * traces[name][signal] for name in LAWS[:2]]))
+    axes[0].set_ylim(0.0, 32.0)
+    for axis in axes:
+        axis.set_xlim(0.0, PARAMETERS.run.press)
+        for at in JUMPS:
+            axis.axvline(at, color=style.INK, linewidth=0.7, linestyle=":")
+    axes[-1].set_xlabel("time since contact [s]")
+
+
+def _limits(signals: Sequence[Array]) -> tuple[float, float]:
+    low, high = min(float(s.min()) for s in signals), max(float(s.max()) for s in signals)
+    margin = 0.12 * (high - low)
+    return low - margin, high + margin
+
+
+def angle_kept(pair: Pair) -> bool:
+    """Whether contact is kept and the angle strays at most half as far as under (4.13)."""
+    return pair.decoupled.lost == 0 and pair.angle <= HALF
+
+
+def _side_kept(pair: Pair) -> bool:
+    return pair.decoupled.lost == 0 and pair.side <= HALF
+
+
+def force_kept(pair: Pair) -> bool:
+    """Whether contact is kept and the force strays little."""
+    return pair.decoupled.lost == 0 and pair.decoupled.force <= SHARE
+
+
+def _all(pair: Pair) -> bool:
+    return angle_kept(pair) and _side_kept(pair) and force_kept(pair)
+
+
+def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
+    """Other worlds, and a law that is wrong about K_e."""
+    worlds: dict[str, Mapping[str, Any]] = {
+        "hardly any\nfriction": FREE,
+        **friction_and_pose(PARAMETERS),
+        "rubber": RUBBER_SURFACE,
+        "relaxing\nfoam": RELAXING_FOAM,
+    }
+    found: dict[str, tuple[Experiment, Mapping[str, Any]]] = {
+        name: (changed(PARAMETERS, changes), {}) for name, changes in worlds.items()
+    }
+    for name, factor in (("K_e half\nas large", 0.5), ("K_e twice\nas large", 2.0)):
+        found[name] = (PARAMETERS, {"wrong": factor})
+    return found
+
+
+def _traces(world: Experiment, seed: int, stiffness: float) -> dict[str, Record]:
+    known = {"controller.stiffness": stiffness}
+    experiments = (changed(world, COUPLED), changed(world, known), changed(world, {**known, **PRINTED}))
+    return {name: slot(press_with_jumps(e, seed)) for name, e in zip(LAWS, experiments, strict=True)}

@@ -1,0 +1,199 @@
+"""Figure 6.3: least squares on styrofoam from raw signals; and whether any one foam shows figures 6.1 to 6.3."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+
+from palpate.bench import Experiment, changed
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.figures import fig_6_02_05 as later
+from palpate_thesis.least_squares import panels, press_runs
+from palpate_thesis.least_squares.press_runs import Found
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "6.3"
+TITLE, CAPTION = texts(NUMBER)
+PLAIN_DAMPINGS = (5.0, 15.0, 30.0, 60.0, 100.0, 200.0, 300.0, 400.0)
+BRANCHES = tuple(product((3000.0, 7000.0, 20000.0, 40000.0), (0.02, 0.1, 0.23, 0.6), (5.0, 60.0)))
+NEAR = 0.06
+
+
+def _plain(damping: float) -> Experiment:
+    return changed(press_runs.PLAIN, {"surface.damping": damping, "surface.mass": 0.05})
+
+
+def _relaxing(branch: float, time: float, damping: float) -> Experiment:
+    return changed(
+        press_runs.RELAXING,
+        {"surface.branch_stiffness": branch, "surface.branch_time": time, "surface.damping": damping},
+    )
+
+
+PARAMETERS = {
+    **{f"B {b:g}": _plain(b) for b in PLAIN_DAMPINGS},
+    **{f"{k / 1000:g} kN/m, {t:g} s, B {b:g}": _relaxing(k, t, b) for k, t, b in BRANCHES},
+}
+"""The foams that are tried: without memory, and with a relaxing branch of so much stiffness and time."""
+SHOWS: dict[str, Callable[[Found], bool]] = {
+    "K in 0.12 s": lambda f: f.settled_K <= 0.12,
+    "B in 0.12 s": lambda f: f.settled_B <= 0.12,
+    "K = f/x": lambda f: abs(f.apart) < NEAR,
+    "B > 0": lambda f: f.B > 0.0,
+    "M < 0": lambda f: f.M < 0.0,
+    "raw: K = f/x": lambda f: abs(f.apart_raw) < NEAR,
+    "raw: B < 0": lambda f: f.B_raw < 0.0,
+    "raw: M < 0": lambda f: f.M_raw < 0.0,
+}
+"""Sentences of figures 6.1 to 6.3 about a foam."""
+
+
+@dataclass(frozen=True)
+class Data:
+    """The press of figure 6.2 from raw signals, and what each foam shows."""
+
+    later: later.Data
+    foams: dict[str, Found]
+
+    @property
+    def table(self) -> dict[str, list[bool]]:
+        """Of each foam, which of `SHOWS` it does."""
+        return {name: [bool(shows(f)) for shows in SHOWS.values()] for name, f in self.foams.items()}
+
+
+def run(runs: Runs) -> Data:
+    """One press a seed on both foams; one on each of the others."""
+    cases = [(e, runs.seeds[0]) for e in PARAMETERS.values()]
+    return Data(
+        later=later.run(runs, press_runs.FOAMS, vary=1),
+        foams=dict(zip(PARAMETERS, runs.over(cases, press_runs.numbers_of), strict=True)),
+    )
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """Signs of M and B, K, and all at once."""
+    return [*_raw_signs(data), _together(data)]
+
+
+def _count(data: Data, *what: str) -> str:
+    columns = [list(SHOWS).index(name) for name in what]
+    good = sum(all(row[i] for i in columns) for row in data.table.values())
+    return f"{good} of the {len(data.foams)} foams tried"
+
+
+def _raw_signs(data: Data) -> list[Claim]:
+    """Signs of M and B, and K, from raw signals."""
+    shown = partial(_count, data)
+    both = ("raw: B < 0", "raw: M < 0")
+    return [
+        later.found_claim(
+            data.later,
+            "least-squares-raw-signals.M",
+            lambda f: f.M_raw,
+            lambda f: f.M_raw < 0.0,
+            "kg",
+            M=shown("raw: M < 0"),
+        ),
+        later.found_claim(
+            data.later,
+            "least-squares-raw-signals.B",
+            lambda f: f.B_raw,
+            lambda f: f.B_raw < 0.0,
+            "N s/m",
+            B=shown("raw: B < 0"),
+            both=shown(*both),
+            all=shown(*both, "B > 0"),
+        ),
+        later.found_claim(
+            data.later,
+            "least-squares-raw-signals.K",
+            lambda f: 100.0 * f.apart_raw,
+            lambda f: abs(f.apart_raw) < NEAR,
+            "%",
+            K=shown("raw: K = f/x"),
+        ),
+    ]
+
+
+def _together(data: Data) -> Claim:
+    counts = {name: sum(row) for name, row in data.table.items()}
+    most = max(counts.values())
+    best = next(name for name, count in counts.items() if count == most)
+    lacking = [what for what, shown in zip(SHOWS, data.table[best], strict=True) if not shown]
+    lack = f"; the best lacks {', '.join(lacking)}" if lacking else ""
+    return claim(
+        "least-squares-one-foam",
+        most == len(SHOWS),
+        most=most,
+        sentences=len(SHOWS),
+        best=best,
+        lack=lack,
+        such=sum(c == most for c in counts.values()),
+        foams=len(counts),
+        names=", ".join(SHOWS),
+    )
+
+
+def plot(data: Data) -> Figure:
+    """The six panels from raw signals; the signs over all foams, and what each foam shows."""
+    drawing, axes = panels.grid(5)
+    shown = data.later.shown
+    panels.six(axes, shown, "raw", (0.0, press_runs.FIRST))
+    ratios = [
+        1e-3
+        * panels.calm(p, "force_sampled", press_runs.FIRST)
+        / panels.calm(p, "displacement", press_runs.FIRST)
+        for p in shown.values()
+    ]
+    panels.calm_limits(axes[4], *ratios)
+    for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):
+        curves = [
+            scale * p[f"{key}_raw"][press_runs.between(p, 0.1, press_runs.FIRST)] for p in shown.values()
+        ]
+        panels.calm_limits(axis, np.zeros(1), *curves)
+        axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
+    for axis in axes[6:]:
+        axis.remove()
+    _signs(drawing.add_subplot(5, 2, (7, 9)), data)
+    _table(drawing.add_subplot(5, 2, (8, 10)), data)
+    return drawing
+
+
+def _signs(axis: Axes, data: Data) -> None:
+    panels.set_title(axis, "g", "Raw signals: signs on all foams")
+    for label, names, color in (
+        ("without memory", [n for n in data.foams if n.startswith("B ")], style.SERIES[0]),
+        ("relaxing", [n for n in data.foams if not n.startswith("B ")], style.SERIES[1]),
+    ):
+        B = [data.foams[n].B_raw for n in names]
+        M = [data.foams[n].M_raw for n in names]
+        axis.plot(B, M, "o", color=color, markersize=4, label=label)
+    axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.set_xscale("symlog", linthresh=50.0)
+    axis.set_xticks([-100.0, 0.0, 100.0, 1000.0], ["-100", "0", "100", "1000"])
+    (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()
+    left = min(left, -60.0)
+    axis.fill_between([left, 0.0], bottom, 0.0, color=style.FAIL, alpha=0.10, linewidth=0.0)
+    axis.set(xlabel="$B_e$ [N s/m]", ylabel="$M_e$ [kg]", xlim=(left, right), ylim=(bottom, top))
+    axis.grid(visible=True, color=style.GRID, linewidth=0.8)
+    axis.legend()
+
+
+def _table(axis: Axes, data: Data) -> None:
+    panels.set_title(axis, "h", "What each foam shows")
+    table = np.array(list(data.table.values()), dtype=float)
+    axis.imshow(table, aspect="auto", cmap="Blues", vmin=-0.15, vmax=1.25)
+    axis.set_xticks(range(len(SHOWS)), list(SHOWS), rotation=40, ha="right")
+    axis.set_yticks(range(len(data.foams)), list(data.foams), fontsize=5)
+    axis.set_xticks(np.arange(len(SHOWS)) - 0.5, minor=True)
+    axis.set_yticks(np.arange(len(data.foams)) - 0.5, minor=True)
+    axis.grid(which="minor", color="white", linewidth=1.0)
+    axis.tick_params(length=0, which="both")
+    axis.set_xlabel("seen in figures 6.1 to 6.3")

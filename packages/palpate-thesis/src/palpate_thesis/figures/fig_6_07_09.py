@@ -1,0 +1,208 @@
+"""Figures 6.7 and 6.9: the neural identifier in the first four seconds, on foam and on rubber."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import Experiment
+from palpate.identifiers.neural_settings import SETTINGS
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.claims import Claim, Numbered
+from palpate_thesis.least_squares import panels
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.neural_identifier import claims, network
+from palpate_thesis.neural_identifier.claims import SMALL, Grounds, Part, share
+from palpate_thesis.neural_identifier.network import AMPLITUDES, STARTS, WEIGHTS, Answer, Choice, Press
+from palpate_thesis.runs import Runs
+
+SHOWN_STARTS = 5
+CALM = 60
+"""Milliseconds after which curves set the scale of a panel."""
+NAMES = {"foam": "plain foam", "rubber": "rubber"}
+
+
+@dataclass(frozen=True)
+class Data:
+    """Data of such a figure: a press, the answers of a few networks on it, and the grounds of the claims."""
+
+    press: Press  # that of the first noise seed
+    curves: list[Array]  # K, B, M and error of a few starts on it
+    grounds: Grounds
+
+
+def run(runs: Runs, experiment: Experiment, surface: str) -> Data:
+    """One press a noise seed, all starts on each; then the network and the conditions varied."""
+    some = network.presses(runs, experiment, surface)
+    return Data(
+        some[0],
+        [network.learn(some[0], network.network_of(runs), start)[1] for start in STARTS[:SHOWN_STARTS]],
+        grounds(runs, experiment, surface, some),
+    )
+
+
+def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[Press]) -> Grounds:
+    """Grounds of the claims about a surface."""
+    x = SETTINGS[surface].values[0]
+    at_probe = experiment.approach.switch + runs.laboratory.of(experiment).surface.stiffness * x
+    return Grounds(
+        surface,
+        network.answers(runs, some, network.network_of(runs)),
+        network.sweep(runs, some),
+        network.answers_under_conditions(runs, experiment, surface),
+        at_probe / x / float(np.median([press.ratio for press in some])),
+        len(network.starts(runs)),
+    )
+
+
+def plot(data: Data, parts: Sequence[Part], band: float) -> Figure:
+    """Six panels as in the thesis; (g), (h) where in the sweep each part holds; (i) under conditions; (j) all answers.
+
+    Args:
+        data: of `run`.
+        parts: of the claim.
+        band: of K over f/x around 1 in which the claim holds.
+    """
+    drawing, axes = panels.grid(5)
+    name = NAMES[data.grounds.surface]
+    panels.six(axes[:6], {name: _record(data)}, "probe", (0.0, network.PRESS))
+    _others(axes[1:6:2], data, panels.COLORS[name])
+    panels.calm_limits(axes[4], 1e-3 * data.press.force[CALM:] / data.press.inputs[CALM:, 0])
+    for axis, thresholds, letter in zip(axes[6:8], (True, False), "gh", strict=True):
+        _map(axis, data.grounds.swept, parts, thresholds=thresholds)
+        kind = "learn" if thresholds else "stay at zero"
+        panels.set_title(axis, letter, f"Where each part holds; thresholds {kind}")
+    _conditions(axes[8], data.grounds, parts)
+    panels.set_title(axes[8], "i", "As chosen, under varied conditions")
+    _cloud(axes[9], data.grounds, band)
+    panels.set_title(axes[9], "j", "All answers; framed: where the claim would hold")
+    return drawing
+
+
+def _record(data: Data) -> Record:
+    K, B, M, _ = data.curves[0].T
+    press = data.press
+    columns = {
+        "t": np.arange(len(press.force)) * network.TICK,
+        "displacement": press.inputs[:, 0].copy(),
+        "force_measured": press.force,
+        "M_probe": M.copy(),
+        "B_probe": B.copy(),
+        "K_probe": K.copy(),
+    }
+    units = {"t": "s", "displacement": "m", "force_measured": "N"}
+    return Record(columns, {**units, "M_probe": "kg", "B_probe": "N s/m", "K_probe": "N/m"}, {})
+
+
+def _others(axes: list[Axes], data: Data, color: str) -> None:
+    """Other starts, and least squares, into the panels of M, B and K."""
+    t = np.arange(len(data.press.force)) * network.TICK
+    for axis, key, (_, scale) in zip(axes, "MBK", panels.PARAMETERS.values(), strict=True):
+        column = "KBM".index(key)
+        curves = [scale * curve[:, column] for curve in data.curves]
+        for other in curves[1:]:
+            axis.plot(t, other, color=color, linewidth=0.8, alpha=0.35)
+        squares = scale * data.press.squares[:, "MBK".index(key)]
+        axis.plot(t, squares, color=style.MEASURED, linewidth=1.0, linestyle="--")
+        panels.calm_limits(axis, *(c[CALM:] for c in curves), squares[200:], margin=0.1)
+    axes[2].plot(
+        t, 1e-3 * np.full(len(t), data.press.ratio), color=style.SERIES[1], linewidth=1.0, linestyle=":"
+    )
+    lines = ("network, five starts", "", "", "", "", "least squares", "f/x at the end")
+    handles = [line for line, label in zip(axes[2].lines, lines, strict=True) if label]
+    labels = [label for label in lines if label]
+    axes[2].legend(handles, labels, ncols=3, loc="lower right")
+
+
+def _map(
+    axis: Axes, swept: Mapping[Choice, Sequence[Answer]], parts: Sequence[Part], *, thresholds: bool
+) -> None:
+    shares = np.array(
+        [
+            [share(swept[Choice(a, w, thresholds)], part) for a in AMPLITUDES for w in WEIGHTS]
+            for part in parts
+        ]
+    )
+    _shares(axis, shares, [part.suffix for part in parts])
+    n = len(WEIGHTS)
+    for i in range(1, len(AMPLITUDES)):
+        axis.axvline(i * n - 0.5, color=style.INK, linewidth=0.6)
+    middles = [i * n + (n - 1) / 2 for i in range(len(AMPLITUDES))]
+    axis.set_xticks(middles, [f"{a:g}" for a in AMPLITUDES])
+    axis.set_xlabel(f"output amplitude [N]; within each, weights {WEIGHTS[0]:g} to {WEIGHTS[-1]:g}")
+
+
+def _conditions(axis: Axes, grounds: Grounds, parts: Sequence[Part]) -> None:
+    cases = {"as chosen": grounds.nominal, **grounds.varied}
+    shares = np.array([[share(some, part) for some in cases.values()] for part in parts])
+    _shares(axis, shares, [part.suffix for part in parts])
+    axis.set_xticks(range(len(cases)), list(cases), rotation=38, ha="right")
+
+
+def _shares(axis: Axes, shares: Array, rows: Sequence[str]) -> None:
+    """Shares from 0 to 1 as shades; a dot where a claim holds."""
+    axis.imshow(shares, aspect="auto", cmap="Greens", vmin=0.0, vmax=1.2, interpolation="nearest")
+    row, column = np.nonzero(shares >= 0.9)
+    axis.plot(column, row, ".", color=style.INK, markersize=4)
+    axis.set_yticks(range(len(rows)), rows)
+    axis.grid(visible=False)
+    axis.tick_params(length=0)
+
+
+def _cloud(axis: Axes, grounds: Grounds, band: float) -> None:
+    from matplotlib.patches import Rectangle
+
+    fixed = [a for choice, some in grounds.swept.items() if not choice.thresholds for a in some]
+    learning = [a for choice, some in grounds.swept.items() if choice.thresholds for a in some]
+    for some, color, label in (
+        (learning, style.SERIES[0], "swept, thresholds learn"),
+        (fixed, style.SERIES[1], "swept, thresholds at zero"),
+        (grounds.nominal, style.INK, "as chosen"),
+    ):
+        axis.plot(
+            [a.over for a in some],
+            [a.M for a in some],
+            ".",
+            color=color,
+            markersize=3,
+            label=label,
+            alpha=0.7,
+        )
+    axis.axvline(grounds.perfect, color=style.MEASURED, linewidth=0.9, linestyle="--")
+    axis.add_patch(
+        Rectangle((1.0 - band, 0.0), 2.0 * band, SMALL, fill=False, edgecolor=style.FAIL, zorder=3)
+    )
+    axis.set(xlim=(0.5, 2.5), xlabel="$K_e$ over f/x (dashed: a network without error)", ylabel="$M_e$ [kg]")
+    axis.set_yscale("symlog", linthresh=0.1)
+    axis.legend(loc="center right", markerscale=3)
+
+
+@dataclass(frozen=True, eq=False)
+class FirstSeconds(Numbered):
+    """The figure of one surface."""
+
+    PARAMETERS: Experiment
+    surface: str
+    parts: Sequence[Part]  # of the thesis' claims
+    band: float  # of K over f/x around 1 in which the claim holds
+
+    def run(self, runs: Runs) -> Data:
+        """One press a noise seed, ten starts on each."""
+        return run(runs, self.PARAMETERS, self.surface)
+
+    def check(self, data: Data) -> Sequence[Claim]:
+        """Settling times and values of K, B and M."""
+        return claims.claims(data.grounds, self.parts)
+
+    def plot(self, data: Data) -> Figure:
+        """The six panels, and where the claims hold."""
+        return plot(data, self.parts, self.band)
+
+
+FOAM = FirstSeconds("6.7", network.FOAM, "foam", claims.FOAM, claims.FOAM_BAND)
+RUBBER = FirstSeconds("6.9", network.RUBBER, "rubber", claims.RUBBER, claims.RUBBER_BAND)
+STUDIES = (FOAM, RUBBER)

@@ -1,0 +1,125 @@
+"""Figure 6.14: the neural controller with a small learning rate, minutes later."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import changed
+from palpate.bench.metrics.following import LIMIT
+from palpate.bench.metrics.window import SETTLE, rms
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, spread, texts
+from palpate_thesis.conditions import RELAXING_FOAM
+from palpate_thesis.figures.fig_6_13 import SLOW
+from palpate_thesis.force_control.panels import force_panel, panels
+from palpate_thesis.force_control.tracking import (
+    FOAM,
+    FOLLOWS,
+    Tracking,
+    describe,
+    following,
+    since_contact,
+    slot,
+    tracking,
+)
+from palpate_thesis.look import Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "6.14"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = changed(FOAM, {**SLOW, "run.press": 190.0, "run.duration": 300.0})
+SHOWN, JUDGED = (179.5, 185.5), (180.0, 190.0)
+CYCLE = 5.0
+"""Over which the course of the error is averaged [s]: one interval of each force."""
+OTHERS: Mapping[str, Mapping[str, Any]] = {
+    "foam that relaxes": RELAXING_FOAM,
+    "PI, K_i = 1 per second": {"controller": {"kind": "proportional-integral", "kf": 0.25, "ki": 1.0}},
+}
+
+
+@dataclass(frozen=True)
+class Course:
+    """The error of each cycle outside the steps [N], up to the first loss of contact."""
+
+    error: Array  # (cycles,)
+    lost: float | None  # when [s]
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    shown: Record
+    nominal: list[Tracking]
+    courses: dict[str, list[Course]]
+
+
+def run(runs: Runs) -> Data:
+    """190 s of contact; on the other foam and with the plain integral controller as well."""
+    both = runs.over_seeds(PARAMETERS, lambda record: (tracking(*JUDGED)(record), course_of(record)))
+    courses = {"foam": [course for _, course in both]}
+    seeds = runs.seeds[:2]
+    for name, changes in OTHERS.items():
+        courses[name] = runs.over([(changed(PARAMETERS, changes), seed) for seed in seeds], course_of)
+    return Data(slot(runs.one(PARAMETERS), *SHOWN), [found for found, _ in both], courses)
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """The force has to follow from 180 to 190 s."""
+    first = spread([float(c.error[:2].mean()) for c in data.courses["foam"]], "N")
+    plain = spread([float(c.error[-2:].mean()) for c in data.courses["PI, K_i = 1 per second"]], "N")
+    lost = [c.lost for c in data.courses["foam that relaxes"] if c.lost is not None]
+    late = np.concatenate([c.error[12:] for c in data.courses["foam"]])
+    other = f"loses contact after {np.median(lost):.0f} s" if lost else "keeps contact"
+    return [
+        claim(
+            "neural-slow-rate.later",
+            following(data.nominal),
+            described=describe(data.nominal),
+            first=first,
+            follows=FOLLOWS,
+            plain=plain,
+            share=np.mean(late <= LIMIT),
+            others=other,
+        )
+    ]
+
+
+def plot(data: Data) -> Figure:
+    """Six seconds after three minutes, and the course of the error."""
+    drawing, ((force,), (course,)) = panels([3.2, 2.4])
+    force_panel(force, data.shown)
+    for (name, found), color in zip(data.courses.items(), style.SERIES[:3], strict=True):
+        for i, one in enumerate(found):
+            t = CYCLE * (np.arange(len(one.error)) + 0.5)
+            course.plot(t, one.error, color=color, linewidth=1, alpha=0.7, label=name if i == 0 else None)
+            if one.lost is not None and len(t):
+                course.plot(t[-1], one.error[-1], "x", color=color, markersize=9, markeredgewidth=2)
+    course.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--", label="limit of following")
+    course.set(
+        xlabel="time since contact [s]",
+        ylabel="RMS error outside steps [N]",
+        ylim=(0.0, None),
+        xlim=(0.0, None),
+    )
+    style.legend(course)
+    return drawing
+
+
+def course_of(record: Record) -> Course:
+    """The error of each whole cycle up to the first loss of contact."""
+    t, phase = since_contact(record), record["phase"]
+    gone = np.nonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT))[0]
+    end = float(t[gone[0]]) if len(gone) else float(t[-1]) + 1e-3
+    error = record["force"] - record["force_desired"]
+    settled = (t >= 0.0) & (np.mod(t + 5e-7, 2.5) >= SETTLE)
+    starts = CYCLE * np.arange(int((end + 1e-6) // CYCLE))
+    values = [rms(error[settled & (t >= a) & (t < a + CYCLE)]) for a in starts]
+    return Course(np.array(values), end if len(gone) else None)

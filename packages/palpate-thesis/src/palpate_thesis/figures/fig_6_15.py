@@ -1,0 +1,155 @@
+"""Figure 6.15: position along the surface and angle under the neural controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.bench import changed, load
+from palpate.bench.metrics.window import rms
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.conditions import VARIED_SEEDS, rougher
+from palpate_thesis.force_control.panels import dots_panel, panels
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, since_contact, slot
+from palpate_thesis.look import Axes, Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "6.15"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = changed(load("foam-neural"), {"run.press": 15.0})
+SHOWN, JUDGED = (0.0, 15.0), (10.0, 15.0)
+VISIBLE = (0.5e-3, np.radians(0.2))
+"""From where errors of y [m] and of the angle [rad] are not zero: some hundred times what an encoder resolves."""
+SHARE = 0.25
+"""A cause whose removal takes this share off the error matters."""
+CAUSES: Mapping[str, Mapping[str, Any]] = {
+    "no sticking\nto the foam": {"wall.side_friction": 0.0},
+    "friction\nhalf": rougher(FOAM, 0.5),
+    "friction\ndouble": rougher(FOAM, 2.0),
+    "friction\ncompensated": {"compensation.level": FOAM.friction.coulomb},
+    "rubber": {"surface": RUBBER.surface},
+    "kp 1600\nkv 160": {
+        "controller.kp": 1600.0,
+        "controller.kv": 160.0,
+        "approach.kp": 1600.0,
+        "approach.kv": 160.0,
+    },
+    "hybrid control\nalone": {"controller": {"kind": "hybrid", "kf": 0.25, "ki": 0.0}},
+}
+
+SOURCE = "fig. 6.15, sec. 6.3"
+
+
+@dataclass(frozen=True)
+class Errors:
+    """True errors: at the switch to force control, and RMS over the window in contact, where they may change sign."""
+
+    y_switch: float  # [m]
+    y: float  # [m]
+    phi: float  # [rad]
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    shown: Record
+    varied: dict[str, list[Errors]]  # by cause; the first as chosen
+
+
+def run(runs: Runs) -> Data:
+    """The whole approach and fifteen seconds of contact; then with one cause changed at a time."""
+    varied = {"as\nchosen": runs.over_seeds(PARAMETERS, errors_of)}
+    for name, changes in CAUSES.items():
+        e = changed(PARAMETERS, changes)
+        varied[name] = runs.over([(e, seed) for seed in runs.seeds[:VARIED_SEEDS]], errors_of)
+    return Data(slot(runs.one(PARAMETERS), *SHOWN), varied)
+
+
+def check(data: Data) -> Sequence[Claim]:
+    """Whether the errors are there, and whether the thesis' two reasons are."""
+    return [_not_zero(data), _there_before(data), _sticks(data)]
+
+
+def _not_zero(data: Data) -> Claim:
+    nominal = data.varied["as\nchosen"]
+    y, phi = _y(nominal), [float(np.degrees(e.phi)) for e in nominal]
+    half = np.median(_y(data.varied["friction\nhalf"])) / np.median(y)
+    return claim(
+        "neural-free-directions",
+        often(map(visible, nominal)),
+        y=y,
+        phi=phi,
+        visible_y=1e3 * VISIBLE[0],
+        visible_phi=np.degrees(VISIBLE[1]),
+        gone=1 - half,
+    )
+
+
+def _there_before(data: Data) -> Claim:
+    before = [1e3 * e.y_switch for e in data.varied["as\nchosen"]]
+    return claim(
+        "neural-free-directions.before",
+        often(abs(b) > 1e3 * VISIBLE[0] for b in before),
+        before=before,
+        visible=1e3 * VISIBLE[0],
+    )
+
+
+def _sticks(data: Data) -> Claim:
+    free = _y(data.varied["no sticking\nto the foam"])
+    taken = 1.0 - np.median(free) / np.median(_y(data.varied["as\nchosen"]))
+    return claim("neural-free-directions.sticks", bool(taken >= SHARE), free=free, taken=taken, share=SHARE)
+
+
+def plot(data: Data) -> Figure:
+    """The four signals of the thesis' figure, and the causes."""
+    drawing, ((desired,), (force,), (y,), (phi,), (dots,)) = panels([0.9, 1.3, 1.0, 1.0, 1.7])
+    shown = data.shown
+    t = shown["t"]
+    _signal(desired, t, shown["force_desired"], "(a) desired\nforce [N]", style.INK)
+    _signal(force, t, shown["force_measured"], "(b) measured\nforce [N]", style.MEASURED)
+    force.plot(t, shown["force"], color=style.F, linewidth=1.6, label="true")
+    _signal(y, t, 1e3 * shown["y_measured"], "(c) y error\n[mm]", style.SERIES[0])
+    _signal(phi, t, np.degrees(shown["phi_measured"]), "(d) angle\nerror [degrees]", style.SERIES[0])
+    for axis in (y, phi):
+        axis.axhline(0.0, **style.KNOWN)
+    phi.set_xlabel("time since contact [s]")
+    dots_panel(
+        dots,
+        data.varied,
+        lambda e: 1e3 * e.y,
+        visible,
+        limit=1e3 * VISIBLE[0],
+        label="RMS of y [mm]",
+        title="10 to 15 s after contact, a dot: y and angle are visibly not zero; a cross: not; dashed: visible",
+    )
+    return drawing
+
+
+def _signal(axis: Axes, t: Any, values: Any, label: str, color: str) -> None:
+    axis.plot(t, values, color=color, linewidth=0.8)
+    axis.set(ylabel=label, xlim=SHOWN)
+
+
+def visible(e: Errors) -> bool:
+    """Whether both errors are."""
+    return e.y > VISIBLE[0] and e.phi > VISIBLE[1]
+
+
+def _y(errors: Sequence[Errors]) -> list[float]:
+    return [1e3 * e.y for e in errors]
+
+
+def errors_of(record: Record) -> Errors:
+    """The errors of a run of fifteen seconds of contact."""
+    t = since_contact(record)
+    first = int(np.argmax(t >= 0.0))
+    inside = (t >= JUDGED[0]) & (t < JUDGED[1])
+    y, phi = record["y"], record["phi"]
+    return Errors(float(y[first]), rms(y[inside]), rms(phi[inside]))

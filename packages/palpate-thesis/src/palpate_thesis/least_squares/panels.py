@@ -1,0 +1,105 @@
+"""The six panels in which the thesis shows an identification, two a row, and rows of ours under them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.records import Record
+from palpate.report import style
+from palpate_thesis.least_squares.press_runs import between
+from palpate_thesis.look import Axes, Figure
+
+COLORS = {"plain foam": style.SERIES[0], "relaxing foam": style.SERIES[1], "rubber": style.SERIES[2]}
+PARAMETERS = {"M": ("$M_e$ [kg]", 1.0), "B": ("$B_e$ [N s/m]", 1.0), "K": ("$K_e$ [kN/m]", 1e-3)}
+CALM = 0.03
+"""Seconds after the change-over from which values set the scale of a panel; before, they go anywhere."""
+
+
+def grid(rows: int) -> tuple[Figure, list[Axes]]:
+    """Panels two a row, lettered (a), (b), ... along the rows."""
+    return style.grid((9.0, 2.15 * rows + 0.4), rows, 2)
+
+
+def set_title(axis: Axes, letter: str, text: str) -> None:
+    """A panel's letter and name above it."""
+    axis.set_title(f"({letter}) {text}")
+
+
+def six(axes: list[Axes], presses: Mapping[str, Record], front: str, slot: tuple[float, float]) -> None:
+    """Force, displacement, their ratio; M, B, K of one front-end; a line for each surface.
+
+    The thesis' letters, in its order read down the columns: (a)-(c) left, (d)-(f) right.
+    """
+    left, right = axes[0:6:2], axes[1:6:2]
+    for axis, letter, name in zip(
+        left, "abc", ("Force", "Displacement", "Force / displacement"), strict=True
+    ):
+        set_title(axis, letter, name)
+    for axis, letter, name in zip(right, "def", ("Inertia", "Damping", "Stiffness"), strict=True):
+        set_title(axis, letter, name)
+    for name, press in presses.items():
+        _lines(left, right, press, front, slot, name)
+    left[0].set_ylabel("f [N]")
+    left[1].set_ylabel("x [mm]")
+    left[2].set_ylabel("f/x [kN/m]")
+    for axis, (label, _) in zip(right, PARAMETERS.values(), strict=True):
+        axis.set_ylabel(label)
+    for axis in (*left, *right):
+        axis.set_xlim(*slot)
+    left[2].set_xlabel("time since 5 N [s]")
+    right[2].set_xlabel("time since 5 N [s]")
+    if len(presses) > 1:
+        style.legend(left[0])
+
+
+def _lines(
+    left: list[Axes], right: list[Axes], press: Record, front: str, slot: tuple[float, float], name: str
+) -> None:
+    shown = between(press, *slot)
+    t, color = press["t"][shown], COLORS[name]
+    x = press["displacement"][shown]
+    force = press["force_sampled" if front == "raw" else "force_measured"][shown]
+    far = np.where(np.abs(x) > 2e-5, x, np.nan)
+    left[0].plot(t, force, color=color, linewidth=0.7, label=name)
+    left[1].plot(t, 1e3 * x, color=color, linewidth=1.1)
+    left[2].plot(t, 1e-3 * force / far, color=color, linewidth=0.7)
+    for axis, (key, (_, scale)) in zip(right, PARAMETERS.items(), strict=True):
+        axis.plot(t, scale * press[f"{key}_{front}"][shown], color=color, linewidth=1.1)
+
+
+def calm_limits(axis: Axes, *curves: Array, margin: float = 0.25) -> None:
+    """The panel's scale from curves without their first moments; a press that ended before has none."""
+    seen = [c for c in curves if np.isfinite(c).any()]
+    if not seen:
+        return
+    low = min(float(np.nanmin(c)) for c in seen)
+    high = max(float(np.nanmax(c)) for c in seen)
+    room = margin * max(high - low, 1e-9)
+    axis.set_ylim(low - room, high + room)
+
+
+def calm(press: Record, column: str, stop: float) -> Array:
+    """A column between its first moments and `stop`."""
+    return press[column][between(press, CALM, stop)]
+
+
+def dots(axis: Axes, groups: Mapping[str, Mapping[str, list[float]]], colors: Mapping[str, str]) -> None:
+    """For each named row, the values of each named group as dots on a line."""
+    rows = list(dict.fromkeys(name for group in groups.values() for name in group))
+    for shift, (label, group) in enumerate(groups.items()):
+        offset = 0.22 * (shift - (len(groups) - 1) / 2)
+        for i, name in enumerate(rows):
+            values = group.get(name, [])
+            axis.plot(
+                values,
+                np.full(len(values), i + offset),
+                "o",
+                color=colors[label],
+                markersize=3.5,
+                label=label if i == 0 else None,
+            )
+    axis.set_yticks(range(len(rows)), rows)
+    axis.invert_yaxis()

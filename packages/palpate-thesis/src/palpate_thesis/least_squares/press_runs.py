@@ -1,0 +1,202 @@
+"""Common parts of the least-squares figures: presses, their measures, varied conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array, Mask
+from palpate.bench import Experiment, changed, load
+from palpate.bench.sequence import CONTACT
+from palpate.records import Record
+from palpate_thesis.conditions import move_wall
+from palpate_thesis.laboratory.laboratory import own_damping
+from palpate_thesis.runs import Runs
+
+PRESS = 8.0
+"""Seconds of contact: the first four as in figures 6.1, 6.3 and 6.4, and the slot of 6.2 and 6.5."""
+FIRST = 4.0
+"""Length of the figures' first slot [s]."""
+SLOT = (6.0, 8.0)
+"""Chosen: "some time after" the first slot [s]."""
+
+
+def nearer(experiment: Experiment) -> Experiment:
+    """The same press after a shorter way in the same steps: the way to the surface costs most of a run's time."""
+    wall = experiment.wall.x
+    return changed(
+        experiment,
+        {"approach.hold": 0.5, "robot.start": (wall - 0.005, 0.0, 0.0), "approach.first": wall - 0.001},
+    )
+
+
+PLAIN = nearer(changed(load("foam-rls"), {"run.press": PRESS, "surface.stiffness": 5400.0}))
+"""Foam without memory. Its K is chosen so that f/x comes out at the thesis' 6.8 kN/m."""
+RELAXING = nearer(changed(load("foam-viscoelastic"), {"run.press": PRESS}))
+RUBBER = nearer(changed(load("rubber-rls"), {"run.press": PRESS}))
+FOAMS = {"plain foam": PLAIN, "relaxing foam": RELAXING}
+COLUMNS = (
+    *("t", "force", "force_sampled", "force_measured", "displacement", "x", "x_measured"),
+    *("vx_raw", "ax_raw", "ax_measured", "penetration"),
+    *(f"{key}_{front}" for front in ("thesis", "raw", "matched") for key in "MBK"),
+)
+SWEPT_SEEDS = 3
+
+
+def contact(record: Record) -> Record:
+    """The first press of a run: the columns that least squares deals with, the clock at zero at the change-over."""
+    pressing = record["phase"] == CONTACT
+    start = int(np.argmax(pressing))
+    later = np.flatnonzero(~pressing[start:])
+    rows = slice(start, start + int(later[0]) if len(later) else len(record))
+    columns = {name: record[name][rows] for name in COLUMNS}
+    columns["t"] = columns["t"] - columns["t"][0]
+    return Record(columns, {name: record.units[name] for name in COLUMNS}, record.meta)
+
+
+def between(press: Record, start: float, stop: float) -> Mask:
+    """Which samples of a press lie in a slot of time [s]."""
+    return (press["t"] >= start) & (press["t"] < stop)
+
+
+def at(press: Record, column: str, time: float) -> float:
+    """A column's value `time` seconds after the change-over; not a number where the press was shorter."""
+    i = round(time * 1000)
+    return float(press[column][i]) if i < len(press) else float("nan")
+
+
+def ratio(press: Record, slot: tuple[float, float] = SLOT) -> float:
+    """Mean force over mean displacement in a slot [N/m]: the thesis' "f/x"."""
+    inside = between(press, *slot)
+    if not inside.any():
+        return float("nan")
+    return float(press["force_measured"][inside].mean() / press["displacement"][inside].mean())
+
+
+def settled_after(values: Array, end: float = FIRST, band: float = 0.10, tick: float = 1e-3) -> float:
+    """Time from which values stay within `band` of what they are at `end` [s]."""
+    shown = values[: round(end / tick)]
+    outside = np.flatnonzero(np.abs(shown - shown[-1]) > band * abs(shown[-1]))
+    return (float(outside[-1]) + 1.0) * tick if len(outside) else 0.0
+
+
+def trajectory(phi: Array, y: Array, start: Sequence[float], covariance: Sequence[float]) -> Array:
+    """Estimates of recursive least squares without forgetting after each sample, shape (k, 3).
+
+    Not by recursion but as running batch solutions of (5.5), which for any P(0) it must equal: one run of the bench
+    serves every P(0) and start.
+
+    Args:
+        phi: regressors, shape (k, 3).
+        y: force [N], shape (k,).
+        start: theta(0).
+        covariance: the diagonal of P(0).
+    """
+    scale = np.sqrt((phi**2).sum(axis=0)) + 1e-30
+    unit = phi / scale
+    prior = np.diag(1.0 / (np.asarray(covariance) * scale**2))
+    information = prior + np.cumsum(unit[:, :, None] * unit[:, None, :], axis=0)
+    right = prior @ (np.asarray(start) * scale) + np.cumsum(unit * y[:, None], axis=0)
+    return np.linalg.solve(information, right[:, :, None])[:, :, 0] / scale
+
+
+def thesis_signals(press: Record) -> tuple[Array, Array]:
+    """Regressor (a, v, x) and force as the thesis' own estimator sees them."""
+    phi = np.column_stack([press["ax_measured"], press["vx_raw"], press["displacement"]])
+    return phi, press["force_measured"]
+
+
+def rubbing(experiment: Experiment, factor: float) -> Experiment:
+    """Coulomb and static friction of all joints times a factor."""
+    friction = experiment.friction
+    return changed(
+        experiment,
+        {
+            "friction.coulomb": tuple(factor * v for v in friction.coulomb),
+            "friction.static": tuple(factor * v for v in friction.static),
+        },
+    )
+
+
+def conditions(experiment: Experiment) -> dict[str, Experiment]:
+    """Variations of one unstated parameter at a time: friction, pose, the surface's B and M."""
+    surface = experiment.surface
+    return {
+        "friction halved": rubbing(experiment, 0.5),
+        "friction doubled": rubbing(experiment, 2.0),
+        "wall at 0.40 m": changed(experiment, move_wall(experiment, 0.40)),
+        "wall at 0.49 m": changed(experiment, move_wall(experiment, 0.49)),
+        "B halved": changed(experiment, {"surface.damping": 0.5 * surface.damping}),
+        "B doubled": changed(experiment, {"surface.damping": 2.0 * surface.damping}),
+        "M = 0": changed(experiment, {"surface.mass": 0.0}),
+        "M = 0.5 kg": changed(experiment, {"surface.mass": 0.5}),
+    }
+
+
+@dataclass(frozen=True)
+class Found:
+    """Results of one press."""
+
+    ratio: float  # f/x in the later slot [N/m]
+    M: float  # estimates at the end of the later slot
+    B: float
+    K: float
+    M_raw: float
+    B_raw: float
+    K_raw: float
+    settled_M: float  # [s]
+    settled_B: float
+    settled_K: float
+    early_apart: float  # K at 4 s against f/x of the second before it, as a share
+    true_B: float  # of the surface; of one that relaxes, its dashpot's, of one that stiffens, that at 20 N [N s/m]
+
+    @property
+    def apart(self) -> float:
+        """K against f/x, as a share of f/x."""
+        return self.K / self.ratio - 1.0
+
+    @property
+    def apart_raw(self) -> float:
+        """The same of K from raw signals."""
+        return self.K_raw / self.ratio - 1.0
+
+
+def numbers_of(record: Record) -> Found:
+    """The numbers of one run."""
+    press = contact(record)
+    end = SLOT[1] - 0.002
+    values = {name: at(press, f"{name}_thesis", end) for name in "MBK"}
+    raw = {f"{name}_raw": at(press, f"{name}_raw", end) for name in "MBK"}
+    settled = {f"settled_{name}": settled_after(press[f"{name}_thesis"]) for name in "MBK"}
+    damping = own_damping(record.meta["experiment"]["surface"])
+    early = at(press, "K_thesis", FIRST) / ratio(press, (FIRST - 1.0, FIRST)) - 1.0
+    return Found(ratio(press), **values, **raw, **settled, early_apart=early, true_B=damping)
+
+
+def sweep(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[Found]]:
+    """Results of the presses of each experiment, over the first few seeds."""
+    seeds = list(runs.seeds)[:SWEPT_SEEDS]
+    cases = [(e, seed) for e in experiments.values() for seed in seeds]
+    answers = iter(runs.over(cases, numbers_of))
+    return {name: [next(answers) for _ in seeds] for name in experiments}
+
+
+def median(values: Sequence[float]) -> float:
+    """The middle one, without those that have no value."""
+    return float(np.nanmedian(np.asarray(values, dtype=float)))
+
+
+def failing(answers: Mapping[str, Sequence[Found]], holds: Callable[[Found], bool]) -> list[str]:
+    """The names of the varied conditions under which a claim does not hold for most of the seeds."""
+    return [name for name, some in answers.items() if 2 * sum(map(holds, some)) <= len(some)]
+
+
+def where_it_fails(fails: Sequence[str], among: int) -> str:
+    """In words, where a claim stops holding."""
+    if not fails:
+        return f"It holds under all {among} varied conditions (friction, pose, the surface's M and B)."
+    if len(fails) == among:
+        return f"It holds under none of the {among} varied conditions."
+    return f"Of {among} varied conditions it does not hold with: {', '.join(fails)}."

@@ -1,0 +1,153 @@
+"""Measures the thesis, study by study; each result is on disk at once, and an interrupted run resumes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from palpate._jit import sources_stamp
+from palpate.errors import InputError
+from palpate.files import check_place, kept_folder, signed, write_json, write_text
+from palpate.report import style
+from palpate.report.figure_panels.panels import panels_of
+from palpate_thesis import look
+from palpate_thesis.claims import Claim, Done, rows_of
+from palpate_thesis.figure import Study
+from palpate_thesis.laboratory.laboratory import values
+from palpate_thesis.page import index_page
+from palpate_thesis.runs import Runs
+
+STATE = "thesis.json"
+PANELS = ".panels.json"
+
+
+@dataclass(frozen=True)
+class Written:
+    """How a measurement is written.
+
+    Args:
+        command: that makes it again, for its page.
+        endings: of the figures' files; the page shows a PNG where a figure has no panels of its own.
+        dpi: of a PNG; the usual one if None.
+    """
+
+    command: str
+    endings: tuple[str, ...] = (".png",)
+    dpi: int | None = None
+
+
+@dataclass
+class State:
+    """Content of the folder, with its sources and seeds."""
+
+    stamp: str
+    wanted: list[str]
+    command: str
+    done: dict[str, Done] = field(default_factory=dict)
+
+
+def measure(
+    studies: Sequence[Study],
+    runs: Runs,
+    folder: Path,
+    *,
+    written: Written,
+    replace: bool = False,
+    started: Callable[[Study], None] = lambda _: None,
+    resumed: Callable[[int], None] = lambda _: None,
+) -> list[Done]:
+    """Runs the studies and writes claims.json, index.html and each figure into the folder, after each study.
+
+    A figure is written as a picture, and as the panels that the page draws (`NUMBER.panels.json`).
+
+    A folder that holds an unfinished measurement of the same sources, studies and seeds is gone on with; `resumed` is
+    told how many studies are done.
+
+    Raises:
+        InputError: the folder holds anything else, and `replace` is off; another process is writing there.
+    """
+    with kept_folder(folder, STATE, replace=replace):
+        state = _state(studies, runs, folder, written.command)
+        _write_state(state, folder)  # from now on the folder is known for what it is
+        if state.done:
+            resumed(len(state.done))
+        for study in studies:
+            if study.NUMBER not in state.done:
+                started(study)
+                state.done[study.NUMBER] = _measure_study(study, runs, folder, written)
+                _write(state, folder)
+    return [state.done[number] for number in state.wanted]
+
+
+def _measure_study(study: Study, runs: Runs, folder: Path, written: Written) -> Done:
+    begun = time.perf_counter()
+    data = study.run(runs)
+    claims = [_with_note(claim, runs) for claim in study.check(data)]
+    with look.apply_look():
+        drawing = study.plot(data)
+        for ending in dict.fromkeys((".png", *written.endings)):
+            style.save(drawing, folder / f"{study.NUMBER}{ending}", written.dpi)
+        write_json(folder / f"{study.NUMBER}{PANELS}", signed({"panels": panels_of(drawing)}))
+    return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
+
+
+def _with_note(claim: Claim, runs: Runs) -> Claim:
+    """A claim with a note that is true of the laboratory: those of the figures speak of the hand-chosen bench."""
+    if runs.laboratory.chosen:
+        return claim
+    told = ", ".join(f"{name} {value:.3g}" for name, value in values(runs.laboratory).items())
+    note = f"In this laboratory: {told}. The reason on the hand-chosen bench is in that measurement."
+    return replace(claim, note=note)
+
+
+def _state(studies: Sequence[Study], runs: Runs, folder: Path, command: str) -> State:
+    wanted = [s.NUMBER for s in studies]
+    sources = sources_stamp(*sorted(Path(__file__).parent.rglob("*.py")))
+    stamp = f"{sources} seeds {list(runs.seeds)}"
+    if not runs.laboratory.chosen:
+        stamp += f" laboratory {values(runs.laboratory)}"
+    if not (folder / STATE).exists():
+        return State(stamp, wanted, command)
+    old = _read_state(folder)
+    if old is None:
+        raise InputError(f"{folder / STATE} is no measurement of the thesis; choose another --out")
+    if old.stamp != stamp or old.wanted != wanted or len(old.done) == len(wanted):
+        raise InputError(
+            f"{folder} holds a measurement already; choose another --out, or add --replace to replace it"
+        )
+    return old
+
+
+def _read_state(folder: Path) -> State | None:
+    check_place(folder / STATE)
+    try:
+        return msgspec.json.decode((folder / STATE).read_bytes(), type=State)
+    except (OSError, msgspec.DecodeError):
+        return None
+
+
+def _write(state: State, folder: Path) -> None:
+    """Everything that the folder says, each file whole or as it was."""
+    finished = [state.done[n] for n in state.wanted if n in state.done]
+    write_json(folder / "claims.json", [asdict(row) for row in rows_of(finished)])
+    panels = {done.number: _panels(folder / f"{done.number}{PANELS}") for done in finished}
+    missing = [number for number in state.wanted if number not in state.done]
+    write_text(folder / "index.html", index_page(finished, panels, missing, state.command))
+    _write_state(state, folder)
+
+
+def _panels(path: Path) -> list[dict[str, Any]]:
+    """As an earlier measurement left them; none where they are spoiled, and the page names the picture."""
+    try:
+        return list(msgspec.json.decode(path.read_bytes(), type=dict[str, Any])["panels"])
+    except (OSError, msgspec.DecodeError, KeyError, TypeError):
+        return []
+
+
+def _write_state(state: State, folder: Path) -> None:
+    write_json(folder / STATE, signed(asdict(state)))

@@ -1,0 +1,215 @@
+"""Claims of the thesis about its neural identifier, part by part, each with its threshold and its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.identifiers.neural_settings import SETTINGS
+from palpate_thesis.claims import ENOUGH, Claim, claim, spread
+from palpate_thesis.neural_identifier.network import GONE, Answer, Choice
+
+TIME = (0.3, 0.9)
+"""Limits of "about 0.6 s": half of it more or less [s]."""
+SMALL = 1.0
+"""Upper limit of a small mass [kg]."""
+FOAM_BAND, RUBBER_BAND = 0.06, 0.15
+"""How far K may be from f/x, as a share of it: "almost same" is said of less than 6 % in sec. 6.1; on rubber the
+thesis' own are 10 % apart."""
+
+
+@dataclass(frozen=True)
+class Grounds:
+    """Data of a claim's verdict and note.
+
+    Args:
+        surface: "foam" or "rubber".
+        nominal: every start on the press of every noise seed.
+        swept: variations of the network's unstated parameters.
+        varied: friction, pose, surface.
+        perfect: what K would come out as, over f/x, if the network knew the surface without error.
+        starts: how many there are for each noise seed in `nominal`, in order.
+    """
+
+    surface: str
+    nominal: Sequence[Answer]
+    swept: Mapping[Choice, Sequence[Answer]]
+    varied: Mapping[str, Sequence[Answer]]
+    perfect: float
+    starts: int
+
+
+@dataclass(frozen=True)
+class Part:
+    """One statement about one coefficient, or about the error: its number in one run, and whether it is true there."""
+
+    suffix: str
+    value: Callable[[Answer], float]
+    unit: str
+    holds: Callable[[Answer], bool]
+
+
+def _time(suffix: str, value: Callable[[Answer], float]) -> Part:
+    return Part(suffix, value, "s", lambda a: TIME[0] <= value(a) <= TIME[1])
+
+
+TIMES = (
+    _time("time-K", lambda a: a.settled_K),
+    _time("time-B", lambda a: a.settled_B),
+    _time("time-M", lambda a: a.settled_M),
+)
+MASS = Part("M", lambda a: a.M, "kg", lambda a: 0.0 < a.M < SMALL)
+ERROR = _time("error", lambda a: a.error_gone)
+
+
+def _parts(band: float, similar: Callable[[Answer], bool]) -> tuple[Part, ...]:
+    stiffness = Part("K", lambda a: a.over, "times f/x", lambda a: abs(a.over - 1.0) <= band)
+    damping = Part("B", lambda a: a.B / a.squares_B, "times that of least squares", similar)
+    return (*TIMES, stiffness, damping, MASS)
+
+
+FOAM = _parts(FOAM_BAND, lambda a: 2 / 3 <= a.B / a.squares_B <= 1.5)
+RUBBER = _parts(RUBBER_BAND, lambda a: 0.0 < a.B < a.squares_B)
+
+
+def claims(grounds: Grounds, parts: Sequence[Part]) -> list[Claim]:
+    """A row for each part."""
+    return [_claim(grounds, part, parts) for part in parts]
+
+
+def _claim(grounds: Grounds, part: Part, parts: Sequence[Part]) -> Claim:
+    values = [part.value(a) for a in grounds.nominal]
+    numbers = {"K": _stiffness, "B": _damping, "M": _mass, "error": _error}.get(part.suffix, _times)
+    return claim(
+        f"network-{grounds.surface}.{part.suffix}",
+        enough(grounds.nominal, part),
+        values=describe_spread(values, part.unit, grounds.starts),
+        good=sum(map(part.holds, grounds.nominal)),
+        runs=len(values),
+        key=part.suffix[-1],
+        first=TIME[0],
+        last=TIME[1],
+        where=where(grounds, part),
+        under=under(grounds, part),
+        jointly=_jointly(grounds, parts),
+        **numbers(grounds, values),
+    )
+
+
+def _times(grounds: Grounds, values: Sequence[float]) -> dict[str, Any]:
+    gone = float(np.median([a.error_gone for a in grounds.nominal]))
+    early, late = sum(t < TIME[0] for t in values), sum(t > TIME[1] for t in values)
+    return {"amplitude": Choice().amplitude, "gone": gone, "early": early, "late": late}
+
+
+def _stiffness(grounds: Grounds, _: Sequence[float]) -> dict[str, Any]:
+    fixed = [float(np.median([a.over for a in s])) for c, s in grounds.swept.items() if not c.thresholds]
+    laws = [
+        f"{np.median([a.over for a in grounds.varied[law]]):.2f} on a {law} one"
+        for law in ("stiffening", "relaxing")
+        if law in grounds.varied
+    ]
+    return {
+        "stiffness": 1e-3 * np.median([a.K for a in grounds.nominal]),
+        "ratio": 1e-3 * np.median([a.ratio for a in grounds.nominal]),
+        "perfect": grounds.perfect,
+        "probe": 1e3 * SETTINGS[grounds.surface].values[0],
+        "at_zero": float(np.median([a.at_zero for a in grounds.nominal])),
+        "least": min(fixed),
+        "largest": max(fixed),
+        "laws": f"The median is {' and '.join(laws)}. " if laws else "",
+    }
+
+
+def _damping(grounds: Grounds, _: Sequence[float]) -> dict[str, Any]:
+    values = [a.B for a in grounds.nominal]
+    return {"least": min(values), "largest": max(values), "by_start": _by_start(values, grounds)}
+
+
+def _mass(grounds: Grounds, values: Sequence[float]) -> dict[str, Any]:
+    by_start = np.reshape(values, (-1, grounds.starts))
+    return {
+        "positive": int(np.sum(by_start > 0)),
+        "firm": int(np.sum(np.all(by_start > 0, axis=0) | np.all(by_start < 0, axis=0))),
+        "starts": grounds.starts,
+        "by_start": _by_start(values, grounds),
+        "small": SMALL,
+    }
+
+
+def _error(grounds: Grounds, _: Sequence[float]) -> dict[str, Any]:
+    times = {c.amplitude: some for c, some in grounds.swept.items() if c == Choice(c.amplitude)}
+    parts = (f"{np.median([x.error_gone for x in s]):.2g} s at {a:g} N" for a, s in times.items())
+    return {"limit": GONE, "amplitudes": ", ".join(parts)}
+
+
+def _by_start(values: Sequence[float], grounds: Grounds) -> str:
+    part = share_of_starts(values, grounds.starts)
+    return f"Initial weights make {'over 99%' if part > 0.99 else f'{part:.0%}'} of its variance, noise the rest."
+
+
+def share_of_starts(values: Sequence[float] | Array, starts: int) -> float:
+    """Share of the variance that lies between starts; the rest lies between noise seeds of one start."""
+    by_start = np.reshape(np.asarray(values, dtype=float), (-1, starts))
+    total = float(np.var(by_start))
+    return float(np.var(by_start.mean(axis=0))) / total if total > 0.0 else 0.0
+
+
+def describe_spread(values: Sequence[float], unit: str, starts: int) -> str:
+    """Median and range over noise seeds and starts."""
+    return spread(values, unit).replace(
+        f"{len(values)} seeds", f"{len(values) // starts} seeds x {starts} starts"
+    )
+
+
+def enough(answers: Sequence[Answer], part: Part) -> bool:
+    """Whether a claim holds in enough of the runs."""
+    return share(answers, part) >= ENOUGH
+
+
+def share(answers: Sequence[Answer], part: Part) -> float:
+    """Share of the runs in which a claim holds."""
+    return sum(map(part.holds, answers)) / len(answers)
+
+
+def where(grounds: Grounds, part: Part) -> str:
+    """A sentence: over which part of the sweep a claim holds."""
+    good = [choice for choice, some in grounds.swept.items() if enough(some, part)]
+    among = f"{len(grounds.swept)} combinations of output amplitude, initial weights and thresholds"
+    if not good:
+        return f"It holds for none of {among}."
+    kinds = {True: "thresholds that learn", False: "thresholds fixed at zero"}
+    regions = [
+        f"{name}: {_region([c for c in good if c.thresholds is kind])}" for kind, name in kinds.items()
+    ]
+    return f"Of {among} it holds for {len(good)} ({'; '.join(regions)})."
+
+
+def _region(good: Sequence[Choice]) -> str:
+    by_amplitude: dict[float, list[str]] = {}
+    for choice in good:
+        by_amplitude.setdefault(choice.amplitude, []).append(f"{choice.weights:g}")
+    return ", ".join(f"{a:g} N with weights to {'/'.join(w)}" for a, w in by_amplitude.items()) or "none"
+
+
+def under(grounds: Grounds, part: Part) -> str:
+    """A sentence: under which varied conditions the networks as chosen agree with the claim."""
+    good = [name for name, some in grounds.varied.items() if enough(some, part)]
+    bad = [name for name in grounds.varied if name not in good]
+    if not bad:
+        return "As chosen, it holds under every varied condition too (friction, pose, surface)."
+    if not good:
+        return f"As chosen, it holds under none of {len(bad)} varied conditions (friction, pose, surface)."
+    return f"As chosen, of the varied conditions it holds with {', '.join(good)}; not with {', '.join(bad)}."
+
+
+def _jointly(grounds: Grounds, parts: Sequence[Part]) -> str:
+    """A sentence: whether any one network satisfies all parts."""
+    most = max(sum(enough(some, p) for p in parts) for some in grounds.swept.values())
+    if most == len(parts):
+        return f"Some combination shows all {most} parts of the claim at once."
+    return f"No combination shows more than {most} of the {len(parts)} parts of the claim at once."

@@ -1,0 +1,248 @@
+"""Common parts of the neural-identifier figures: presses, the networks that learn from them, their answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import Experiment, changed, load
+from palpate.identifiers.neural_probe import NeuralProbe
+from palpate.identifiers.neural_settings import SETTINGS
+from palpate.records import Record
+from palpate_thesis.least_squares import press_runs
+from palpate_thesis.runs import Runs
+
+PRESS = 4.0
+"""Seconds of contact that the figures show [s]."""
+LATE = 0.5
+"""Seconds at the end over which answers, force and displacement are averaged [s]."""
+FOAM = press_runs.nearer(changed(load("foam-rls"), {"run.press": PRESS, "surface.stiffness": 5450.0}))
+"""Its K is chosen so that f/x comes out near the thesis' 6.7 kN/m."""
+RUBBER = press_runs.nearer(changed(load("rubber-rls"), {"run.press": PRESS, "surface.stiffness": 49200.0}))
+"""A rubber of its own: f/x is 62 kN/m in this run of the thesis and 44 in the one for least squares."""
+RELAXING = press_runs.nearer(changed(load("foam-viscoelastic"), {"run.press": PRESS}))
+STIFFENING = {
+    "foam": {"kind": "hunt-crossley", "stiffness": 5.6e5, "damping": 1e7, "exponent": 2.0, "mass": 0.1},
+    "rubber": {"kind": "hunt-crossley", "stiffness": 4.8e7, "damping": 1.9e9, "exponent": 2.0, "mass": 0.05},
+}
+"""Surfaces whose force grows with the square of the depth: from 5 to 20 N over the same way as the linear ones."""
+
+STARTS = tuple(range(10))
+"""Seeds of the weights at the start; all are tried on the press of every noise seed."""
+VARIED_NOISE, VARIED_STARTS = 2, 10
+"""Noise seeds and starts for each varied condition."""
+MEAN_OVER = 0.05
+"""Length of the running mean under which an error is looked at: what is left is no noise [s]."""
+GONE = 1.0
+"""An error of the output is almost zero within this [N]: 5 % of the desired force."""
+TICK = 1e-3
+
+
+@dataclass(frozen=True)
+class Press:
+    """One contact, as the thesis' identifiers are given it.
+
+    Args:
+        surface: whose scales and probe the thesis gives: "foam" or "rubber".
+        inputs: displacement [m], velocity [m/s], acceleration [m/s^2], shape (n, 3), one a millisecond.
+        force: filtered [N], shape (n,).
+        ratio: f/x at the end [N/m].
+        squares: M, B, K of recursive least squares, shape (n, 3).
+    """
+
+    surface: str
+    inputs: Array
+    force: Array
+    ratio: float
+    squares: Array
+
+    @property
+    def rest(self) -> float:
+        """Mean displacement at the end [m]."""
+        return float(self.inputs[-round(LATE / TICK) :, 0].mean())
+
+
+def press_of(record: Record, surface: str) -> Press:
+    """The first contact of a run."""
+    first = press_runs.contact(record)
+    inputs = np.column_stack([first[c] for c in ("displacement", "vx_raw", "ax_measured")])
+    late = round(LATE / TICK)
+    ratio = first["force_measured"][-late:].mean() / first["displacement"][-late:].mean()
+    squares = np.column_stack([first[f"{key}_thesis"] for key in "MBK"])
+    return Press(surface, inputs, first["force_measured"], float(ratio), squares)
+
+
+def cut(press: Press, seconds: float) -> Press:
+    """The first seconds of a press; f/x is that of its own end."""
+    n, late = round(seconds / TICK), round(LATE / TICK)
+    inputs, force = press.inputs[:n], press.force[:n]
+    ratio = float(force[-late:].mean() / inputs[-late:, 0].mean())
+    return Press(press.surface, inputs, force, ratio, press.squares[:n])
+
+
+def presses(
+    runs: Runs, experiment: Experiment, surface: str, seeds: Sequence[int] | None = None
+) -> list[Press]:
+    """One press a noise seed."""
+    cases = [(experiment, seed) for seed in (runs.seeds if seeds is None else seeds)]
+    return runs.over(cases, lambda record: press_of(record, surface))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Unstated parameters of the thesis' network, and its stated learning rate (1e-4).
+
+    As chosen here: an output of up to twice the desired force, weights from -0.5 to 0.5, thresholds that learn (which
+    sec. 5.2 does say).
+    """
+
+    amplitude: float = 40.0
+    weights: float = 0.5
+    thresholds: bool = True
+    rate: float = 1e-4
+    scale: tuple[float, float, float] | None = None  # the thesis' own where None
+
+    def probe(self, surface: str, start: int) -> NeuralProbe:
+        """The 3-4-1 network before it has learned anything."""
+        setting = SETTINGS[surface] if self.scale is None else SETTINGS[surface]._replace(scale=self.scale)
+        weights, thresholds = self.weights, self.thresholds
+        return NeuralProbe(
+            setting, self.amplitude, self.rate, seed=start, weights=weights, thresholds=thresholds
+        )
+
+
+def network_of(runs: Runs) -> Choice:
+    """The network of the runs' laboratory."""
+    return Choice(runs.laboratory.amplitude, runs.laboratory.weights)
+
+
+def starts(runs: Runs) -> tuple[int, ...]:
+    """The seeds of the weights that its claims are looked at over: all, or the laboratory's own."""
+    return STARTS if runs.laboratory.start is None else (int(runs.laboratory.start),)
+
+
+AMPLITUDES = (22.0, 25.0, 30.0, 40.0, 60.0, 100.0, 200.0)
+WEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0)
+SWEEP = [Choice(a, w, t) for t, a, w in product((True, False), AMPLITUDES, WEIGHTS)]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer of one network after one press: averages over the last half second."""
+
+    K: float
+    B: float
+    M: float
+    ratio: float  # f/x of the press [N/m]
+    squares_B: float  # least squares' B of the same press [N s/m]
+    settled_K: float  # from when on within 10 % of the value at 4 s [s]
+    settled_B: float
+    settled_M: float
+    error_gone: float  # from when on the mean error of the output is within GONE [s]; infinite: never
+    at_zero: float  # what the network says where nothing is pressed and nothing moves [N]
+    tangent: float  # slope of its force at the displacement that it rests at [N/m]
+    outside: bool  # whether the probe was warned of
+
+    @property
+    def over(self) -> float:
+        """K as a multiple of f/x."""
+        return self.K / self.ratio
+
+
+def answer(press: Press, choice: Choice, start: int) -> Answer:
+    """Lets one network learn from one press."""
+    probe, answers = learn(press, choice, start)
+    K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
+    settled_K, settled_B, settled_M = (
+        press_runs.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T
+    )
+    asked = probe.probe()
+    return Answer(
+        K,
+        B,
+        M,
+        press.ratio,
+        float(press.squares[-1, 1]),
+        settled_K,
+        settled_B,
+        settled_M,
+        error_gone(answers[:, 3]),
+        asked.force_at_zero,
+        tangent(probe, press.rest),
+        bool(asked.warnings),
+    )
+
+
+def tangent(probe: NeuralProbe, x: float) -> float:
+    """Slope of the network's force over displacement at x, by central difference [N/m]."""
+    d = 0.02 * x
+    return (probe.force((x + d, 0.0, 0.0)) - probe.force((x - d, 0.0, 0.0))) / (2.0 * d)
+
+
+def learn(press: Press, choice: Choice, start: int) -> tuple[NeuralProbe, Array]:
+    """The network after the press, and K, B, M and the output's error along it, shape (n, 4)."""
+    probe = choice.probe(press.surface, start)
+    return probe, probe.trajectory(press.inputs, press.force)
+
+
+def error_gone(error: Array) -> float:
+    """From when on the running mean of an error stays within `GONE` [s]; infinite if it does not at the end."""
+    n = round(MEAN_OVER / TICK)
+    sums = np.cumsum(np.concatenate([np.zeros(n), error]))
+    count = np.minimum(np.arange(1, len(error) + 1), n)
+    large = np.flatnonzero(~(np.abs((sums[n:] - sums[:-n]) / count) <= GONE))
+    if not len(large):
+        return 0.0
+    return float("inf") if large[-1] == len(error) - 1 else float((large[-1] + 1) * TICK)
+
+
+def answers(
+    runs: Runs, some: Sequence[Press], choice: Choice, from_: Sequence[int] | None = None
+) -> list[Answer]:
+    """Every start on every press."""
+    cases = [(press, choice, start) for press in some for start in (starts(runs) if from_ is None else from_)]
+    return runs.map(lambda case: answer(*case), cases)
+
+
+def sweep(
+    runs: Runs, some: Sequence[Press], choices: Sequence[Choice] = tuple(SWEEP)
+) -> dict[Choice, list[Answer]]:
+    """For each choice as many answers as there are presses, each of them with a start of its own if there are many."""
+    own = starts(runs)
+    cases = [
+        (press, choice, i if len(own) > 1 else own[0]) for choice in choices for i, press in enumerate(some)
+    ]
+    found = iter(runs.map(lambda case: answer(*case), cases))
+    return {choice: [next(found) for _ in some] for choice in choices}
+
+
+def conditions(experiment: Experiment) -> dict[str, Experiment]:
+    """Variations of one other unstated parameter at a time: friction, pose, and the surface's B, M and law."""
+    cases = dict(press_runs.conditions(experiment))
+    cases["stiffening"] = changed(experiment, {"surface": STIFFENING[_kind(experiment)]})
+    if _kind(experiment) == "foam":
+        cases["relaxing"] = RELAXING
+    return cases
+
+
+def _kind(experiment: Experiment) -> str:
+    return "foam" if experiment.surface == FOAM.surface else "rubber"
+
+
+def answers_under_conditions(runs: Runs, experiment: Experiment, surface: str) -> dict[str, list[Answer]]:
+    """Answers of networks as chosen under each condition."""
+    some = varied_presses(runs, experiment, surface)
+    own = starts(runs)[:VARIED_STARTS]
+    return {name: answers(runs, few, network_of(runs), own) for name, few in some.items()}
+
+
+def varied_presses(runs: Runs, experiment: Experiment, surface: str) -> Mapping[str, list[Press]]:
+    """The presses of each condition, for a few noise seeds."""
+    seeds = list(runs.seeds)[:VARIED_NOISE]
+    cases = conditions(experiment)
+    made = iter(runs.over([(e, s) for e in cases.values() for s in seeds], lambda r: press_of(r, surface)))
+    return {name: [next(made) for _ in seeds] for name in cases}

@@ -1,0 +1,69 @@
+"""Many runs of an experiment: over seeds, over parameters, on all cores."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from palpate.bench import Experiment, build
+from palpate.bench.ending import INTERRUPTED
+from palpate.bench.speed import cores
+from palpate.records import Record
+from palpate_thesis.laboratory.laboratory import CHOSEN, Laboratory
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs experiments on the bench. Compiled loops release the interpreter, so threads fill the cores.
+
+    Args:
+        seeds: every measured claim is looked at over all of them; at least ten.
+        waiting: called when a loop has to be compiled first.
+        laboratory: in which every experiment is run.
+    """
+
+    seeds: Sequence[int] = tuple(range(10))
+    waiting: Callable[[], None] | None = None
+    laboratory: Laboratory = CHOSEN
+    _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
+
+    def one(self, experiment: Experiment, seed: int | None = None) -> Record:
+        """The record of one run, for a figure; of the first seed unless another is given."""
+        number = self.seeds[0] if seed is None else seed
+        run = experiment.run
+        record = build(self.laboratory.of(experiment)).run(
+            run.duration, number, press=run.press, waiting=self.waiting, progress=self._look
+        )
+        if record.meta["end"] == INTERRUPTED:  # a part of a run would be measured as if it were all of it
+            raise KeyboardInterrupt
+        return record
+
+    def over_seeds(self, experiment: Experiment, measure: Callable[[Record], T]) -> list[T]:
+        """`measure` of each seed's record; the records themselves are not kept (some 12 MB each)."""
+        return self.over([(experiment, seed) for seed in self.seeds], measure)
+
+    def over(self, cases: Iterable[tuple[Experiment, int]], measure: Callable[[Record], T]) -> list[T]:
+        """`measure` of the record of each case, an experiment and a seed, in their order."""
+
+        def work(case: tuple[Experiment, int]) -> T:
+            return measure(self.one(*case))
+
+        return self.map(work, list(cases))
+
+    def map(self, work: Callable[[Any], T], items: Sequence[Any]) -> list[T]:
+        """`work` of each item, in their order, on all cores."""
+        with ThreadPoolExecutor(cores()) as pool:
+            try:
+                return list(pool.map(work, items))
+            except BaseException:
+                self._stopped.set()  # the other threads' runs end at their next look
+                raise
+
+    def _look(self, _: float, __: str) -> None:
+        if self._stopped.is_set():
+            raise KeyboardInterrupt

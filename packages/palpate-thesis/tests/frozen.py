@@ -1,0 +1,87 @@
+"""Every claim's verdict and numbers as they were last measured, and what has changed since.
+
+`make claims` takes a whole measurement of `palpate thesis` into runs/claims, and
+`python packages/palpate-thesis/tests/frozen.py runs/claims` compares and keeps it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from palpate_thesis.claims import Claim
+from palpate_thesis.measure import STATE
+
+FILE = Path(__file__).with_name("claims.json")
+NUMBER = r"[-±]?\d+(?:\.\d+)?(?:e[-+]\d+)?"
+SPREAD = re.compile(
+    rf"(?P<middle>{NUMBER})(?P<unit>[^()\d]*) \((?P<low>{NUMBER}) to (?P<high>{NUMBER}), (?P<of>\d+ seeds[^)]*)\)"
+)
+
+
+class Spread(NamedTuple):
+    """Median and range over the seeds, as `palpate_thesis.claims.spread` writes them."""
+
+    middle: str
+    low: str
+    high: str
+
+    def holds(self, other: Spread) -> bool:
+        """Whether the other's median lies in this range; rounding, which keeps the order, makes no difference."""
+        return value(self.low) <= value(other.middle) <= value(self.high)
+
+
+def value(number: str) -> float:
+    return float(number.lstrip("±"))
+
+
+def parts(measured: str) -> tuple[str, list[Spread]]:
+    """The sentence without its spreads, and these."""
+    spreads = [Spread(found["middle"], found["low"], found["high"]) for found in SPREAD.finditer(measured)]
+    return SPREAD.sub(r"<\g<unit>, \g<of>>", measured), spreads
+
+
+def told(claim: Claim) -> str:
+    """What became of a claim, in one line."""
+    return f"{claim.verdict}: {claim.measured}"
+
+
+def differences(before: Mapping[str, str], claims: Sequence[Claim]) -> Iterator[str]:
+    """A line for each claim of a study that is not what it was.
+
+    A number with a range over the seeds may move within it: each median lies in the other's range. Verdicts, words and
+    numbers that stand without a range are as they were: they do not depend on the processor (with and without fused
+    multiplication and vectors, every digit is the same).
+    """
+    now = {claim.id: told(claim) for claim in claims}
+    for name in sorted(before.keys() ^ now.keys()):
+        yield f"{name}: {'new' if name in now else 'gone'}"
+    for name in sorted(before.keys() & now.keys()):
+        (words, old), (new_words, new) = parts(before[name]), parts(now[name])
+        if words != new_words or not all(a.holds(b) and b.holds(a) for a, b in zip(old, new, strict=True)):
+            yield f"{name} was {before[name]!r}, and is {now[name]!r}"
+
+
+def kept() -> dict[str, dict[str, str]]:
+    """By study and claim, what became of it."""
+    return json.loads(FILE.read_text("utf-8"))
+
+
+def main(folder: str) -> None:
+    """Keep a measurement, and say what is not what it was."""
+    done = json.loads((Path(folder) / STATE).read_text("utf-8"))["done"]
+    studies = {number: [Claim(**claim) for claim in one["claims"]] for number, one in done.items()}
+    before = kept()
+    for number, claims in studies.items():
+        for line in differences(before.get(number, {}), claims):
+            sys.stdout.write(f"{line}\n")
+    new = {number: {claim.id: told(claim) for claim in claims} for number, claims in studies.items()}
+    FILE.write_text(json.dumps(new, indent=1, ensure_ascii=False) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,63 @@
+"""The thesis measured again, claim by claim, against the measurement that is kept: `make claims` takes a new one."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from frozen import differences, kept, told
+from palpate.report import style
+from palpate_thesis.claims import Claim, spread
+from palpate_thesis.figure import studies, study
+from palpate_thesis.runs import Runs
+
+FROZEN = kept()
+QUICK = ("3.7",)
+ONE = Claim(
+    "a.K",
+    "here",
+    "it holds",
+    "1",
+    f"1 foam {spread([4.0, 5.0, 6.0], 'N')}; 3 of 3",
+    "any",
+    "reproduced",
+    "why",
+)
+
+
+def changes(measured=ONE.measured, verdict="reproduced"):
+    return list(differences({ONE.id: told(ONE)}, [replace(ONE, measured=measured, verdict=verdict)]))
+
+
+def test_every_study_is_kept():
+    assert list(FROZEN) == [one.NUMBER for one in studies()]
+
+
+def test_a_median_may_move_within_the_range_and_nothing_else_may():
+    moved = spread([4.1, 5.9, 6.5], "N")
+    assert changes() == changes(f"1 foam {moved}; 3 of 3") == []
+    assert "6.1" in changes(f"1 foam {spread([5.0, 6.1, 6.2], 'N')}; 3 of 3")[0]
+    assert changes(f"1 foam {spread([5.1, 5.2, 5.3], 'N')}; 3 of 3"), "the old median is not in the new range"
+    assert changes(f"1 foam {moved}; 2 of 3")
+    assert changes(f"1 foam {spread([4.0, 5.0, 6.0], 'kN')}; 3 of 3")
+    assert changes(f"1 foam {spread([4.0, 5.0, 6.0, 5.0], 'N')}; 3 of 3")
+    assert "reproduced" in changes(verdict="differs")[0]
+    assert list(differences({}, [ONE])) == ["a.K: new"]
+    assert list(differences({"b": "differs: 1"}, [])) == ["b: gone"]
+
+
+@pytest.mark.timeout(900)  # of one run of minutes, on a machine that others use
+@pytest.mark.parametrize(
+    "number",
+    [pytest.param(n, marks=() if n in QUICK else pytest.mark.long) for n in FROZEN],
+)
+def test_a_study_comes_to_what_it_came_to(number, tmp_path):
+    """Its claims, each with all it has to say, and its figure."""
+    one = study(number)
+    data = one.run(Runs())
+    claims = one.check(data)
+    assert list(differences(FROZEN[number], claims)) == []
+    for claim in claims:
+        assert all(text for name, text in claim.__dict__.items() if name != "group")
+        assert not re.search(r"\b(nan|inf)\b", f"{claim.measured} {claim.note}")
+    assert style.save(one.plot(data), tmp_path / "figure.png").stat().st_size > 10_000

@@ -1,0 +1,224 @@
+"""The figures of the neural controller: what they measure by, on records made by hand, and each whole."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from palpate.bench import changed
+from palpate.bench.metrics.following import LIMIT
+from palpate.bench.metrics.window import SETTLE
+from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import CONTACT, LOST
+from palpate.records import Record
+from palpate_thesis.conditions import move_wall, rougher, stops_holding
+from palpate_thesis.explanations import e2_integrator, e3_divergence
+from palpate_thesis.figure import study
+from palpate_thesis.figures import fig_6_10, fig_6_14, fig_6_15, fig_6_17
+from palpate_thesis.force_control.tracking import (
+    FOAM,
+    RUBBER,
+    SINE,
+    Tracking,
+    following,
+    tracking,
+    variations,
+)
+from palpate_thesis.force_control.weights import watch
+from palpate_thesis.runs import Runs
+
+OURS = [f"6.{i}" for i in range(10, 18)] + [
+    "neural-is-an-integrator",
+    "delayed-divergence",
+    "rate-layers-neurons",
+]
+TICK = 1e-3
+
+
+def pressed(force, seconds=10.0, before=0.2, **columns) -> Record:
+    """A record of steps between 20 and 10 N; force(since, desired) is the true and the measured one."""
+    n, first = round((seconds + before) / TICK), round(before / TICK)
+    since = TICK * (np.arange(n) - first)
+    desired = np.where(since < 0.0, 0.0, np.where(np.floor((since + 5e-7) / 2.5) % 2 == 0, 20.0, 10.0))
+    table = {name: np.zeros(n) for name in COLUMNS}
+    table["t"] = TICK * np.arange(n)
+    table["phase"] = np.where(since >= -5e-7, CONTACT, 0.0)
+    table["force_desired"] = desired
+    table["force"] = table["force_measured"] = force(since, desired)
+    table.update(columns)
+    return Record(table, COLUMNS, {"experiment": {"force": {"period": 2.5}}, "end": "done"})
+
+
+def test_a_perfect_force_follows():
+    found = tracking(0.0, 10.0)(pressed(lambda t, d: d))
+    assert found == Tracking(0.0, 0.0, 0.0, 0.0, 0)
+    assert found.follows
+
+
+def test_errors_right_after_a_step_are_not_judged_and_later_ones_are():
+    def late(until):
+        return lambda t, d: d - np.where(np.mod(t + 5e-7, 2.5) < until, 8.0, 0.0)
+
+    early = tracking(0.0, 10.0)(pressed(late(SETTLE)))
+    assert early.settled == pytest.approx(0.0, abs=1e-9)
+    assert early.rms == pytest.approx(8.0 * np.sqrt(SETTLE / 2.5), rel=1e-3)
+    assert early.follows
+    assert not tracking(0.0, 10.0)(pressed(late(SETTLE + 0.5))).follows
+
+
+def test_a_steady_error_counts_as_a_share_of_what_is_asked_for():
+    found = tracking(0.0, 10.0)(pressed(lambda t, d: d - 1.2))
+    assert found.settled == pytest.approx(1.2)
+    assert found.off == pytest.approx(0.12)
+    assert found.settled < LIMIT
+    assert not found.follows
+
+
+def test_a_lost_contact_never_follows():
+    record = pressed(lambda t, d: d)
+    record.columns["phase"][2000:2100] = LOST
+    found = tracking(5.0, 10.0)(record)
+    assert found.lost == 1
+    assert not found.follows
+    assert not found.kept
+
+
+def test_a_run_without_the_window_never_follows():
+    assert not tracking(20.0, 30.0)(pressed(lambda t, d: d)).kept
+    assert not tracking(0.0, 10.0)(pressed(lambda t, d: d, phase=np.zeros(10200))).follows
+
+
+def test_nine_of_ten_are_enough_and_eight_are_not():
+    good, bad = Tracking(0.1, 0.1, 0.0, 0.0, 0), Tracking(9.0, 9.0, 0.5, 0.0, 0)
+    assert following([good] * 9 + [bad])
+    assert not following([good] * 8 + [bad] * 2)
+    told = stops_holding({"a\nb": [good], "c": [bad, good]}, lambda one: one.follows)
+    assert told == "It holds with: a b; it does not with: c (1 of 2 runs)."
+
+
+def test_variations_change_what_they_say_and_nothing_else():
+    there = changed(FOAM, move_wall(FOAM, 0.40))
+    assert there.wall.x == 0.40
+    assert there.wall.x - there.robot.start[0] == pytest.approx(FOAM.wall.x - FOAM.robot.start[0])
+    assert there.wall.x - there.approach.first == pytest.approx(FOAM.wall.x - FOAM.approach.first)
+    assert there.surface == FOAM.surface
+    rough = changed(FOAM, rougher(FOAM, 2.0))
+    assert rough.friction.coulomb == tuple(2.0 * f for f in FOAM.friction.coulomb)
+    names = [set(variations(e, 0)) for e in (FOAM, RUBBER, changed(RUBBER, SINE))]
+    assert "relaxing\nfoam" in names[0]
+    assert "relaxing\nfoam" not in names[1]
+    assert names[2] - names[1] == {"clock\nruns on", "motor 2\nto 4 N m"}
+
+
+def test_ends_of_intervals_are_told_apart_by_level():
+    ends = fig_6_10.ends_of(pressed(lambda t, d: np.where(d == 20.0, 16.0, 12.5)))
+    assert (ends.high, ends.low) == pytest.approx((-4.0, 2.5))
+    assert fig_6_10.misses(ends)
+    assert not fig_6_10.misses(fig_6_10.Ends(-4.0, 0.5))
+
+
+def test_the_course_of_the_error_ends_with_the_contact():
+    record = pressed(lambda t, d: d - 2.0, seconds=20.0)
+    whole = fig_6_14.course_of(record)
+    assert whole.error == pytest.approx([2.0] * 4)
+    assert whole.lost is None
+    record.columns["phase"][12200:12300] = LOST
+    cut = fig_6_14.course_of(record)
+    assert len(cut.error) == 2
+    assert cut.lost == pytest.approx(12.0, abs=2e-3)
+
+
+def test_an_error_that_changes_sign_is_still_an_error():
+    record = pressed(lambda t, d: d, seconds=15.0)
+    t = record["t"] - 0.2
+    record.columns["y"][:] = np.where(np.floor(t / 2.5) % 2 == 0, 2e-3, -2e-3)
+    assert fig_6_15.errors_of(record).y == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize("adapts", [1.0, 4.0])
+def test_the_time_of_adapting_is_found(adapts):
+    record = pressed(lambda t, d: d - np.where(t < adapts, 5.0, 0.0), seconds=20.0)
+    assert fig_6_17.adapted_at(fig_6_17.away_from_settled(record)) == pytest.approx(
+        adapts, abs=fig_6_17.SMOOTHED
+    )
+
+
+def test_the_gain_of_an_integrator_is_found_under_noise():
+    noise = np.random.default_rng(3).normal(0.0, 0.5, 10200)
+    record = pressed(lambda t, d: d - 3.0 * np.exp(-np.mod(t, 2.5)) + noise)
+    pressing = record["phase"] == CONTACT
+    error = (record["force_desired"] - record["force_measured"]) * pressing
+    record.columns["memory_fx"][1:] = 7.0 * TICK * np.cumsum(error)[:-1]
+    assert e2_integrator.gain_of(record) == pytest.approx(7.0, rel=1e-9)
+
+
+def test_the_text_s_learning_rate_is_five_per_second():
+    assert pytest.approx(5.0) == e2_integrator.GAIN
+
+
+def test_watching_sees_the_run_of_the_bench():
+    """Chunks and looks must not change what happens: the last row is the one of the recorded run."""
+    experiment = changed(FOAM, {"run.press": 2.0})
+    record = Runs(range(1)).one(experiment)
+    seen = []
+    lost = watch(
+        experiment, 0, 2.0, lambda one: seen.append((one.rows[-1].copy(), one.neural.network.weights.copy()))
+    )
+    assert lost is None
+    assert len(seen) >= 2
+    row = seen[0][0]
+    at = round(row[0] / TICK)
+    assert row.tolist() == [record[name][at] for name in COLUMNS]
+    assert not np.array_equal(seen[0][1], seen[1][1])
+
+
+def test_a_network_that_loses_contact_is_noticed():
+    """The relaxing foam at ten times the listing's rate: lost at once, while the bench's PI holds."""
+    wild = changed(e3_divergence.RELAXING, {"controller.learning_rate": 1e-3})
+    lost = watch(wild, 0, 10.0, lambda one: None)
+    assert lost is not None
+    assert 0.0 < lost < 10.0
+    assert watch(changed(wild, e2_integrator.PI), 0, 10.0, lambda one: None) is None
+
+
+def test_sizes_of_the_weights_add_up():
+    from palpate.controllers import Neural
+    from palpate.networks import Perceptron
+
+    neural = Neural.thesis()
+    sizes = e3_divergence.sizes_of(neural.start())
+    perceptron = Perceptron.thesis()
+    parts = (perceptron.hidden[:, 7:], perceptron.hidden[:, 1:7], perceptron.hidden[:, 0])
+    assert sizes[:3] == pytest.approx([np.linalg.norm(part) for part in parts])
+    assert sizes[3:] == pytest.approx(
+        [np.linalg.norm(perceptron.output[0, 1:]), np.linalg.norm(perceptron.output[:, 0])]
+    )
+
+
+def test_torque_gains_are_the_slope_of_the_network():
+    from palpate.controllers import Neural
+    from palpate.networks import Perceptron
+
+    inputs = np.array([0.465, 0.01, 0.01, 0.465, 0.01, 0.01, 1.0, -2.0, 0.1])
+    neural, perceptron = Neural.thesis(), Perceptron.thesis()
+    state = neural.start()
+    state.network.weights[:] *= 100.0
+    perceptron.hidden[:] *= 100.0
+    perceptron.output[:] *= 100.0
+    state.network.signals[:9] = inputs
+    neural.network.forward(state.network)
+    slopes = []
+    for i in (6, 7, 8):
+        step = np.zeros(9)
+        step[i] = 1e-6
+        slopes.append((perceptron.forward(inputs + step)[0] - perceptron.forward(inputs - step)[0]) / 2e-6)
+    assert e3_divergence.torque_gains_of(state) == pytest.approx(slopes, rel=1e-5)
+
+
+@pytest.mark.parametrize("number", OURS)
+def test_each_study_says_what_it_shows_and_what_was_chosen(number):
+    one = study(number)
+    assert number == one.NUMBER
+    assert len(one.TITLE) > 10
+    assert len(one.CAPTION) > 60
+    assert one.PARAMETERS

@@ -1,0 +1,189 @@
+"""The figures of the neural identifier: what is measured, how it is judged, and that each figure stands."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from palpate_thesis import look
+from palpate_thesis.explanations import e4_probe
+from palpate_thesis.figures import fig_6_06, fig_6_08
+from palpate_thesis.neural_identifier import claims, network
+from palpate_thesis.neural_identifier.network import Answer, Choice, Press
+from palpate_thesis.runs import Runs
+
+STIFFNESS = 6000.0
+GOOD = Answer(
+    K=6600.0,
+    B=200.0,
+    M=0.1,
+    ratio=6700.0,
+    squares_B=210.0,
+    settled_K=0.6,
+    settled_B=0.6,
+    settled_M=0.6,
+    error_gone=0.6,
+    at_zero=0.0,
+    tangent=6600.0,
+    outside=False,
+)
+
+
+def spring(offset: float = 0.0) -> Press:
+    """A press on a spring, without noise: to 3 mm within 0.1 s, then at rest."""
+    t = np.arange(4000) * network.TICK
+    x = 3e-3 * np.minimum(t / 0.1, 1.0)
+    v = np.where(t < 0.1, 0.03, 0.0)
+    force = offset + STIFFNESS * x
+    ratio = float(force[-1] / x[-1])
+    return Press("foam", np.column_stack([x, v, 0.0 * t]), force, ratio, np.ones((len(t), 3)))
+
+
+def grounds(nominal: list[Answer], swept: dict | None = None) -> claims.Grounds:
+    return claims.Grounds(
+        surface="foam",
+        nominal=nominal,
+        swept=swept or {Choice(): nominal, Choice(thresholds=False): nominal},
+        varied={"friction halved": nominal},
+        perfect=1.2,
+        starts=10,
+    )
+
+
+def test_an_error_is_gone_when_its_running_mean_stays_small():
+    error = np.where(np.arange(4000) < 500, 5.0, 0.0)
+    assert 0.5 < network.error_gone(error) < 0.5 + network.MEAN_OVER
+    assert network.error_gone(np.zeros(4000)) == 0.0
+    assert network.error_gone(np.full(4000, 2.0)) == np.inf
+    assert network.error_gone(np.full(4000, np.nan)) == np.inf
+    assert network.error_gone(5.0 * (-1.0) ** np.arange(4000)) < 0.01  # noise is no error
+
+
+def test_a_straight_network_through_zero_answers_the_springs_stiffness():
+    found = network.answer(spring(), e4_probe.STRAIGHT, start=0)
+    assert found.at_zero == 0.0
+    assert pytest.approx(1.0, abs=0.06) == found.over
+    assert pytest.approx(STIFFNESS, rel=0.2) == found.tangent
+
+
+def test_thresholds_that_learn_put_an_offset_into_the_stiffness():
+    found = network.answer(spring(), Choice(), start=0)
+    assert found.at_zero > 3.0  # a spring has none
+    assert found.over > 1.15
+    assert found.tangent < 0.7 * STIFFNESS
+
+
+def test_where_a_press_rests_every_network_answers_force_over_displacement():
+    press = spring(offset=5.0)
+    for start in range(3):
+        rest = e4_probe.Toggle(displacement=None)
+        assert pytest.approx(1.0, abs=0.02) == e4_probe.look(rest, press, start).over
+
+
+def test_the_tangent_is_the_derivative_of_the_networks_force():
+    probe, _ = network.learn(spring(), Choice(), start=1)
+    hidden, output = probe.layers
+    x = 2.5e-3
+    signal = np.tanh((hidden[:, 0] + hidden[:, 1] * 1e3 * x) / 2)
+    out = np.tanh((output[0, 0] + output[0, 1:] @ signal) / 2)
+    slope = 40.0 * 0.5 * (1 - out**2) * (output[0, 1:] @ (0.5 * (1 - signal**2) * hidden[:, 1])) * 1e3
+    assert network.tangent(probe, x) == pytest.approx(slope, rel=1e-3)
+
+
+def test_a_probe_beyond_what_was_pressed_is_warned_of():
+    look = e4_probe.look(e4_probe.Toggle(displacement=2.0), spring(), 0)
+    assert look.warned
+    probe, _ = network.learn(spring(), Choice(), 0)
+    assert {code for code, _ in probe.probe(displacement=4e-3).warnings} == {"probe-outside-learned"}
+
+
+def test_a_cut_press_has_the_ratio_of_its_own_end():
+    press = spring(offset=5.0)
+    short = network.cut(press, 1.0)
+    assert len(short.force) == len(short.squares) == 1000
+    assert short.ratio == pytest.approx(23.0 / 3e-3)
+
+
+def test_every_part_holds_of_an_answer_as_the_thesis_has_it():
+    found = claims.claims(grounds([GOOD] * 100), claims.FOAM)
+    assert [c.id for c in found] == [
+        f"network-foam.{s}" for s in ("time-K", "time-B", "time-M", "K", "B", "M")
+    ]
+    assert {c.verdict for c in found} == {"reproduced"}
+
+
+@pytest.mark.parametrize(
+    ("suffix", "change"),
+    [
+        ("time-K", {"settled_K": 0.1}),
+        ("time-B", {"settled_B": 1.5}),
+        ("time-M", {"settled_M": 0.0}),
+        ("K", {"K": 7500.0}),
+        ("B", {"B": 100.0}),
+        ("M", {"M": -0.1}),
+        ("M", {"M": 1.5}),
+    ],
+)
+def test_a_part_differs_alone_when_its_own_number_does(suffix, change):
+    bad = replace(GOOD, **change)
+    found = claims.claims(grounds([bad] * 100), claims.FOAM)
+    assert [c.id for c in found if c.verdict == "differs"] == [f"network-foam.{suffix}"]
+
+
+def test_nine_of_ten_runs_are_enough_and_fewer_are_not():
+    bad = replace(GOOD, M=-1.0)
+    assert claims.enough([GOOD] * 90 + [bad] * 10, claims.MASS)
+    assert not claims.enough([GOOD] * 89 + [bad] * 11, claims.MASS)
+
+
+def test_a_note_names_the_part_of_the_sweep_that_agrees():
+    bad = replace(GOOD, M=-1.0)
+    swept = {Choice(): [bad] * 10, Choice(60.0, 0.1, thresholds=False): [GOOD] * 10}
+    told = claims.where(grounds([bad] * 100, swept), claims.MASS)
+    assert "fixed at zero: 60 N with weights to 0.1" in told
+    assert "learn: none" in told
+
+
+def test_variance_is_shared_out_between_starts_and_noise():
+    start, seed = np.meshgrid(np.arange(5.0), np.arange(4.0))
+    assert claims.share_of_starts(start.ravel(), 5) == pytest.approx(1.0)
+    assert claims.share_of_starts(seed.ravel(), 5) == pytest.approx(0.0)
+
+
+def test_a_rate_is_slower_only_if_every_smaller_one_takes_longer():
+    times = dict(zip(fig_6_06.SMALLER, (0.1, 0.2, 0.6, 2.0), strict=True))
+    by_rate = {rate: [replace(GOOD, error_gone=t)] for rate, t in times.items()}
+    assert fig_6_06.slower_throughout(by_rate) == [True]
+    by_rate[fig_6_06.SMALLER[2]] = [replace(GOOD, error_gone=0.15)]
+    assert fig_6_06.slower_throughout(by_rate) == [False]
+
+
+def test_a_rate_is_too_large_when_all_beyond_it_are_stuck_too():
+    stuck = [replace(GOOD, error_gone=np.inf)]
+    by_rate = {rate: stuck if rate in (1e-3, 3e-2, 1e-1) else [GOOD] for rate in fig_6_06.RATES}
+    assert fig_6_06.stuck_from(by_rate) == 3e-2
+    assert fig_6_06.stuck_from({rate: [GOOD] for rate in fig_6_06.RATES}) == np.inf
+
+
+def test_a_sign_is_firm_when_no_noise_seed_turns_it():
+    values = np.array([[1.0, -1.0, 1.0], [0.5, -2.0, -1.0]])
+    assert e4_probe.firm_signs(values).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    "study", [fig_6_06, pytest.param(fig_6_08, marks=pytest.mark.long)], ids=lambda one: one.NUMBER
+)
+def test_a_study_runs_and_says_why(study):
+    """By one seed; what all come to over ten: test_frozen_claims.py."""
+    data = study.run(Runs(seeds=(3,)))
+    claims = study.check(data)
+    assert claims
+    for claim in claims:
+        assert len(claim.note) > 150
+        assert "nan" not in claim.measured + claim.note
+        assert all((claim.tolerance, claim.thesis, claim.measured))
+    with look.apply_look():
+        drawing = study.plot(data)
+    lettered = [axis for axis in drawing.axes if axis.get_title(loc="left").startswith("(")]
+    assert len(lettered) == 4
+    drawing.canvas.draw()
