@@ -21,6 +21,8 @@ HERE = Path(__file__).parent
 FIGURES = {
     "First touches: UR5e": "first_touches.py --touches 5000 --arms ur5e",
     "First touches: FR3": "first_touches.py --touches 5000 --arms fr3",
+    "Wrong sensors in free motion": "free_motion.py --touches 1000",
+    "Beyond the gains": "beyond.py --touches 50",
     "Laws that know the surface": "first_touches.py --touches 1000 --laws knowing told",
     "False alarms": "false_alarms.py --hours 20 --arms ur5e",
     "Wrong priors, changes, sways, curves: UR5e": "disturbed.py --touches 100 --arms ur5e",

@@ -16,7 +16,7 @@ from touches import Rig
 
 from palpate.force import ForceLoop
 from palpate.force.flat import STATE
-from palpate.force.force_loop import FARTHEST
+from palpate.force.guard import FARTHEST
 from palpate.force.simulated_press import ENCODER
 
 SECONDS = 2.0

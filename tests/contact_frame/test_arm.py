@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.synthetic_contacts import pressed, record, shaken
-from palpate.contact_frame import Arm, described, identify_contact, robot_stiffness
+from palpate.contact_frame import Arm, describe, identify_contact, robot_stiffness
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify
 
@@ -77,7 +77,7 @@ def test_a_press_on_a_rigid_wall_is_the_arm():
         abs(own.value - 5000) < 1.5 * (own.ci95[1] - own.ci95[0]) / 2
     )  # 95 % are missed once in twenty, not by half
     assert "series-compliance" not in found.codes
-    assert any("taken out of K" in line for line in described(along.meta))
+    assert any("taken out of K" in line for line in describe(along.meta))
 
 
 def test_a_high_stiffness_of_joints_is_a_lower_bound():

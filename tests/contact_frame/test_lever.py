@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contact_frame.synthetic_arm import any_world, log_of
-from palpate.contact_frame import ContactFrame, described, project
+from palpate.contact_frame import ContactFrame, describe, project
 from palpate.records import Record
 
 
@@ -27,7 +27,7 @@ def log():
 
 def off(record, **said):
     along = project(record, ContactFrame(wrench_frame="tool", **said))
-    return along.meta["contact_frame"]["line_of_action_off_m"], described(along.meta)
+    return along.meta["contact_frame"]["line_of_action_off_m"], describe(along.meta)
 
 
 def test_the_right_lever_arm_is_met(log):

@@ -9,7 +9,8 @@ from palpate.force.gains import gains_for
 
 
 @cache
-def gains_of(name="ur5e", force=20.0, cap=1e6, noise=0.1):
+def gains_of(name="ur5e", force=20.0, cap=1e6, noise=0.1, resolution=None):
     arm = load_arm(name)
-    arm = msgspec.structs.replace(arm, sensor=msgspec.structs.replace(arm.sensor, noise=noise))
+    sensor = msgspec.structs.replace(arm.sensor, noise=noise, resolution=resolution)
+    arm = msgspec.structs.replace(arm, sensor=sensor)
     return gains_for(arm, force, cap=cap, limit=60.0)

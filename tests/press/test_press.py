@@ -228,7 +228,7 @@ WRONG = [
     (["--at", "3,0"], "three numbers"),
     (["--normal", "0,0,0"], "a normal needs a length"),
     (["--seconds", "0"], "longer than 0 s"),
-    (["--seconds", "nan"], "longer than 0 s"),
+    (["--seconds", "nan"], "must be a number"),
     (["--probe", "1.5"], "share of the force"),
     (["--seed", "1.5"], "whole number"),
     (["--gains", "nowhere.toml"], "No such file"),

@@ -147,7 +147,7 @@ class Relay(threading.Thread):
         self._near.bind(("127.0.0.1", 0))
         self._far.bind(("127.0.0.1", 0))
         self.address = f"sim:127.0.0.1:{self._near.getsockname()[1]}"
-        self.commands, self.done = [], threading.Event()
+        self.commands, self.rests, self.done = [], [], threading.Event()
 
     def run(self):
         master, begun, held = None, None, []
@@ -159,6 +159,8 @@ class Relay(threading.Thread):
                 if data[8] == 4:
                     begun = begun or now
                     self.commands.append((now, data))
+                if data[8] == 5:
+                    self.rests.append(now)
                 self._far.sendto(data, self._to)
             if self._far in ready:
                 data = self._far.recv(512)

@@ -111,8 +111,8 @@ def test_whoever_types_the_word_presses_and_ctrl_c_then_brings_the_arm_to_rest(f
         terminal.typed(b"press\n")
         assert rows_came(tmp_path / "rec" / "rows.f64"), terminal.text
         terminal.typed(b"\x03")
-        assert terminal.ended() == 1, terminal.text
-    assert "stopped by the user; the arm rests" in terminal.text
+        assert terminal.ended() == 130, terminal.text
+    assert "stopped by the user (Ctrl-C); the arm rests" in terminal.text
     assert (tmp_path / "rec" / "record.parquet").exists()
 
 

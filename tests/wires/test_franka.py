@@ -142,7 +142,7 @@ def test_a_driver_that_dies_is_told_and_the_controller_has_the_arm(folder, here,
 def test_a_second_master_nothing_at_the_address_and_another_protocol_are_named(
     folder, here, capsys, address, monkeypatch
 ):
-    monkeypatch.setattr("palpate.wires.franka._ANSWER", 1.0)
+    monkeypatch.setattr("palpate.wires.franka.FrankaWire.answer", 1.0)
     assert main(words_of(folder, address, "--dry-run")) == 2
     assert f"no Franka answers at {address}, port 1337" in capsys.readouterr().err
     with socket.socket() as other:
@@ -157,7 +157,7 @@ def test_a_second_master_nothing_at_the_address_and_another_protocol_are_named(
     monkeypatch.chdir(here)
     with controller(folder, address):
         first = open_wire(f"franka:{address}")
-        monkeypatch.setattr("palpate.wires.franka._ANSWER", 1.0)
+        monkeypatch.setattr("palpate.wires.franka.FrankaWire.answer", 1.0)
         try:
             assert main(words_of(folder, address, "--yes")) == 2
             assert "no other program is connected" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from contextlib import contextmanager
 
 import numpy as np
@@ -92,6 +93,7 @@ def test_a_second_master_is_refused(folder, here, capsys):
 
     with node(folder):
         first = open_wire(words_of(folder)[2])
+        first.begin(30.0)  # else it rests the arm by itself and lets go
         try:
             assert main(words_of(folder, "--yes")) == 2
             assert "another master" in capsys.readouterr().err
@@ -173,3 +175,50 @@ def test_joints_are_found_by_name_and_never_by_place():
 def same(ours, theirs):
     """Equal but for the padding behind the last byte, which the first four count."""
     return ours[4:].rstrip(b"\0") == bytes(theirs)[4:].rstrip(b"\0") and ours[:2] == bytes(theirs)[:2]
+
+
+@pytest.mark.long
+def test_a_controller_sees_by_deadline_and_liveliness_that_commands_ended(folder, here):
+    """One that asks for them is served, and hears of the end of the commands from DDS itself."""
+    from cyclonedds.core import Listener, Policy, Qos
+    from cyclonedds.domain import DomainParticipant
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+
+    from palpate.wires import Command, open_wire
+    from palpate.wires import ros2_messages as m
+
+    told = []
+
+    class Told(Listener):
+        def on_requested_deadline_missed(self, reader, status):
+            told.append("deadline")
+
+        def on_liveliness_changed(self, reader, status):
+            told.append(f"alive {status.alive_count}")
+
+    lag = 200_000_000
+    with node(folder):
+        participant = DomainParticipant(DOMAIN)
+        kind = m.message("geometry_msgs/msg/TwistStamped")
+        qos = Qos(
+            Policy.Reliability.Reliable(10**8), Policy.Deadline(lag), Policy.Liveliness.ManualByTopic(lag)
+        )
+        reader = DataReader(participant, Topic(participant, "rt/command", kind), qos=qos, listener=Told())
+        wire = open_wire(words_of(folder)[2])
+        try:
+            wire.begin(0.2)
+            for _ in range(30):
+                wire.read(1.0)
+                wire.write(Command((0.0, 0.0, -0.001), (0.0, 0.0, 0.0)))
+            assert reader.read(1), "a reader with a deadline is not served"
+            served = list(told)
+            wire._driver.kill()  # the process of the library: nothing says that it ended
+            wire._driver.wait()
+            time.sleep(0.6)
+        finally:
+            wire.close()
+    assert "alive 1" in served
+    assert {"deadline", "alive 0"} & set(
+        told[len(served) :]
+    )  # a writer that is gone misses no deadline any more

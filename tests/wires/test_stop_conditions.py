@@ -15,7 +15,7 @@ from palpate.wires.stop_conditions import Moment, reason_to_stop, spoiled
 GAINS = gains_for(load_arm("ur5e"), 10.0)
 THETA = GAINS.theta
 SENSE = Sense(100.0, 5.0, (0.0, 0.0, -10.0), (0.0,) * 3, (0.4, 0.0, 0.3), (1.0, 0.0, 0.0, 0.0))
-REST = AtRest(np.array(SENSE.position), np.zeros(3), 0.1, 500.0, SENSE)
+REST = AtRest(np.array(SENSE.position), np.zeros(3), 0.1, 0.0, 0.1, 500.0, SENSE, 95.0)
 MOMENT = Moment(SENSE, 10.0, 0.001, 0.0, 0, 0.0, 1.0, None)
 
 
@@ -56,15 +56,19 @@ def test_each_limit_says_what_was_passed(order, changed, says):
         ({"stamp": math.nan}, "no number"),
         ({"stamp": 4.0}, "went back, from 5 to 4 s"),
         ({"stamp": 5.0}, "went back"),
-        ({"stamp": 1e6, "received": 100.002}, "jumped ahead"),
+        ({"stamp": 1e6, "received": 100.002}, "ahead of this computer's"),
+        ({"stamp": 5.002 + 1.1 * THETA, "received": 100.002}, "run too fast"),
+        ({"quaternion": (0.0, 0.0, 0.0, 0.0)}, "a quaternion of length 0"),
+        ({"quaternion": (1e200, 0.0, 0.0, 1e200)}, "which is no orientation"),
+        ({"quaternion": (0.0, 0.0, 0.0, 1.006)}, "which is no orientation"),
     ],
 )
 def test_a_reading_that_is_none_is_named(changed, says):
-    assert says in spoiled(SENSE._replace(**{"stamp": 5.002, "received": 100.002} | changed), SENSE, THETA)
+    sense = SENSE._replace(**{"stamp": 5.002, "received": 100.002} | changed)
+    assert says in spoiled(sense, SENSE, REST, THETA)
 
 
 def test_a_reading_that_catches_up_within_the_lag_counts():
     late = SENSE._replace(received=SENSE.received + 0.9 * THETA)
-    assert (
-        spoiled(SENSE._replace(stamp=5.0 + THETA, received=late.received + 0.1 * THETA), late, THETA) is None
-    )
+    caught_up = SENSE._replace(stamp=5.0 + THETA, received=late.received + 0.1 * THETA)
+    assert spoiled(caught_up, late, REST, THETA) is None

@@ -23,7 +23,7 @@ def payload(**changed):
 def at_rest(force):
     """The tool points down: turned by half a turn about x."""
     sense = Sense(0.0, 0.0, tuple(force), (0.0,) * 3, (0.4, 0.0, 0.3), (1.0, 0.0, 0.0, 0.0))
-    return AtRest(np.zeros(3), np.array(force), 0.1, 500.0, sense)
+    return AtRest(np.zeros(3), np.array(force), 0.1, 0.0, 0.1, 500.0, sense, 0.0)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

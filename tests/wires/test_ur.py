@@ -106,7 +106,7 @@ def test_the_controller_stops_the_arm_where_its_master_dies(folder, here, addres
 def test_a_second_master_is_refused(folder, here, capsys, address):
     with controller(folder, address):
         first = open_wire(f"rtde:{address}")
-        first.begin()
+        first.begin(30.0)  # else it rests the arm by itself and lets go
         assert main(words_of(folder, address, "--yes")) == 2
         assert "with no other master" in capsys.readouterr().err
         first.close()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from palpate.contact_frame.arm import robot_stiffness, with_arm
 from palpate.contact_frame.declared import Arm, ContactFrame
-from palpate.contact_frame.description import described
+from palpate.contact_frame.description import describe
 from palpate.contact_frame.identify import identify_contact
 from palpate.contact_frame.payload import Payload, load_payload
 from palpate.contact_frame.projecting import project
@@ -20,7 +20,7 @@ __all__ = [
     "ContactFrame",
     "Payload",
     "Weighed",
-    "described",
+    "describe",
     "identify_contact",
     "load_payload",
     "project",

@@ -11,6 +11,8 @@ from palpate.contact_frame.declared import Arm
 from palpate.errors import InputError
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn
 
+LOWER_BOUND = "a lower bound of the surface's stiffness"
+"""Begins the reason of a K that holds the arm's own compliance."""
 _STIFF = 1000.0
 """Above this an arm's own compliance, of 20 to 100 kN/m in a light one, takes more than some percent [N/m]."""
 
@@ -32,7 +34,7 @@ def with_arm(found: Identification, arm: Arm, tolerance: float, *, from_pose: bo
     if warning is not None:
         warnings.append(warning)
         if arm.position_from == "joints":
-            parameters["K"] = _bounded(parameters["K"])
+            parameters["K"] = _lower_bound(parameters["K"])
     return replace(found, parameters=parameters, warnings=tuple(warnings))
 
 
@@ -69,17 +71,18 @@ def _without_tool(mass: Parameter, arm: Arm, tolerance: float) -> Parameter:
     tool, tool_std = arm.tool_mass
     if not (tool or tool_std):
         return mass
-    if mass.value is None or mass.std is None or mass.ci95 is None:
-        return replace(mass, reason=f"{mass.reason}; the tool's {tool:.3g} kg are not taken off yet")
-    std = float(np.hypot(mass.std, tool_std))
-    wider = std / mass.std if mass.std else 1.0
-    low, high = (mass.value + wider * (end - mass.value) - tool for end in mass.ci95)
-    value, half = mass.value - tool, (high - low) / 2
+    if mass.ci95 is None or (mass.value is None and mass.verdict is Verdict.REJECTED):
+        return replace(
+            mass, ci95=None, reason=f"{mass.reason}; the tool's {tool:.3g} kg are not taken off yet"
+        )
+    value = (mass.ci95[0] + mass.ci95[1]) / 2 - tool
+    half = float(np.hypot((mass.ci95[1] - mass.ci95[0]) / 2, 1.96 * tool_std))
+    std, low, high = half / 1.96, value - half, value + half
     taken = f"the tool's {tool:.3g} kg taken off"
     if low <= 0 <= high:
         bounds = f"95 %: {low:.3g} to {high:.3g} {mass.unit}"
         reason = f"{taken}, the log does not show the environment's ({bounds})"
-        return Parameter(None, None, None, mass.unit, Verdict.NOT_IDENTIFIABLE, reason)
+        return Parameter(None, None, (low, high), mass.unit, Verdict.NOT_IDENTIFIABLE, reason)
     if high < 0:
         reason = f"{taken}, {value:.3g} kg are left, below zero: is the tool that heavy?"
         return Parameter(None, None, None, mass.unit, Verdict.REJECTED, reason)
@@ -117,7 +120,7 @@ def _compliance(parameters: Mapping[str, Parameter], arm: Arm, from_pose: bool) 
     return None
 
 
-def _bounded(stiffness: Parameter) -> Parameter:
+def _lower_bound(stiffness: Parameter) -> Parameter:
     """A high K of an arm of unknown stiffness is a lower bound."""
     if (
         stiffness.value is None
@@ -126,5 +129,8 @@ def _bounded(stiffness: Parameter) -> Parameter:
         or stiffness.unit != "N/m"
     ):
         return stiffness
-    reason = f"a lower bound, {stiffness.ci95[0]:.4g} {stiffness.unit} at least: the arm gives way with the surface"
+    reason = (
+        f"{LOWER_BOUND}, at least {stiffness.ci95[0]:.4g} {stiffness.unit}: the arm's own compliance is in it; give"
+        " --robot-stiffness"
+    )
     return replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)

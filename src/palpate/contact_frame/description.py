@@ -15,7 +15,7 @@ _FAR = 0.01
 a lever arm that is told wrong is off by centimetres."""
 
 
-def described(meta: Mapping[str, Any]) -> list[str]:
+def describe(meta: Mapping[str, Any]) -> list[str]:
     """Sentences for a user, from the metadata of a record along the normal."""
     lines = list(meta.get("facts", ()))
     about = meta.get("contact_frame")
@@ -36,14 +36,14 @@ def _wrench(about: Mapping[str, Any]) -> str:
         f"wrench in the {about['wrench_frame']}'s axes{'' if about['wrench_frame_said'] else ' (concluded)'}"
     )
     if about["sensor_rpy_rad"]:
-        axes += f", turned by {_listed(np.degrees(about['sensor_rpy_rad']))} deg"
+        axes += f", turned by {_list_words(np.degrees(about['sensor_rpy_rad']))} deg"
     if any(about["tcp_m"]):
-        axes += f"; the tool touches at {_listed(1e3 * np.array(about['tcp_m']))} mm"
+        axes += f"; the tool touches at {_list_words(1e3 * np.array(about['tcp_m']))} mm"
     return f"{axes}; {sign}"
 
 
 def _normal(about: Mapping[str, Any]) -> str:
-    normal = f"normal into the surface {_listed(about['normal'])} in the base"
+    normal = f"normal into the surface {_list_words(about['normal'])} in the base"
     if not about["normal_found"]:
         return f"{normal}, as given"
     std = np.degrees(about["normal_std_rad"])
@@ -55,15 +55,15 @@ def _load(about: Mapping[str, Any]) -> str:
         return "no free motion: bias and weight are not known"
     if about["weight_N"] is None:
         what = "bias" if about["gravity_compensated"] else "bias and weight together"
-        return f"{what} {_listed(about['bias_N'])} N in the tool's axes (std {about['load_std_N']:.2g} N)"
+        return f"{what} {_list_words(about['bias_N'])} N in the tool's axes (std {about['load_std_N']:.2g} N)"
     weight, std = float(np.linalg.norm(about["weight_N"])), about["weight_std_N"]
     if about.get("payload_said"):
         return (
-            f"tool's weight {weight:.3g} N (std {std:.2g} N) by the payload file; bias {_listed(about['bias_N'])} N"
+            f"tool's weight {weight:.3g} N (std {std:.2g} N) by the payload file; bias {_list_words(about['bias_N'])} N"
             f"{'' if about['free_rows'] else ' by the same, as the log has no free motion'}"
         )
     mass = f"--tool-mass {weight / GRAVITY:.3g}:{std / GRAVITY:.1g} would subtract its inertia from M"
-    return f"tool's weight {weight:.3g} N (std {std:.2g} N; {mass}); bias {_listed(about['bias_N'])} N"
+    return f"tool's weight {weight:.3g} N (std {std:.2g} N; {mass}); bias {_list_words(about['bias_N'])} N"
 
 
 def _lever(about: Mapping[str, Any]) -> list[str]:
@@ -96,5 +96,5 @@ def _arm(arm: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _listed(values: Sequence[float] | np.ndarray[Any, Any]) -> str:
+def _list_words(values: Sequence[float] | np.ndarray[Any, Any]) -> str:
     return "(" + ", ".join(f"{value:.3g}" if abs(value) > 1e-9 else "0" for value in values) + ")"

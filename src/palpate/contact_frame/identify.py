@@ -57,7 +57,7 @@ def identify_contact(
         record = project(record, frame or ContactFrame())
         spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "air_inertia_kg"))
     elif inertia is not None and wrong_sign(inertia):
-        record = _noted(record, inertia)
+        record = _note_inertia_sign(record, inertia)
     if arm.stiffness is not None:
         options |= {"series_stiffness": arm.stiffness[0], "series_std": arm.stiffness[1]}
         options["series_mass"] = arm.mass
@@ -66,7 +66,7 @@ def identify_contact(
     scale = float(np.hypot(calibration, spread))
     found = identify(record, tolerance=tolerance, calibration=scale, **options)
     if in_space and not record.meta["contact_frame"]["normal_shown"]:
-        found = _untouched(found)
+        found = _refuse_direction(found)
     if in_space and Code.NO_CONTACT.word in found.codes:
         found, record = _all_free(found, record)
     if wrong_sign(inertia):
@@ -77,13 +77,13 @@ def identify_contact(
     return with_arm(found, arm, tolerance, from_pose=in_space), record
 
 
-def _noted(record: Record, inertia: tuple[float, float]) -> Record:
+def _note_inertia_sign(record: Record, inertia: tuple[float, float]) -> Record:
     """A record whose tool's inertia was weighed with the wrong sign says so."""
     note = {"code": Code.TOOL_INERTIA.word, "text": wrong_sign_of(inertia)}
     return replace(record, meta={**record.meta, "notes": [*record.meta.get("notes", ()), note]})
 
 
-def _untouched(found: Identification) -> Identification:
+def _refuse_direction(found: Identification) -> Identification:
     """If the force has no direction, a fit along any direction is chance."""
     reason = "the force has no direction, so there seems to be no contact"
     refused = {

@@ -46,19 +46,19 @@ def in_range(signals: Signals, frame: ContactFrame) -> tuple[Signals, Unloaded, 
     Returns:
         The signals without these readings, the force, and notes as a record's meta has them.
     """
-    freed = _unloaded(signals, frame)
+    freed = _remove_load(signals, frame)
     stuck = saturated_rows(signals.recorded, signals.place, freed.inside)
     if not stuck.any():
         return signals, freed, []
     signals = replace(signals, force=np.where(stuck[:, None], np.nan, signals.force))
     text = f"an axis of the force rests at its extreme value for {int(stuck.sum())} rows; they are left out"
-    return signals, _unloaded(signals, frame), [{"code": "saturated", "text": text}]
+    return signals, _remove_load(signals, frame), [{"code": "saturated", "text": text}]
 
 
-def _unloaded(signals: Signals, frame: ContactFrame) -> Unloaded:
+def _remove_load(signals: Signals, frame: ContactFrame) -> Unloaded:
     there = read_rows(signals.force)
     if frame.free is None:
-        load, inside, free = _found(signals, there, frame)
+        load, inside, free = _fit_load(signals, there, frame)
     else:
         free = rows_between(signals.time, frame.free) & there
         load = _load(signals, free, frame)
@@ -74,7 +74,7 @@ def _load(signals: Signals, free: Rows, frame: ContactFrame) -> Load:
     return load_of(force, rotations, weighs=not frame.gravity_compensated)
 
 
-def _found(signals: Signals, there: Rows, frame: ContactFrame) -> tuple[Load, Rows, Rows]:
+def _fit_load(signals: Signals, there: Rows, frame: ContactFrame) -> tuple[Load, Rows, Rows]:
     """Weight and bias by the free rows; which rows these are, depends on the weight where the tool turns."""
     turned = signals.turned and turns(signals.rotations[there])
     none = there & False

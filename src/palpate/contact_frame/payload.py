@@ -10,8 +10,8 @@ from msgspec import Meta
 
 from palpate.contact_frame.vectors import Vector
 from palpate.errors import InputError
-from palpate.files import write_text
-from palpate.force.arm import NotNegative, Table, from_toml, read_small
+from palpate.files import read_text, write_text
+from palpate.force.arm import NotNegative, Table, from_toml
 
 
 class Payload(Table):
@@ -80,7 +80,7 @@ class Payload(Table):
     def to_toml(self) -> str:
         """The file's text."""
         plain = {name: value for name, value in msgspec.to_builtins(self).items() if value is not None}
-        lines = [f"{name} = {_written(value)}" for name, value in plain.items()]
+        lines = [f"{name} = {_toml_value(value)}" for name, value in plain.items()]
         head = "# Made by palpate payload; palpate identify and palpate tune take it by --payload. SI units."
         return "\n".join([head, *lines]) + "\n"
 
@@ -95,10 +95,10 @@ def load_payload(path: Path) -> Payload:
     Raises:
         InputError: no such file, an unknown or missing key, a value out of range.
     """
-    return from_toml(read_small(path, "a payload"), str(path), Payload)
+    return from_toml(read_text(path, "a payload"), str(path), Payload)
 
 
-def _written(value: object) -> str:
+def _toml_value(value: object) -> str:
     if isinstance(value, str):
         return msgspec.json.encode(value).decode()
     if isinstance(value, list | tuple):

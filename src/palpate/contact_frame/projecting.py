@@ -44,7 +44,7 @@ def project(record: Record, frame: ContactFrame) -> Record:
     signals = signals_of(record, frame)
     signals, freed, notes = in_range(signals, frame)
     normal = _normal(signals, freed, frame)
-    sign, normal, turned = _oriented(signals, freed, normal, frame)
+    sign, normal, turned = _orient(signals, freed, normal, frame)
     position = (signals.place - signals.place[read_rows(signals.place)][0]) @ normal.direction
     spread = scale_std(normal, *_in_contact(signals, freed))
     inertia = _inertia_in_air(signals, freed, sign, frame)
@@ -74,7 +74,7 @@ def _in_contact(signals: Signals, freed: Unloaded) -> tuple[Array, Array]:
     return freed.force[rows & freed.there], signals.place[rows & placed]
 
 
-def _oriented(
+def _orient(
     signals: Signals, freed: Unloaded, normal: Normal, frame: ContactFrame
 ) -> tuple[float, Normal, list[dict[str, Any]]]:
     """The sign that makes the force act from the tool on the surface, and the normal into the surface."""

@@ -11,6 +11,8 @@ import msgspec
 from msgspec import Meta
 
 from palpate.errors import InputError, unknown
+from palpate.files import read_table, read_text
+from palpate.results import Readable
 from palpate.signals.low_pass import LowPass
 
 Positive = Annotated[float, Meta(gt=0)]
@@ -24,11 +26,9 @@ _REMEDIES = {
     "mass": "take the tip's, 1/(n^T J M^-1 J^T n), from the arm's model",
     "noise": "record the sensor in the air: it is the readings' standard deviation",
 }
-_LARGEST = 1 << 16
-"""Bytes of an arm's file."""
 
 
-class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Table(Readable, msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A table of an arm's file: its keys and no others."""
 
 
@@ -113,7 +113,7 @@ class TorqueLoop(Table, tag="torque", tag_field="kind"):
     """From reading the encoders to the torque [s]."""
 
 
-class Sensor(Table):
+class Sensor(Table, omit_defaults=True):
     """The force sensor, as the control loop reads it."""
 
     sampling: Positive
@@ -124,6 +124,12 @@ class Sensor(Table):
     """Largest force that it reads [N]."""
     low_pass: str = "none"  # noqa: S105 - a filter
     """Before the sampling, as butterworth3:120."""
+    accuracy: Positive | None = None
+    """Of a reading, as the maker states it [N]; a tare takes its constant part off."""
+    resolution: Positive | None = None
+    """Step in which it reads [N]; left out if it is finer than the noise."""
+    drift: Positive | None = None
+    """Largest change of the reading at rest [N/s], as stated or reported."""
 
 
 class Limits(Table):
@@ -234,23 +240,7 @@ def load_arm(name: str) -> Arm:
     path = Path(name)
     if path.suffix.lower() != ".toml":
         raise unknown("arm", name, [*names(), "a TOML file"])
-    return parse_arm(read_small(path, "an arm"), name)
-
-
-def read_small(path: Path, what: str) -> str:
-    """The text of a file that a person wrote.
-
-    Raises:
-        InputError: it is far too long for what it should be, or no text.
-    """
-    with path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise InputError(f"{path}: more than {_LARGEST} bytes are not {what}; check the path")
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text file; check the path") from None
+    return parse_arm(read_text(path, "an arm"), name)
 
 
 def parse_arm(text: str, where: str) -> Arm:
@@ -264,30 +254,10 @@ def from_toml(text: str, where: str, kind: type[T]) -> T:
     Raises:
         InputError: TOML that does not parse, an unknown or missing key, a value out of range or not finite.
     """
-    try:
-        tables = msgspec.toml.decode(text)
-        _check_finite(tables, "")
-        return msgspec.convert(tables, kind)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {error}{_remedy(str(error))}") from None
-    except msgspec.DecodeError as error:
-        raise InputError(f"{where}: not TOML: {error}") from None
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+    return read_table(text, where, kind, _remedy)
 
 
 def _remedy(error: str) -> str:
     """Remedy of a missing number."""
     name = error.partition("missing required field `")[2].partition("`")[0]
     return f"; {_REMEDIES[name]}" if name in _REMEDIES else ""
-
-
-def _check_finite(value: object, path: str) -> None:
-    if isinstance(value, float) and not math.isfinite(value):
-        raise InputError(f"{path} must be finite, got {value}")
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            _check_finite(inner, f"{path}.{key}" if path else str(key))
-    if isinstance(value, list):
-        for inner in value:
-            _check_finite(inner, path)

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.files import signed, write_json
+from palpate.files import read_bytes, signed, write_json
 from palpate.force.arm import PositionLoop, Table
 from palpate.force.cells import Prover
 from palpate.force.claims import Claim
@@ -69,13 +69,10 @@ class Certificate(Table):
         Raises:
             InputError: no certificate.
         """
-        with path.open("rb") as file:
-            data = file.read(_LARGEST + 1)
-        if len(data) > _LARGEST:
-            raise InputError(f"{path}: more than {_LARGEST} bytes are no certificate; check the path")
+        data = read_bytes(path, _LARGEST, "a certificate")
         try:
             return msgspec.structs.replace(msgspec.json.decode(data, type=cls), written_by="")
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise InputError(f"{path}: no certificate of palpate certify: {error}") from None
         except InputError as error:
             raise InputError(f"{path}: {error}") from None

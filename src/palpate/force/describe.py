@@ -25,13 +25,15 @@ def sentence(claim: Claim, gains_kind: str) -> str:
     if claim.kind == "held":
         factor = f", or up to {claim.shares[1]:g} times that gain" if claim.shares[1] > 1.0 else ""
         return (
-            f"constant gain of K_u = cap{factor}: K + B/theta at the measured position from {claim.low:.4g} to "
-            f"{claim.high:.4g} N/m, {times}; K and B may change every tick within a cell"
+            f"the gain held at that of the stiffest surface{factor}: every surface whose K + B/theta, as the measured "
+            f"position shows it, is {claim.low:.4g} to {claim.high:.4g} N/m, {times}; K and B may change from tick to "
+            "tick within a cell"
         )
     if claim.kind == "one-sided":
         return (
-            f"constant gain of K_u = cap, with loss of contact at ticks over gaps of up to F_d/({claim.low:.3g} N/m): "
-            f"K + B/theta at the measured position up to {claim.high:.4g} N/m, {times}"
+            f"the gain held at that of the stiffest surface, with loss of contact at ticks over gaps of up to "
+            f"F_d/({claim.low:.3g} N/m): every surface whose K + B/theta, as the measured position shows it, is up to "
+            f"{claim.high:.4g} N/m, {times}"
         )
     which = (
         "every constant stiffness"

@@ -7,8 +7,9 @@ import numpy as np
 from palpate.force.gains import Gains
 from palpate.force.steps import Step
 
-LAGS, DECAYS, RISES = 8.0, 4.0, 5.0
-"""Lags of the loop, B/K, and times in which a surface rises out of the noise, that a first touch takes at most.
+LAGS, DECAYS, RISES, LEVELS = 8.0, 4.0, 5.0, 1.8
+"""Lags of the loop, B/K, times in which a surface rises out of the noise, and in which it comes to the level, that a
+first touch takes at most.
 
 Measured by benchmarks/force/first_touches.py, where more than 99.9 % of all touches keep to their sum.
 """
@@ -41,13 +42,29 @@ def settling_bound(gains: Gains, stiffness: float, damping: float = 0.0) -> floa
     """
     travel = gains.force / (stiffness * gains.arm.limits.speed)
     found = RISES * rise(gains, stiffness)
-    return LAGS * gains.theta + travel + DECAYS * damping / stiffness + found
+    return (
+        LAGS * gains.theta
+        + travel
+        + DECAYS * damping / stiffness
+        + found
+        + LEVELS * level_time(gains, stiffness)
+    )
+
+
+def level_time(gains: Gains, stiffness: float) -> float:
+    """Time from the touch until the force is above what the sensor may show in free motion, at the approach [s].
+
+    Args:
+        gains: of the loop.
+        stiffness: K of the surface itself [N/m].
+    """
+    return 2.0 * gains.level / (gains.arm.seen(stiffness) * gains.approach)
 
 
 def softest(gains: Gains) -> float:
     """The surface whose force rises by a standard deviation of the noise in a lag, at the approach's speed [N/m].
 
-    On stiffer ones a touch is found as soon as it is felt: `settling_bound` holds without its last term.
+    On stiffer ones a touch is found as soon as it is felt: `settling_bound` holds without the noise's term.
     """
     felt = gains.arm.sensor.noise / (gains.approach * gains.theta)
     return gains.arm.surface(felt)

@@ -9,6 +9,7 @@ import numpy as np
 from palpate._jit import reader, writer
 from palpate._jit.stored import leaves, places
 from palpate.arrays import Array
+from palpate.force.guard import SafetyState
 from palpate.force.law import Cautious, CautiousState
 
 
@@ -20,12 +21,15 @@ def flattened(tree: Any) -> Array:
 law_in = reader(Cautious)
 state_in = reader(CautiousState)
 put_state = writer(CautiousState)
+guard_in = reader(SafetyState)
+put_guard = writer(SafetyState)
 
 _PLACES = places(CautiousState)
 STATE = len(_PLACES)
 """Numbers of a state."""
-LAST, VARIANCE, TIDE = (_PLACES.index(("watch", name)) for name in ("last", "variance", "tide"))
+VARIANCE, REST, DRIFT = (_PLACES.index(("watch", name)) for name in ("variance", "rest", "drift"))
 PHASE = _PLACES.index(("stage", "phase"))
-SINCE = _PLACES.index(("known", "since"))
 FOUND, STD = (_PLACES.index(("known", name, "x")) for name in ("found", "std"))
 BOUND = _PLACES.index(("bound", "used"))
+GUARD, TROUBLE = len(places(SafetyState)), STATE + places(SafetyState).index(("trouble",))
+"""Numbers of a guard's state behind it, and the place of the trouble."""

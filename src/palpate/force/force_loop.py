@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,20 +14,24 @@ from palpate.files import write_text
 from palpate.force.contact_evidence import AIR
 from palpate.force.flat import (
     BOUND,
+    DRIFT,
     FOUND,
-    LAST,
+    GUARD,
     PHASE,
-    SINCE,
+    REST,
     STATE,
     STD,
-    TIDE,
+    TROUBLE,
     VARIANCE,
     flattened,
+    guard_in,
     law_in,
+    put_guard,
     put_state,
     state_in,
 )
 from palpate.force.gains import Gains, load_gains
+from palpate.force.guard import LEAST, TROUBLES, safe_step
 from palpate.force.stage import LEARNING, LOCKED
 
 if TYPE_CHECKING:
@@ -36,88 +39,20 @@ if TYPE_CHECKING:
 
 
 PHASES = {AIR: "air", LEARNING: "learning", LOCKED: "locked"}
-FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED, PULLED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
-TROUBLES = {
-    FINE: "",
-    BLIND: "a reading was no number: the tip was held",
-    STALE: "the force reading has not changed for longer than the loop's lag: the tip was held; "
-    "the sensor, or what reads it, stands still (a simulated one needs noise)",
-    SATURATED: "the force sensor is at the end of its scale: the tip withdrew",
-    LIMITED: "the force is above its limit: the tip withdrew",
-    LATE: "ticks were missed: nothing was learned from them",
-    UNREACHED: "the force asked for cannot be reached: the command went three times as far as that takes; "
-    "a motor is at its limit, or something blocks the tip: it was held",
-    PULLED: "the force is negative beyond its noise: its sign is turned, or the sensor was not tared in the air; "
-    "the tip was held",
-}
-FARTHEST = 3.0
-"""Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer.
-
-Measured by benchmarks/force/in_vain.py: where nothing is wrong it is a third of that way at most; the proof lets the
-stiffness be wrong by a factor of 2, and half of that again is room for friction.
-"""
-LEAST = 8.0
-"""Standard deviations of the noise: the least force that may be asked for, and the least that counts as a pull."""
-NEAR = 0.05
-"""Of F_d: an error that counts, and a change of the force that starts the count anew; the band of what is settled."""
-# Behind the law's own state: ticks without a good reading, ticks since the reading changed, the trouble of this tick,
-# how far the command has gone in vain [N], and from which force.
-_BLIND, _UNCHANGED, _TROUBLE, _VAIN, _FROM, EXTRA = STATE, STATE + 1, STATE + 2, STATE + 3, STATE + 4, 5
 
 
 @law
-def safe_step(numbers, state, desired, force, position, missed):
-    """One tick, with a safe answer to everything that is no reading: the speed [m/s]; the state changes in place."""
-    control = law_in(numbers)
-    lag = control.theta / control.tick
-    if not (abs(force) < inf and abs(position) < inf):
-        state[_BLIND] += 1.0
-        state[_TROUBLE] = BLIND
-        return 0.0
-    if state[_BLIND] > lag or missed > lag:  # too long to go on from what was known
-        renewed(control, state)
-    elif state[_BLIND] > 0.0 or missed > 0.0:
-        state[SINCE] = 0.0  # the low-pass has to forget the gap before anything is learned
-    trouble = LATE if missed > 0.0 or state[_BLIND] > 0.0 else FINE
-    state[_BLIND] = 0.0
-    state[_UNCHANGED] = state[_UNCHANGED] + 1.0 if force == state[LAST] and state[0] > 0.0 else 0.0
-    speed, after = control.step(state_in(state), desired, force, position)
-    put_state(state, after)
-    if abs(force) >= 0.99 * control.full_scale:
-        trouble, speed = SATURATED, -control.approach if force > 0.0 else 0.0
-    elif force > control.force_limit:
-        trouble, speed = LIMITED, min(speed, -control.approach)
-    elif after.watch.mean < -LEAST * control.noise:
-        trouble, speed = PULLED, 0.0
-    elif state[_UNCHANGED] > max(lag, 5.0 * control.period / control.tick):
-        trouble, speed = STALE, 0.0
-    elif in_vain(control, state, after, desired, speed) > FARTHEST * desired:
-        trouble, speed = UNREACHED, 0.0
-    state[_TROUBLE] = trouble
+def flat_step(numbers, state, desired, force, position, missed):
+    """`safe_step` on flat arrays: the speed [m/s]; the state changes in place."""
+    speed, after, guard = safe_step(
+        law_in(numbers), state_in(state[:STATE]), guard_in(state[STATE:]), desired, force, position, missed
+    )
+    put_state(state[:STATE], after)
+    put_guard(state[STATE:], guard)
     return speed
 
 
-@law
-def in_vain(control, state, after, desired, speed):
-    """Force that the command would have added since the error last fell [N]."""
-    stiffness = control.cap * max(after.known.found.x, 0.0)
-    low = after.watch.mean < (1.0 - NEAR) * desired and after.stage.phase != AIR
-    if not low or abs(after.watch.mean - state[_FROM]) > NEAR * desired:
-        state[_VAIN], state[_FROM] = 0.0, after.watch.mean
-    else:
-        state[_VAIN] += control.tick * speed * stiffness / (1.0 + control.compliance * stiffness)
-    return state[_VAIN]
-
-
-@law
-def renewed(control, state):
-    """In the air, knowing nothing but the sensor's noise."""
-    variance, tide = state[VARIANCE], state[TIDE]
-    put_state(state, control.start())
-    state[VARIANCE], state[TIDE] = variance, tide
-
-
-_step = kernel(safe_step)
+_step = kernel(flat_step)
 
 
 @dataclass(frozen=True)
@@ -168,7 +103,7 @@ class ForceLoop:
         self.gains, self.certificate = gains, certificate
         self._desired = gains.force
         self._numbers = flattened(gains.cautious())
-        self._state = np.zeros(STATE + EXTRA)
+        self._state = np.zeros(STATE + GUARD)
         self.reset()
         self._bind()
 
@@ -241,12 +176,22 @@ class ForceLoop:
     @property
     def trouble(self) -> str:
         """Fault of the last tick, in words; empty if there was none."""
-        return TROUBLES[float(self._state[_TROUBLE])]
+        return TROUBLES[float(self._state[TROUBLE])]
 
     @property
     def noise(self) -> float:
         """Standard deviation of a force reading, as measured in the air [N]."""
         return float(np.sqrt(self._state[VARIANCE]))
+
+    @property
+    def bias(self) -> float:
+        """Force of the sensor in free motion, which is taken out of the readings [N]."""
+        return float(self._state[REST])
+
+    @property
+    def drift(self) -> float:
+        """Change of that bias over the last second of free motion [N/s]."""
+        return float(self._state[DRIFT])
 
     @property
     def state(self) -> tuple[float, ...]:

@@ -14,7 +14,8 @@ from msgspec import Meta
 from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force.arm import Arm, PositionLoop, Positive, Table, from_toml, read_small
+from palpate.files import read_text
+from palpate.force.arm import Arm, PositionLoop, Positive, Table, from_toml
 from palpate.force.lag import lag_of
 from palpate.force.law import Cautious
 from palpate.force.sampled_loop import filter_of
@@ -26,11 +27,26 @@ ALPHA = 0.42
 Measured by benchmarks/force/first_touches.py: 0.45 overshoots by 9 % on the stiffest surfaces, 0.36 is a
 quarter slower.
 """
-LAW = "cautious adaptive control 5"
+LAW = "cautious adaptive control 6"
 """Its name in adaptive control (a gain that the estimate's uncertainty lowers), and which form of it.
 
 A certificate of another one is refused.
 """
+LEVEL = 0.0075
+"""Of F_d, that a sensor may show in free motion either way, or two standard deviations if that is more.
+
+Measured by benchmarks/force/free_motion.py: twice as much costs 0.05 s on the softest surfaces, hums exceed half as
+much.
+"""
+BIAS = 0.1
+"""Of F_d, that is taken out of the readings as bias: pressed too hard by that, if it was a surface's."""
+DRIFT = 0.35
+"""Drift that is followed, whatever a sensor's maker states [N/s]: what rises more slowly at the approach is no surface.
+
+Above the 0.3 N/s that benchmarks/force/free_motion.py puts to it; the softest surface is this over the approach.
+"""
+_DIGIT = 1e-5
+"""Of F_d: the least noise that is believed, so that a simulated sensor without noise has information that is finite."""
 _TOUCH = 0.5
 """Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch; on a surface with a damping ratio of 1
 the damping's 2 v sqrt(K m) is then F_d."""
@@ -79,6 +95,9 @@ class Gains(Table):
     """Speed in the air [m/s]."""
     force_limit: Positive
     """Above which the tip withdraws [N]."""
+    level: Positive
+    """Largest force that the sensor may show in free motion, either way [N]: below it, whatever the signal, the tip is
+    never faster than the approach."""
     alpha: Annotated[float, Meta(gt=0, le=1)] = ALPHA
     relief: Annotated[float, Meta(ge=0, le=0.3)] = 0.0
     """rho: share of the lag that a torque arm does not have on a stiff surface, see `relief_of`."""
@@ -134,6 +153,16 @@ class Gains(Table):
         """Lowest K_u [N/m]."""
         return max(_SLOWEST * self.alpha * self.force / (self.theta * self.arm.limits.speed), 1.0)
 
+    @property
+    def bias(self) -> float:
+        """Largest force at rest that is taken out of the readings [N]."""
+        return BIAS * self.force
+
+    @property
+    def drift(self) -> float:
+        """Slowest rise that counts as a surface's [N/s]."""
+        return max(DRIFT, self.arm.sensor.drift or 0.0)
+
     def cautious(self) -> Cautious:
         """The law's numbers."""
         arm = self.arm
@@ -141,11 +170,14 @@ class Gains(Table):
         memory = (_FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick) + 1.0 / arm.sensor.sampling
         swing = SWING * arm.inner.swing if isinstance(arm.inner, PositionLoop) else 0.0
         E, e0, e1, c = followed(arm)
+        step = arm.sensor.resolution or 0.0
         numbers: dict[str, Any] = {
             "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,
             "relief": self.relief, "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed,
-            "approach": self.approach,
-            "noise": arm.sensor.noise, "memory": memory, "blind": memory + swing,
+            "approach": self.approach, "level": 2.0 * self.level, "bias": self.bias, "drift": self.drift,
+            "noise": arm.sensor.noise, "resolution": step,
+            "least": max((0.25 * arm.sensor.noise) ** 2, step**2 / 12.0, (_DIGIT * self.force) ** 2),
+            "memory": memory, "blind": memory + swing,
             "period": max(1.0 / arm.sensor.sampling, arm.tick), "E": E, "e0": e0, "e1": e1, "c": c,
             "d": 0.0 if low_pass.sections else 1.0, "z": _SURE, "eps": _ROOM, "full_scale": arm.sensor.full_scale,
             "force_limit": self.force_limit, "locking": 1.0, "bounding": 1.0, "backing": 1.0,
@@ -168,7 +200,7 @@ def load_gains(path: Path) -> Gains:
     Raises:
         InputError: no such file, another law, a number out of range.
     """
-    return from_toml(read_small(path, "gains"), str(path), Gains)
+    return from_toml(read_text(path, "gains"), str(path), Gains)
 
 
 def gains_for(
@@ -202,8 +234,13 @@ def gains_for(
     return Gains(
         arm=arm, force=force, theta=theta, cap=cap, relief=_known_relief(_any_noise(arm), theta),
         force_limit=arm.sensor.full_scale if limit is None else limit,
-        approach=approach,
+        approach=approach, level=free_motion_level(arm, force),
     )  # fmt: skip
+
+
+def free_motion_level(arm: Arm, force: float) -> float:
+    """Largest force that a sensor is taken to show in free motion [N], for a desired force [N]."""
+    return max(LEVEL * force, 2.0 * arm.sensor.noise)
 
 
 def known_lag(arm: Arm) -> float:

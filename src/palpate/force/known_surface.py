@@ -3,15 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import isfinite
-from typing import Any, TypeGuard
+from dataclasses import dataclass, field, replace
+from math import inf, isfinite
+from typing import Any, NamedTuple, TypeGuard
 
 from palpate.errors import InputError
+from palpate.force.arm import Arm
 from palpate.force.lag import SOFTEST
 
 _OF_IDENTIFY = " (to palpate identify, whose --json palpate tune takes)"
 """Behind what an identification asks for."""
+_SERIES = "series-compliance"
+"""Warning of an identification whose position does not show how the arm gives way."""
+
+
+class Assumed(NamedTuple):
+    """A value that nothing measured.
+
+    Args:
+        value: that the gains allow for; infinite if there is none.
+        unit: in SI.
+        why: it is this one.
+    """
+
+    value: float
+    unit: str
+    why: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"value": _finite(self.value), "unit": self.unit, "why": self.why}
 
 
 @dataclass(frozen=True)
@@ -20,10 +41,13 @@ class Known:
 
     Args:
         stiffness: K, lowest and highest [N/m].
-        damping: B, lowest and highest [N s/m].
+        damping: B, lowest and highest [N s/m]; infinite where nothing bounds it.
         value: K itself [N/m]; None where only a range was given.
         source: where that comes from.
         warnings: of the identification, code and text.
+        assumed: of what has no number, by name.
+        in_series: the position that it was measured with does not show how the arm gives way.
+        force: at which it was measured [N]; None where that is unknown.
     """
 
     stiffness: tuple[float, float]
@@ -31,6 +55,56 @@ class Known:
     value: float | None = None
     source: str = "told"
     warnings: tuple[tuple[str, str], ...] = ()
+    assumed: Mapping[str, Assumed] = field(default_factory=dict)
+    in_series: bool = False
+    force: float | None = None
+
+    @classmethod
+    def stated(cls, stiffness: tuple[float, float], damping: float | None = None) -> Known:
+        """A surface from a range of K [N/m] and the highest B [N s/m]; no damping is assumed when None."""
+        none = {"damping": Assumed(0.0, "N s/m", "none is given: --damping-max allows for one")}
+        return cls(stiffness, assumed=none).with_damping_up_to(damping)
+
+    def with_damping_up_to(self, highest: float | None) -> Known:
+        """The same with a stated highest B [N s/m]; as it is when None.
+
+        Raises:
+            InputError: below 0.
+        """
+        if highest is None:
+            return self
+        if not 0.0 <= highest < inf:
+            raise InputError(f"--damping-max must be 0 N s/m or more, got {highest:g} N s/m")
+        return replace(self, damping=(min(self.damping[0], highest), highest), assumed={})
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values of the estimate."""
+        return {
+            "stiffness": self.value,
+            "stiffness_interval": list(self.stiffness),
+            "damping_interval": [_finite(end) for end in self.damping],
+            "source": self.source,
+        }
+
+    def beyond(self, arm: Arm) -> Known:
+        """The surface alone, where the arm gave way in series with it in the log.
+
+        K = Ks k/(Ks + k) and B = Bs (k/(Ks + k))^2 of the surface's Ks and Bs and the arm's k.
+        """
+        if not self.in_series or arm.kind != "position":
+            return self
+        seen = self.stiffness[1]
+        alone = min(arm.surface(seen), max(arm.limits.stiffness, seen))
+        why = (
+            f"surface and arm in series have up to {seen:.4g} N/m, the arm alone {arm.series / 1e3:.3g} kN/m"
+        )
+        return replace(
+            self,
+            stiffness=(self.stiffness[0], alone),
+            damping=(self.damping[0], self.damping[1] * (alone / seen) ** 2),
+            assumed={**self.assumed, "stiffness": Assumed(alone, "N/m", why)},
+            in_series=False,
+        )
 
 
 def known_from(found: Mapping[str, Any], source: str) -> Known:
@@ -39,6 +113,7 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
     Raises:
         InputError: no such object, or one without a stiffness in N/m that can be bounded.
     """
+    logs = found.get("logs")
     if "logs" in found:
         found = found.get("pooled") or {}
     parameters = found.get("parameters") if isinstance(found, Mapping) else None
@@ -63,16 +138,72 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
     low, high = interval
     if not high > 0.0:
         raise InputError(f"{source}: a stiffness of {low:g} to {high:g} N/m is none that one can press on")
-    B = parameters.get("B")
-    damping = (_interval(B) if isinstance(B, Mapping) else None) or (0.0, 0.0)
-    value = K.get("value")
+    damping, assumed = _damping(parameters.get("B"), logs if isinstance(logs, list) else [])
+    value, warnings = K.get("value"), _warned(found.get("warnings")) + _of_mass(parameters.get("M"))
+    force = point.get("force_N") if isinstance(point, Mapping) else None
     return Known(
-        (max(low, SOFTEST), high),
-        (max(damping[0], 0.0), max(damping[1], 0.0)),
+        (max(low, SOFTEST), high + _relaxing(parameters)),
+        damping,
         float(value) if _is_number(value) else None,
         source,
-        _warned(found.get("warnings")),
+        warnings,
+        assumed,
+        any(code == _SERIES for code, _ in warnings),
+        float(force) if _is_number(force) and force > 0.0 else None,
     )
+
+
+def _damping(B: object, logs: list[Any]) -> tuple[tuple[float, float], dict[str, Assumed]]:
+    """B's interval [N s/m], and what is assumed of it: where it has no number, its upper end counts.
+
+    Args:
+        B: the parameter.
+        logs: that it is pooled from; the widest of their intervals counts where the pooled B has none.
+    """
+    each = [_of_unit(own["B"], "N s/m") for own in map(_parameters, logs) if "B" in own]
+    widest = [end for end in each if end is not None]
+    interval = _of_unit(B, "N s/m")
+    if interval is None and each and len(widest) == len(each):
+        interval = min(low for low, _ in widest), max(high for _, high in widest)
+    why = B.get("reason") or B.get("verdict") if isinstance(B, Mapping) else None
+    if interval is None:
+        return (0.0, inf), {"damping": Assumed(inf, "N s/m", str(why or "it has no B in N s/m"))}
+    low, high = max(interval[0], 0.0), max(interval[1], 0.0)
+    if isinstance(B, Mapping) and _is_number(B.get("value")) and B.get("verdict") in (None, "identified"):
+        return (low, high), {}
+    text = f"the upper end of its 95 % interval, {interval[0]:.3g} to {interval[1]:.3g} N s/m"
+    return (low, high), {"damping": Assumed(high, "N s/m", text)}
+
+
+def _of_mass(M: object) -> tuple[tuple[str, str], ...]:
+    """A warning of a surface that has a mass of its own, which is in no proof."""
+    interval = _of_unit(M, "kg")
+    if (
+        interval is None
+        or not interval[0] > 0.0
+        or not isinstance(M, Mapping)
+        or M.get("verdict") != "identified"
+    ):
+        return ()
+    text = f"the surface moves a mass of {interval[0]:.3g} to {interval[1]:.3g} kg, which no proof covers: touch slowly"
+    return (("surface-mass", text),)
+
+
+def _parameters(log: object) -> Mapping[str, Any]:
+    found = log.get("parameters") if isinstance(log, Mapping) else None
+    return found if isinstance(found, Mapping) else {}
+
+
+def _of_unit(parameter: object, unit: str) -> tuple[float, float] | None:
+    """A parameter's interval; None if it has none, or is in another unit."""
+    right = isinstance(parameter, Mapping) and parameter.get("unit") in (None, unit)
+    return _interval(parameter) if right and isinstance(parameter, Mapping) else None
+
+
+def _relaxing(parameters: Mapping[str, Any]) -> float:
+    """The stiffness that a relaxing solid has beyond K while it is pressed fast [N/m]."""
+    interval = _of_unit(parameters.get("K1"), "N/m")
+    return max(interval[1], 0.0) if interval else 0.0
 
 
 def _warned(warnings: object) -> tuple[tuple[str, str], ...]:
@@ -91,6 +222,10 @@ def _interval(parameter: Mapping[str, Any]) -> tuple[float, float] | None:
         if isinstance(ends, list | tuple) and len(ends) == 2 and all(_is_number(end) for end in ends):
             return float(ends[0]), float(ends[1])
     return None
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
 
 
 def _is_number(value: object) -> TypeGuard[float]:

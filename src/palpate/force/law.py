@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3
-from palpate.force.backstop import Backstop, guarded
-from palpate.force.contact_evidence import AIR, Watch, behind, listened, watched
+from palpate.force.backstop import MOST, Backstop, guarded
+from palpate.force.contact_evidence import AIR, Watch, behind, listened, retared, watched, white
 from palpate.force.learned import Learned, begun, taken
 from palpate.force.onset import NO_STARTS, Starts
 from palpate.force.regression import NOTHING, Fit
-from palpate.force.stage import STEP, Stage, staged
-from palpate.force.stiffness_bound import Bound, bounded
+from palpate.force.stage import STEP, Stage, is_false, staged
+from palpate.force.stiffness_bound import Bound, Sure, bounded
 
 
 @part
@@ -36,8 +36,13 @@ class Cautious(NamedTuple):
         cap: largest K + B/theta that there may be, as the measured position feels it [N/m].
         floor: lowest K_u that is used [N/m].
         speed: the arm's limit [m/s].
-        approach: speed in the air [m/s].
-        noise: standard deviation of a reading, until the air has told better [N].
+        approach: speed in free motion [m/s].
+        level: force above the bias that is a surface's if it follows the tip [N]; twice what the sensor may show.
+        bias: largest force at rest that is taken out of the readings [N].
+        drift: slowest rise that counts as a surface's [N/s].
+        noise: standard deviation of a reading, until free motion has told better [N].
+        least: least variance of a reading that is believed [N^2].
+        resolution: step in which the sensor reads; 0 for none [N].
         memory: time in which the sensor's low-pass forgets [s].
         blind: time after a touch for which nothing is learned: the low-pass', and half of a swing of the tip [s].
         period: between two readings [s].
@@ -62,7 +67,12 @@ class Cautious(NamedTuple):
     floor: float
     speed: float
     approach: float
+    level: float
+    bias: float
+    drift: float
     noise: float
+    least: float
+    resolution: float
     memory: float
     blind: float
     period: float
@@ -81,17 +91,19 @@ class Cautious(NamedTuple):
 
     def start(self):
         """In the air, knowing nothing."""
-        fit, variance = Fit(NOTHING, ZERO3), self.noise * self.noise
+        fit, variance = Fit(NOTHING, ZERO3), max(self.noise * self.noise, self.least)
         return CautiousState(
             0.0,
             0.0,
-            Watch(0.0, 0.0, 0.0, 0.0, variance, 0.5 * variance * self.period / self.theta, 0.0, 0.0, 0.0),
+            Watch(
+                0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variance, white(self, variance), 0.0, 0.0, 0.0, 0.0
+            ),
             Follow(ZERO3, 0.0, 0.0, 0.0, 0.0),
             Stage(AIR, 0.0, 0.0, 0.0),
             Learned(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
             NO_STARTS,
-            Bound(self.cap, self.cap, 0.0),
-            Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0)),
+            Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         )
 
     def step(self, state, desired, force, position):
@@ -100,18 +112,21 @@ class Cautious(NamedTuple):
         follow = followed(self, state, position)
         starts = listened(self, state, follow, force)
         watch = watched(self, state, starts, force)
-        stage = staged(self, state.stage, watch, desired, before, force)
+        stage = staged(self, state, watch, desired, before)
+        if state.stage.phase != AIR and is_false(self, state, watch):
+            watch = retared(self, watch)
         known = begun(self, state.known, state.stage, stage, watch, follow, starts, behind(self, state))
         known = taken(self, known, state, stage, watch, follow, force)
-        bound = bounded(self, state.bound, stage, known)
-        backstop = guarded(self, state.backstop, stage, watch, desired, before)
-        u = backstop.care * gain(self, bound.used) * (desired - force)
+        bound = bounded(self, state.bound, stage, known, watch, follow)
+        backstop = guarded(self, state.backstop, state.stage, stage, watch, desired, before)
+        u = backstop.care * gain(self, bound.used) * (desired - (force - watch.rest))
         forward = 0.0
         if stage.phase != AIR and abs(desired - before) <= STEP * abs(desired):
             forward = (desired - before) / self.tick * (self.compliance + 1.0 / bound.used)
-        firm = stage.firm * self.tick > self.theta or bound.used < 0.5 * self.cap
-        limit = self.speed if stage.phase != AIR and firm else self.approach
-        speed = max(min(u + forward, limit), -self.speed) if stage.phase != AIR else self.approach
+        limit = bound.sure.limit
+        speed = max(min(u + forward, limit), -limit)
+        if stage.phase == AIR:
+            speed = backstop.care * self.approach if backstop.bounces < MOST else 0.0
         return speed, CautiousState(
             state.ticks + 1.0, desired, watch, follow, stage, known, starts, bound, backstop
         )  # fmt: skip

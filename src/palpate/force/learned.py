@@ -6,7 +6,7 @@ from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3, sqrt
 from palpate.force.contact_evidence import AIR, EDGE, LEVEL, spread_of
 from palpate.force.onset import explained, latest
-from palpate.force.regression import AXIS_B, AXIS_K, BOTH, Fit, fit_of, fit_through, without_offset
+from palpate.force.regression import AXIS_B, AXIS_K, BOTH, UNKNOWN, Fit, fit_of, fit_through, without_offset
 from palpate.force.stage import LEARNING, LOCKED
 
 
@@ -65,14 +65,16 @@ def taken(law, known, state, stage, w, f, force):
         return Learned(known.slow, known.fast, since, known.origin, known.shown, known.found, known.std)
     rate = (f.y - f.y0) / law.tick
     phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
+    if state.bound.sure.refuted > 0.0:  # it was no surface: what it seemed to tell is forgotten
+        nothing = fit_through(law.cap * (f.y - known.origin), w.mean, UNKNOWN)
+        return Learned(nothing, nothing, law.blind / law.tick, known.origin, 0.0, ZERO3, ZERO3)
     if (
         state.bound.used >= law.cap
         and known.std.z > 0.0
-        and force - known.found @ phi > EDGE * sqrt(w.variance)
+        and force - known.found @ phi > EDGE * max(sqrt(w.variance), 2.0 * sqrt(w.tide))
     ):
-        return Learned(
-            known.fast, known.fast, stage.firm, known.origin, 0.0, ZERO3, ZERO3
-        )  # refuted: it begins here
+        here = fit_through(phi.x, force, sqrt(w.variance))  # refuted: it begins here
+        return Learned(here, known.fast, stage.firm, known.origin, 0.0, ZERO3, ZERO3)
     moving = min(max(known.found.x, 0.0), 1.0) * law.cap * rate * law.tick
     noise = 2.0 * law.theta * w.tide / (w.gap * law.tick)
     weight = 1.0 / (noise + moving * moving / 12.0)

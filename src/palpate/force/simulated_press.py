@@ -20,13 +20,14 @@ ENCODER = 1e-6
 """Resolution of the measured position [m]."""
 
 
-def world_of(arm: Arm, *, noise: float, phase: float = 0.0) -> World:
+def world_of(arm: Arm, *, noise: float, phase: float = 0.0, resolution: float = 0.0) -> World:
     """The world of an arm.
 
     Args:
         arm: what moves.
         noise: standard deviation of a reading [N].
         phase: when the sensor samples first [s].
+        resolution: of a reading [N]; 0 for none.
     """
     inner = arm.inner
     steps = max(round(arm.tick / STEP[arm.kind]), 1)
@@ -57,6 +58,7 @@ def world_of(arm: Arm, *, noise: float, phase: float = 0.0) -> World:
         noise=float(noise),
         full_scale=float(arm.sensor.full_scale),
         step=ENCODER,
+        resolution=float(resolution),
     )
 
 
@@ -69,7 +71,7 @@ def surface(stiffness: float, damping: float = 0.0, **others: float) -> Surface:
     return Surface(float(stiffness), float(damping), **{k: float(v) for k, v in numbers.items()})
 
 
-# More than seven arguments: who waits for the compiler is told.
+# More than seven arguments: who waits for the compiler is told, and a sensor may be wrong.
 def pressed(
     world: World,
     touched: Surface,
@@ -78,6 +80,7 @@ def pressed(
     desired: Array,
     seed: Any,
     waiting: Callable[[], None] | None = None,
+    error: Array | None = None,
 ) -> Array:
     """A run from the air: force on the surface (mean of each tick), K_u, position, speed and reading, shape (n, 5).
 
@@ -89,11 +92,14 @@ def pressed(
         desired: F_d at each tick [N], shape (n,).
         seed: of the noise.
         waiting: called when the loop has to be compiled first.
+        error: of the sensor beside its noise [N], shape (n,); none if left out.
     """
     n = len(desired)
     out = np.zeros((n, 5))
     noise = np.random.default_rng(seed).standard_normal(8 * (n + 1))
-    compiled_touch.run(waiting, world, touched, control, -gap, desired, noise, np.zeros(world.delay + 1), out)
+    false = np.zeros(n) if error is None else error
+    line = np.zeros(world.delay + 1)
+    compiled_touch.run(waiting, world, touched, control, -gap, desired, noise, false, line, out)
     return out
 
 

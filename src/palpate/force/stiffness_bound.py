@@ -3,16 +3,21 @@
 from typing import NamedTuple
 
 from palpate._jit import law, part
-from palpate.force.contact_evidence import AIR, EVIDENT
+from palpate._vector import sqrt
+from palpate.force.contact_evidence import AIR, EDGE, EVIDENT, FEWEST, PLAIN
 from palpate.force.regression import AXIS_K, BOTH
 from palpate.force.stage import LOCKED
 
-PLAIN = 2.5
-"""Standard deviations above which a stiffness, or a damping, is a surface and not noise in the air.
+SHOWED = 1.5
+"""Times what free motion has shown, that a surface has to exceed."""
+EARNED = 3.0
+"""Times as fast as before the tip may be where the readings bear the stiffness out: twice as fast costs a tenth of a
+second on the softest surfaces, four times as fast lets a sensor that lies once come to twice the peak.
 
-Measured by benchmarks/force/first_touches.py: with 2 noise passes for a soft surface once in some thousand touches
-(22 % over, --arms ur5e --touches 1000 --seed 2), with 1.5 oftener (37 %).
+Measured by benchmarks/force/free_motion.py.
 """
+BORNE = 2.0
+"""Standard deviations by which a rise that is foretold has to stand out of the noise to count as a test."""
 SURE = 4.0
 """Readings for which K_u stays where it was at a touch: what they refute was an edge, not a ramp.
 
@@ -36,49 +41,94 @@ before the bound is held."""
 
 
 @part
+class Sure(NamedTuple):
+    """The force as surely that of a surface."""
+
+    stiffness: float  # with which it became so, in caps; 0 while the force may be the sensor's alone
+    x: float  # position at the last test of it [m]
+    force: float  # mean force there [N]
+    limit: float  # of the speed [m/s]
+    refuted: float  # 1 in the tick in which it became unsure again
+
+
+@part
 class Bound(NamedTuple):
     """K_u."""
 
     used: float  # [N/m]
     held: float  # what is evident of it: `used` but for a suspicion while it is locked [N/m]
+    most: float  # the cap, or what has refuted it [N/m]
+    least: float  # half of what was held, until there is free motion: a surface that recedes looks soft [N/m]
     calm: float  # ticks since the last suspicion
+    sure: Sure
 
 
 @law
-def bounded(law, bound, stage, known):
+def bounded(law, bound, stage, known, w, f):
     """K_u at this tick: what all since the touch allows; locked, what was known then or has become evident since.
 
     Locked, it rises at once where the last theta alone is by `z` standard deviations for a stiffer surface. Noise is so
     too, now and then: the rise is taken back unless the readings bear it out, so that it adds up to nothing.
     """
     if stage.phase == AIR:
-        return Bound(law.cap, law.cap, 0.0)
+        return Bound(bound.most, bound.most, bound.most, 0.0, 0.0, Sure(0.0, 0.0, 0.0, law.approach, 0.0))
     if known.since * law.tick < law.blind or stage.since * law.tick < SURE * law.period:
         return bound
     p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
-    upper = min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), law.cap)
+    most = max(bound.most, (1.0 + law.eps) * highest(law, p, -SHOWN * alone, -SHOWN * both))
+    upper = min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), most)
     if stage.phase != LOCKED:
-        now = from_slow(law, known)
+        sure = borne_out(law, bound.sure, known, w, f)
+        if sure.stiffness == 0.0:
+            return Bound(most, most, most, bound.least, 0.0, sure)
+        now = max(from_slow(law, known, most), bound.least)
         now = upper if highest(law, p, -alone, -both) > now else now
-        return Bound(now, now, 0.0)
+        return Bound(now, now, most, bound.least, 0.0, sure)
     held = bound.held
     if highest(law, p, -SHOWN * alone, -SHOWN * both) > STIFFER * held:
         held = upper
     suspected = highest(law, p, -law.z * alone, -law.z * both)
     calm = 0.0 if suspected > STIFFER * held else bound.calm + 1.0
     used = bound.used if calm * law.tick < AGAIN * law.theta else held
-    return Bound(upper if suspected > STIFFER * used else max(used, held), held, calm)
+    return Bound(
+        upper if suspected > STIFFER * used else max(used, held), held, most, 0.5 * held, calm, bound.sure
+    )
 
 
 @law
-def from_slow(law, known):
+def borne_out(law, sure, known, w, f):
+    """Whether the force is surely that of a surface, and how fast the tip may be.
+
+    It becomes so above the level, and above what free motion has shown, where the force follows the tip. From there on
+    each part of the way is a test: the force has to rise by half of what the stiffness foretells, where that stands out
+    of the noise. If it does, the speed may be `EARNED` times as high; if not, nothing is sure.
+    """
+    sigma = sqrt(w.variance)
+    if sure.stiffness > 0.0:
+        noise = max(BORNE * 0.7 * sigma, w.peak)
+        expected, rise = 0.5 * sure.stiffness * law.cap * (f.y - sure.x), w.mean - sure.force
+        if rise < expected - noise:
+            return Sure(0.0, 0.0, 0.0, law.approach, 1.0)
+        if expected > noise or sure.limit >= law.speed:
+            return Sure(sure.stiffness, f.y, w.mean, min(EARNED * sure.limit, law.speed), 0.0)
+        return sure
+    level = max(law.level, EDGE * sigma, SHOWED * w.peak)
+    follows = (known.found.x - EDGE * known.std.x) * law.cap * law.approach > law.drift
+    heard = w.fresh > FEWEST
+    if heard and w.mean - w.rest > level and follows:
+        return Sure(known.found.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0)
+    return Sure(0.0, 0.0, 0.0, law.approach, 0.0)
+
+
+@law
+def from_slow(law, known, most):
     """K_u as all since the touch allows: never below the bound, and the cap unless a surface is plain to see."""
     p, sd = known.found, known.std
     room = law.z * law.bounding / (1.0 + law.eps)
     plain = known.shown > 0.0 or p.x + p.y > PLAIN * sd.z or p.x > PLAIN * sd.x
     if law.bounding > 0.0 and not plain:
-        return law.cap
-    return min(max((1.0 + law.eps) * highest(law, p, room * sd.x, room * sd.z), law.floor), law.cap)
+        return most
+    return min(max((1.0 + law.eps) * highest(law, p, room * sd.x, room * sd.z), law.floor), most)
 
 
 @law

@@ -57,6 +57,7 @@ class World(NamedTuple):
         noise: of a reading [N].
         full_scale: of the sensor [N].
         step: quantisation of the position [m].
+        resolution: of a reading, to whose multiples it is rounded; 0 for none [N].
     """
 
     torque: float
@@ -76,6 +77,7 @@ class World(NamedTuple):
     noise: float
     full_scale: float
     step: float
+    resolution: float
 
 
 @part
@@ -118,8 +120,8 @@ def contact_of_mass(surface, K, x, v):
 
 
 @law
-def moved(world, surface, body, held, t, h, noise, at):
-    """The body a step later: `held` is the commanded position or the torque as a force."""
+def moved(world, surface, body, held, t, h, noise, at, error):
+    """The body a step later: `held` is the commanded position or the torque as a force, `error` the sensor's [N]."""
     swing = surface.sway * sin(surface.frequency * t)
     place = surface.place + swing
     K, p = surface.stiffness, body.p
@@ -142,14 +144,16 @@ def moved(world, surface, body, held, t, h, noise, at):
     z = world.E @ body.z + force * world.e
     reading, samples = body.reading, body.samples
     if t + h >= world.phase + samples / world.sampling:
-        reading = world.c @ z + world.d * force + world.noise * noise[at + int(samples) % 8]
+        reading = world.c @ z + world.d * force + world.noise * noise[at + int(samples) % 8] + error
+        if world.resolution > 0.0:
+            reading = world.resolution * round(reading / world.resolution)
         reading = min(max(reading, -world.full_scale), world.full_scale)
         samples += 1.0
     return BodyState(x, v, p, force, z, reading, samples)
 
 
 @law
-def touch(world, surface, control, start, desired, noise, line, out):
+def touch(world, surface, control, start, desired, noise, error, line, out):
     """A run from the air: row k of `out` is force on the surface (mean of the tick), K_u, position, speed, reading.
 
     Args:
@@ -159,11 +163,12 @@ def touch(world, surface, control, start, desired, noise, line, out):
         start: of the tip [m].
         desired: F_d at each tick [N], shape (n,).
         noise: standard normal numbers, shape (8 (n + 1),).
+        error: of the sensor beside its noise: bias, drift, hum [N], shape (n,).
         line: room for what is on its way, zeros, shape (delay + 1,).
         out: shape (n, 5).
     """
     state = control.start()
-    body = BodyState(start, 0.0, 0.0, 0.0, ZERO3, world.noise * noise[0], 0.0)
+    body = BodyState(start, 0.0, 0.0, 0.0, ZERO3, world.noise * noise[0] + error[0], 0.0)
     command, h = start, world.tick / world.steps
     line[:] = start if world.torque == 0.0 else 0.0
     for k in range(len(desired)):
@@ -182,7 +187,7 @@ def touch(world, surface, control, start, desired, noise, line, out):
             line[world.delay - 1] = into
         mean = 0.0
         for j in range(world.steps):
-            body = moved(world, surface, body, held, (k * world.steps + j) * h, h, noise, 8 * k)
+            body = moved(world, surface, body, held, (k * world.steps + j) * h, h, noise, 8 * k, error[k])
             mean += body.force
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = (
             mean / world.steps,

@@ -152,14 +152,8 @@ class Tuning(Result, shown_by="palpate.report.tuning.in_python"):
                 {"error": e, "times": stiffening(gains, self.steps[1], e), "overshoot": OVERSHOOT}
                 for e in STIFFENING_AT
             ],
-            "estimate": None
-            if known is None
-            else {
-                "stiffness": known.value,
-                "stiffness_interval": list(known.stiffness),
-                "damping_interval": list(known.damping),
-                "source": known.source,
-            },
+            "estimate": None if known is None else known.to_json(),
+            "assumed": {} if known is None else {name: own.to_json() for name, own in known.assumed.items()},
             "warnings": [{"code": code, "text": text} for code, text in self.warnings],
         }
 
@@ -194,7 +188,9 @@ def tune(
     """
     _check(force, known, cap)
     theta = known_lag(arm)
-    stiffest = _cap(arm, known, cap, theta)
+    known = None if known is None else known.beyond(arm)
+    farther = () if known is None or cap is not None else _beyond_log(arm, known, force)
+    stiffest = arm.limits.stiffness if farther else _cap(arm, known, cap, theta)
     limit = arm.sensor.full_scale if peak is None else min(peak, arm.sensor.full_scale)
     gains = gains_for(arm, force, cap=stiffest, theta=theta, limit=limit)
     soft = min(known.stiffness[0] if known else SOFTEST, stiffest)
@@ -202,7 +198,7 @@ def tune(
     steps = step_of(gains, felt), step_of(gains, gains.seen_cap)
     nothing = Certificate(form=FORM, gains=gains, claims=())
     at = margins(gains, gains.seen_cap)
-    found = Tuning(gains, known, nothing, steps, at, tuple(_warnings(arm, known, at.gain)))
+    found = Tuning(gains, known, nothing, steps, at, (*farther, *_warnings(arm, known, at.gain)))
     _check_peak(found, peak)
     _check_surface_speed(gains, surface_speed)
     found = replace(found, certificate=certify(gains, adapting=prove_adapting))
@@ -230,13 +226,39 @@ def _check(force: float, known: Known | None, cap: float | None) -> None:
 def _cap(arm: Arm, known: Known | None, cap: float | None, theta: float) -> float:
     if known is None:
         return arm.limits.stiffness if cap is None else cap
-    needed = known.stiffness[1] + known.damping[1] / theta
+    if cap is None and "damping" in known.assumed and not isfinite(known.damping[1]):
+        raise InputError(
+            f"{known.source} does not bound the damping B ({known.assumed['damping'].why}); "
+            "give the highest that there may be with --damping-max, as --damping-max 200 (N s/m)"
+        )
+    damping = known.damping[1] if isfinite(known.damping[1]) else 0.0
+    needed = known.stiffness[1] + damping / theta
     if cap is not None and cap < needed:
         raise InputError(
             f"the stiffness cap of {cap:g} N/m is below what was identified, K + B/theta up to {needed:.4g} N/m; "
             "raise it"
         )
     return needed if cap is None else cap
+
+
+TIMES = 2.0
+"""Of the force of a log, up to which its stiffness stands for that of a press.
+
+The stiffness of a force that is a power of the depth grows no faster than the force, and the adapting law's proof bears
+one that is twice as high.
+"""
+
+
+def _beyond_log(arm: Arm, known: Known, force: float) -> tuple[tuple[str, str], ...]:
+    """A warning if the force is far beyond that of the log: the arm's own limit of stiffness is the cap then."""
+    if known.force is None or force <= TIMES * known.force:
+        return ()
+    text = (
+        f"the log presses with {known.force:.3g} N, and {force:g} N are asked for: a surface may stiffen, so that the "
+        f"arm's own limit of {arm.limits.stiffness:.3g} N/m is the cap; record a press of {force / TIMES:.3g} N or "
+        "more, or give --stiffness-cap"
+    )
+    return (("force-beyond-log", text),)
 
 
 def _warnings(arm: Arm, known: Known | None, margin: float) -> list[tuple[str, str]]:

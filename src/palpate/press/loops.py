@@ -7,7 +7,7 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
-from palpate.force.gains import Gains, approach_speed
+from palpate.force.gains import Gains, approach_speed, free_motion_level
 from palpate.force.lag import lag_of
 
 MODES = ("torque", "position")
@@ -54,7 +54,7 @@ def gains_for(arm: Arm, force: float) -> Gains:
     cap = arm.limits.stiffness
     return Gains(
         arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale,
-        approach=approach_speed(arm, force, theta, cap),
+        approach=approach_speed(arm, force, theta, cap), level=free_motion_level(arm, force),
     )  # fmt: skip
 
 
@@ -84,7 +84,7 @@ def mass_note(gains: Gains, mass: float | None = None) -> str | None:
         return None
     known = "the tip's along the normal, 1/(n^T J M^-1 J^T n)" if mass is None else f"{mass:.2g} kg here"
     return (
-        f"the gains take the arm's tip for one without mass: a heavy one swings on the arm's {inner.stiffness:g} N/m,"
+        f"the gains leave out the mass of the arm's tip: a heavy tip swings on the arm's {inner.stiffness:g} N/m,"
         f" and after a touch the force may go over; add mass = M, {known}, under [inner] of the arm's file, and tune"
         " again"
     )

@@ -17,6 +17,7 @@ from palpate.force.gains import Gains
 from palpate.press.protocol import Command, Sense, Wire
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.troubles import Troubles
 from palpate.signals.types import Task
 
 CAUTIOUS = "cautious"
@@ -35,6 +36,8 @@ class Acted(NamedTuple):
     phase: float
     speed: float  # asked of the tip along the normal [m/s]
     bound: float  # K_u of the cautious law [N/m]; 0 where there is none
+    trouble: str = ""  # of the law in this tick
+    ended: str | None = None  # by a trouble that lasts
 
 
 class Pilot(Protocol):
@@ -57,6 +60,7 @@ class Cautious:
     def __init__(self, wire: Wire, gains: Gains, normal: Array):
         self._wire, self._normal, self.loop = wire, normal, ForceLoop(gains)
         self._touched = False
+        self._troubles = Troubles(gains.theta, lambda _: None)
 
     def step(self, sense: Sense, desired: float) -> Acted:
         """See `Pilot`."""
@@ -68,7 +72,9 @@ class Cautious:
         self._touched = self._touched or pressing
         phase = CONTACT if pressing else LOST if self._touched else APPROACH
         estimate = self.loop.estimate
-        return Acted(phase, speed, estimate.bound if estimate is not None else self.loop.gains.seen_cap)
+        bound = estimate.bound if estimate is not None else self.loop.gains.seen_cap
+        trouble = self.loop.trouble
+        return Acted(phase, speed, bound, trouble, self._troubles.lasting(trouble, sense.time))
 
 
 class ByTorque:

@@ -11,6 +11,7 @@ from palpate.arrays import Array
 from palpate.contact_frame import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
+from palpate.force.arm import Sensor
 from palpate.force.gains import Gains, load_gains
 from palpate.press.engines import ENGINES
 from palpate.press.loops import MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
@@ -20,7 +21,7 @@ from palpate.press.pressing import Progress, press
 from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import Asked
-from palpate.press.tare import SURE, check_range
+from palpate.press.tare import SURE, check_drift, check_range, fitting, noise_and_drift
 from palpate.press.tool import held_tool, with_tool
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
@@ -83,15 +84,34 @@ class Pressing:
         asked = self.asked
         loop = asked.gains.arm
         cell = cell_of(asked.arm, asked.place, asked.surface, loop, held_tool(asked.payload))
-        arm = SimulatedArm(asked.arm, loop, asked.place, cell, asked.physics, asked.seed)
+        arm, resting = (
+            SimulatedArm(asked.arm, loop, asked.place, cell, asked.physics, asked.seed) for _ in range(2)
+        )
         if asked.payload is not None:
             arm.tare()
             most = self.plan.force + SURE * loop.sensor.noise
             check_range(abs(arm.zero), most, loop.sensor.full_scale)
-        pilot = pilot_of(asked.controller, arm, asked.gains, asked.place, self.plan.force)
+        gains = fitted(asked.gains, resting.at_rest(), self.plan)
+        pilot = pilot_of(asked.controller, arm, gains, asked.place, self.plan.force)
         record = press(arm, pilot, asked.place, self.plan, progress)
         meta = {**record.meta, **asked.meta(record), "tare_N": arm.zero}
         return Record(record.columns, record.units, meta)
+
+
+def fitted(gains: Gains, shown: Array, plan: Plan) -> Gains:
+    """The gains for the noise of an arm at rest.
+
+    Args:
+        gains: as they were tuned.
+        shown: by the sensor in each tick at rest [N], shape (n,).
+        plan: of the press.
+
+    Raises:
+        InputError: a drift, or a noise, with which there is no press.
+    """
+    noise, drift, std = noise_and_drift(gains.arm.tick * np.arange(len(shown), dtype=np.float64), shown)
+    check_drift(drift, std, plan.force, plan.longest + plan.seconds, gains.arm.sensor)
+    return fitting(gains, noise, len(shown)) or gains
 
 
 def prepared(question: Question) -> Pressing:
@@ -105,7 +125,7 @@ def prepared(question: Question) -> Pressing:
     arm = _loaded(question, arm_of(question.arm, question.site))
     place = place_of(arm, _array(question.at), _array(question.normal))
     gains = _gains(question, arm, place)
-    _check_force(question, gains)
+    _check_surface(question, gains)
     notes = check_able(arm, place, gains.approach, question.force)
     massless = mass_note(gains, place.mass)
     notes = [*arm.notes, *notes, *([massless] if massless else []), *_engine_notes(question, arm)]
@@ -201,17 +221,19 @@ def _gains(question: Question, arm: SerialArm, place: Place) -> Gains:
     if question.gains is not None:
         gains = load_gains(question.gains)
         check_mode(gains, question.mode)
+        _check_sensor(question, gains.arm.sensor, gains.force_limit)
         return gains
     mode = question.mode or usual_mode(question.arm)
     if question.controller != CAUTIOUS and question.mode is None:
         mode = "torque"
-    return gains_for(
-        loop_of(question.arm, arm.title, mode, place.mass), question.force * (1.0 - question.probe)
-    )
+    loop = loop_of(question.arm, arm.title, mode, place.mass)
+    _check_sensor(question, loop.sensor, loop.sensor.full_scale)
+    return gains_for(loop, question.force * (1.0 - question.probe))
 
 
-def _check_force(question: Question, gains: Gains) -> None:
-    least, most = SURE * gains.arm.sensor.noise, gains.force_limit
+def _check_sensor(question: Question, sensor: Sensor, most: float) -> None:
+    """Refuse a force that noise hides, or that is not below the largest that may be [N]."""
+    least = SURE * sensor.noise
     lowest = question.force * (1.0 - question.probe)
     if not least <= lowest:
         raise InputError(
@@ -222,6 +244,9 @@ def _check_force(question: Question, gains: Gains) -> None:
         raise InputError(
             f"--force {question.force:g} N is not below the force limit of {most:g} N; ask for less"
         )
+
+
+def _check_surface(question: Question, gains: Gains) -> None:
     total = question.surface.stiffness + question.surface.damping / gains.theta
     if total > gains.cap:
         raise InputError(

@@ -20,7 +20,7 @@ from palpate.records import Record
 Progress = Callable[[float, str], None]
 
 PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact"}
-JOINT_LIMIT = "joint limit"
+JOINT_LIMIT, TROUBLE = "joint limit", "trouble"
 _SHOWN = 200
 """Ticks between two looks at the progress."""
 
@@ -86,7 +86,7 @@ def press(
         try:
             acted = pilot.step(sense, desired)
             if progress is not None and k % _SHOWN == 0:
-                progress(k * tick, PHASES[acted.phase])
+                progress(k * tick, acted.trouble or PHASES[acted.phase])
         except KeyboardInterrupt:
             ending = Ending(INTERRUPTED, f"interrupted at {k * tick:.3f} s")
             break
@@ -128,6 +128,8 @@ def _judged(
         return Ending(
             JOINT_LIMIT, f"{robot.names[beyond[0]]} reached the end of its range at {k * tick:.3f} s"
         )
+    if acted.ended is not None:
+        return Ending(TROUBLE, f"{acted.ended}; at {k * tick:.3f} s")
     if touched is None:
         late = (k + 1) * tick >= plan.longest
         return Ending(NO_CONTACT, f"no surface was felt within {plan.longest:.3g} s") if late else None

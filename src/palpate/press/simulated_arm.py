@@ -104,13 +104,20 @@ class SimulatedArm:
         seen = self._seen
         return Sense(self._k * self.loop.tick, force, self.arm.forward_kinematics(seen), seen)
 
-    def tare(self) -> None:
-        """Rests in the air, and takes what the sensor shows in the second half of that for zero."""
+    def at_rest(self) -> Array:
+        """Readings of the sensor in the second half of a rest in the air, tick by tick [N], shape (n,).
+
+        In the first half its low-pass settles.
+        """
         shown = []
         for _ in range(round(TARE / self.loop.tick)):
             self.write(Command(velocity=np.zeros(6)))
             shown.append(self._touch.reading.value)
-        self.zero = float(np.mean(shown[len(shown) // 2 :]))
+        return np.array(shown[len(shown) // 2 :], dtype=np.float64)
+
+    def tare(self) -> None:
+        """Rests in the air, and takes what the sensor shows in the second half of that for zero."""
+        self.zero = float(self.at_rest().mean())
 
     def write(self, command: Command) -> None:
         """Moves as told for a tick.

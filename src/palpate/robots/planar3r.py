@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
+from palpate.results import Readable
 from palpate.robots.arm3 import Arm3
 
 _THESIS = Arm3()
@@ -23,7 +24,7 @@ _SINGULAR = 1e-6
 
 
 @dataclass(frozen=True)
-class Planar3R:
+class Planar3R(Readable):
     """A planar arm with three revolute joints, in a level plane.
 
     Joint angles q [rad], rates qd [rad/s] and accelerations qdd [rad/s^2] are arrays of shape (..., 3); so
@@ -54,12 +55,12 @@ class Planar3R:
     @property
     def torque_limits(self) -> Array:
         """Limit of each motor [N m], shape (3,)."""
-        return _frozen(self.arm.limits)
+        return _freeze(self.arm.limits)
 
     @property
     def rotor_inertia(self) -> Array:
         """Inertias of the motors' rotors [kg m^2], shape (3,); not in `mass_matrix`, see `with_rotors`."""
-        return _frozen(self.arm.rotor)
+        return _freeze(self.arm.rotor)
 
     def with_rotors(self) -> Planar3R:
         """The arm whose links carry the rotors of their direct-drive motors."""
@@ -67,7 +68,7 @@ class Planar3R:
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
         """Pose of the tip, shape (..., 3); phi is the sum of the joint angles, turns included."""
-        return _joined(self.arm.pose(_split(q, "q")))
+        return _join(self.arm.pose(_split(q, "q")))
 
     def inverse_kinematics(self, pose: ArrayLike, elbow: ArrayLike = +1) -> Array:
         """Joint angles of a pose, shape (..., 3).
@@ -85,11 +86,11 @@ class Planar3R:
         if not np.all(np.abs(side) == 1.0):
             raise InputError(f"elbow must be +1 or -1, got {elbow!r}")
         self._check_reach(p)
-        return _joined(self.arm.inverse(p, side if side.ndim else float(side)))
+        return _join(self.arm.inverse(p, side if side.ndim else float(side)))
 
     def jacobian(self, q: ArrayLike) -> Array:
         """d pose / d q, shape (..., 3, 3)."""
-        return _joined(self.arm.jac(_split(q, "q")))
+        return _join(self.arm.jac(_split(q, "q")))
 
     def jacobian_inverse(self, q: ArrayLike) -> Array:
         """Inverse of the Jacobian in closed form, shape (..., 3, 3).
@@ -106,19 +107,19 @@ class Planar3R:
                 f"the Jacobian is singular at q{_at(worst)}: |det J| = {det[worst]:.3g} m^2, "
                 f"at least {least:.3g} is needed; bend joint 2 away from 0 and pi"
             )
-        return _joined(self.arm.jac_inverse(angles))
+        return _join(self.arm.jac_inverse(angles))
 
     def jacobian_dot(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """Time derivative of the Jacobian, shape (..., 3, 3)."""
-        return _joined(self.arm.jac_dot(*_together(q=q, qd=qd)))
+        return _join(self.arm.jac_dot(*_together(q=q, qd=qd)))
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q) [kg m^2], shape (..., 3, 3), without the rotors."""
-        return _joined(self.arm.inertia(_split(q, "q")))
+        return _join(self.arm.inertia(_split(q, "q")))
 
     def bias_torque(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """Centrifugal and Coriolis torque h(q, qd) [N m], shape (..., 3)."""
-        return _joined(self.arm.bias(*_together(q=q, qd=qd)))
+        return _join(self.arm.bias(*_together(q=q, qd=qd)))
 
     def inverse_dynamics(
         self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, tip_wrench: ArrayLike = 0.0
@@ -131,13 +132,13 @@ class Planar3R:
             qdd: joint accelerations.
             tip_wrench: w, what the arm exerts on what it touches, in base axes at the tip; 0 for none.
         """
-        return _joined(self.arm.newton_euler(*_together(q=q, qd=qd, qdd=qdd, tip_wrench=_wrench(tip_wrench))))
+        return _join(self.arm.newton_euler(*_together(q=q, qd=qd, qdd=qdd, tip_wrench=_wrench(tip_wrench))))
 
     def forward_dynamics(
         self, q: ArrayLike, qd: ArrayLike, torque: ArrayLike, tip_wrench: ArrayLike = 0.0
     ) -> Array:
         """Joint accelerations [rad/s^2], shape (..., 3): the qdd of tau = M qdd + h + J^T w."""
-        return _joined(
+        return _join(
             self.arm.accelerations(*_together(q=q, qd=qd, torque=torque, tip_wrench=_wrench(tip_wrench)))
         )
 
@@ -190,15 +191,15 @@ def _wrench(w: ArrayLike) -> Array:
     return np.zeros(3)
 
 
-def _joined(value: Vec3 | Mat3) -> Array:
+def _join(value: Vec3 | Mat3) -> Array:
     """A vector of arrays (...) as one array (..., 3), a matrix of them as (..., 3, 3)."""
     if isinstance(value, Mat3):
         shape = np.broadcast_shapes(*(np.shape(v) for row in value for v in row))
-        return np.stack([np.broadcast_to(_joined(row), (*shape, 3)) for row in value], axis=-2)
+        return np.stack([np.broadcast_to(_join(row), (*shape, 3)) for row in value], axis=-2)
     return np.stack(np.broadcast_arrays(*value), axis=-1).astype(float, copy=False)
 
 
-def _frozen(v: Vec3) -> Array:
+def _freeze(v: Vec3) -> Array:
     array = np.array(v)
     array.setflags(write=False)
     return array

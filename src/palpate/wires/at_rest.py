@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.press.tare import SURE, TARE, check_range
+from palpate.force import ForceLoop
+from palpate.press.tare import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
 from palpate.wires.order import Order
-from palpate.wires.protocol import Sense, Wire
+from palpate.wires.protocol import Sense, Wire, unreadable
 
 _FEWEST = 20
 """Readings, at least: they tell the noise's deviation to 1/sqrt(2 n), 16 %, and `_check` wants eight of them."""
@@ -27,23 +28,30 @@ class AtRest:
     Args:
         position: [m], shape (3,).
         bias: of the force [N], shape (3,).
-        noise: of the force along the direction [N].
+        noise: of the force along the direction, about its drift [N].
+        drift: of the force along the direction [N/s].
+        drift_std: its standard deviation [N/s].
         rate: readings a second [Hz].
         last: the last reading.
+        offset: of this computer's clock from the arm's, the least that was seen [s].
     """
 
     position: Array
     bias: Array
     noise: float
+    drift: float
+    drift_std: float
     rate: float
     last: Sense
+    offset: float
 
 
 def look(wire: Wire, order: Order) -> AtRest:
     """Read an arm at rest in the air, and refuse what no press should begin with.
 
     Raises:
-        InputError: another rate than the gains', an arm that moves, a sensor that is saturated, untared or too noisy.
+        InputError: another rate than the gains', another clock, an arm that moves, a sensor that is saturated, untared,
+            too noisy or that drifts.
         LostError: no readings.
     """
     gains = order.loop.gains
@@ -59,13 +67,53 @@ def look(wire: Wire, order: Order) -> AtRest:
         raise InputError(
             f"the arm gives {rate:.4g} readings a second, and the gains are for {gains.arm.rate:g}: tune for this rate"
         )
+    broken = next(filter(None, map(unreadable, sensed)), None)
+    if broken is not None:
+        raise InputError(f"{broken}; is its sensor switched on?")
+    offsets = np.array([s.received - s.stamp for s in sensed])
+    _check_clock(offsets, gains.theta)
     force, place = np.array([s.force for s in sensed]), np.array([s.position for s in sensed])
-    if not (np.isfinite(force).all() and np.isfinite(place).all()):
-        raise InputError("the arm gives readings that are no numbers; is its sensor switched on?")
     along = force @ np.array(order.task.direction)
-    found = AtRest(place[-1], force.mean(axis=0), float(along.std()), rate, sensed[-1])
+    noise, drift, drift_std = noise_and_drift(np.array([s.stamp for s in sensed]), along)
+    found = AtRest(
+        place[-1], force.mean(axis=0), noise, drift, drift_std, rate, sensed[-1], float(offsets.min())
+    )
     _check(found, float(np.ptp(place, axis=0).max()), order)
     return found
+
+
+def with_noise_of(rest: AtRest, order: Order) -> tuple[Order, str | None]:
+    """The order for the noise that was measured, and a sentence if that is another one than the gains'.
+
+    Raises:
+        InputError: the noise is above that of the gains, and a certificate or the force does not allow another.
+    """
+    gains = fitting(order.loop.gains, rest.noise, _count(rest))
+    if gains is None:
+        return order, None
+    expected = order.loop.gains.arm.sensor.noise
+    said = f"the force's noise is {rest.noise:.2g} N at rest, and the gains are for {expected:g} N"
+    if order.loop.certificate is not None:
+        raise InputError(f"{said}: the certificate is of other gains; tune for this noise, and certify again")
+    loop = ForceLoop(gains)
+    loop.desired = order.task.force
+    return replace(order, loop=loop), f"{said}: tuned again for {gains.arm.sensor.noise:.2g} N"
+
+
+def _count(rest: AtRest) -> int:
+    return max(round(TARE * rest.rate), _FEWEST)
+
+
+def _check_clock(offsets: Array, theta: float) -> None:
+    """Refuse two clocks that run apart while the arm rests; readings that are late make no offset smaller [s]."""
+    half = len(offsets) // 2
+    apart = float(offsets[half:].min() - offsets[:half].min())
+    if abs(apart) > theta / 2.0:
+        way = "slow" if apart > 0.0 else "fast"
+        raise InputError(
+            f"the arm's clock runs too {way}: it and this computer's came {1e3 * abs(apart):.3g} ms apart within"
+            f" {TARE / 2.0:g} s; is it a simulation that is not in real time?"
+        )
 
 
 def rate_of(stamps: Array) -> float:
@@ -99,3 +147,4 @@ def _check(found: AtRest, moved: float, order: Order) -> None:
         raise InputError(
             f"the force's noise is {found.noise:.2g} N in the air: {lowest:g} N is below 8 standard deviations of it"
         )
+    check_drift(found.drift, found.drift_std, task.force, limits.seconds, gains.arm.sensor)

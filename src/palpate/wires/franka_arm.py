@@ -1,8 +1,9 @@
 """A simulated arm that speaks as a Franka does, to rehearse with: libfranka's protocol, on a loopback address.
 
 `python -m palpate.wires.franka_arm --address 127.0.0.10`. The protocol is franky-sim's (`pip install franky-sim`), by
-which libfranka cannot tell it from a controller; behind it stands an arm of one direction. As a controller does, it
-ends the motion where 20 commands in a row are missing.
+which libfranka cannot tell it from a controller; behind it stands an arm of one direction, moved by Cartesian
+velocities. Every other kind of motion is refused, and named on standard error. As a controller does, it ends the motion
+where 20 commands in a row are missing.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ def robot_of(arm: OneDirection) -> Any:
             self.speed = -float(velocity[2])
 
         def joint_position_control(self, *_: Any, **__: Any) -> None:
+            """Of the server, while no motion runs."""
             self.speed, self.silent = 0.0, 0
 
         def _get_state(self) -> Any:
@@ -63,6 +65,23 @@ def robot_of(arm: OneDirection) -> Any:
     return Robot()
 
 
+def server_of(robot: Any, address: str) -> Any:
+    """Server of franky-sim's protocol that refuses each motion but that by Cartesian velocities."""
+    from franky_sim import FrankaRobotServer
+
+    class Server(FrankaRobotServer):  # type: ignore[misc, unused-ignore]
+        """The server."""
+
+        def start_motion(self, controller_mode: Any, motion_generator_mode: Any, motion_id: int) -> None:
+            if motion_generator_mode.name != "kCartesianVelocity":
+                asked = f"{controller_mode.name[1:]} with {motion_generator_mode.name[1:]}"
+                # franky-sim prints it, and answers with an aborted motion.
+                raise ValueError(f"a motion by {asked} is not simulated: Cartesian velocities alone")
+            super().start_motion(controller_mode, motion_generator_mode, motion_id)
+
+    return Server(robot, [address])
+
+
 def serve(arm: OneDirection, address: str, seconds: float) -> None:
     """Run at real time until the seconds of the arm are over.
 
@@ -72,9 +91,7 @@ def serve(arm: OneDirection, address: str, seconds: float) -> None:
         seconds: of the arm's time.
     """
     robot = robot_of(arm)
-    from franky_sim import FrankaRobotServer
-
-    server: Any = FrankaRobotServer(robot, [address])
+    server = server_of(robot, address)
     server.init()
     ready(f"franka:{address}")
     for _ in paced(arm, seconds):

@@ -16,7 +16,8 @@ import sys
 import time
 from typing import Any
 
-from palpate.wires import franka_link as link
+from palpate.wires import link
+from palpate.wires.host import line, prepare
 from palpate.wires.protocol import Sense, Triple
 from palpate.wires.turns import from_matrix_by_columns
 
@@ -29,6 +30,10 @@ _ACCELERATION = 2.0
 """Of the commanded speed [m/s^2]. From one way to the other within a tick that is a jerk of 4000 m/s^3; an FR3's
 controller takes 4500 (Franka Control Interface, limits in Cartesian space)."""
 _ZERO = (0.0, 0.0, 0.0)
+_WATCHDOG = (
+    "a second process holds the connection and brings the arm to rest; if that dies too, the controller stops it when"
+    " 20 commands in a row are missing (20 ms)"
+)
 
 
 class Driver:
@@ -92,23 +97,25 @@ class Driver:
 
     def _obey(self, message: bytes) -> None:
         if message[0] == link.MOVE:
-            self._wanted, self._silent = link.read_move(message), 0
+            self._wanted, self._silent = link.read_move(message).velocity, 0
         elif message[0] == link.REST:
             self._ending = True
             if self._control is None:
-                self._tell(link.text(link.RESTED, ""))
+                self._tell(link.text(link.RESTED))
         elif message[0] == link.BEGIN:
             self._begin()
+        elif message[0] == link.TARE:  # the estimate has no zero that could be set
+            self._tell(link.text(link.TARED))
 
     def _begin(self) -> None:
         mode = self._library.ControllerMode.JointImpedance
         try:
             self._control = self._robot.start_cartesian_velocity_control(mode)
         except Exception as error:  # noqa: BLE001 - libfranka throws kinds of no common base
-            self._tell(link.text(link.REFUSED, line(error)))
+            self._tell(link.text(link.REFUSED, f"the Franka may not be moved: {line(error)}"))
             return
         self._wanted, self._speed, self._silent, self._ending = _ZERO, _ZERO, 0, False
-        self._tell(link.text(link.BEGUN, ""))
+        self._tell(link.text(link.BEGUN))
 
     def _write(self) -> None:
         if self._ending or self._silent > _REST:
@@ -121,7 +128,7 @@ class Driver:
         self._control.writeOnce(command)
         if last:
             self._control = None
-            self._tell(link.text(link.RESTED, ""))
+            self._tell(link.text(link.RESTED))
 
 
 def nearer(old: Triple, new: Triple, step: float) -> Triple:
@@ -134,25 +141,22 @@ def nearer(old: Triple, new: Triple, step: float) -> Triple:
     return x, y, z
 
 
-def line(error: BaseException) -> str:
-    """The first line of what a library says."""
-    return (str(error).splitlines() or [type(error).__name__])[0]
-
-
 def main() -> None:
     """Connect, say so, and go on until the wire has gone."""
     import pylibfranka
 
-    address, number, sign = sys.argv[1:4]
+    prepare()
+    address, sign, number = sys.argv[1:4]
     wire = socket.socket(fileno=int(number))
     wire.setblocking(False)
     try:
         robot = pylibfranka.Robot(address, pylibfranka.RealtimeConfig.kIgnore)
-        wire.send(link.text(link.READY, ""))
+        title = f"a Franka at {address}, over its control interface"
+        wire.send(link.text(link.READY, f"{title}\n{_WATCHDOG}\n"))
         Driver(pylibfranka, robot, wire, float(sign)).run()
     except Exception as error:  # noqa: BLE001 - likewise
         try:
-            wire.send(link.text(link.FAILED, line(error)))
+            wire.send(link.text(link.FAILED, f"the controller: {line(error)}"))
         except OSError:
             os._exit(1)
     os._exit(0)  # libfranka's destructors may wait for a controller that has gone

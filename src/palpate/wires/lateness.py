@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-_CLOCKS = 1e-4
+CLOCKS = 1e-4
 """Rate at which two clocks may run apart [s/s]: twice what quartz does."""
 SHARES = (50.0, 99.0, 99.9)
 
@@ -44,8 +44,8 @@ class Lateness:
             )
         elif self.jumps or self.missed:
             lines.append(
-                f"the certificate does not cover this run: in {self.jumps} ticks the age of a reading changed by more"
-                f" than its {1e3 * self.allowed:.3g} ms of jitter, and {self.missed} readings were missed"
+                f"the certificate does not cover this run: it allows the age of a reading to change by"
+                f" {1e3 * self.allowed:.3g} ms; {self.jumps} ticks exceeded that, {self.missed} readings were missed"
             )
         else:
             lines.append(f"within the {1e3 * self.allowed:.3g} ms of jitter that the certificate allows")
@@ -80,7 +80,7 @@ class Stopwatch:
 
     def age(self, stamp: float, now: float) -> float:
         """Of a reading of this stamp, beyond the least that was seen [s]."""
-        self._offset = min(self._offset + _CLOCKS * max(now - self._at, 0.0), now - stamp)
+        self._offset = min(self._offset + CLOCKS * max(now - self._at, 0.0), now - stamp)
         self._at = now
         return now - stamp - self._offset
 

@@ -42,9 +42,9 @@ def _rtde(where: str) -> Wire:
 
 
 def _ros2(where: str) -> Wire:
-    from palpate.wires.ros2 import Ros2Wire, topics_of
+    from palpate.wires.ros2 import Ros2Wire
 
-    return Ros2Wire(*topics_of(where))
+    return Ros2Wire(where)
 
 
 def _franka(where: str) -> Wire:

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.force import ForceLoop
+from palpate.force.gains import Gains
 from palpate.press.plan import Plan
 from palpate.press.tare import TARE
 from palpate.wires.protocol import Triple, triple
@@ -100,6 +101,21 @@ class Order:
         claims = [] if certificate is None else [c for c in certificate.claims if c.kind == "adapting"]
         ticks = max((claim.jitter for claim in claims), default=None)
         return None if ticks is None else ticks * self.loop.gains.arm.tick
+
+
+def stiffest(gains: Gains) -> float:
+    """The stiffest surface of the gains, as the measured position feels it [N/m]."""
+    return gains.seen_cap
+
+
+def travel_for(gains: Gains, force: float) -> float:
+    """Travel within which no surface of the gains is pressed with more than a force, whatever the sensor shows [m].
+
+    Args:
+        gains: of the loop; their cap is the stiffest surface.
+        force: that is allowed [N].
+    """
+    return force / stiffest(gains)
 
 
 def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,7 @@ class Outcome:
         stiffness: what the loop found of the surface, as the position feels it, and its std [N/m]; None if nothing.
         lateness: of the loop.
         rest: what was seen before.
+        troubles: ticks of each trouble of the law, by its sentence.
     """
 
     ended: str
@@ -39,6 +41,7 @@ class Outcome:
     stiffness: tuple[float, float] | None
     lateness: Lateness
     rest: AtRest
+    troubles: Mapping[str, int]
 
     def to_json(self) -> dict[str, Any]:
         """As plain JSON values."""
@@ -52,6 +55,8 @@ class Outcome:
             "lateness": self.lateness.to_json(),
             "bias_N": self.rest.bias.tolist(),
             "noise_N": self.rest.noise,
+            "drift_N_per_s": self.rest.drift,
+            "troubles": dict(self.troubles),
             "rate_Hz": self.rest.rate,
         }
 

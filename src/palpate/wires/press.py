@@ -1,6 +1,8 @@
 """A press over a wire: tare in the air, approach and press with `ForceLoop`, withdraw, rest; stop at any limit.
 
-The loop is driven by the arm's own readings. Whatever ends it, the arm is told to rest, and all that came is kept.
+The loop is driven by the arm's own readings. In each tick a reading comes through the guard, is compared with all stop
+conditions, and goes through the law; its speed goes out through the guard. Whatever ends the press, the arm is told to
+rest, and all that came is kept.
 """
 
 from __future__ import annotations
@@ -10,37 +12,45 @@ from collections.abc import Callable
 
 import numpy as np
 
-from palpate.wires.at_rest import AtRest, look
+from palpate.press.troubles import Troubles
+from palpate.wires.at_rest import AtRest, look, with_noise_of
+from palpate.wires.guard import Guard
 from palpate.wires.lateness import Stopwatch
 from palpate.wires.order import Order
 from palpate.wires.outcome import Outcome, force_reached, settling_time
-from palpate.wires.protocol import Command, LostError, Sense, Wire, triple
+from palpate.wires.protocol import Command, EndedError, Sense, Wire, triple
 from palpate.wires.recording import Rows
 from palpate.wires.stop_conditions import Moment, reason_to_stop, spoiled
 
 _PHASES = {"air": 0.0, "learning": 1.0, "locked": 2.0}
 
 
-class _EndedError(Exception):
-    """The press ends; the text says why."""
-
-
-def press(wire: Wire, order: Order, rows: Rows, asked_to_stop: Callable[[], bool]) -> Outcome:
+def press(
+    wire: Wire,
+    order: Order,
+    rows: Rows,
+    asked_to_stop: Callable[[], str | None],
+    show: Callable[[str], None] = lambda _: None,
+) -> Outcome:
     """Press as told; the arm rests when this returns or raises.
 
     Args:
         wire: to an arm at rest in the air.
         order: what to do with it, from `checked`.
         rows: keeps everything.
-        asked_to_stop: whether the user wants it to end.
+        asked_to_stop: the reason why the user wants it to end; None while he does not.
+        show: called with each sentence for the user while it presses; must not block.
 
     Raises:
         InputError: what `look` refuses, or the arm has another master.
     """
     try:
         wire.tare()
-        under_way = _Press(wire, order, rows, asked_to_stop, look(wire, order))
-        wire.begin()
+        rest = look(wire, order)
+        order, note = with_noise_of(rest, order)
+        if note is not None:
+            show(note)
+        under_way = _Press(wire, order, rows, rest, asked_to_stop, show)
         return under_way.run()
     finally:
         wire.stop()
@@ -49,11 +59,20 @@ def press(wire: Wire, order: Order, rows: Rows, asked_to_stop: Callable[[], bool
 class _Press:
     """A press under way; see `press`."""
 
-    def __init__(self, wire: Wire, order: Order, rows: Rows, asked_to_stop: Callable[[], bool], rest: AtRest):
-        self._wire, self._order, self._rows = wire, order, rows
-        self._asked_to_stop, self._rest = asked_to_stop, rest
+    def __init__(
+        self,
+        wire: Wire,
+        order: Order,
+        rows: Rows,
+        rest: AtRest,
+        asked_to_stop: Callable[[], str | None],
+        show: Callable[[str], None],
+    ):
+        self._wire, self._order, self._rows, self._rest = wire, order, rows, rest
         self._loop, self._plan = order.loop, order.task.plan
-        self._tick = order.loop.gains.arm.tick
+        self._tick, lag = order.loop.gains.arm.tick, order.loop.gains.theta
+        self._guard = Guard(wire, order.limits, rest.position, self._tick, lag, asked_to_stop)
+        self._troubles = Troubles(lag, show)
         self._watch = Stopwatch(self._tick, order.jitter, order.most)
         self._direction = np.array(order.task.direction)
         self._last, self._depth, self._commanded = rest.last, 0.0, 0.0
@@ -63,11 +82,12 @@ class _Press:
 
     def run(self) -> Outcome:
         """All of it."""
+        self._guard.begin()
         try:
             self._hold()
             ended, ok = f"pressed for {self._order.task.hold:g} s", True
             self._retreat()
-        except (_EndedError, LostError) as reason:
+        except EndedError as reason:
             ended, ok = str(reason), False
         finally:
             self._wire.stop()
@@ -80,6 +100,7 @@ class _Press:
             if now.since_touch is not None:
                 self._loop.desired = self._plan.desired(now.since_touch)
             self._move(now, self._loop.update(now.force, now.depth, float(now.missed)))
+            self._end_if(self._troubles.lasting(self._loop.trouble, now.since_start))
 
     def _retreat(self) -> None:
         """Go back from the surface."""
@@ -93,9 +114,8 @@ class _Press:
 
     def _read(self) -> Moment:
         """The next reading, within all limits."""
-        sense = self._wire.read(self._loop.gains.theta)
-        self._end_if("stopped by the user" if self._asked_to_stop() else None)
-        self._end_if(spoiled(sense, self._last, self._loop.gains.theta))
+        sense = self._guard.read()
+        self._end_if(spoiled(sense, self._last, self._rest, self._loop.gains.theta))
         now = self._moment(sense)
         self._depth, self._last = now.depth, sense
         self._end_if(reason_to_stop(now, self._order, self._rest))
@@ -103,7 +123,7 @@ class _Press:
 
     def _end_if(self, reason: str | None) -> None:
         if reason is not None:
-            raise _EndedError(reason)
+            raise EndedError(reason)
 
     def _moment(self, sense: Sense) -> Moment:
         ticks = (sense.stamp - self._last.stamp) / self._tick
@@ -120,12 +140,17 @@ class _Press:
         )
 
     def _move(self, now: Moment, wanted: float) -> None:
-        """Command a speed along the direction [m/s], within the limit, and keep the row."""
-        most = self._order.limits.speed
-        speed = min(max(wanted, -most), most)
+        """Command a speed along the direction [m/s], within the limit, and keep the row.
+
+        A speed that the arm cannot have, or that is no number, is a fault of the law: the guard refuses it as it is.
+        """
+        most, speed = self._order.limits.speed, wanted
+        if abs(wanted) <= self._loop.gains.arm.limits.speed:
+            speed = min(max(wanted, -most), most)
         self._commanded += self._tick * speed
-        place = self._rest.position + self._commanded * self._direction
-        self._wire.write(Command(triple(speed * self._direction), triple(place)))
+        way = self._order.task.direction  # plain numbers: the guard names those that are none
+        place = [p + self._commanded * w for p, w in zip(self._rest.position, way, strict=True)]
+        self._guard.write(Command(triple([speed * w for w in way]), triple(place)))
         self._watch.done(now.sense.stamp, time.monotonic(), now.missed)
         self._keep(now, speed)
 
@@ -156,4 +181,5 @@ class _Press:
             stiffness=self._stiffness,
             lateness=self._watch.summary(),
             rest=self._rest,
+            troubles=self._troubles.ticks,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -37,6 +38,20 @@ class Sense(NamedTuple):
     quaternion: Quaternion
 
 
+_UNIT = 0.01
+"""Of a quaternion's squared length, as much as ROS 2's tf2 takes: a force turned by it is wrong by 2 % at most."""
+
+
+def unreadable(sense: Sense) -> str | None:
+    """Why a reading is none, whatever came before, in words; None if it is one."""
+    if not all(map(math.isfinite, (sense.stamp, *sense.force, *sense.position, *sense.quaternion))):
+        return "the arm gives a reading that is no number"
+    size = math.hypot(*sense.quaternion)
+    if not abs(size * size - 1.0) <= _UNIT:
+        return f"the arm gives a quaternion of length {size:.3g}, which is no orientation"
+    return None
+
+
 class Command(NamedTuple):
     """One command: a wire takes the speed or the position, as its arm does.
 
@@ -49,8 +64,30 @@ class Command(NamedTuple):
     position: Triple
 
 
-class LostError(PalpateError):
+SILENCE = 0.1
+"""Without a command, after which an arm is to stop by itself where nobody says another time [s]."""
+
+
+class EndedError(PalpateError):
+    """The press ends, and the arm is to rest; the text says why."""
+
+
+class LostError(EndedError):
     """The wire gave no reading, or took no command; the text says what was seen."""
+
+
+class SilentError(LostError):
+    """No reading came in time, and the wire may yet give one.
+
+    Args:
+        source: of the readings, as ` at /wrench`; may be empty.
+        seconds: for how long none came [s].
+        seen: something that came instead, in words; may be empty.
+    """
+
+    def __init__(self, source: str, seconds: float, seen: str = ""):
+        super().__init__(f"no reading{source} for {1e3 * seconds:.3g} ms{seen}")
+        self.source, self.seen = source, seen
 
 
 class Wire(Protocol):
@@ -77,7 +114,8 @@ class Wire(Protocol):
             timeout: for how long to wait [s].
 
         Raises:
-            LostError: none came, or what came was no reading.
+            SilentError: none came in time.
+            LostError: none will come, or what came was no reading.
         """
         ...
 
@@ -85,8 +123,11 @@ class Wire(Protocol):
         """Let the arm's driver take its sensor's present reading for zero, if it can; the arm is in the air."""
         ...
 
-    def begin(self) -> None:
+    def begin(self, silence: float = SILENCE) -> None:
         """Take the arm over: from here on commands move it.
+
+        Args:
+            silence: without a command, after which the arm is to stop by itself, if it can [s].
 
         Raises:
             InputError: another master has it, or it may not be moved.
@@ -107,4 +148,13 @@ class Wire(Protocol):
 
     def close(self) -> None:
         """Let go of the wire; never raises."""
+        ...
+
+
+class Hosted(Wire, Protocol):
+    """A wire that `host` runs in a process of its own."""
+
+    @property
+    def source(self) -> str:
+        """Where its readings come from, as ` at /wrench`; may be empty."""
         ...

@@ -6,6 +6,7 @@ become `record.parquet`, which `palpate identify` takes as it takes the record o
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,8 @@ class Rows:
         check_place(folder, "--record")
         folder.mkdir()
         write_json(folder / _HEAD, signed({"unfinished": True, **about}))
-        self._rows = np.memmap(folder / _ROWS, dtype=np.float64, mode="w+", shape=shape)
+        _reserve(folder / _ROWS, 8 * most * len(UNITS))
+        self._rows = np.memmap(folder / _ROWS, dtype=np.float64, mode="r+", shape=shape)
 
     @property
     def full(self) -> bool:
@@ -84,6 +86,19 @@ class Rows:
         self._rows.flush()
         path = _finished(self.folder, self.record(), {**self.about, **outcome})
         return path if self.count else None
+
+
+def _reserve(path: Path, size: int) -> None:
+    """Room on the disk for all rows: a disk that is full in mid-press would end the process.
+
+    Raises:
+        OSError: there is no room.
+    """
+    with path.open("xb") as file:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size)
+        else:
+            file.truncate(size)
 
 
 def recover(folder: Path) -> Path:

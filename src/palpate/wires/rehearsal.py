@@ -52,7 +52,7 @@ class OneDirection:
         self._line = [*self._line[1:], into]
         noise, h = self._rng.standard_normal(8), world.tick / world.steps
         for j in range(world.steps):
-            self.body = moved(world, self.surface, self.body, held, self.time + j * h, h, noise, 0)
+            self.body = moved(world, self.surface, self.body, held, self.time + j * h, h, noise, 0, 0.0)
         self.time += world.tick
 
     def reading(self) -> tuple[float, ...]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any, Literal
 from urllib.parse import parse_qsl
 
 import msgspec
 
 from palpate.errors import InputError
-from palpate.wires.protocol import Command, LostError, Sense, Triple
+from palpate.wires.apart import ApartWire
+from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError, Triple
 from palpate.wires.ros2_tool import JointTool, PoseTool, Tool, seconds
 from palpate.wires.turns import turned
 
@@ -84,36 +87,52 @@ def topics_of(where: str) -> tuple[int, Topics]:
 
 @dataclass
 class _Ends:
-    """Readers and writers of a participant."""
+    """Readers of a participant, and the maker of its writer."""
 
     wrench: Any
     place: Any
-    command: Any
+    writer: Callable[[float], Any]
     writers: Any
     waiting: Any
 
 
-class Ros2Wire:
-    """An arm under ROS 2, whose controller runs.
+class Ros2Wire(ApartWire):
+    """An arm under ROS 2, whose controller runs; commands come from a process of their own, which outlives this one.
+
+    Args:
+        where: domain and topics, see `topics_of`.
+
+    Raises:
+        InputError: cyclonedds is missing, or nothing publishes there.
+    """
+
+    def __init__(self, where: str):
+        domain, _ = topics_of(where)
+        if any(find_spec(name) is None for name in ("cyclonedds.idl", "rosbags")):
+            raise InputError("this wire needs cyclonedds: pip install 'palpate[ros2]'")
+        super().__init__("host", ["ros2", where], f"nothing to read in ROS domain {domain}")
+
+
+class DdsWire:
+    """The same in the process of the library.
 
     Args:
         domain: ROS_DOMAIN_ID.
         topics: by name.
 
     Raises:
-        InputError: cyclonedds is missing, or nothing publishes there.
+        InputError: nothing publishes there.
     """
 
     def __init__(self, domain: int, topics: Topics):
-        try:
-            from palpate.wires import ros2_messages
-        except ImportError:
-            raise InputError("this wire needs cyclonedds: pip install 'palpate[ros2]'") from None
+        from palpate.wires import ros2_messages
+
         self._messages: Any = ros2_messages
         self._topics, self._domain = topics, domain
         self._tool: Tool = JointTool(topics.arm, topics.site) if topics.arm else PoseTool()
         self._ends = _opened(domain, topics, ros2_messages)
-        self._last, self._begun = -1.0, False
+        self._last, self._silence = -1.0, _PATIENCE
+        self._command: Any = None
         try:
             self.read(_PATIENCE)
         except LostError as error:
@@ -129,8 +148,15 @@ class Ros2Wire:
     def watchdog(self) -> str:
         """Its stop if this process dies."""
         return (
-            f"only what the controller at {self._topics.command} does when commands stop: look up its timeout"
+            "a second process sends a speed of 0 when it gets no command; if that dies too, only what the controller at"
+            f" {self._topics.command} does when commands stop: look up its timeout. Commands have a deadline, a"
+            " liveliness and a lifespan of the loop's lag, by which a controller can see that they ended"
         )
+
+    @property
+    def source(self) -> str:
+        """The wrench's topic."""
+        return f" at {self._topics.wrench}"
 
     def read(self, timeout: float) -> Sense:
         """The next wrench, with the newest place of the tool."""
@@ -143,18 +169,18 @@ class Ros2Wire:
                     self._tool.take(sample)
             fresh = [sample for sample in wrenches if hasattr(sample, "wrench")]
             if fresh and self._tool.stamp is not None:
-                sense = self._sense(fresh[-1], timeout)
+                sense = self._sense(fresh[-1])
                 if sense is not None:
                     return sense
         lacking = self._topics.wrench if self._tool.stamp is not None else self._topics.place
-        raise LostError(f"no reading at {lacking} for {1e3 * timeout:.3g} ms")
+        raise SilentError(f" at {lacking}", timeout)
 
-    def _sense(self, sample: Any, timeout: float) -> Sense | None:
+    def _sense(self, sample: Any) -> Sense | None:
         received, stamp = time.monotonic(), seconds(sample.header.stamp)
         if not stamp > self._last:
             return None
         behind = stamp - float(self._tool.stamp or 0.0)
-        if behind > timeout:
+        if behind > self._silence:
             raise LostError(
                 f"what came at {self._topics.place} is {behind:.3g} s older than what came at {self._topics.wrench}:"
                 " has it ended, or are their clocks not set alike?"
@@ -170,9 +196,9 @@ class Ros2Wire:
     def tare(self) -> None:
         """ROS 2 has no one way to zero a sensor."""
 
-    def begin(self) -> None:
+    def begin(self, silence: float = SILENCE) -> None:
         """Refuse another master, and a topic that nobody listens at."""
-        name, own = f"rt{self._topics.command}", self._ends.command
+        name, own = f"rt{self._topics.command}", self._ends.writer(silence)
         end = time.monotonic() + _PATIENCE
         while not own.get_matched_subscriptions():
             if time.monotonic() > end:
@@ -184,12 +210,12 @@ class Ros2Wire:
         ]  # fmt: skip
         if others:
             raise InputError(f"{self._topics.command} has another master; end that one first")
-        self._begun = True
+        self._command, self._silence = own, silence
 
     def write(self, command: Command) -> None:
         """A message of the kind that was told."""
         try:
-            self._ends.command.write(self._message(command.velocity, command.position))
+            self._command.write(self._message(command.velocity, command.position))
         except Exception as error:  # noqa: BLE001 - cyclonedds has many, of no common base
             raise LostError(f"a command could not be sent: {error}") from None
 
@@ -206,16 +232,16 @@ class Ros2Wire:
 
     def stop(self) -> None:
         """Speed 0, or the place where the tool is; said three times."""
-        if not self._begun:
+        if self._command is None:
             return
-        self._begun = False
         position, _ = self._tool.place()
         for _ in range(3):
             try:
                 self.write(Command((0.0, 0.0, 0.0), position))
             except LostError:
-                return
+                break
             time.sleep(0.002)
+        self._command = None
 
     def close(self) -> None:
         """Leave the domain."""
@@ -233,16 +259,23 @@ def _opened(domain: int, topics: Topics, messages: Any) -> _Ends:
 
     participant = DomainParticipant(domain)
     into = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(_KEPT))
-    out = Qos(Policy.Reliability.Reliable(10**8), Policy.History.KeepLast(1))
 
     def topic(name: str, kind: str) -> Any:
         return Topic(participant, f"rt{name}", messages.message(kind))
 
+    def writer(silence: float) -> Any:
+        """A writer of commands, whose samples expire, and whose end is seen, after this silence [s]."""
+        lag = round(1e9 * silence)
+        out = Qos(
+            Policy.Reliability.Reliable(10**8), Policy.History.KeepLast(1), Policy.Lifespan(lag),
+            Policy.Deadline(lag), Policy.Liveliness.ManualByTopic(lag),
+        )  # fmt: skip
+        return DataWriter(participant, topic(topics.command, SENT[topics.kind]), qos=out)
+
     of_place = "geometry_msgs/msg/PoseStamped" if topics.pose else "sensor_msgs/msg/JointState"
     wrench = DataReader(participant, topic(topics.wrench, "geometry_msgs/msg/WrenchStamped"), qos=into)
     place = DataReader(participant, topic(topics.place, of_place), qos=into)
-    command = DataWriter(participant, topic(topics.command, SENT[topics.kind]), qos=out)
     waiting = WaitSet(participant)
     waiting.attach(ReadCondition(wrench, ViewState.Any | InstanceState.Alive | SampleState.NotRead))
     writers = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
-    return _Ends(wrench, place, command, writers, waiting)
+    return _Ends(wrench, place, writer, writers, waiting)

@@ -92,7 +92,9 @@ class JointTool:
         return (x, y, z), from_matrix_by_columns(pose.T.ravel().tolist())
 
     def speeds(self, velocity: Triple) -> list[float]:
-        """The smallest joint speeds that do it, J^+ (v, 0)."""
+        """The smallest joint speeds that do it, J^+ (v, 0); none is needed for rest."""
+        if not any(velocity):
+            return [0.0] * len(self._q)
         J = self._arm.jacobian(self._q)
         if self._arm.singular_values(self._q)[-1] < _NEARLY:
             raise LostError(

@@ -1,7 +1,9 @@
 """A simulated arm that speaks as a UR does, to rehearse with: RTDE, dashboard and script port, on a loopback address.
 
 `python -m palpate.wires.rtde_arm --address 127.0.0.9`. It knows of ur-rtde's control script what a press needs: speedL,
-servoL and their stops, zeroFtSensor, the watchdog, the end; to all else it answers as a script that has done it.
+servoL and their stops, zeroFtSensor, the watchdog, the end. Every other command ends the script, and is named on
+standard error. Of the variables of RTDE, time, pose, force, status and the registers of ur-rtde are simulated; others
+are 0, and an unknown one is refused.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import selectors
 import socket
 import struct
+import sys
 import time
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,7 +24,36 @@ _RUNNING, _STOPPED = 2, 1
 READY, DONE = 1, 2
 # Numbers of ur-rtde's commands.
 NOTHING, ZERO, SPEEDL, SPEED_STOP, SERVO_STOP, SERVOL, WATCHDOG, STOP = 0, 8, 10, 15, 16, 24, 35, 255
-_SIX = {"actual_TCP_pose", "actual_TCP_force", "actual_TCP_speed", "actual_q", "actual_qd"}
+_DONE = {ZERO, SPEED_STOP, SERVO_STOP, WATCHDOG}
+_NAMES = {
+    1: "moveJ", 2: "moveJ_IK", 3: "moveL", 4: "moveL_FK", 6: "forceMode", 7: "forceModeStop", 9: "speedJ", 11: "servoJ",
+    12: "servoC", 13: "setStandardDigitalOut", 14: "setToolDigitalOut", 17: "setPayload", 18: "teachMode",
+    19: "endTeachMode", 20: "forceModeSetDamping", 21: "forceModeSetGainScaling", 22: "setSpeedSlider",
+    23: "setAnalogOutput", 25: "toolContact", 29: "setTcp", 31: "triggerProtectiveStop", 33: "stopL", 34: "stopJ",
+}  # fmt: skip
+"""Of ur-rtde's commands that are not simulated."""
+_TYPES = {
+    "VECTOR6D": "target_q target_qd target_qdd target_current target_moment actual_q actual_qd actual_current"
+    " actual_current_window joint_control_output actual_TCP_pose actual_TCP_speed actual_TCP_force target_TCP_pose"
+    " target_TCP_speed joint_temperatures actual_joint_voltage payload_inertia ft_raw_wrench external_force_torque",
+    "VECTOR3D": "actual_tool_accelerometer elbow_position elbow_velocity payload_cog",
+    "VECTOR6INT32": "joint_mode",
+    "UINT64": "actual_digital_input_bits actual_digital_output_bits",
+    "UINT32": "runtime_state robot_status_bits safety_status_bits analog_io_types euromap67_input_bits"
+    " euromap67_output_bits tool_mode tool_analog_input_types output_bit_registers0_to_31 output_bit_registers32_to_63"
+    " input_bit_registers0_to_31 input_bit_registers32_to_63 script_control_line speed_slider_mask",
+    "INT32": "robot_mode safety_mode safety_status tool_output_voltage time_scale_source",
+    "UINT8": "tool_output_mode tool_digital_output0_mode tool_digital_output1_mode standard_digital_output_mask"
+    " configurable_digital_output_mask standard_digital_output configurable_digital_output standard_analog_output_mask"
+    " standard_analog_output_type",
+    "DOUBLE": "timestamp actual_execution_time speed_scaling target_speed_fraction actual_momentum actual_main_voltage"
+    " actual_robot_voltage actual_robot_current standard_analog_input0 standard_analog_input1 standard_analog_output0"
+    " standard_analog_output1 standard_analog_output_0 standard_analog_output_1 io_current euromap67_24V_voltage"
+    " euromap67_24V_current tool_analog_input0 tool_analog_input1 tool_output_current tool_temperature tcp_force_scalar"
+    " payload joint_position_deviation_ratio collision_detection_ratio speed_slider_fraction",
+}
+_TYPE_OF = {name: kind for kind, names in _TYPES.items() for name in names.split()}
+_REGISTERS = {"bit_register_": "BOOL", "int_register_": "INT32", "double_register_": "DOUBLE"}
 _DASHBOARD = {
     "PolyscopeVersion": "URSoftware 5.15.0.1202319 (Aug 22 2023)",
     "is in remote control": "true",
@@ -34,17 +66,18 @@ _DASHBOARD = {
 
 
 def kind_of(name: str) -> str:
-    """The type of a variable of RTDE."""
-    if name in _SIX:
-        return "VECTOR6D"
-    if name.startswith(("input_int", "output_int", "robot_mode", "safety_mode")):
-        return "INT32"
-    if name.endswith(("_bits", "runtime_state")):
-        return "UINT32"
-    return "DOUBLE"
+    """The type of a variable of RTDE, as its guide has it; NOT_FOUND of an unknown one."""
+    way, _, rest = name.partition("_")
+    register = next((kind for prefix, kind in _REGISTERS.items() if rest.startswith(prefix)), None)
+    if way in {"input", "output"} and register is not None:
+        return register
+    return _TYPE_OF.get(name, "NOT_FOUND")
 
 
-_CODES = {"VECTOR6D": "6d", "INT32": "i", "UINT32": "I", "DOUBLE": "d"}
+_CODES = {
+    "VECTOR6D": "6d", "VECTOR3D": "3d", "VECTOR6INT32": "6i", "UINT64": "Q", "UINT32": "I", "INT32": "i", "UINT8": "B",
+    "BOOL": "?", "DOUBLE": "d",
+}  # fmt: skip
 
 
 @dataclass
@@ -109,7 +142,18 @@ class Controller:
             self.least = value[0]
         if command == STOP:
             self.running = False
+        elif command not in _DONE:
+            self._refuse(command)
+            return
         self.state = DONE
+
+    def _refuse(self, command: int) -> None:
+        """End the script, as a controller does with a command that it cannot execute."""
+        name = _NAMES.get(command, "a command")
+        sys.stderr.write(
+            f"rtde_arm: {name} (number {command} of ur-rtde) is not simulated: the script has ended\n"
+        )
+        self.speed, self.height, self.running = 0.0, None, False
 
     def tick(self) -> None:
         """Go on by one tick."""
@@ -124,6 +168,7 @@ class Controller:
         x, y, z = self.arm.reading()[6:9]
         # The controller shows what the surface exerts on the tool.
         up = -(self.arm.reading()[2] - self.zero)
+        code = _CODES[kind_of(name)]
         known = {
             "timestamp": self.arm.time,
             "actual_TCP_pose": (x, y, z, 3.14159, 0.0, 0.0),
@@ -133,7 +178,8 @@ class Controller:
             "runtime_state": _RUNNING if self.running else _STOPPED,
             "output_int_register_0": self.state,
         }
-        return known.get(name, (0.0,) * 6 if name in _SIX else 0)
+        zeros = struct.unpack(f">{code}", bytes(struct.calcsize(f">{code}")))
+        return known.get(name, zeros if len(zeros) > 1 else zeros[0])
 
 
 class Server:
@@ -227,9 +273,10 @@ class Server:
         elif kind == "v":
             self._send(client, "v", struct.pack(">4I", *_VERSION))
         elif kind == "O":
-            client.outputs = [name for name in body[8:].decode().split(",") if name]
-            kinds = ",".join(kind_of(name) for name in client.outputs)
-            self._send(client, "O", b"\x01" + kinds.encode())
+            asked = [name for name in body[8:].decode(errors="replace").split(",") if name]
+            kinds = [kind_of(name) for name in asked]
+            client.outputs = [] if "NOT_FOUND" in kinds else asked
+            self._send(client, "O", bytes([bool(client.outputs)]) + ",".join(kinds).encode())
         elif kind == "I":
             self._inputs(client, [name for name in body.decode().split(",") if name])
         elif kind in "SP":
@@ -247,10 +294,12 @@ class Server:
         if master is not None and master is not client:
             self._send(client, "I", b"\x00" + ",".join("IN_USE" for _ in names).encode())
             return
-        self.controller.master = client
-        number = len(client.inputs) + 1
-        client.inputs[number] = names
-        self._send(client, "I", bytes([number]) + ",".join(kind_of(name) for name in names).encode())
+        kinds, number = [kind_of(name) for name in names], 0
+        if "NOT_FOUND" not in kinds:
+            self.controller.master = client
+            number = len(client.inputs) + 1
+            client.inputs[number] = names
+        self._send(client, "I", bytes([number]) + ",".join(kinds).encode())
 
     def _packet(self, client: Client) -> bytes:
         parts = [b"\x01"]

@@ -9,7 +9,7 @@ import time
 
 from palpate.errors import InputError
 from palpate.wires import sim_protocol as protocol
-from palpate.wires.protocol import Command, LostError, Sense
+from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError
 
 _ANSWER = 1.0
 """Within which an arm answers a greeting [s]."""
@@ -90,8 +90,7 @@ class SimWire:
             if sense is not None:
                 return sense
             strange += 1
-        what = f", only {strange} datagrams that are none" if strange else ""
-        raise LostError(f"no reading for {1e3 * timeout:.3g} ms{what}")
+        raise SilentError("", timeout, f", only {strange} datagrams that are none" if strange else "")
 
     def _latest(self, sense: Sense | None) -> Sense | None:
         """The newest of what has come: a late loop does not answer what is past."""
@@ -117,8 +116,8 @@ class SimWire:
     def tare(self) -> None:
         """The simulated sensor has no zero of its own."""
 
-    def begin(self) -> None:
-        """The greeting has taken it over."""
+    def begin(self, silence: float = SILENCE) -> None:
+        """The greeting has taken it over; the arm rests after ten ticks without a command."""
 
     def write(self, command: Command) -> None:
         """Send the speed."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from palpate.wires.at_rest import AtRest
+from palpate.wires.lateness import CLOCKS
 from palpate.wires.order import Order
-from palpate.wires.protocol import Sense
+from palpate.wires.protocol import Sense, unreadable
 
 
 class Moment(NamedTuple):
@@ -36,21 +36,27 @@ class Moment(NamedTuple):
     since_touch: float | None
 
 
-def spoiled(sense: Sense, last: Sense, theta: float) -> str | None:
+def spoiled(sense: Sense, last: Sense, rest: AtRest, theta: float) -> str | None:
     """Why a reading is none, in words; None if it is one.
 
     Args:
         sense: as it came.
         last: the one before.
+        rest: the arm before the press, by whose readings the two clocks are compared.
         theta: the loop's lag [s]: no reading that counts is later than that, so that none catches up by more.
     """
-    if not all(map(math.isfinite, (sense.stamp, *sense.force, *sense.position, *sense.quaternion))):
-        return "the arm gives a reading that is no number"
+    reason = unreadable(sense)
+    if reason is not None:
+        return reason
     if not sense.stamp > last.stamp:
         return f"the arm's clock went back, from {last.stamp:.6g} to {sense.stamp:.6g} s; has its controller restarted?"
-    ahead = (sense.stamp - last.stamp) - (sense.received - last.received)
+    apart = CLOCKS * (sense.received - rest.last.received)
+    ahead = rest.offset - (sense.received - sense.stamp) - apart
     if ahead > theta:
-        return f"the arm's clock jumped ahead by {ahead:.3g} s; has it been set, or do two arms speak?"
+        return (
+            f"the arm's clock is {ahead:.3g} s ahead of this computer's since the arm was at rest; does it run too"
+            " fast, has it been set, or do two arms speak?"
+        )
     return None
 
 

@@ -9,9 +9,11 @@ from palpate.wires.protocol import Quaternion
 
 
 def from_rotation_vector(vector: Sequence[float]) -> Quaternion:
-    """The quaternion x, y, z, w of a rotation vector [rad]."""
+    """The quaternion x, y, z, w of a rotation vector [rad]; no numbers of one that is not finite."""
     x, y, z = vector
-    angle = math.sqrt(x * x + y * y + z * z)
+    angle = math.hypot(x, y, z)
+    if not angle < math.inf:
+        return (math.nan,) * 4
     share = 0.5 if angle < 1e-12 else math.sin(angle / 2.0) / angle
     return share * x, share * y, share * z, math.cos(angle / 2.0)
 
@@ -20,7 +22,7 @@ def from_matrix_by_columns(m: Sequence[float]) -> Quaternion:
     """The quaternion x, y, z, w of a homogeneous matrix of 4 x 4 that is written by columns.
 
     From the largest of its four squares, so that nothing small divides (Shepperd, J. Guidance and Control 1 (1978)
-    223).
+    223). It has the length 1 if the matrix is a rotation, and another one if it is none.
     """
     a, b, c = float(m[0]), float(m[5]), float(m[10])
     squares = (1.0 + a - b - c, 1.0 - a + b - c, 1.0 - a - b + c, 1.0 + a + b + c)
@@ -33,8 +35,8 @@ def from_matrix_by_columns(m: Sequence[float]) -> Quaternion:
         (xz, yz, squares[2], zw),
         (xw, yw, zw, squares[3]),
     )[most]
-    size = math.sqrt(sum(part * part for part in row))
-    x, y, z, w = (float(part) / size for part in row)
+    double = 2.0 * math.sqrt(squares[most])
+    x, y, z, w = (float(part) / double for part in row)
     return x, y, z, w
 
 

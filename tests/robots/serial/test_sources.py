@@ -197,3 +197,59 @@ def test_without_the_extra_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(InputError, match=r"palpate\[arms\]"):
         SerialArm.from_urdf(URDF, "probe")
+
+
+MODEL = (
+    "<mujoco>{size}<asset>{asset}</asset><worldbody>{extra}<body pos='{pos}'><inertial pos='0 0 .1' mass='{mass}'"
+    " diaginertia='.1 .1 .1'/><joint axis='0 1 0'/><site name='tip'/></body></worldbody></mujoco>"
+)
+ORDINARY = {"size": "", "asset": "", "extra": "", "pos": "0 0 1", "mass": "1"}
+FIELD = {
+    "asset": "<hfield name='h' nrow='100000' ncol='100000' size='1 1 1 1'/>",
+    "extra": "<geom type='hfield' hfield='h'/>",
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (FIELD, "more than 0.25 GB"),
+        ({"size": "<size memory='100G'/>"}, "allocate memory"),
+        ({"mass": "1e308"}, "mass must be within 1e.06 kg, got 1e.308"),
+        ({"pos": "1e200 0 0"}, "must be within 1000 m"),
+        ({"pos": "nan 0 0"}, "not finite"),
+        pytest.param(
+            {"extra": "<replicate count='100000000'><geom size='.1'/></replicate>"},
+            "takes more than 25 s",
+            marks=pytest.mark.long,
+        ),
+    ],
+)
+def test_a_model_that_exhausts_the_machine(tmp_path, change, words):
+    path = tmp_path / "arm.xml"
+    path.write_text(MODEL.format(**ORDINARY))
+    assert SerialArm.from_mujoco(path).joints == 1
+    path.write_text(MODEL.format(**ORDINARY | change))
+    with pytest.raises(InputError, match=words):
+        SerialArm.from_mujoco(path)
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        ("mass = 1e307", "mass must be within"),
+        ("at = [1e200, 0, 0]", "within 1000 m"),
+        ("rotor = 1e300", "rotor inertia"),
+    ],
+)
+def test_numbers_that_no_arm_has(tmp_path, number, words):
+    text = 'title = "one"\nhome = [0.0]\n[[joint]]\nname = "a"\nat = [0, 0, 1]\nmass = 1\nrotor = 1\n'
+    path = tmp_path / "arm.toml"
+    path.write_text(text)
+    assert SerialArm.from_toml(path).joints == 1
+    key = number.partition(" ")[0]
+    path.write_text(
+        "".join(f"{number}\n" if line.startswith(f"{key} ") else f"{line}\n" for line in text.splitlines())
+    )
+    with pytest.raises(InputError, match=words):
+        SerialArm.from_toml(path)

@@ -37,7 +37,10 @@ def free_level(force: Array, position: Array) -> float | None:
     if not high > low:
         return None
     bends = [
-        min((_bent(force, side * (position - low - share * (high - low))), side, share) for share in _PLACES)
+        min(
+            (_misfit_of_bend(force, side * (position - low - share * (high - low))), side, share)
+            for share in _PLACES
+        )
         for side in (1.0, -1.0)
     ]
     best, other = sorted(bends)
@@ -48,7 +51,7 @@ def free_level(force: Array, position: Array) -> float | None:
     return float(np.median(force[flat])) if _is_flat(force, position, flat) else None
 
 
-def _bent(force: Array, beyond: Array) -> float:
+def _misfit_of_bend(force: Array, beyond: Array) -> float:
     """Misfit of a force that is flat up to a place and straight beyond."""
     return _misfit(force, np.maximum(beyond, 0.0))
 

@@ -45,19 +45,19 @@ def notes_against(
         fit: of them.
     """
     notes = [
-        *_saturated(signals, there, fit.fitted),
+        *_saturation_notes(signals, there, fit.fitted),
         *_another_frame(record, frame, signals, there, fit.poses, fit.fitted),
-        *_touched(signals.time[there], fit.poses, fit.means),
+        *_touch_notes(signals.time[there], fit.poses, fit.means),
         *_inertia(fit.parameters),
     ]
     if signals.guess:
         notes.append({"code": "frame-guess", "text": f"{signals.guess}; say --wrench-frame if it is not so"})
     if not any(note["code"] == "pose-frame" for note in notes):
-        notes += _untared(fit.parameters)
+        notes += _tare_notes(fit.parameters)
     return notes
 
 
-def _saturated(signals: Signals, there: Rows, fitted: Fitted) -> list[dict[str, Any]]:
+def _saturation_notes(signals: Signals, there: Rows, fitted: Fitted) -> list[dict[str, Any]]:
     """Axes that rest at their extreme value while the weight turns in the sensor."""
     weight = np.einsum("nji,j->ni", signals.rotations[there], fitted.whole[:3])
     stuck = 0
@@ -80,11 +80,11 @@ def _another_frame(
     fine = poses_of(time, turns, signals.force[there], groups_of(turns, _FINE))
     own = _misfit(fine, solve_force(fine, drift=len(fitted.whole) > 6))
     readings = {
-        "the pose is of the base in the tool: give its inverse": _inverted(fine),
+        "the pose is of the base in the tool: give its inverse": _invert(fine),
         **_in_other_axes(record, frame, fine),
     }
     found = [(_misfit(other, solve_force(other, drift=False)), text) for text, other in readings.items()]
-    turn = _turned(fine)
+    turn = _best_rotation(fine)
     if turn is not None:
         rpy, misfit = turn
         if np.degrees(np.linalg.norm(rpy)) > 2.0:
@@ -133,7 +133,7 @@ def _misfit(poses: Poses, whole: Array) -> float:
     return float(np.average((left**2).mean(axis=1), weights=poses.count))
 
 
-def _inverted(poses: Poses) -> Poses:
+def _invert(poses: Poses) -> Poses:
     turns = poses.turns.transpose(0, 2, 1)
     in_base = np.einsum("gij,gj->gi", turns, poses.signal)
     return replace(poses, turns=turns, turns_t=poses.turns_t.transpose(0, 2, 1), in_base=in_base)
@@ -153,7 +153,7 @@ def _in_other_axes(record: Record, frame: ContactFrame, poses: Poses) -> dict[st
     return found
 
 
-def _turned(poses: Poses) -> tuple[Array, float] | None:
+def _best_rotation(poses: Poses) -> tuple[Array, float] | None:
     """Roll, pitch and yaw [rad] of the best rotation of the wrench's axes, and the residual [N^2]."""
     from scipy.optimize import least_squares
     from scipy.spatial.transform import Rotation
@@ -188,7 +188,7 @@ def _in_axes(poses: Poses, turn: Array) -> Poses:
     return replace(poses, signal=signal, signal_t=poses.signal_t @ turn.T, in_base=in_base)
 
 
-def _touched(time: Array, poses: Poses, means: Array) -> list[dict[str, Any]]:
+def _touch_notes(time: Array, poses: Poses, means: Array) -> list[dict[str, Any]]:
     """An interval whose force contradicts the prediction from the others."""
     from scipy.special import fdtri
 
@@ -230,7 +230,7 @@ def _inertia(parameters: dict[str, Estimated]) -> list[dict[str, Any]]:
     return []
 
 
-def _untared(parameters: dict[str, Estimated]) -> list[dict[str, Any]]:
+def _tare_notes(parameters: dict[str, Estimated]) -> list[dict[str, Any]]:
     size = float(np.linalg.norm(parameters["bias"].value))
     weight = float(np.linalg.norm(parameters["weight"].value))
     if size <= weight:

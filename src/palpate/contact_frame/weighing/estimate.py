@@ -180,7 +180,7 @@ def solve_force(poses: Poses, drift: bool) -> Array:
     """Weight, bias and drift of a force, w, b, d; not finite if the poses do not determine them, shape (9,) or (6,)."""
     A, r = _normal_equations(poses)
     n = 9 if drift else 6
-    return _solved(A[:, :n, :n].sum(axis=0), r[:, :n].sum(axis=0))
+    return _solve(A[:, :n, :n].sum(axis=0), r[:, :n].sum(axis=0))
 
 
 def fit_force(poses: Poses, drift: bool) -> Fitted:
@@ -189,12 +189,12 @@ def fit_force(poses: Poses, drift: bool) -> Fitted:
     n = 9 if drift else 6
     A, r = A[:, :n, :n], r[:, :n]
     whole, total = A.sum(axis=0), r.sum(axis=0)
-    left_out = np.array([_solved(whole - a, total - b) for a, b in zip(A, r, strict=True)])
+    left_out = np.array([_solve(whole - a, total - b) for a, b in zip(A, r, strict=True)])
     rest = whole[3:, 3:]
     schur = whole[:3, :3] - whole[:3, 3:] @ np.linalg.pinv(rest, hermitian=True) @ whole[3:, :3]
     information, axes = np.linalg.eigh(schur / poses.count.sum())
     dof = poses.effective - 1.0
-    return Fitted(_solved(whole, total), left_out, np.maximum(information, 0.0), axes, dof)
+    return Fitted(_solve(whole, total), left_out, np.maximum(information, 0.0), axes, dof)
 
 
 def fit_centre(poses: Poses, weight: Array, drift: bool) -> Fitted:
@@ -214,8 +214,8 @@ def fit_centre(poses: Poses, weight: Array, drift: bool) -> Fitted:
     r[:, 3:6], r[:, 6:] = poses.signal, poses.signal_t
     A, r = (A * count[:, None, None])[:, :n, :n], (r * count[:, None])[:, :n]
     whole, total = A.sum(axis=0), r.sum(axis=0)
-    left_out = np.array([_solved(whole - a, total - b) for a, b in zip(A, r, strict=True)])
-    return Fitted(_solved(whole, total), left_out, np.ones(3), eye, poses.effective - 1.0)
+    left_out = np.array([_solve(whole - a, total - b) for a, b in zip(A, r, strict=True)])
+    return Fitted(_solve(whole, total), left_out, np.ones(3), eye, poses.effective - 1.0)
 
 
 def _normal_equations(poses: Poses) -> tuple[Array, Array]:
@@ -237,7 +237,7 @@ def _fill_bias(A: Array, eye: Array, t: Array, tt: Array) -> None:
     A[:, 6:, 6:] = tt[:, None, None] * eye
 
 
-def _solved(A: Array, r: Array) -> Array:
+def _solve(A: Array, r: Array) -> Array:
     """The solution; not finite where there is none."""
     scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
     scaled = A / np.outer(scale, scale)

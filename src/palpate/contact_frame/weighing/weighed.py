@@ -132,13 +132,13 @@ def _fit(signals: Signals, there: Mask, tolerance: float) -> PoseFit:
     time = signals.time[there] - signals.time[there].mean()
     turns, force = signals.rotations[there], signals.force[there]
     poses = poses_of(time, turns, force, groups_of(turns))
-    fitted = _fitted(poses, tolerance)
+    fitted = _fit_with_drift(poses, tolerance)
     parameters = {"mass": fitted.mass, "weight": fitted.weight, "bias": fitted.bias}
     if fitted.drift is not None:
         parameters["drift"] = fitted.drift
     if np.isfinite(fitted.whole).all():
         parameters |= _centre(signals, there, time, poses, fitted)
-    left = force - _modelled(time, turns, fitted)
+    left = force - _model_force(time, turns, fitted)
     means = np.add.reduceat(left, poses.first, axis=0) / poses.count[:, None]
     return PoseFit(poses, fitted, parameters, means)
 
@@ -172,7 +172,7 @@ def _centre_of(signals: Signals, parameters: dict[str, Estimated], frame: Contac
     return place
 
 
-def _fitted(poses: Poses, tolerance: float) -> Fitted:
+def _fit_with_drift(poses: Poses, tolerance: float) -> Fitted:
     """With a drift if the poses determine it beside the weight, without one otherwise."""
     if len(poses.count) < _FEWEST:
         return fit_force(poses, drift=False)
@@ -187,7 +187,7 @@ def _determines(fitted: Fitted, tolerance: float) -> bool:
     return bool(np.isfinite(mass.half) and float(mass.half) <= max(tolerance * float(mass.value), 1e-3))
 
 
-def _modelled(time: Array, turns: Array, fitted: Fitted) -> Array:
+def _model_force(time: Array, turns: Array, fitted: Fitted) -> Array:
     whole = np.where(np.isfinite(fitted.whole), fitted.whole, 0.0)
     force: Array = np.einsum("nji,j->ni", turns, whole[:3]) + whole[3:6]
     return force + time[:, None] * whole[6:] if len(whole) > 6 else force
@@ -210,8 +210,8 @@ def _lacking(poses: Poses, fitted: Fitted, tolerance: float) -> list[str]:
         axis = weak[0][1]
         across = fitted.axes[:, -1]
         text = (
-            f"{listed}: the weight along {_listed(axis)} of the base cannot be told from the bias, because the tool"
-            f" turns it by {weak[0][0]:.2g} deg only; turn the tool by 30 deg and more about {_listed(across)} too"
+            f"{listed}: the weight along {_list_axes(axis)} of the base cannot be told from the bias, because the tool"
+            f" turns it by {weak[0][0]:.2g} deg only; turn the tool by 30 deg and more about {_list_axes(across)} too"
         )
         return [text]
     share = float(fitted.mass.half / fitted.mass.value) if np.isfinite(fitted.mass.half) else np.inf
@@ -252,7 +252,7 @@ def _inertia(signals: Signals, fit: PoseFit, frame: ContactFrame) -> dict[str, E
     if side is None:
         return {}
     time = signals.time - signals.time[read_rows(signals.force)].mean()
-    left = signals.force - _modelled(time, signals.rotations, fit.fitted)
+    left = signals.force - _model_force(time, signals.rotations, fit.fitted)
     exerted = side * np.einsum("nij,nj->ni", signals.rotations, left)
     place = _centre_of(signals, fit.parameters, frame)
     found = free_inertia(signals.time, exerted, place, np.ones(len(time), bool))
@@ -312,5 +312,5 @@ def _three(values: Array) -> Vector:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _listed(vector: Array) -> str:
+def _list_axes(vector: Array) -> str:
     return "(" + ", ".join(f"{value + 0.0:.2g}" for value in np.round(vector, 2)) + ")"

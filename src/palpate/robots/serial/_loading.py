@@ -6,24 +6,62 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from palpate.arrays import Array
+from palpate.files import open_file
+from palpate.files.confined import read_confined
+from palpate.files.limits import GB, Budget, Limits
 from palpate.robots.serial._extra import mujoco, refusals
 from palpate.robots.serial.inertias import check_inertia
 
+_LIMITS = Limits(
+    size=GB / 4,
+    seconds=25.0,
+    what="a model of a robot",
+    larger="leave height fields, textures and meshes out of it that the arm does not touch",
+    longer="leave out of it what the arm does not touch",
+)
+"""The largest arm of MuJoCo's own collection with its meshes takes 4 s and 60 MB."""
 
-def load_mjcf(path: Path) -> tuple[Any, list[str]]:
-    """The model of a file, and notes on it.
+
+def load_mjcf(path: Path, text: str | None = None, *, published: bool = True) -> tuple[Any, list[str]]:
+    """The model of a file, and notes on it; MuJoCo compiles it in a process of its own, under limits.
+
+    Args:
+        path: of the file.
+        text: MJCF or URDF in its place.
+        published: keep inertias that MuJoCo would refuse, with a note.
 
     Raises:
-        InputError: what MuJoCo refuses; an inertia that is none.
+        InputError: what MuJoCo refuses; an inertia that is none; a model that takes too much.
         OSError: no such file.
     """
-    with path.open("rb"):
-        pass
-    with refusals(str(path)):
-        spec = mujoco().MjSpec.from_file(str(path))
-        return compiled(spec)
+    open_file(path, "a model of MuJoCo").close()
+    mujoco()
+    arrays, notes = read_confined(
+        __name__, path, "a model of MuJoCo", Budget(path, _LIMITS), [text, published]
+    )
+    name = "model.mjb"
+    return mujoco().MjModel.from_binary_path(name, {name: arrays["model"].tobytes()}), notes
+
+
+def unpack(
+    path: Path, size: int, question: tuple[str | None, bool]
+) -> tuple[dict[str, NDArray[Any]], list[str]]:
+    """The compiled model as MuJoCo itself stores it, and notes on it. Runs in a process of its own."""
+    (text, published), specs = question, mujoco().MjSpec
+    try:
+        with refusals(str(path)):
+            spec = specs.from_file(str(path)) if text is None else specs.from_string(text)
+            model, notes = compiled(spec) if published else (spec.compile(), [])
+    except RuntimeError:  # a foreign exception without a name: there is no memory for what it asks
+        raise MemoryError from None
+    if model.narena + model.nbuffer > size:
+        raise MemoryError
+    stored = np.zeros(mujoco().mj_sizeModel(model), np.uint8)
+    mujoco().mj_saveModel(model, None, stored)
+    return {"model": stored}, notes
 
 
 def compiled(spec: Any) -> tuple[Any, list[str]]:

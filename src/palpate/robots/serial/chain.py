@@ -11,6 +11,7 @@ import numpy as np
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, cos, sin
 from palpate.arrays import Array
+from palpate.errors import InputError
 from palpate.robots.serial.spatial import (
     UNIT3,
     Inertia,
@@ -87,7 +88,13 @@ class Tip(NamedTuple):
 
 
 def spread_of(inertia: Array) -> tuple[Array, Array]:
-    """`least` and `spread` of a `Chain`, of inertias in any axes [kg m^2], shape (n, 3, 3)."""
+    """`least` and `spread` of a `Chain`, of inertias in any axes [kg m^2], shape (n, 3, 3).
+
+    Raises:
+        InputError: a number of them is not finite.
+    """
+    if not np.isfinite(inertia).all():
+        raise InputError("the inertia of a link is not finite; mend its mass, its moments and its places")
     moments, axes = np.linalg.eigh(np.asarray(inertia, dtype=float).reshape(-1, 3, 3))
     beyond = np.sqrt(moments[:, 1:] - moments[:, :1])
     return moments[:, 0].copy(), np.ascontiguousarray(beyond[:, :, None] * axes.swapaxes(1, 2)[:, 1:])

@@ -66,7 +66,7 @@ def _tip(model: Any, site: str | None, where: str) -> tuple[int, Array, Array]:
     """Body that carries the tip, and the tip in it."""
     k = _site_index(model, site, where)
     if k >= 0:
-        return int(model.site_bodyid[k]), np.array(model.site_pos[k]), _turned(model.site_quat[k])
+        return int(model.site_bodyid[k]), np.array(model.site_pos[k]), _rotate(model.site_quat[k])
     return int(model.body(site).id), np.zeros(3), np.eye(3)
 
 
@@ -256,7 +256,7 @@ def _matrix(numbers: Any) -> Array:
     return np.array(numbers, dtype=float).reshape(3, 3)
 
 
-def _turned(quat: Any) -> Array:
+def _rotate(quat: Any) -> Array:
     turn = np.zeros(9)
     mujoco().mju_quat2Mat(turn, np.array(quat, dtype=float))
     return turn.reshape(3, 3)

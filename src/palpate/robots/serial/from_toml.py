@@ -13,6 +13,7 @@ from msgspec import Meta
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
+from palpate.files import read_table, read_text
 from palpate.robots.serial.chain import Chain, spread_of
 from palpate.robots.serial.inertias import check_inertia
 from palpate.robots.serial.serial_arm import SerialArm
@@ -21,8 +22,6 @@ Triple = tuple[float, float, float]
 NotNegative = Annotated[float, Meta(ge=0)]
 Positive = Annotated[float, Meta(gt=0)]
 GRAVITY = 9.81
-_LARGEST = 1 << 20
-"""Bytes of an arm's file."""
 
 
 class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -67,7 +66,7 @@ class ArmFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 def names() -> list[str]:
     """The arms that come with palpate."""
     folder = files("palpate.robots.serial").joinpath("arms")
-    return sorted(f.name.removesuffix(".toml") for f in folder.iterdir())
+    return sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml"))
 
 
 def named(name: str) -> SerialArm:
@@ -88,14 +87,7 @@ def read(path: Path) -> SerialArm:
     Raises:
         InputError: as `parse`; a file that is far too long, or no text.
     """
-    with path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise InputError(f"{path}: more than {_LARGEST} bytes are not an arm; check the path")
-    try:
-        return parse(data.decode("utf-8"), str(path))
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text file; check the path") from None
+    return parse(read_text(path, "an arm"), str(path))
 
 
 def parse(text: str, where: str) -> SerialArm:
@@ -104,18 +96,14 @@ def parse(text: str, where: str) -> SerialArm:
     Raises:
         InputError: TOML that does not parse, an unknown or missing key, a number that is none, an inertia that is none.
     """
+    file = read_table(text, where, ArmFile, finite=False)
     try:
-        tables = msgspec.toml.decode(text)
-        return _built(msgspec.convert(tables, ArmFile))
-    except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {error}") from None
-    except msgspec.DecodeError as error:
-        raise InputError(f"{where}: not TOML: {error}") from None
+        return _build(file)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
 
-def _built(file: ArmFile) -> SerialArm:
+def _build(file: ArmFile) -> SerialArm:
     joints = file.joint
     if len(file.home) != len(joints):
         raise InputError(f"home needs {len(joints)} numbers, one a joint, got {len(file.home)}")

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from palpate.errors import InputError, unknown
-from palpate.robots.serial._extra import mujoco, refusals
-from palpate.robots.serial._loading import compiled
+from palpate.files import read_bytes
+from palpate.robots.serial._loading import load_mjcf
 from palpate.robots.serial.from_mujoco import arm_of
 from palpate.robots.serial.serial_arm import SerialArm
 
@@ -32,9 +32,7 @@ def from_urdf(path: Path, link: str) -> SerialArm:
         root.remove(own)
     options = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(options, "compiler", fusestatic="false", discardvisual="false")
-    with refusals(str(path)):
-        spec = mujoco().MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-        model, notes = compiled(spec)
+    model, notes = load_mjcf(path, ElementTree.tostring(root, encoding="unicode"))
     arm = arm_of(model, link, str(path), notes)
     speeds = _speeds(root)
     return replace(
@@ -45,10 +43,7 @@ def from_urdf(path: Path, link: str) -> SerialArm:
 
 
 def _robot(path: Path) -> ElementTree.Element:
-    with path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise InputError(f"{path}: more than {_LARGEST} bytes are not an arm; check the path")
+    data = read_bytes(path, _LARGEST, "an arm")
     try:
         root = ElementTree.fromstring(data)  # noqa: S314 - Python's expat bounds what entities may grow to
     except (ElementTree.ParseError, ValueError, LookupError) as error:

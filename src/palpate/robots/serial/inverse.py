@@ -28,7 +28,7 @@ def inverse_kinematics(arm: SerialArm, pose: ArrayLike, near: Array) -> Array:
     goal = checked_pose(pose)
     best, off = near, np.full(6, np.inf)
     for start in _starts(arm, near):
-        q = _searched(arm, goal, start)
+        q = _search(arm, goal, start)
         left = pose_error(arm.forward_kinematics(q), goal)
         if np.linalg.norm(left) < np.linalg.norm(off):
             best, off = q, left
@@ -85,7 +85,7 @@ def _box(arm: SerialArm) -> tuple[Array, Array]:
     )
 
 
-def _searched(arm: SerialArm, goal: Array, q: Array) -> Array:
+def _search(arm: SerialArm, goal: Array, q: Array) -> Array:
     """Damped least squares (Wampler, 1986) in short steps within the joints' limits, so that it stays near.
 
     The damping falls with the error, so that it converges as Newton's method does where the pose can be reached.

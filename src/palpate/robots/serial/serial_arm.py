@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from palpate.arrays import Array
 from palpate.errors import InputError
+from palpate.results import Readable
 from palpate.robots.serial.chain import Chain, chain_model, room_for
 from palpate.robots.serial.described import Found, compiled_description, found_for
 
@@ -41,7 +42,7 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class SerialArm:
+class SerialArm(Readable):
     """An arm of n revolute and prismatic joints, one after the other.
 
     Joint positions q [rad, m], rates qd and accelerations qdd are arrays of shape (n,); torques [N m, N] too. A pose
@@ -88,6 +89,7 @@ class SerialArm:
                 raise InputError(f"{self.title}: {name} needs {n} numbers, got shape {values.shape}")
             values.setflags(write=False)
             object.__setattr__(self, name, values)
+        _check_range(self)
         _check_moves(self)
 
     @classmethod
@@ -244,6 +246,22 @@ def _wrench(w: ArrayLike) -> Array:
     if array.shape != (6,):
         raise InputError(f"tip_wrench must have shape (6,), force above moment, got {array.shape}")
     return array
+
+
+def _check_range(arm: SerialArm) -> None:
+    """Refuse numbers that no arm has and that its laws, which multiply five of them, overflow by."""
+    chain = arm.chain
+    for what, unit, most, values in (
+        ("joint frame, centre of mass or tip", "m", 1e3, (chain.at, chain.com, chain.tip)),
+        ("mass", "kg", 1e6, (chain.mass,)),
+        ("moment of inertia", "kg m^2", 1e9, (chain.least, chain.spread**2)),
+        ("rotor inertia", "kg m^2", 1e9, (chain.rotor,)),
+        ("gravity", "m/s^2", 1e3, (chain.gravity,)),
+        ("home position", "rad or m", 1e3, (arm.home,)),
+    ):
+        largest = float(np.max(np.abs(np.concatenate([own.ravel() for own in values]))))
+        if not largest <= most:
+            raise InputError(f"{arm.title}: a {what} must be within {most:g} {unit}, got {largest:g}")
 
 
 def _check_moves(arm: SerialArm) -> None:

@@ -19,10 +19,10 @@ def scene_of(arm: SerialArm) -> Scene:
     Raises:
         InputError: MuJoCo is not installed, or refuses the arm's numbers.
     """
-    return arm.scene or _made(arm)
+    return arm.scene or _make_scene(arm)
 
 
-def _made(arm: SerialArm) -> Scene:
+def _make_scene(arm: SerialArm) -> Scene:
     with refusals(arm.title):
         model, _ = compiled(mujoco().MjSpec.from_string(mjcf(arm)))
     n = np.arange(arm.joints)

@@ -1,0 +1,44 @@
+"""Troubles of the force law in a press: shown when they begin, and an end of the press when they last."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+
+from palpate.force.guard import BEYOND, DRIFTS, LATE, TROUBLES
+
+BORNE = {TROUBLES[code] for code in (LATE, DRIFTS, BEYOND)}
+"""Troubles with which a press goes on, however long they last."""
+
+
+class Troubles:
+    """Troubles of the law: each is shown when it begins, and one that lasts longer than the lag ends the press.
+
+    Missed ticks alone do not: the wire counts them, and ends the press where they are too many.
+
+    Args:
+        lag: of the loop [s].
+        show: called with the sentence of a trouble.
+    """
+
+    def __init__(self, lag: float, show: Callable[[str], None]):
+        self._lag, self._show = lag, show
+        self._now, self._since = "", 0.0
+        self.ticks: Counter[str] = Counter()
+
+    def lasting(self, trouble: str, time: float) -> str | None:
+        """The sentence of a trouble that has lasted too long; None of none.
+
+        Args:
+            trouble: of this tick, empty for none.
+            time: by the clock of the arm [s].
+        """
+        trouble = "" if trouble in BORNE else trouble
+        if trouble != self._now:
+            self._now, self._since = trouble, time
+        if not trouble:
+            return None
+        if trouble not in self.ticks:
+            self._show(trouble)
+        self.ticks[trouble] += 1
+        return trouble if time - self._since > self._lag else None

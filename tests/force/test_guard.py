@@ -1,0 +1,160 @@
+"""The guard: no reading and no history makes a speed that is not finite or beyond the limit, or that runs away."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from force.gained import gains_of
+from palpate.force import ForceLoop
+from palpate.force.contact_evidence import AIR
+from palpate.force.flat import state_in
+from palpate.force.guard import BEYOND, BLIND, BOUNCED, DRIFTS, TROUBLES, UNTARED, Guarded
+from palpate.force.simulated_press import pressed, surface, world_of
+
+HOSTILE = [
+    0.0,
+    -0.0,
+    1e-300,
+    1e77,
+    -1e77,
+    1e154,
+    1e300,
+    np.nan,
+    np.inf,
+    -np.inf,
+    5.0,
+    99.5,
+    101.0,
+    999.0,
+    -999.0,
+]
+
+
+def travel(name, error, seconds=1.5, noise=0.1, force=20.0):
+    """Rows of an approach in free motion alone, with the sensor's error [N] as a function of time."""
+    gains = gains_of(name, force)
+    n = round(seconds * gains.arm.rate)
+    wrong = error(np.arange(n) * gains.arm.tick)
+    world = world_of(gains.arm, noise=noise)
+    return gains, pressed(
+        world, surface(1e5), Guarded(gains.cautious()), 10.0, np.full(n, force), 3, error=wrong
+    )
+
+
+@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+@pytest.mark.parametrize(
+    "error",
+    [
+        lambda t: 0.6 + 0.0 * t,
+        lambda t: 0.3 * t,
+        lambda t: 0.3 * np.sin(2.0 * np.pi * 15.0 * t),
+        lambda t: 0.5 * (t > 0.4) + 0.5 * (t > 0.9),
+        lambda t: 4.0 + 0.0 * t,
+    ],
+    ids=["bias", "drift", "hum", "steps", "untared"],
+)
+def test_no_error_of_the_sensor_makes_the_tip_faster_than_its_approach(name, error):
+    gains, rows = travel(name, error)
+    assert rows[:, 3].max() <= gains.approach * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+def test_any_signal_below_the_level_leaves_the_approach(name):
+    gains = gains_of(name)
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        walk = np.cumsum(rng.standard_normal(20_000)) * rng.uniform(0.005, 0.05)
+        level = gains.level - 4.0 * 0.02
+        _, rows = travel(name, lambda t, w=walk, a=level: a * np.sin(w[: len(t)]), noise=0.02)
+        assert rows[:, 3].max() <= gains.approach * (1.0 + 1e-12)
+
+
+def test_a_bias_that_does_not_follow_the_tip_is_taken_out_and_a_drift_is_said():
+    gains = gains_of("ur5e")
+    loop, rng, x = ForceLoop(gains), np.random.default_rng(0), 0.0
+    said = set()
+    for k in range(3000):
+        t = k * gains.arm.tick
+        x += gains.arm.tick * loop.update(0.6 + 0.05 * t + 0.1 * rng.standard_normal(), x)
+        said.add(loop.trouble)
+    assert loop.bias == pytest.approx(0.6 + 0.05 * t, abs=0.15)
+    assert loop.drift == pytest.approx(0.05, abs=0.03)
+    assert TROUBLES[DRIFTS] in said
+    assert loop.phase == "air"
+
+
+def test_an_offset_beyond_the_bias_holds_the_tip():
+    gains = gains_of("ur5e")
+    loop, rng, x = ForceLoop(gains), np.random.default_rng(0), 0.0
+    for _ in range(1500):
+        x += gains.arm.tick * loop.update(4.0 + 0.1 * rng.standard_normal(), x)
+    assert loop.trouble == TROUBLES[UNTARED]
+    assert loop.update(4.0, x) == 0.0
+
+
+@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+@pytest.mark.parametrize("seed", range(4))
+def test_hostile_streams_leave_only_finite_speeds_within_the_limit(name, seed):
+    gains, rng = gains_of(name), np.random.default_rng(seed)
+    loop = ForceLoop(gains)
+    for _ in range(20_000):
+        force = rng.choice(HOSTILE) if rng.random() < 0.1 else rng.normal(10.0, 30.0)
+        place = rng.choice(HOSTILE) if rng.random() < 0.05 else rng.normal(0.0, 0.01)
+        missed = rng.choice([0.0, 0.0, 0.0, 1.0, 50.0, np.nan, -1.0])
+        speed = loop.update(float(force), float(place), float(missed))
+        assert abs(speed) <= gains.arm.limits.speed
+
+
+@pytest.mark.parametrize("reading", [(1e77, 0.0), (5.0, 1e4), (np.nan, 0.0), (5.0, -np.inf)])
+def test_what_no_sensor_can_show_is_no_reading(reading):
+    loop = ForceLoop(gains_of("ur5e"))
+    loop.update(0.1, 0.0)
+    assert loop.update(*reading) == 0.0
+    assert loop.trouble == TROUBLES[BLIND]
+    assert np.isfinite(loop.update(0.1, 0.0))
+    assert loop.trouble != TROUBLES[BLIND]
+
+
+@pytest.mark.parametrize("times", [5.0, 50.0])
+def test_a_cap_that_is_far_too_low_ends_within_three_bounces(times):
+    gains = gains_of("ur5e", cap=1e5 / times)
+    world = world_of(gains.arm, noise=0.1)
+    rows = pressed(world, surface(1e5, 10.0), Guarded(gains.cautious()), 1e-3, np.full(2000, 20.0), 1)
+    force = rows[:, 0]
+    first = int(np.argmax(force > 0.0))
+    assert ((force[first:-1] > 0.0) & (force[first + 1 :] <= 0.0)).sum() <= 3
+    assert np.abs(force[-200:] - 20.0).max() < 0.05 * 20.0
+
+
+def test_a_cap_that_is_refuted_is_said():
+    gains = gains_of("ur5e", cap=2e3)
+    control = Guarded(gains.cautious())
+    world, state, said = world_of(gains.arm, noise=0.1), control.start(), set()
+    rows = pressed(world, surface(4e4, 10.0), control, 1e-3, np.full(1000, 20.0), 1)
+    for k in range(len(rows)):
+        place = rows[k - 1, 2] if k else -1e-3
+        _, state = control.step(state, 20.0, rows[k, 4], place)
+        said.add(state.guard.trouble)
+    assert BEYOND in said
+
+
+def test_bounces_that_do_not_end_stop_the_tip():
+    gains = gains_of("ur5e")
+    loop, rng, x = ForceLoop(gains), np.random.default_rng(0), 0.0
+    for k in range(2000):
+        force = 60.0 if k % 100 < 20 and k > 100 else 0.0
+        x += gains.arm.tick * loop.update(force + 0.1 * rng.standard_normal(), x)
+    assert state_in(np.array(loop.state)).stage.phase == AIR
+    assert loop.trouble == TROUBLES[BOUNCED]
+    loop.reset()
+    assert loop.update(0.0, x) == pytest.approx(gains.approach)
+
+
+def test_a_sensor_of_coarse_steps_presses_if_its_step_is_given():
+    quiet = {"noise": 0.3, "resolution": 1.0}
+    gains = gains_of("ur5e", **quiet)
+    world = world_of(gains.arm, noise=0.01, resolution=1.0)
+    rows = pressed(world, surface(5e3, 10.0), Guarded(gains.cautious()), 2e-3, np.full(1500, 20.0), 1)
+    assert np.abs(rows[-200:, 0] - 20.0).max() < 1.0
+    assert rows[:, 0].max() < 1.1 * 20.0

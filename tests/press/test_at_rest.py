@@ -1,0 +1,64 @@
+"""Noise and drift of a force at rest, compared with those of the gains."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from palpate.errors import InputError
+from palpate.force import load_arm
+from palpate.press.loops import gains_for
+from palpate.press.tare import check_drift, fitting, noise_and_drift
+
+GAINS = gains_for(load_arm("ur5e"), 20.0)
+TIMES = np.arange(250) / 500.0
+
+
+def shown(seed, noise=0.1, drift=0.0, hum=0.0):
+    rng = np.random.default_rng(seed)
+    return noise * rng.normal(size=250) + drift * TIMES + hum * np.sin(2.0 * np.pi * 50.0 * TIMES)
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.3, -2.0])
+def test_noise_and_drift_are_found_with_an_honest_uncertainty(drift):
+    found = np.array([noise_and_drift(TIMES, shown(seed, drift=drift)) for seed in range(400)])
+    assert found[:, 0].mean() == pytest.approx(0.1, rel=0.02)
+    assert found[:, 1].mean() == pytest.approx(drift, abs=0.01)
+    # Student's t of eight degrees of freedom: 2.31 deviations are 95 %.
+    covered = np.abs(found[:, 1] - drift) < 2.31 * found[:, 2]
+    assert 0.92 < covered.mean() < 0.98
+
+
+def test_a_hum_is_noise_and_no_drift():
+    noise, drift, std = noise_and_drift(TIMES, shown(0, noise=0.02, hum=0.5))
+    assert noise == pytest.approx(0.5 / np.sqrt(2.0), rel=0.05)
+    assert abs(drift) < 4.5 * std
+
+
+def test_a_sensor_that_drifts_is_refused_and_a_still_one_never():
+    sensor = GAINS.arm.sensor
+    for seed in range(300):
+        _, drift, std = noise_and_drift(TIMES, shown(seed))
+        check_drift(drift, std, 20.0, 30.0, sensor)
+    for seed in range(30):
+        _, drift, std = noise_and_drift(TIMES, shown(seed, drift=1.5))
+        with pytest.raises(InputError, match=r"N/s at rest, and at most 0\.033 N/s is borne"):
+            check_drift(drift, std, 20.0, 30.0, sensor)
+
+
+def test_the_makers_drift_is_borne_where_it_is_more_than_a_press_would_bear():
+    sensor = msgspec.structs.replace(GAINS.arm.sensor, drift=0.5)
+    check_drift(0.45, 0.001, 20.0, 30.0, sensor)
+    with pytest.raises(InputError, match=r"at most 0\.5 N/s is borne"):
+        check_drift(0.55, 0.001, 20.0, 30.0, sensor)
+
+
+def test_gains_are_those_of_the_noise_that_is_there():
+    assert fitting(GAINS, 0.1, 250) is None
+    assert fitting(GAINS, 0.12, 250) is None
+    again = fitting(GAINS, 0.5, 250)
+    assert again.arm.sensor.noise == 0.5
+    assert (again.theta, again.gain, again.approach) == (GAINS.theta, GAINS.gain, GAINS.approach)
+    with pytest.raises(InputError, match="below 8 standard deviations"):
+        fitting(GAINS, 3.0, 250)
