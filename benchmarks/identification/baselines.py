@@ -59,7 +59,7 @@ from palpate.identification import identify
 from palpate.identifiers import ContactIdentifier, KalmanFilter, RecursiveLeastSquares
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
-from palpate.thesis.neural_identifier import network
+from palpate_thesis.neural_identifier import network
 
 Array = NDArray[np.float64]
 Found = tuple[dict[str, float], dict[str, float]]
@@ -189,7 +189,7 @@ def by_thesis(case: Case, front: str) -> Found:
 def by_network(case: Case) -> Found:
     """The thesis' neural identifier."""
     seen = network.press_of(case.record, case.material)
-    _, answers = network.learned(seen, network.Choice(), case.seed)
+    _, answers = network.learn(seen, network.Choice(), case.seed)
     late = answers[-round(network.LATE / network.TICK) :, :3].mean(axis=0)
     return dict(zip(NAMES, late.tolist(), strict=True)), _unknown()
 

@@ -5,6 +5,11 @@
 
 At 1 kHz, 5e7 samples are 14 hours. Every million of them is a press, a rest, and a press on a surface as stiff again.
 `ContactIdentifier` takes its ticks one by one: some minutes.
+
+`--hostile 2e7` feeds so many hostile samples to each: numbers of any size and sign, not numbers, stuck and swapped
+readings between stretches of an honest press. A refused sample is left out, as the error says. Each thousand samples
+the estimate is asked for: it must be finite, with no variance below zero; in the honest press after each stretch none
+may be refused; and nothing may be called identified beyond the range of a contact.
 """
 
 from __future__ import annotations
@@ -24,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pressing import NOISE, REST, START, VAGUE, motion, regressors
 
+from palpate.errors import InputError
 from palpate.identifiers import (
     ContactIdentifier,
     Directional,
@@ -42,9 +48,12 @@ HEAD = (
     "| estimator | samples | finite, no variance below 0 | largest variance of the initial "
     "| median | p99.9 | largest | p99.9, busy |"
 )
+HOSTILE_HEAD = (
+    "| estimator | hostile samples | exceptions other than a refusal | honest samples refused "
+    "| estimates not finite | with a variance below 0 | identified beyond a contact |"
+)
 SURFACES = (7e3, 14e3)  # [N/m], in turn
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reliability.md"
-BEGIN, END = "<!-- soak: begin -->", "<!-- soak: end -->"
 MAKERS: dict[str, Callable[[], Any]] = {
     "no forgetting": lambda: RecursiveLeastSquares(START, VAGUE),
     "exponential 0.998": lambda: RecursiveLeastSquares(START, VAGUE, Exponential(0.998)),
@@ -148,10 +157,125 @@ class Contact:
         return found
 
 
+WHOLE = 1000
+"""Samples from one look at a hostile stream's estimate to the next."""
+LIMITS = {"M": 1e2, "B": 1e5, "K": 1e7}
+"""No contact has more [kg], [N s/m], [N/m]."""
+
+
+def spoiled(random: np.random.Generator, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers with a fault of some kind in a share of them; changed in place."""
+    share = 10 ** random.uniform(-3.0, 0.0)
+    hit = random.random(numbers.shape) < share
+    kind = random.integers(7)
+    if kind == 0:
+        numbers[hit] = random.choice(
+            [np.nan, np.inf, -np.inf, 1e308, -1e150, 1e30, 1e-308, 0.0], int(hit.sum())
+        )
+    elif kind == 1:
+        numbers[hit] *= 10.0 ** random.uniform(-30, 30, int(hit.sum()))
+    elif kind == 2:
+        numbers[:] = numbers.flat[0]
+    elif kind == 3:
+        numbers *= 10.0 ** random.uniform(-12, 12)
+    elif kind == 4:
+        numbers[hit] = -numbers[hit]
+    elif kind == 5:
+        flipped = numbers.view(np.int64)
+        flipped ^= np.where(hit, np.int64(1) << random.integers(0, 63, numbers.shape), 0)
+    else:
+        numbers[:] = random.normal(0.0, 10.0 ** random.uniform(-9, 9), numbers.shape)
+    return numbers
+
+
+@dataclass
+class Hostile:
+    """Faults of an estimator over hostile samples."""
+
+    samples: int = 0
+    exceptions: int = 0
+    stuck: int = 0
+    not_finite: int = 0
+    below_zero: int = 0
+    beyond: int = 0
+
+    @property
+    def bad(self) -> int:
+        """Of all kinds."""
+        return self.exceptions + self.stuck + self.not_finite + self.below_zero + self.beyond
+
+    def take(self, estimator: Any, rows: Sequence[Any], force: list[float], honest: bool) -> None:
+        """Feeds one by one; an honest sample that is refused has the estimator stuck."""
+        for row, f in zip(rows, force, strict=True):
+            try:
+                estimator.update(row, f)
+            except InputError:
+                self.stuck += honest
+            except Exception:  # noqa: BLE001 - any other is what is counted
+                self.exceptions += 1
+        self.samples += len(force)
+
+    def look(self, estimator: Any, contact: bool) -> None:
+        """Judges the present estimate."""
+        try:
+            found = estimator.estimate()
+            verdicts = found.verdicts()
+        except Exception:  # noqa: BLE001 - any other is what is counted
+            self.exceptions += 1
+            return
+        variances = np.diag(found.covariance)
+        self.not_finite += not (np.isfinite(found.theta).all() and np.isfinite(found.covariance).all())
+        self.below_zero += bool((variances < 0.0).any())
+        if contact:
+            values = dict(zip(found.names, found.theta.tolist(), strict=True))
+            known = [name for name in LIMITS if verdicts[name] == "identified"]
+            self.beyond += any(not 0.0 < values[name] <= LIMITS[name] for name in known)
+
+
+def attacked(name: str, count: int) -> Hostile:
+    """A hostile stretch, an honest one, in turns; a new estimator every twenty of them."""
+    found, number = Hostile(), 0
+    while found.samples < count:
+        random = np.random.default_rng([17, number])
+        if number % 20 == 0:
+            contact = name == "ContactIdentifier"
+            estimator = (
+                ContactIdentifier("butterworth3:120", 1000.0, 0.0035, touch=random.choice([None, 0.0, 3.0]))
+                if contact
+                else MAKERS[name]()
+            )
+        x, v = motion(random, "four tones", WHOLE, 1000.0)
+        phi = regressors(x, v)
+        force = phi @ [60.0, 7e3, 0.0] + random.normal(0.0, NOISE, WHOLE)
+        rows: Any = x if contact else phi
+        if number % 2 == 0:
+            both = [rows, force]
+            for one in both if random.random() < 0.5 else [both[random.integers(2)]]:
+                spoiled(random, one)
+        with np.errstate(all="ignore"):
+            found.take(estimator, rows.tolist() if contact else list(rows), force.tolist(), number % 2 == 1)
+            found.look(estimator, contact)
+        number += 1
+    return found
+
+
 def memory() -> float:
     """What this process holds [MB]."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * resource.getpagesize() / 2**20
+
+
+def hostilities(rows: list[str], count: int) -> int:
+    """The table of hostile streams; how many faults there were."""
+    for line in (HOSTILE_HEAD, "|" + "---|" * (HOSTILE_HEAD.count("|") - 1)):
+        _tell(rows, line)
+    bad = 0
+    for name in (*MAKERS, "ContactIdentifier"):
+        h = attacked(name, count)
+        cells = (h.exceptions, h.stuck, h.not_finite, h.below_zero, h.beyond)
+        _tell(rows, f"| {name} | {h.samples:.1e} | " + " | ".join(map(str, cells)) + " |")
+        bad += h.bad
+    return bad
 
 
 def _tell(rows: list[str], row: str) -> None:
@@ -163,8 +287,11 @@ def main() -> int:
     """Prints the table; 1 if anything was not finite, or grew."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=float, default=5e7)
+    parser.add_argument("--hostile", type=float, help="so many hostile samples to each, and nothing else")
     parser.add_argument("--write", action="store_true", help="put the result into docs/reliability.md")
     asked = parser.parse_args()
+    if asked.hostile:
+        return hostile(asked)
     count = int(asked.samples)
     estimators = {name: make() for name, make in MAKERS.items()}
     soaked(estimators, CHUNK)
@@ -197,11 +324,28 @@ def main() -> int:
         f" {grown:.1f} MB.",
     )
     if asked.write:
-        head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        PAGE.write_text(
-            f"{head}{BEGIN}\n\n" + "\n".join(rows) + f"\n\n{END}{rest.partition(END)[2]}", encoding="utf-8"
-        )
+        write(rows, "soak")
     return 0 if contact.good and all(good for good, _ in found.values()) and grown < 50.0 else 1
+
+
+def hostile(asked: argparse.Namespace) -> int:
+    """Prints the table of hostile streams; 1 if there was a fault."""
+    rows: list[str] = []
+    bad = hostilities(rows, int(asked.hostile))
+    _tell(rows, "")
+    _tell(rows, f"`benchmarks/online/soak.py --hostile {asked.hostile:g}`, {datetime.now(UTC):%Y-%m-%d}.")
+    if asked.write:
+        write(rows, "hostile")
+    return 1 if bad else 0
+
+
+def write(rows: list[str], name: str) -> None:
+    """Puts a table into docs/reliability.md, between the marks of its name."""
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    head, _, rest = PAGE.read_text(encoding="utf-8").partition(begin)
+    PAGE.write_text(
+        f"{head}{begin}\n\n" + "\n".join(rows) + f"\n\n{end}{rest.partition(end)[2]}", encoding="utf-8"
+    )
 
 
 if __name__ == "__main__":

@@ -221,7 +221,7 @@ def test_no_longer_than_the_longest():
         (lambda: SurfaceRange((3.0, 8.0), (1.0, 2.0), (np.nan, 1.0)), "mass must be LOW:HIGH"),
         (lambda: replace(PROBLEM, precision={}), "at least one of K, B, M"),
         (lambda: replace(PROBLEM, precision={"X": 0.1}), "unknown parameter 'X'"),
-        (lambda: replace(PROBLEM, precision={"K": 0.0}), "between 0 and 100 %"),
+        (lambda: replace(PROBLEM, precision={"K": 0.0}), "between 0.0001 and 100 %"),
         (lambda: replace(PROBLEM, precision={"K": 10.0}), "got 1000 %"),
         (lambda: replace(PROBLEM, kind="noise"), "unknown excitation 'noise'"),
         (lambda: replace(PROBLEM, criterion="T"), "unknown criterion 'T'"),

@@ -274,14 +274,14 @@ def test_jitter_and_repeated_times():
 def test_units_off_by_a_thousand_are_suspected():
     log = pressed()
     found = identify(record(log["time"], log["position"] * 1e6, log["force"]))
-    assert "unit-guess" in found.codes
+    assert "unit-doubtful" in found.codes
 
 
 def test_a_press_of_metres_is_one_of_millimetres():
     log = pressed()
     found = identify(record(log["time"], log["position"] * 1e3, log["force"]))
-    assert any(w.code.word == "unit-guess" and "say NAME:mm" in w.text for w in found.warnings)
-    assert "unit-guess" not in identify(log).codes
+    assert any(w.code.word == "unit-doubtful" and "say NAME:mm" in w.text for w in found.warnings)
+    assert "unit-doubtful" not in identify(log).codes
 
 
 def test_ten_rows_a_second():

@@ -102,8 +102,10 @@ def test_its_answer_is_the_least_squares_of_these():
     theta = np.linalg.lstsq(np.array(taken.regressors), np.array(taken.forces), rcond=None)[0]
     estimate = one.estimate()
     assert estimate.names == NAMES
-    assert (np.abs(estimate.theta - theta) < 1e-3 * estimate.std).all()
+    # The octaves count by their own noise and leave out the ends of the log: the two differ within their interval.
+    assert (np.abs(estimate.theta - theta) < 1.96 * estimate.std).all()
     assert (np.abs(estimate.theta - [0.3, 60.0, 5200.0, 30.0]) < 4 * estimate.std).all()
+    assert estimate.std[2] < 60.0
     assert estimate.samples == len(taken.forces)
 
 
@@ -165,17 +167,62 @@ def test_where_the_position_counts_from_does_not_matter():
     np.testing.assert_allclose(there.estimate().theta, here.estimate().theta, rtol=1e-6)
 
 
-@pytest.mark.parametrize("tick", [(np.inf, 1.0), (0.5, -np.inf)])
-def test_a_tick_that_is_not_finite_is_refused_and_changes_nothing(tick):
+@pytest.mark.parametrize("tick", [(np.inf, 1.0), (0.5, -np.inf), (1.1e3, 1.0), (1e150, 1.0), (0.5, -1.1e6)])
+def test_a_tick_out_of_any_range_is_refused_and_changes_nothing(tick):
     x, force = moving()
     bad, good = identifier(), identifier()
     for one in (bad, good):
         one.update_many(x[:900], force[:900])
-    with pytest.raises(InputError, match=r"a tick must be finite, got position .* call skip\(\)"):
+    with pytest.raises(InputError, match=r"a tick must be finite, .* got position .* call skip\(\)"):
         bad.update(*tick)
     for one in (bad, good):
         one.update_many(x[900:], force[900:])
     np.testing.assert_array_equal(told(bad), told(good))
+
+
+@pytest.mark.parametrize("glitch", [1.0, 999.0, -37.0])
+def test_a_position_that_no_tip_reaches_is_a_missing_one(glitch):
+    """As if it had been NaN; a tip cannot travel so far in a tick."""
+    x, force = moving()
+    spoiled, missing = identifier(), identifier()
+    lost, bad = x.copy(), x.copy()
+    lost[[500, 900]], bad[[500, 900]] = np.nan, glitch
+    spoiled.update_many(bad, force)
+    missing.update_many(lost, force)
+    np.testing.assert_array_equal(told(spoiled), told(missing))
+
+
+def test_a_position_that_stays_where_it_jumped_is_read_again():
+    """An encoder that is reset: the second reading confirms the first, and contact goes on from there."""
+    x, force = moving()
+    x[800:] += 2.0
+    taken = Taken()
+    identifier(taken).update_many(x, force)
+    rows = np.flatnonzero(np.isin(force, taken.forces))
+    assert rows[-1] > 1400
+    assert not np.isin(np.arange(800, 810), rows).any()
+
+
+def test_a_value_beyond_any_contact_is_rejected():
+    """A position in nanometres that is told to be metres makes a spring of 5e10 N/m."""
+    t = np.arange(TICKS) / RATE
+    x = 1e-3 * np.sin(2 * np.pi * 3 * t) + 1e-4 * np.sin(2 * np.pi * 20 * t)
+    one = identifier()
+    one.update_many(1e-7 * x, 5200 * read(x, np.arange(TICKS) - 2.1, taps(SENSOR, 1 / RATE, 3))[0])
+    assert "beyond that of any contact" in one.estimate().rejected
+
+
+def test_a_damping_below_zero_is_no_damping():
+    t = np.arange(3 * TICKS) / RATE
+    x = 1e-3 * np.sin(2 * np.pi * 3 * t) + 1e-4 * np.sin(2 * np.pi * 20 * t)
+    columns = read(x, np.arange(len(t)) - 2.1, taps(SENSOR, 1 / RATE, 3))
+    one = identifier()
+    noise = np.random.default_rng(0).normal(0, 0.01, len(t))
+    one.update_many(x, 5200 * columns[0] - 60 * RATE * columns[1] + noise)
+    estimate = one.estimate()
+    assert abs(estimate.theta[1] + 60) < 6
+    verdicts = estimate.verdicts()
+    assert (verdicts["B"], verdicts["K"]) == ("rejected", "identified")
 
 
 def test_missing_ticks_keep_their_place():

@@ -63,21 +63,26 @@ def test_a_stiffness_is_known_all_the_same(fault):
 
 
 @pytest.mark.parametrize(
-    ("fault", "reason"),
-    [
-        ("saturation", "it is saturated"),
-        ("chatter", "contact|the force does|not explained|change"),
-        ("surface changes", "a change was found|the force does|not explained"),
-        ("relaxing", "the force does|not explained|a change was found"),
-    ],
+    ("fault", "reason"), [("saturation", "it is saturated"), ("chatter", "contact is lost|not explained")]
 )
-def test_what_takes_the_verdict_away_is_said(fault, reason):
-    refused = [identified(press(seed, fault)).estimate() for seed in range(2020, 2024)]
-    told = [found for found in refused if found.rejected]
-    assert len(told) >= 3
-    for found in told:
-        assert set(found.verdicts().values()) == {"rejected"}
-        assert any(part in found.rejected for part in reason.split("|")), found.rejected
+def test_the_reason_of_a_refusal_is_given(fault, reason):
+    found = [identified(press(seed, fault)).estimate() for seed in range(2020, 2024)]
+    assert all(one.verdicts()["K"] != "identified" for one in found)
+    refused = [one.rejected for one in found if one.rejected]
+    assert refused
+    assert all(any(part in text for part in reason.split("|")) for text in refused), refused
+
+
+@pytest.mark.parametrize("fault", ["surface changes", "relaxing"])
+def test_a_surface_that_is_no_spring_and_damper_has_a_width_and_not_a_refusal(fault):
+    """The stiffness of the surface at the end, or that of the motion."""
+    known = 0
+    for seed in range(2020, 2024):
+        made = press(seed, fault)
+        found = identified(made).estimate()
+        assert not found.rejected
+        known += found.verdicts()["K"] == "identified" and misses(made, found)["K"][0] <= 1.0
+    assert known >= 3
 
 
 def test_a_loss_of_contact_is_found_and_so_is_the_next_touch():

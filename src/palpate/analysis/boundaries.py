@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.constant_modes import heeded
+from palpate.analysis.constant_modes import effective_states
 from palpate.analysis.linear_model import linearise
 from palpate.analysis.stability_cells import stable_pieces
 from palpate.arrays import Array
@@ -56,7 +56,7 @@ def stable_intervals(
     def period(s: float) -> Array:
         loop = linearise(_with(of, key, min(max(value(s), low), high)), **options)
         if not kept:
-            kept.append(heeded(loop.transition))
+            kept.append(effective_states(loop.transition))
         steps = loop.motion.steps
         return (loop.transition / steps[:, None] * steps)[np.ix_(kept[0], kept[0])]
 

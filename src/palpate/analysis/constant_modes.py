@@ -34,7 +34,7 @@ def moving(transition: Array, steps: Array) -> tuple[Complex, Complex]:
         transition: of the state over a period, shape (n, n).
         steps: units of the state's elements that make it well scaled, shape (n,).
     """
-    kept = heeded(transition)
+    kept = effective_states(transition)
     scaled = (transition / steps[:, None] * steps)[np.ix_(kept, kept)]
     into, _, _ = change(scaled)
     values, inside = np.linalg.eig(into.T @ scaled @ into)
@@ -43,7 +43,7 @@ def moving(transition: Array, steps: Array) -> tuple[Complex, Complex]:
     return values.astype(complex), vectors
 
 
-def heeded(transition: Array) -> NDArray[np.intp]:
+def effective_states(transition: Array) -> NDArray[np.intp]:
     """Indices of states that affect others or decay alone: not of integrals without effect."""
     others = transition - np.diag(np.diag(transition))
     return np.flatnonzero(others.any(axis=0) | (np.abs(np.diag(transition) - 1.0) > CONSTANT))

@@ -10,6 +10,7 @@ from palpate.arrays import Array
 from palpate.excitation.budget import used_up
 from palpate.excitation.prediction import Made, Prediction
 from palpate.excitation.problem import Problem
+from palpate.excitation.rounding import error_of_sweep
 from palpate.references.waves import Chirp
 
 _ENDS = 6  # places for each end of the sweep
@@ -54,15 +55,15 @@ def _share(problem: Problem, sweep: Chirp) -> float:
 def _predicted(problem: Problem, sweep: Chirp) -> Made:
     omega = _frequencies(sweep)
     forces = problem.forces(omega, np.full(_FINE, sweep.amplitude))
-    information = problem.information(omega, forces).mean(axis=1)
-    pulls = problem.pull(omega, forces, together=False)
-    predictions = []
-    each = zip(problem.surfaces.surfaces(), forces, information, pulls, strict=True)
-    for surface, force, told, pull in each:
+    sensors, predictions = problem.sensors, []
+    for surface, force in zip(problem.surfaces.surfaces(), forces, strict=True):
+        motion = force / surface.impedance(omega)
+        error = error_of_sweep(motion, omega, sweep.seconds, sensors.rate, sensors.position_step)
+        known = problem.predicted(surface, omega, force, error, sweep.seconds, together=False)
         felt = float(np.abs(force).max())
         travel = 2 * float(np.abs(force / surface.impedance(omega)).max())
         between = (problem.budget.mean - felt, problem.budget.mean + felt)
         predictions.append(
-            Prediction(surface, problem.surfaces.names, told, problem.prior, pull, between, travel)
+            Prediction(surface, problem.surfaces.names, known[0], problem.prior, *known[1:], between, travel)
         )
     return Made(sweep, tuple(predictions), gap=0.0)

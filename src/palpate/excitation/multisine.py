@@ -14,6 +14,7 @@ from palpate.excitation.budget import used_up
 from palpate.excitation.phases import low_peak, summed
 from palpate.excitation.prediction import Made, Prediction
 from palpate.excitation.problem import Problem
+from palpate.excitation.rounding import error_of_period
 from palpate.excitation.spectra import optimal
 from palpate.references.waves import Multisine
 
@@ -66,7 +67,7 @@ def _make(problem: Problem, seconds: float, mix: float) -> Made:
         amplitudes = _spread(omega, powers, base * harmonics.astype(np.float64), width)
         used = amplitudes > 0
         phases = low_peak(amplitudes[used], harmonics[used], rounds)
-        return _within_budget(problem, harmonics[used], base, amplitudes[used], phases, gap)
+        return _within_budget(problem, harmonics[used], seconds, amplitudes[used], phases, gap)
 
     tried = {width: spread(width, _QUICK).excess(seconds, problem.precision) for width in _WIDTHS}
     return spread(min(tried, key=tried.__getitem__), _THOROUGH)
@@ -85,10 +86,11 @@ def _spread(omega: Array, powers: Array, dense: Array, width: float) -> Array:
 
 
 def _within_budget(
-    problem: Problem, harmonics: Harmonics, base: float, amplitudes: Array, phases: Array, gap: float
+    problem: Problem, harmonics: Harmonics, seconds: float, amplitudes: Array, phases: Array, gap: float
 ) -> Made:
     """As strong as the budget allows, for the desired force and for the force on every surface."""
-    omega, start = base * harmonics.astype(np.float64), np.exp(1j * phases)
+    period, sensors = _period(problem, seconds), problem.sensors
+    omega, start = 2 * np.pi / period * harmonics.astype(np.float64), np.exp(1j * phases)
 
     def share(strength: float) -> float:
         asked = strength * amplitudes * start
@@ -99,17 +101,18 @@ def _within_budget(
 
     amplitudes = amplitudes * used_up(share, problem.budget.desired_swing)
     forces = problem.forces(omega, amplitudes)
-    told = problem.information(omega, forces).sum(axis=1)
     predictions = []
-    pulls = problem.pull(omega, forces, together=True)
-    each = zip(problem.surfaces.surfaces(), forces, told, pulls, strict=True)
-    for surface, force, information, pull in each:
+    for surface, force in zip(problem.surfaces.surfaces(), forces, strict=True):
         felt_there = problem.budget.mean + summed(force * start, harmonics, _POINTS)
         moved = summed(force / surface.impedance(omega) * start, harmonics, _POINTS)
         between = float(felt_there.min()), float(felt_there.max())
+        motion = force / surface.impedance(omega) * start
+        readings = max(round(period * sensors.rate), 2 * int(harmonics[-1]) + 2)
+        error = error_of_period(motion, harmonics, readings, sensors.position_step)
+        known = problem.predicted(surface, omega, force * start, error[:, harmonics], seconds, together=True)
         names, prior = problem.surfaces.names, problem.prior
         predictions.append(
-            Prediction(surface, names, information, prior, pull, between, float(np.ptp(moved)))
+            Prediction(surface, names, known[0], prior, known[1], known[2], between, float(np.ptp(moved)))
         )
     frequencies = omega / (2 * np.pi)
     wave = Multisine(tuple(frequencies.tolist()), tuple(amplitudes.tolist()), tuple(phases.tolist()))

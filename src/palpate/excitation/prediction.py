@@ -28,7 +28,8 @@ class Prediction:
         names: of the parameters that are identified.
         information: about them (of their logarithms) and the lag, of a second, shape (n, n).
         prior: information of the same parameters, shape (n, n).
-        pull: share by which noise of the position pulls each, shape (n,).
+        rounding: covariance by the rounding of the position, which repeats with the motion, shape (n, n).
+        pull: share by which that rounding pulls each towards zero, shape (n,).
         force: lowest and highest force on the surface [N].
         travel: of the tip, from end to end [m].
     """
@@ -37,6 +38,7 @@ class Prediction:
     names: tuple[str, ...]
     information: Array
     prior: Array
+    rounding: Array
     pull: Array
     force: tuple[float, float]
     travel: float
@@ -44,9 +46,11 @@ class Prediction:
     def half_widths(self, seconds: float) -> dict[str, float]:
         """95 % half-width of each parameter, as a share of its value, after so many seconds.
 
-        What noise of the position pulls is undone as well as its power is known, which no time makes better.
+        A pull towards zero is corrected as well as the power of the rounding is known. No time makes that better, nor
+        the rounding itself.
         """
-        C = covariance(seconds * self.information, self.prior) + np.diag((POWER_KNOWN * self.pull) ** 2)
+        C = covariance(seconds * self.information, self.prior)
+        C = C + self.rounding + np.diag((POWER_KNOWN * self.pull) ** 2)
         return {name: 1.96 * float(np.sqrt(C[i, i])) for i, name in enumerate(self.names)}
 
 

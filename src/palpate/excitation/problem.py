@@ -16,11 +16,14 @@ from palpate.excitation.force_loops import ForceLoop, HybridLoop, contact_force
 from palpate.excitation.prediction import ALL
 from palpate.excitation.sensors import Sensors
 from palpate.excitation.spectra import CRITERIA, covariance
-from palpate.excitation.surfaces import SurfaceRange
+from palpate.excitation.surfaces import Surface, SurfaceRange
+from palpate.identifiers.octave_system import SEEN
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 KINDS = ("multisine", "chirp")
+_FINEST = 1e-6
+"""Finest precision, as a share: no force sensor is calibrated to it."""
 LONGEST = 3600.0
 """Of an excitation [s]; nobody presses longer."""
 
@@ -75,9 +78,9 @@ class Problem:
         for name, asked in self.precision.items():
             if name not in self.surfaces.names:
                 raise unknown("parameter", name, self.surfaces.names)
-            if not 0 < asked < 1:
+            if not _FINEST <= asked < 1:
                 raise InputError(
-                    f"the precision of {name} must be between 0 and 100 %, got {100 * asked:g} %"
+                    f"the precision of {name} must be between {100 * _FINEST:g} and 100 %, got {100 * asked:g} %"
                 )
 
     def _check_robot(self) -> None:
@@ -120,21 +123,46 @@ class Problem:
         found = np.stack([self.sensors.information(surface, omega, force) for surface, force in pairs])
         return found[:, :, self.free[:, None], self.free]
 
-    def pull(self, omega: Array, forces: Complex, together: bool) -> Array:
-        """By what share noise of the position pulls each of `free` from its value on each surface, shape (C, n).
+    def predicted(
+        self, surface: Surface, omega: Array, force: Complex, error: Complex, seconds: float, together: bool
+    ) -> tuple[Array, Array, Array]:
+        """Information of a second about `free`, and the errors of `free` by rounding.
 
-        Least squares take the noise for motion; its part of the information is taken out again, as well as it is known.
+        The rounding of a repeated motion repeats itself, so that its errors stay however long it lasts: for each place
+        of the encoder one. Octaves in which it drowns the motion do not count, as in an identification. Beside them
+        the products of the error with itself pull each estimate towards zero.
 
         Args:
+            surface: which.
             omega: angular frequencies [rad/s], shape (F,).
-            forces: phasors on the surfaces [N], shape (C, F).
+            force: phasors on the surface [N], shape (F,).
+            error: phasors of the rounding there [m], shape (places, F).
+            seconds: that the motion lasts.
             together: all frequencies at once; otherwise one after the other, each for an equal time.
+
+        Returns:
+            Information, shape (n, n); covariance by rounding, shape (n, n); share of each that the estimate is pulled
+            by, shape (n,).
         """
-        found = np.zeros((len(forces), len(self.free)))
-        own = self.free[:-1]  # the lag is calibrated: noise does not move it
-        for i, (surface, force) in enumerate(zip(self.surfaces.surfaces(), forces, strict=True)):
-            moments = self.sensors.moments(surface, omega, force / surface.impedance(omega))
-            motion = (moments.sum(axis=0) if together else moments.mean(axis=0))[np.ix_(own, own)]
-            noise = self.sensors.noise_moments(surface)[np.ix_(own, own)]
-            found[i, :-1] = covariance(motion, np.zeros_like(motion)) @ noise.sum(axis=1)
-        return found
+        share = 1.0 if together else 1.0 / len(omega)
+        motion = force / surface.impedance(omega)
+        power = _smooth(np.mean(np.abs(error) ** 2, axis=0), omega)
+        density = self.sensors.density(surface, omega, power * (seconds * share) / 4)
+        density = np.where(_smooth(np.abs(motion) ** 2, omega) >= SEEN * power, density, np.inf)
+        columns = self.sensors.columns(surface, omega, motion)[:, self.free]
+        A = np.real(np.einsum("fi,fj->fij", columns, np.conj(columns))) / 2 * share
+        whole = (A / density[:, None, None]).sum(axis=0)
+        own = (A * (self.sensors.density(surface, omega, 0.0) / density**2)[:, None, None]).sum(axis=0)
+        C = covariance(whole, self.prior / seconds)
+        felt = error * surface.impedance(omega) * self.sensors.force.low_pass.at(omega)
+        moved = np.real(np.einsum("fi,pf->pi", np.conj(columns) / density[:, None], felt)) / 2 * share @ C
+        noisy = self.sensors.moments(surface, omega, np.sqrt(np.mean(np.abs(error) ** 2, axis=0)) + 0j)
+        noisy = (noisy[:, self.free[:, None], self.free] / density[:, None, None]).sum(axis=0) * share
+        pull = C[:, :-1] @ noisy[:-1, :-1].sum(axis=1)
+        return whole @ np.linalg.pinv(own, hermitian=True) @ whole, moved.T @ moved / len(moved), pull
+
+
+def _smooth(power: Array, omega: Array) -> Array:
+    """The mean of a power within half an octave to either side, shape (F,)."""
+    near = np.abs(np.log2(omega[:, None] / omega)) < 0.5
+    return np.asarray((near * power).sum(axis=1) / near.sum(axis=1))

@@ -19,6 +19,20 @@ FACTORS: dict[str, dict[str, float]] = {
     },
 }
 """Units by quantity, and their factors into SI."""
+_LARGEST = {
+    "stiffness": 1e12,
+    "damping": 1e9,
+    "mass": 1e6,
+    "frequency": 1e7,
+    "force rate": 1e12,
+    "force": 1e9,
+    "length": 1e6,
+    "time": 1e9,
+    "velocity": 1e6,
+}
+"""In SI: no robot has more, and no calculation with its fourth power overflows."""
+_SMALLEST = 1e-15
+"""In SI, but for 0: the step of no sensor is finer."""
 
 
 def quantity(option: str, text: str, kind: str) -> float:
@@ -30,10 +44,12 @@ def quantity(option: str, text: str, kind: str) -> float:
         kind: of `FACTORS`.
 
     Raises:
-        InputError: no number, or no such unit.
+        InputError: no number, no such unit, or a number that no robot has.
     """
     number, colon, symbol = text.partition(":")
-    return _number(option, text, number) * (_factor(option, symbol, kind) if colon else 1.0)
+    return _in_range(
+        option, _number(option, text, number), _factor(option, symbol, kind) if colon else 1.0, kind
+    )
 
 
 def spread(option: str, text: str, kind: str) -> tuple[float, float]:
@@ -49,7 +65,17 @@ def spread(option: str, text: str, kind: str) -> tuple[float, float]:
     if len(parts) > 2:
         raise InputError(f"{option} needs LOW:HIGH or LOW:HIGH:UNIT, got {text!r}")
     low, high = (_number(option, text, part) for part in (parts[0], parts[-1]))
-    return factor * low, factor * high
+    return _in_range(option, low, factor, kind), _in_range(option, high, factor, kind)
+
+
+def _in_range(option: str, number: float, factor: float, kind: str) -> float:
+    value, most = number * factor, _LARGEST[kind]
+    if not (value == 0 or _SMALLEST <= abs(value) <= most):
+        raise InputError(
+            f"{option} must be 0, or between {_SMALLEST:g} and {most:g} in SI units, got {value:g};"
+            f" no robot has such a {kind}"
+        )
+    return value
 
 
 def shares(option: str, text: str, names: tuple[str, ...]) -> dict[str, float]:

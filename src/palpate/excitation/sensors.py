@@ -18,8 +18,6 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 LAG_UNIT = 1e-4
 """The lag is counted in tenths of a millisecond, so that it is of the size of the relative parameters."""
-_BANDS = 2000
-"""Into which the spectrum of the position's noise is cut."""
 _SURE = 1e-8  # s; a lag known better is known as well as exactly
 
 
@@ -49,24 +47,33 @@ class Sensors:
             if not low <= getattr(self, name) < np.inf:
                 raise InputError(f"{name} of the sensors must be {low:g} or above, got {getattr(self, name)}")
 
-    def information(self, surface: Surface, omega: Array, force: Complex) -> Array:
+    def information(
+        self, surface: Surface, omega: Array, force: Complex, rounding: Array | float | None = None
+    ) -> Array:
         """Fisher information about (ln K, ln B, ln M, lag) of a second at each frequency, shape (F, 4, 4).
 
-        Both noises are white; that of the position acts like a force of |Z H| times its size. The offset is known
-        from the mean alone, and the mean says nothing else as long as the touch is not known exactly.
+        Noise of the position acts like a force of |Z H| times its size. The offset is known from the mean alone, and
+        the mean says nothing else as long as the touch is not known exactly.
 
         Args:
             surface: the touched surface.
             omega: angular frequencies [rad/s], shape (F,).
             force: phasors of the force on the surface [N], shape (F,).
+            rounding: power of the position's error at them [m^2/Hz], shape (F,); None for white noise of step^2/12.
         """
         Z = surface.impedance(omega)
-        quantised = (np.abs(Z * self.force.low_pass.at(omega)) * self.position_step) ** 2 / 12
-        density = self.force.noise**2 / self.force.sampling + quantised / self.rate  # N^2/Hz, of both signs
+        density = self.density(surface, omega, rounding)
         return self.moments(surface, omega, force / Z) / density[:, None, None]
 
-    def moments(self, surface: Surface, omega: Array, motion: Complex) -> Array:
-        """Mean products of the regressors of (ln K, ln B, ln M, lag) under a motion, shape (F, 4, 4) [N^2].
+    def density(self, surface: Surface, omega: Array, rounding: Array | float | None = None) -> Array:
+        """Noise of both sensors as a force, as `information` has it, shape (F,) [N^2/Hz], of both signs."""
+        if rounding is None:
+            rounding = self.position_step**2 / (12 * self.rate)
+        gain = np.abs(surface.impedance(omega) * self.force.low_pass.at(omega)) ** 2
+        return np.asarray(self.force.noise**2 / self.force.sampling + gain * rounding)
+
+    def columns(self, surface: Surface, omega: Array, motion: Complex) -> Complex:
+        """The regressors of (ln K, ln B, ln M, lag) under a motion, phasors of shape (F, 4) [N].
 
         Args:
             surface: the touched surface.
@@ -76,20 +83,13 @@ class Sensors:
         s, Z = 1j * omega, surface.impedance(omega)
         K, B, M = surface.values
         columns = np.stack([K + 0 * s, B * s, M * s**2, -s * Z * LAG_UNIT], axis=-1)
-        columns *= (self.force.low_pass.at(omega) * motion)[:, None]
+        return np.asarray(columns * (self.force.low_pass.at(omega) * motion)[:, None])
+
+    def moments(self, surface: Surface, omega: Array, motion: Complex) -> Array:
+        """Mean products of the regressors under a motion, shape (F, 4, 4) [N^2]; see `columns`."""
+        columns = self.columns(surface, omega, motion)
         found: Array = np.real(columns[:, :, None] * np.conj(columns[:, None, :])) / 2
         return found
-
-    def noise_moments(self, surface: Surface) -> Array:
-        """The same products of what the quantisation of the position makes of the regressors, shape (4, 4) [N^2].
-
-        Its error is even in a step and white (Widrow, 1956), so its power lies evenly below half the rate; the force
-        sensor's low-pass lets through what is slower than its cut-off, be there a motion or not.
-        """
-        edges = np.linspace(0, np.pi * self.rate, _BANDS + 1)
-        middles = (edges[1:] + edges[:-1]) / 2
-        amplitude = self.position_step * np.sqrt(2 / (12 * _BANDS))
-        return self.moments(surface, middles, np.full(_BANDS, amplitude, complex)).sum(axis=0)
 
     def prior(self) -> Array:
         """Information about the same four before anything has moved: that of the lag, shape (4, 4)."""

@@ -16,7 +16,7 @@ from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.warning_codes import Code, Warn
 from palpate.signals.runs import runs
-from palpate.signals.spectral import detrended
+from palpate.signals.spectral import detrend
 
 ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""
@@ -181,7 +181,7 @@ def _without_drift(channels: Channels, air: FreeMotion) -> Channels:
     raw = replace(raw, held_force=raw.held_force - air.drift(at))
     warnings, moved = channels.warnings, float(np.ptp(air.levels))
     if moved > air.noise:  # less is not seen in the log
-        text = f"the force in the air differs by {moved:.3g} N from stay to stay there, which is removed as a drift"
+        text = f"in free motion the force changes by {moved:.3g} N during the log; the change is removed as a drift"
         warnings = (*warnings, Warn(Code.FORCE_DRIFTS, text))
     return replace(channels, force=channels.force - air.drift(rows), raw=raw, warnings=warnings)
 
@@ -203,7 +203,7 @@ def _never_left(channels: Channels, force: Array, position: Array, options: Opti
 def _correlation(force: Array, position: Array, dt: float) -> float:
     """Of block means over a hundredth of the log, without their slow trend."""
     width = max(len(force) // _BLOCKS, 1)
-    f, x = (detrended(block_means(values, width)) for values in (force, position))
+    f, x = (detrend(block_means(values, width)) for values in (force, position))
     size = float(np.sqrt((f @ f) * (x @ x)))
     return float(f @ x) / size if size > 0 else 0.0
 

@@ -14,6 +14,7 @@ what the answer differs by from force to force, is in the interval.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import atanh, isfinite, pi, sqrt, tan
@@ -23,9 +24,12 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Press, Tangent, Verdict
+from palpate.units import unit
 
 ASSUMED = "a half space (deep and wide compared with the contact), small strain, no adhesion"
 """Assumptions of the laws, which no press can check."""
+_SIZE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*:?\s*([a-zA-Zµμ°]*)\s*")
+"""A number and its unit."""
 _UNTOLD = (0.75, 1.0)
 """1 - nu^2 of materials that do not thicken when they are pulled: nu from 0.5 to 0."""
 
@@ -51,6 +55,28 @@ class Indenter:
             raise InputError(
                 f"the half angle of a cone must be under 90 deg, got {np.degrees(self.size):g} deg"
             )
+
+    @classmethod
+    def parse(cls, text: str) -> Indenter:
+        """A shape from `sphere:RADIUS:UNIT`, `punch:RADIUS:UNIT` or `cone:HALF_ANGLE:UNIT`.
+
+        Raises:
+            InputError: another shape, no number, or no unit of the right quantity.
+        """
+        shape, _, size = text.partition(":")
+        match = _SIZE.fullmatch(size)
+        if shape not in _LAWS or match is None:
+            shapes = "sphere:RADIUS, punch:RADIUS or cone:HALF_ANGLE, as sphere:5:mm"
+            raise InputError(f"--indenter needs {shapes}, got {text!r}")
+        quantity, usual = ("angle", "deg") if shape == "cone" else ("length", "mm")
+        if not match[2]:
+            raise InputError(f"--indenter {text} needs a unit, as {shape}:{match[1]}:{usual}")
+        own = unit(match[2])
+        if own.quantity != quantity:
+            raise InputError(
+                f"{match[2]!r} of --indenter is a unit of {own.quantity}; a {shape} needs one of {quantity}"
+            )
+        return cls(shape, float(match[1]) * own.factor)
 
     @property
     def _size(self) -> str:
@@ -109,7 +135,7 @@ def with_modulus(
             f"an indenter needs force in N and position in m, this log has {units[0]} and {units[1]}"
         )
     modulus = _modulus(found.press, indenter, poisson, tolerance)
-    return replace(found, parameters={**found.parameters, "E": modulus})
+    return replace(found, parameters={"E": modulus, **found.parameters})
 
 
 def check_poisson(poisson: tuple[float, float] | None) -> None:
@@ -217,7 +243,7 @@ def _judged(
     low, high = value - half, value + half
     if low <= 0:
         reason = f"the press does not follow a {indenter}: 95 % 0 to {high:.3g} Pa, most of it {main}"
-        return replace(_none(reason), budget=budget)
+        return replace(_none(reason), ci95=(low, high), budget=budget)
     share = f"{100 * half / value:.2g} %"
     if half <= tolerance * value:
         verdict, reason = Verdict.IDENTIFIED, f"known to {share} (95 %): {terms}"

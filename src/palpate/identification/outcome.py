@@ -150,7 +150,7 @@ def _doubts(parameters: dict[str, Parameter], problem: Problem, options: Options
         text = (
             f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: is a unit off, as by a factor of 1000?"
         )
-        warnings.append(Warn(Code.UNIT_GUESS, text))
+        warnings.append(Warn(Code.UNIT_DOUBTFUL, text))
     series = options.series_stiffness
     if stiffness is not None and series and stiffness > series / 3:
         text = (
@@ -160,7 +160,7 @@ def _doubts(parameters: dict[str, Parameter], problem: Problem, options: Options
     deep = float(np.ptp(problem.motion.position[_samples(problem)]))
     if terms.position_unit == "m" and deep > _DEEPEST:
         text = f"the probe moves by {deep:.3g} m in contact: is the position in mm? then say NAME:mm"
-        warnings.append(Warn(Code.UNIT_GUESS, text))
+        warnings.append(Warn(Code.UNIT_DOUBTFUL, text))
     return warnings
 
 

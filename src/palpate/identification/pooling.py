@@ -297,7 +297,7 @@ def _judged(mean: Mean, alike: float, count: int, kind: tuple[str, str], toleran
     budget = {cause: part for cause, part in sorted(parts.items(), key=lambda item: -item[1]) if part > 0}
     if share >= 1:
         reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g}; zero is within it ({of})"
-        return Parameter(None, None, None, kind[0], Verdict.NOT_IDENTIFIABLE, reason, None, budget)
+        return Parameter(None, None, interval, kind[0], Verdict.NOT_IDENTIFIABLE, reason, None, budget)
     verdict = Verdict.IDENTIFIED if share <= tolerance else Verdict.NOT_IDENTIFIABLE
     only = "" if verdict is Verdict.IDENTIFIED else " only"
     reason = f"known to {100 * share:.2g} %{only} (95 %), from {of}"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from math import pi, sqrt
+from math import isclose, pi, sqrt
 from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.warning_codes import Warn
-from palpate.results import Compared, Result
+from palpate.results import Compared, Readable, Result
 from palpate.signals import Estimate
 
 
@@ -24,14 +24,15 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Parameter(Readable):
     """One parameter of the contact.
 
     Args:
         value, std: None where the log carries no number worth printing.
         unit: in SI.
         verdict: identified, not identifiable or rejected.
-        ci95: 95 % interval that holds whatever the model; verdicts rest on it.
+        ci95: 95 % interval that holds whatever the model, also where `value` is None and the log bounds it; verdicts
+            rest on it.
         reason: why.
         ci95_if_model_holds: 95 % interval of least squares on this model, were it exactly true.
         budget: half-width of `ci95` by cause, largest first.
@@ -61,7 +62,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class DynamicStiffness:
+class DynamicStiffness(Readable):
     """Force over position about one frequency: storage in phase with the position, loss in quadrature.
 
     Args:
@@ -160,7 +161,7 @@ class Press(Compared):
 
 
 @dataclass(frozen=True)
-class WorkingPoint:
+class WorkingPoint(Readable):
     """The stiffness that the log shows, whatever the model, and what it belongs to.
 
     Args:
@@ -292,6 +293,14 @@ class Identification(Result, shown_by="palpate.report.identification.in_python")
     options: dict[str, Any] = field(default_factory=dict, repr=False)
     depth: float | None = None
 
+    def __getattr__(self, name: str) -> Parameter:
+        """A parameter by its name: `found.K`."""
+        parameters = self.__dict__.get("parameters", {})
+        if name not in parameters:
+            known = ", ".join(parameters) or "none"
+            raise AttributeError(f"an Identification has no {name!r}; its parameters are {known}")
+        return parameters[name]
+
     @property
     def codes(self) -> tuple[str, ...]:
         """The stable words of the warnings."""
@@ -312,6 +321,12 @@ class Identification(Result, shown_by="palpate.report.identification.in_python")
         k, b, m = (p.value or 0.0 for p in own if p)
         return sqrt(k / m) / (2 * pi), b / (2 * sqrt(k * m))
 
+    def _compared(self, own: Comparison) -> dict[str, Any]:
+        """One of the models; the chosen one is called as the parameters' model, whose mass may be left out."""
+        chosen = isclose(own.rmse, self.rmse, rel_tol=1e-9)
+        name = self.model if chosen else own.model
+        return {"model": name, "r2": _plain(own.r2), "note": own.note, "chosen": chosen}
+
     def to_json(self) -> dict[str, Any]:
         """The plain values that `palpate identify --json` prints."""
         return {
@@ -325,7 +340,7 @@ class Identification(Result, shown_by="palpate.report.identification.in_python")
             "lag_s": None if self.lag is None else asdict(self.lag),
             "fit": {"r2": _plain(self.r2), "rmse_N": _plain(self.rmse), "n": self.n},
             "warnings": [{"code": warn.code.word, "text": warn.text} for warn in self.warnings],
-            "models": [{"model": c.model, "r2": _plain(c.r2), "note": c.note} for c in self.comparison],
+            "models": [self._compared(c) for c in self.comparison],
             "options": self.options,
         }
 

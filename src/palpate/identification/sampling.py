@@ -117,8 +117,10 @@ def channels_of(record: Record) -> Channels:
         text = (
             f"only {rate:.3g} fresh readings a second: motion faster than about {rate / 8:.2g} Hz is not seen"
         )
-        text += "; or is the time in ms? then say NAME:ms" if dt >= _LONG_STEP else ""
         warnings.append(Warn(Code.LOW_RATE, text))
+        if dt >= _LONG_STEP:
+            text = f"by its unit there is a row every {dt:.3g} s: is the time in ms? then say NAME:ms"
+            warnings.append(Warn(Code.TIME_DOUBTFUL, text))
     grid = time if even else np.arange(time[0], time[-1] + dt / 2, dt)
     x, f, valid = _common(grid, time, (position, use_x), (force, use_f), even)
     own_x, near_x = _bridge(grid, time[use_x], position[use_x])

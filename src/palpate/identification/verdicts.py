@@ -98,9 +98,11 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
         reach = float(np.hypot(holds.t * holds.std(name), scale))
         own = (holds[name] - reach, holds[name] + reach)
 
-    def said(verdict: Verdict, reason: str, number: bool = True) -> Parameter:
+    def said(
+        verdict: Verdict, reason: str, number: bool = True, bounds: tuple[float, float] | None = None
+    ) -> Parameter:
         if not number:
-            return Parameter(None, None, None, unit, verdict, reason, None, budget)
+            return Parameter(None, None, bounds, unit, verdict, reason, None, budget)
         return Parameter(value, half / 1.96, interval, unit, verdict, reason, own, budget)
 
     positive = name in found.fit.model.positive
@@ -114,13 +116,13 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
     if not choice.explains:
         left = float(np.sqrt(1 - found.explained))
         reason = f"the model leaves {left:.0%} of the force's amplitude unexplained ({bounds})"
-        return said(Verdict.REJECTED, reason, number=clear and name == "K")
+        return said(Verdict.REJECTED, reason, clear and name == "K", interval)
     if half <= terms.tolerance * abs(value) and clear:
         return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}")
     limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
     main = cause_of(next(iter(budget), "noise"))
     reason = f"{bounds}; {limit}. Mostly due to {main.described}: {main.remedy}"
-    return said(Verdict.NOT_IDENTIFIABLE, reason, number=clear)
+    return said(Verdict.NOT_IDENTIFIABLE, reason, clear, interval)
 
 
 def _at(found: Answer, name: str, terms: Terms) -> str:
@@ -247,7 +249,7 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
         elif not lag.known and damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
             reach = 1.96 * lag.std * abs(found["K"]) if "K" in found.names else 0.0
             text = (
-                f"a lag T of the force looks like a damping of -K T, and the lag is not calibrated: B is uncertain by"
+                f"a lag of the force lowers B by K times the lag, and the lag is not calibrated: B is uncertain by"
                 f" {_digits(reach, 2)} {_shown(damping.unit)}; give --lag"
             )
             warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))

@@ -14,7 +14,7 @@ class Code(Enum):
         " Damping is refused. Calibrate the lag and give it with --lag."
     )
     LAG_DAMPING_CONFOUNDED = (
-        "A lag T of the force looks like a damping of -K T, and this log cannot tell the two apart."
+        "A lag of the force lowers the damping by K times the lag, and this log does not separate the two."
         " Calibrate the lag and give it with --lag, or excite the contact over a wider band."
     )
     SERIES_COMPLIANCE = (
@@ -34,10 +34,11 @@ class Code(Enum):
     SATURATED = (
         "The force rests at its extreme value while the probe moves on: it is at the end of its range."
     )
-    UNIT_GUESS = (
-        "A unit was taken from a column's name, or the stiffness is so unusual that a unit is probably wrong."
+    UNIT_GUESS = "A unit was taken from a column's name or values."
+    UNIT_STATED = "A unit was taken from the file's own statement."
+    UNIT_DOUBTFUL = (
+        "A unit is probably wrong: by it the press is unusual, or the name of the column has another."
     )
-    UNIT_STATED = "A unit was taken from the file's own statement, or differs from it."
     TIME_DOUBTFUL = "The time is doubtful in this unit: it counts rows, or its rate is beyond any log's."
     COLUMNS_SWAPPED = "A column was given a role that its own name contradicts."
     LINES_SKIPPED = "Lines of the file that are not rows of its table were left out."

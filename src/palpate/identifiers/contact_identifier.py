@@ -15,19 +15,31 @@ from numpy.typing import ArrayLike
 from palpate._jit import kernel
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identifiers.block_fit import block_fit
 from palpate.identifiers.estimator import entry
-from palpate.identifiers.kernels import block_sums, contact_state, contact_stream, positions, sample_clock
+from palpate.identifiers.kernels import contact_state, contact_stream, octave_sums, positions, sample_clock
 from palpate.identifiers.kernels.contact_stream import ticked
+from palpate.identifiers.line_noise import LineNoise
+from palpate.identifiers.octave_fit import octave_fit
+from palpate.identifiers.octave_system import OctaveData
+from palpate.results import Readable
 from palpate.signals.low_pass import LowPass
 from palpate.signals.taps import FRACTIONS, taps
 from palpate.signals.types import Estimate
 
 NAMES = ("M", "B", "K", "offset")
+PASSIVE = NAMES[:3]
+"""No passive surface has one of these below zero."""
 _FORGOTTEN = 10.0
 """Times the low-pass' slowest mode falls by e until what was before is forgotten."""
 _VAGUE = np.array([10.0, 1e4, 1e6, 1e3])
 """Deviation of each parameter before anything is known [kg], [N s/m], [N/m], [N]."""
+
+FARTHEST, STRONGEST = 1e3, 1e6
+"""Largest position [m] and force [N] that are readings of a sensor."""
+FASTEST = positions.FASTEST
+
+_RANGE = 10.0
+"""Deviations of the prior within which a contact's parameters are."""
 
 
 class Estimator(Protocol):
@@ -40,7 +52,7 @@ class Estimator(Protocol):
         """The present estimate."""
 
 
-class ContactIdentifier:
+class ContactIdentifier(Readable):
     """Identifies a contact on line from what a control loop has: a position and a force each tick.
 
     When to use it: the force sensor's low-pass and lag are known, and the loop runs at an even rate. What it says of
@@ -79,6 +91,7 @@ class ContactIdentifier:
         dt = 1 / rate
         window = taps(self.low_pass, dt, 3)
         self._weights = np.ascontiguousarray(window.weights[:, ::-1] / np.array([dt**2, dt, 1.0])[:, None])
+        self._lines = LineNoise.of(self._weights[FRACTIONS // 2], dt, 1 / (sampling or rate))
         settings = _settings(self.low_pass, rate, lag, sampling, touch)
         settings[[contact_stream.BEFORE, contact_stream.AFTER]] = window.before, window.after
         if settings[contact_stream.HOLD] > 0:  # contact is decided when the regressor is there
@@ -114,20 +127,22 @@ class ContactIdentifier:
     @property
     def samples(self) -> int:
         """How many samples came through."""
-        return int(self._sums[block_sums.SEEN])
+        return int(self._sums[octave_sums.SEEN])
 
     def update(self, position: float, force: float) -> None:
         """Takes in a tick's position [m], growing into the surface, and force on the surface [N].
 
         A reading that is missing is NaN, and keeps its place: short gaps of the position are filled, longer ones cost
-        the samples about them.
+        the samples about them. A position that jumps faster than `FASTEST` is a missing one, unless the next confirms
+        it.
 
         Raises:
-            InputError: an infinite number; the estimate is unchanged.
+            InputError: a number out of the range of any sensor; the estimate is unchanged.
         """
-        if abs(position) == np.inf or abs(force) == np.inf:
+        if abs(position) > FARTHEST or abs(force) > STRONGEST:
             raise InputError(
-                f"a tick must be finite, got position {position}, force {force}; in its place call skip()"
+                f"a tick must be finite, a position within {FARTHEST:g} m and a force within {STRONGEST:g} N, "
+                f"got position {position}, force {force}; in its place call skip()"
             )
         taken = self._one(self._state, self._weights, position, force, self._out)
         if taken and self.estimator is not None:
@@ -153,26 +168,30 @@ class ContactIdentifier:
         `block_fit` fails, the estimate is `rejected`, with the reason.
         """
         own = self.estimator.estimate() if self.estimator is not None else None
-        fit = block_fit(self._blocks(own), self._weights[FRACTIONS // 2], _VAGUE, self._lag_error)
-        refused = self._refusal() or (fit.rejected if fit is not None else "")
+        since = own.samples if own is not None else np.inf
+        c, track = self._contact, self._track
+        data = OctaveData(
+            self._sums,
+            self._lines,
+            max(float(c[contact_state.POWER]), float(c[contact_state.QUANTUM]) ** 2 / 12),
+            positions.step_in(track),
+            _VAGUE,
+            self._lag_error,
+            float(self.contacts),
+        )
+        fit = octave_fit(data, since)
         if own is None:
             theta = fit.theta if fit is not None else np.zeros(4)
             covariance = fit.covariance if fit is not None else np.diag(_VAGUE**2)
-            worth = float(self.samples)
+            worth = fit.system.samples if fit is not None else float(self.samples)
         else:
-            theta = own.theta + (fit.step if fit is not None else 0.0)
-            covariance = own.covariance + (fit.open if fit is not None else 0.0)
+            theta, covariance = own.theta, own.covariance
+            if fit is not None:
+                theta, opened = fit.compensated(own.theta, _VAGUE)
+                covariance = covariance + fit.open + opened
             worth = own.samples
-        return Estimate(NAMES, theta, covariance, worth, refused)
-
-    def _blocks(self, own: Estimate | None) -> Array:
-        """The blocks that an estimate rests on, the newest last, shape (b, WIDTH)."""
-        blocks = self._sums[block_sums.HEADER : -block_sums.COLUMNS].reshape(-1, block_sums.WIDTH)
-        blocks = blocks[: int(self._sums[block_sums.FILLED]) + 1]
-        if own is None:
-            return blocks
-        newer = np.cumsum(blocks[::-1, block_sums.WEIGHT])[::-1]
-        return blocks[newer <= own.samples + 0.5]
+        refused = self._refusal(theta) or (fit.rejected if fit is not None else "")
+        return Estimate(NAMES, theta, covariance, worth, refused, passive=PASSIVE)
 
     @property
     def _lag_error(self) -> float:
@@ -183,18 +202,25 @@ class ContactIdentifier:
         between = min(clock[sample_clock.HIGH] - clock[sample_clock.LOW], 1.0)
         return float(np.hypot(self.lag_std, between / self.rate / np.sqrt(12)))
 
-    def _refusal(self) -> str:
-        """Why none of the numbers can be trusted, as far as the samples tell before a fit."""
+    def _refusal(self, theta: Array) -> str:
+        """Why none of the numbers can be trusted, whatever the fit says; empty if nothing speaks against them."""
+        for name, value, most in zip(NAMES, theta, _RANGE * _VAGUE, strict=True):
+            if abs(value) > most:
+                return f"{name} is beyond that of any contact: check the units of position and force"
         c = self._contact
         if c[contact_state.LIMITED]:
             return f"the force stands at {c[contact_state.HIGHEST]:.4g} N while the tip moves on: it is saturated"
-        if self.samples < block_sums.FIRST and c[contact_state.LOST] > 0:
+        if self.samples < octave_sums.ROWS and c[contact_state.LOST] > 0:
             return "contact is lost again before the low-pass has settled"
         return ""
 
     @property
     def _contact(self) -> Array:
         return self._state[contact_stream.AT_CONTACT : contact_stream.AT_SUMS]
+
+    @property
+    def _track(self) -> Array:
+        return self._state[contact_stream.AT_POSITIONS : contact_stream.AT_CONTACT]
 
     @property
     def _sums(self) -> Array:
@@ -245,7 +271,7 @@ def _state(settings: Array) -> Array:
     for at in (contact_state.KNOWN, contact_state.CERTAIN):
         contact[at + 4 : at + 20] = np.diag(_VAGUE).ravel()
     ring = np.full(2 * room, np.nan)
-    parts = [settings, own, clock, track, contact, block_sums.no_sums(), ring]
+    parts = [settings, own, clock, track, contact, octave_sums.no_sums(), ring]
     return np.concatenate([*parts, np.zeros(queue * contact_state.SAMPLE)])
 
 

@@ -8,17 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import Kernel
+from palpate._jit import Kernel, kernel, law
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identifiers.kernels.dimension import size_of
+from palpate.identifiers.kernels.state_layout import length
+from palpate.results import Readable
 from palpate.signals.types import Estimate
 
-HUGE = 1e300
+LARGEST = 1e30
+"""No measurement in SI units is larger: the range of a log's columns."""
+HUGE = LARGEST**2
 """A sum of squares beyond it, or not a number, is no sample."""
 
 
-class Streaming(ABC):
+class Streaming(Readable, ABC):
     """Estimates theta in ``force = regressor . theta``; the update is compiled in the constructor.
 
     An estimator belongs to one thread at a time: updates change its state in place without a lock of their own, which
@@ -27,7 +31,7 @@ class Streaming(ABC):
     Args:
         state: all that is known, flat; the first n values are theta.
         n: number of parameters.
-        policy: the part that tells the kernels how to update.
+        policy: the part with `absorb(state, phi, y, size)`, which takes a sample in and says whether it was one.
         names: of the parameters, in the order of the regressor.
     """
 
@@ -40,11 +44,6 @@ class Streaming(ABC):
         self._n, self._state, self._policy, self._size = n, state, policy, size_of(n)
         self._bind()
 
-    @staticmethod
-    @abstractmethod
-    def _kernels() -> tuple[Kernel, Kernel]:
-        """The update by one sample and by many."""
-
     @abstractmethod
     def estimate(self) -> Estimate:
         """The estimate with its covariance, from which its verdicts follow."""
@@ -53,6 +52,11 @@ class Streaming(ABC):
     @abstractmethod
     def covariance(self) -> Array:
         """P, shape (n, n)."""
+
+    @property
+    def _floor(self) -> Array:
+        ends = length(self._n) - 2 * self._n
+        return self._state[ends : ends + self._n]
 
     @property
     def theta(self) -> Array:
@@ -98,14 +102,13 @@ class Streaming(ABC):
         if shape != (self._n,):
             return InputError(f"regressor must have shape ({self._n},), got {shape}")
         return InputError(
-            f"a sample must be finite numbers, got regressor {regressor!r}, force {force!r}; leave it out"
+            f"a sample must be finite numbers up to 1e30, got regressor {regressor!r}, force {force!r}; leave it out"
         )
 
     def _bind(self) -> None:
-        one, many = self._kernels()
         # An impossible sample compiles the update and leaves the state alone.
-        self._one = entry(one, self._state, np.full(self._n, np.nan), 0.0, self._policy, self._size)
-        self._many = many.compiled
+        self._one = entry(_one, self._state, np.full(self._n, np.nan), 0.0, self._policy, self._size)
+        self._many = _many.compiled
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -117,6 +120,44 @@ class Streaming(ABC):
     def __setstate__(self, known: dict[str, Any]) -> None:
         self.__dict__.update(known)
         self._bind()
+
+
+@kernel
+def _one(state, phi, y, policy, size):
+    return len(phi) == size.n and policy.absorb(state, phi, y, size)
+
+
+@kernel
+def _many(state, phi, y, policy, size):
+    """Index of the first sample that is not finite, or how many there are."""
+    for i in range(len(y)):
+        if not policy.absorb(state, phi[i], y[i], size):
+            return i
+    return len(y)
+
+
+@law
+def is_sample(p, y):
+    """Whether a regressor and a force are numbers of a measurement."""
+    return p @ p + y * y < HUGE
+
+
+def as_estimate(
+    names: tuple[str, ...], theta: Array, covariance: Array, samples: float, floor: Array
+) -> Estimate:
+    """An estimate; where regressors of too different size took all digits of a covariance, with that of the start.
+
+    Args:
+        names: of the parameters.
+        theta: the values, shape (n,).
+        covariance: of them, shape (n, n), as it was computed.
+        samples: that they are worth.
+        floor: inverse of each initial variance, shape (n,).
+    """
+    own = np.diag(covariance)
+    if not (np.isfinite(covariance).all() and (own >= 0.0).all()):
+        return Estimate(names, theta, np.diag(1.0 / floor), samples)
+    return Estimate(names, theta, 0.5 * (covariance + covariance.T), samples)
 
 
 def entry(kernel: Kernel, *example: Any) -> Any:

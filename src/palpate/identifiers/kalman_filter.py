@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import Kernel, kernel, law, part
+from palpate._jit import law, part
 from palpate._vector import sqrt
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identifiers.estimator import HUGE, Streaming, checked
+from palpate.identifiers.estimator import Streaming, as_estimate, checked, is_sample
 from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
 from palpate.identifiers.kernels.dimension import AnyNumber
 from palpate.identifiers.kernels.error_covariance import carried
@@ -40,6 +40,26 @@ class Noise(NamedTuple):
     """Noise of the force: its variance [N^2], or 0 where it is to be estimated."""
 
     variance: float
+
+    def absorb(self, state, phi, y, size):
+        """Takes a sample in; False where it is none."""
+        p = size.vector(phi, 0)
+        if not is_sample(p, y):
+            return False
+        n = size.n
+        k = length(n)
+        S, doubt, steps = size.matrix(state, n), error_covariance_in(state, size), k + 2 * n * n
+        S = bounded(S, size.vector(state, k - 2 * n), size.vector(state, k - n), size)
+        for i in range(n):
+            S = drifted(S, size.axis(i), state[steps + i])
+        r = _variance(doubt, self.variance, n)
+        theta, S, gain, e, a = measured(size.vector(state, 0), S, p, y, r)
+        # A sample takes from the older ones as much as it adds, shared among the parameters.
+        keep, memory = 1.0 - (1.0 - r / a) / n, 1.0 - 1.0 / min(MEMORY, 2.0 * doubt.weight)
+        put(state, size, theta, S, doubt.after(p, gain, e * sqrt(r / a), keep, memory, size))
+        walked = size.matrix(state, k) + size.matrix(state, k + n * n)
+        size.put_matrix(state, k, carried(walked, p, gain, 0.0))
+        return True
 
 
 class KalmanFilter(Streaming):
@@ -87,10 +107,6 @@ class KalmanFilter(Streaming):
         state = _first(start, P, pace * np.sqrt(period), 1.0 if noise is None else float(noise))
         super().__init__(state, len(start), known, names)
 
-    @staticmethod
-    def _kernels() -> tuple[Kernel, Kernel]:
-        return _one, _many
-
     @property
     def covariance(self) -> Array:
         """P, shape (n, n): the covariance of theta, were the noise white and as it is said or estimated."""
@@ -108,7 +124,7 @@ class KalmanFilter(Streaming):
         doubt, walked = error_covariance_in(self._state, size), size.matrix(self._state, length(n))
         C = doubt.covariance(float(n)).of + walked.of
         seen = max(float(doubt.weight) - _GUESS - n, 0.0)
-        return Estimate(self.names, self.theta, 0.5 * (C + C.T), seen)
+        return as_estimate(self.names, self.theta, C, seen, self._floor)
 
 
 def _first(theta: Array, P: Array, steps: Array, noise: float) -> Array:
@@ -125,42 +141,6 @@ def _first(theta: Array, P: Array, steps: Array, noise: float) -> Array:
 @law
 def _variance(doubt, given, n):
     return given if given > 0.0 else doubt.noise(n)
-
-
-@law
-def _absorb(state, phi, y, noise, size):
-    """One sample, in place. False where it is none."""
-    p = size.vector(phi, 0)
-    if not abs(p @ p + y) < HUGE:
-        return False
-    n = size.n
-    k = length(n)
-    S, doubt, steps = size.matrix(state, n), error_covariance_in(state, size), k + 2 * n * n
-    S = bounded(S, size.vector(state, k - 2 * n), size.vector(state, k - n), size)
-    for i in range(n):
-        S = drifted(S, size.axis(i), state[steps + i])
-    r = _variance(doubt, noise.variance, n)
-    theta, S, gain, e, a = measured(size.vector(state, 0), S, p, y, r)
-    # What a sample takes from the older ones is what it teaches, shared among the parameters.
-    keep, memory = 1.0 - (1.0 - r / a) / n, 1.0 - 1.0 / min(MEMORY, 2.0 * doubt.weight)
-    put(state, size, theta, S, doubt.after(p, gain, e * sqrt(r / a), keep, memory, size))
-    walked = size.matrix(state, k) + size.matrix(state, k + n * n)
-    size.put_matrix(state, k, carried(walked, p, gain, 0.0))
-    return True
-
-
-@kernel
-def _one(state, phi, y, noise, size):
-    return len(phi) == size.n and _absorb(state, phi, y, noise, size)
-
-
-@kernel
-def _many(state, phi, y, noise, size):
-    """Index of the first sample that is not finite, or how many there are."""
-    for i in range(len(y)):
-        if not _absorb(state, phi[i], y[i], noise, size):
-            return i
-    return len(y)
 
 
 class KalmanIdentifier(IdentifierTable, tag="kalman-filter"):

@@ -14,6 +14,7 @@ from palpate.errors import InputError, unknown
 from palpate.identifiers.neural_settings import SETTINGS, Setting
 from palpate.networks import Network, layers_of, network, random_layers
 from palpate.networks.backpropagation import backward, descend, forward
+from palpate.results import Readable
 from palpate.signals.types import Estimate
 
 CHANNELS = ("displacement", "velocity", "acceleration")
@@ -40,7 +41,7 @@ class Probed:
     warnings: tuple[tuple[str, str], ...]
 
 
-class NeuralProbe:
+class NeuralProbe(Readable):
     """Learns force from displacement, velocity and acceleration, a sample at a time; any curve, no model.
 
     When to use it: to see what the thesis saw. For numbers to rely on, `RecursiveLeastSquares` or `identify`: a

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike
 
-from palpate._jit import Kernel, kernel, law
+from palpate._jit import law, part
 from palpate.arrays import Array
-from palpate.identifiers.estimator import HUGE, Streaming, checked
+from palpate.identifiers.estimator import Streaming, as_estimate, checked, is_sample
 from palpate.identifiers.forgetting import Directional, Exponential, Forgetting, SIFt, policy_of
 from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
 from palpate.identifiers.kernels.dimension import AnyNumber
@@ -43,11 +43,22 @@ class LeastSquaresEstimator(Streaming):
         """
         doubt = error_covariance_in(self._state, AnyNumber(self._n))
         C = doubt.covariance(float(self._n)).of
-        return Estimate(self.names, self.theta, 0.5 * (C + C.T), self._worth(float(doubt.weight)))
+        return as_estimate(self.names, self.theta, C, self._worth(float(doubt.weight)), self._floor)
 
     @abstractmethod
     def _worth(self, weight: float) -> float:
         """How many samples the estimate is worth, if the noise was heard in so many."""
+
+
+@part
+class Recursion(NamedTuple):
+    """The update of `RecursiveLeastSquares`, with a policy of `forgetting`."""
+
+    forgetting: Any
+
+    def absorb(self, state, phi, y, size):
+        """Takes a sample in; False where it is none."""
+        return absorbed(state, phi, y, self.forgetting, size)[1] > 0.0
 
 
 class RecursiveLeastSquares(LeastSquaresEstimator):
@@ -77,21 +88,17 @@ class RecursiveLeastSquares(LeastSquaresEstimator):
     ):
         start, P = checked(theta, covariance)
         self.forgetting = policy_of(forgetting)
-        super().__init__(known_first(start, P), len(start), self.forgetting, names)
+        super().__init__(known_first(start, P), len(start), Recursion(self.forgetting), names)
 
     def _worth(self, weight: float) -> float:
         return weight
 
-    @staticmethod
-    def _kernels() -> tuple[Kernel, Kernel]:
-        return _one, _many
-
 
 @law
-def absorb(state, phi, y, forgetting, size):
+def absorbed(state, phi, y, forgetting, size):
     """One sample, in place: its innovation, scaled to the noise, and the variance that it had; (0, 0) if it is none."""
     p = size.vector(phi, 0)
-    if not abs(p @ p + y) < HUGE:
+    if not is_sample(p, y):
         return 0.0, 0.0
     n = size.n
     ends = length(n) - 2 * n
@@ -104,20 +111,6 @@ def absorb(state, phi, y, forgetting, size):
     theta, S, doubt, e, a = learned(theta, S, doubt, p, y, forgetting.keep, size)
     put(state, size, theta, S, doubt)
     return e, a
-
-
-@kernel
-def _one(state, phi, y, forgetting, size):
-    return len(phi) == size.n and absorb(state, phi, y, forgetting, size)[1] > 0.0
-
-
-@kernel
-def _many(state, phi, y, forgetting, size):
-    """Index of the first sample that is not finite, or how many there are."""
-    for i in range(len(y)):
-        if not absorb(state, phi[i], y[i], forgetting, size)[1] > 0.0:
-            return i
-    return len(y)
 
 
 class LeastSquaresIdentifier(IdentifierTable, tag="least-squares"):

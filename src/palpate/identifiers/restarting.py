@@ -2,28 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike
 
-from palpate._jit import Kernel, kernel, law
+from palpate._jit import part
 from palpate.errors import InputError
 from palpate.identifiers.estimator import checked
 from palpate.identifiers.forgetting import Forgetting, policy_of
 from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
-from palpate.identifiers.kernels.change_detection import (
-    COUNTERS,
-    EXTRA,
-    Watch,
-    counters,
-    looked_back,
-    noticed,
-)
+from palpate.identifiers.kernels.change_detection import COUNTERS, EXTRA, counters, looked_back, noticed
 from palpate.identifiers.kernels.state_layout import known_first, length, statistics_at
-from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorb
+from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorbed
 from palpate.signals.tables import Positive
+
+
+@part
+class Watch(NamedTuple):
+    """The update of `RestartingLeastSquares`.
+
+    Args:
+        forgetting: a policy of `forgetting`, between changes.
+        rows: samples that it looks back over.
+        evidence: log-likelihood ratio from which the surface has changed.
+    """
+
+    forgetting: Any
+    rows: float
+    evidence: float
+
+    def absorb(self, state, phi, y, size):
+        """Takes a sample in; False where it is none."""
+        n = size.n
+        s = statistics_at(n)
+        before = (state[s], state[s + 1], state[s + 2])
+        e, a = absorbed(state[: length(n)], phi, y, self.forgetting, size)
+        if not a > 0.0:
+            return False
+        noise = noticed(state, n, phi, y, e, a, before, self.rows)
+        if noise > 0.0:
+            looked_back(state, self, noise, size)
+        return True
 
 
 class RestartingLeastSquares(LeastSquaresEstimator):
@@ -67,10 +88,6 @@ class RestartingLeastSquares(LeastSquaresEstimator):
         state = np.concatenate([known_first(start, P), *initial])
         super().__init__(state, n, Watch(self.forgetting, float(memory), float(evidence)), names)
 
-    @staticmethod
-    def _kernels() -> tuple[Kernel, Kernel]:
-        return _one, _many
-
     def _worth(self, weight: float) -> float:
         return min(weight, float(self.since))
 
@@ -83,34 +100,6 @@ class RestartingLeastSquares(LeastSquaresEstimator):
     def since(self) -> int:
         """How many samples the estimate rests on: those since the last change, or all."""
         return int(self._state[counters(self._n) + 4])
-
-
-@law
-def _absorb(state, phi, y, watch, size):
-    n = size.n
-    s = statistics_at(n)
-    before = (state[s], state[s + 1], state[s + 2])
-    e, a = absorb(state[: length(n)], phi, y, watch.forgetting, size)
-    if not a > 0.0:
-        return False
-    noise = noticed(state, n, phi, y, e, a, before, watch.rows)
-    if noise > 0.0:
-        looked_back(state, watch, noise, size)
-    return True
-
-
-@kernel
-def _one(state, phi, y, watch, size):
-    return len(phi) == size.n and _absorb(state, phi, y, watch, size)
-
-
-@kernel
-def _many(state, phi, y, watch, size):
-    """Index of the first sample that is not finite, or how many there are."""
-    for i in range(len(y)):
-        if not _absorb(state, phi[i], y[i], watch, size):
-            return i
-    return len(y)
 
 
 class RestartingIdentifier(IdentifierTable, tag="restarting-least-squares"):

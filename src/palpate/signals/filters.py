@@ -91,14 +91,14 @@ class Cascade(NamedTuple):
 
 def lowpass1(cutoff: float, rate: float) -> Biquad:
     """First-order low-pass, cut-off and rate [Hz]; bilinear transform, prewarped at the cut-off."""
-    w = _prewarped(cutoff, rate)
+    w = _prewarp(cutoff, rate)
     return Biquad(w / (1 + w), w / (1 + w), 0.0, (w - 1) / (1 + w), 0.0, rate)
 
 
 def lowpass2(frequency: float, quality: float, rate: float) -> Biquad:
     """Second-order low-pass of natural frequency [Hz] and quality factor; bilinear, prewarped there."""
     require(quality > 0, "quality", "above 0", quality)
-    w = _prewarped(frequency, rate)
+    w = _prewarp(frequency, rate)
     scale = 1 + w / quality + w * w
     b = w * w / scale
     return Biquad(b, 2 * b, b, 2 * (w * w - 1) / scale, (1 - w / quality + w * w) / scale, rate)
@@ -114,7 +114,7 @@ def butterworth3(cutoff: float, rate: float) -> Cascade:
     return Cascade(lowpass1(cutoff, rate), lowpass2(cutoff, 1.0, rate))
 
 
-def _prewarped(cutoff: float, rate: float) -> float:
+def _prewarp(cutoff: float, rate: float) -> float:
     """tan(pi cutoff/rate): what the bilinear transform puts at the cut-off, in units of twice the rate."""
     require(0 < cutoff < rate / 2, "cut-off", f"between 0 and half the rate ({rate / 2:g} Hz)", cutoff)
     return math.tan(math.pi * cutoff / rate)
@@ -177,7 +177,7 @@ class StateVariable(NamedTuple):
 def state_variable(cutoff: float, rate: float, quality: float = math.sqrt(0.5)) -> StateVariable:
     """A state-variable filter of cut-off and rate [Hz]; Butterworth unless another quality is given."""
     require(quality > 0, "quality", "above 0", quality)
-    return StateVariable(_prewarped(cutoff, rate), 1.0 / quality, rate)
+    return StateVariable(_prewarp(cutoff, rate), 1.0 / quality, rate)
 
 
 class History(NamedTuple):

@@ -13,14 +13,14 @@ _SHORT = 256
 """Taps below which a direct convolution is the faster one."""
 
 
-def detrended(values: Array) -> Array:
+def detrend(values: Array) -> Array:
     """Values less their straight line of least squares, shape (n,)."""
     u = np.arange(len(values)) - (len(values) - 1) / 2
     mean = float(np.mean(values))
     return values - mean - u * float(u @ values) / max(float(u @ u), 1.0)
 
 
-def convolved(signal: Array, taps: Array) -> Array:
+def convolve(signal: Array, taps: Array) -> Array:
     """The full convolution, shape (n + m - 1,)."""
     if len(taps) <= _SHORT:
         return np.convolve(signal, taps)

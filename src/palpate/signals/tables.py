@@ -7,6 +7,8 @@ from typing import Annotated, Any, TypeVar, Union
 import msgspec
 from msgspec import Meta, Struct
 
+from palpate.results import Readable
+
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
 Triple = tuple[float, float, float]
@@ -17,7 +19,7 @@ Size = Annotated[int, Meta(ge=1, le=1000)]
 T = TypeVar("T", bound=Struct)
 
 
-class Table(Struct, frozen=True, forbid_unknown_fields=True):
+class Table(Readable, Struct, frozen=True, forbid_unknown_fields=True):
     """A table of the file; keys that it does not know are refused."""
 
 

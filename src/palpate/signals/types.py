@@ -13,6 +13,9 @@ from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.results import Compared
 
+NORMAL = 1.96
+"""Standard deviations of a 95 % half-width."""
+
 
 @part
 class Sense(NamedTuple):
@@ -46,6 +49,7 @@ class Estimate(Compared):
         covariance: of theta, shape (n, n): the noise found in the data included.
         samples: how many samples the data are worth (fewer than were seen when old ones are forgotten).
         rejected: the reason why none of its numbers is valid; empty if the model is not rejected.
+        passive: names of the parameters that no passive surface has below zero.
     """
 
     names: tuple[str, ...]
@@ -53,6 +57,7 @@ class Estimate(Compared):
     covariance: Array
     samples: float
     rejected: str = ""
+    passive: tuple[str, ...] = ()
 
     @property
     def std(self) -> Array:
@@ -63,15 +68,16 @@ class Estimate(Compared):
         """By parameter, "identified" or "not identifiable", see `verdict`; "rejected" where the estimate is."""
         if self.rejected:
             return dict.fromkeys(self.names, "rejected")
-        pairs = zip(self.names, self.theta, self.std, strict=True)
-        return {name: verdict(float(value), float(std), tolerance) for name, value, std in pairs}
+        rules = {name: passive_verdict if name in self.passive else verdict for name in self.names}
+        values = zip(self.names, self.theta.tolist(), self.std.tolist(), strict=True)
+        return {name: rules[name](value, std, tolerance) for name, value, std in values}
 
 
 def verdict(value: float, std: float, tolerance: float = 0.25) -> str:
     """Whether a number may be trusted: "identified" if its 95 % half-width is at most `tolerance` of it."""
-    return "identified" if 1.96 * std <= tolerance * abs(value) else "not identifiable"
+    return "identified" if NORMAL * std <= tolerance * abs(value) else "not identifiable"
 
 
 def passive_verdict(value: float, std: float, tolerance: float = 0.25) -> str:
     """The same for a mass, damping or stiffness, which no passive surface has below zero: then "rejected"."""
-    return "rejected" if value + 1.96 * std < 0.0 else verdict(value, std, tolerance)
+    return "rejected" if value + NORMAL * std < 0.0 else verdict(value, std, tolerance)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.models import Model, Motion
-from palpate.signals.spectral import detrended, quadrature
+from palpate.signals.spectral import detrend, quadrature
 
 FRICTION = "Fc"
 TOUCH = "touch"
@@ -68,5 +68,5 @@ def _in_quadrature(x: Array, segments: list[Segment]) -> Array:
     """
     found = np.zeros(len(x))
     for s in segments:
-        found[s.first : s.last] = quadrature(detrended(x[s.first : s.last]))
+        found[s.first : s.last] = quadrature(detrend(x[s.first : s.last]))
     return found

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.identification.filters.position_noise import PositionNoise
-from palpate.signals.spectral import convolved
+from palpate.signals.spectral import convolve
 
 ORDER = 5
 _LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak
@@ -94,7 +94,7 @@ class Chain:
         np.subtract(signal, level, out=padded[reach:-reach])
         padded[:reach], padded[-reach:] = padded[reach], padded[-reach - 1]
         start = reach - first
-        full = convolved(padded, taps)
+        full = convolve(padded, taps)
         return full[start : start + len(signal)] + (level if derivative == 0 else 0.0)
 
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:

@@ -8,9 +8,8 @@ ratio (Gustafsson, Adaptive Filtering and Change Detection, 2000, ch. 9), whose 
 from __future__ import annotations
 
 from math import inf, log
-from typing import Any, NamedTuple
 
-from palpate._jit import law, part
+from palpate._jit import law
 from palpate.identifiers.kernels.error_covariance import long_run_variance, unsure
 from palpate.identifiers.kernels.least_squares import learned
 from palpate.identifiers.kernels.state_layout import length, put, statistics_at
@@ -32,21 +31,6 @@ _MARGIN = 2.0
 
 _ENOUGH = 2
 """Samples a parameter that the new surface must have shown: one outlier is no change."""
-
-
-@part
-class Watch(NamedTuple):
-    """Settings of the change detection.
-
-    Args:
-        forgetting: a policy of `forgetting`, between changes.
-        rows: samples that it looks back over.
-        evidence: log-likelihood ratio from which it takes the surface to have changed.
-    """
-
-    forgetting: Any
-    rows: float
-    evidence: float
 
 
 @law

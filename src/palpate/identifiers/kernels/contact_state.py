@@ -78,7 +78,6 @@ def found(contact, queue, capacity, read, settling):
     """By the two tests; samples on their way are taken back, or after all, as far as the tests point back."""
     k = int((read - 1.0) % capacity) * SAMPLE
     instant, force = queue[k], queue[k + 1]
-    _heard(contact, force)
     if contact[TOUCHING] > 0.0:
         phi = Vec4(Vec3(queue[k + 2], queue[k + 3], queue[k + 4]), 1.0)
         if _left(contact, phi, force, instant):
@@ -113,7 +112,7 @@ def _marked(queue, capacity, read, since, number):
 
 
 @law
-def _heard(contact, force):
+def hear_noise(contact, force):
     """Adds to what the force's noise is told from while nothing else is known: a motion hardly shows in it."""
     p = PAST
     if contact[COUNT] > 4.0:

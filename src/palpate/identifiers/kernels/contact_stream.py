@@ -7,7 +7,6 @@ and the sums of those that came through.
 from math import floor, inf, isnan
 
 from palpate._jit import law
-from palpate.identifiers.kernels.block_sums import LENGTH, added
 from palpate.identifiers.kernels.contact_state import (
     CONTACTS,
     FIELDS,
@@ -15,12 +14,15 @@ from palpate.identifiers.kernels.contact_state import (
     TOUCHING,
     decide_contact,
     found,
+    hear_noise,
     learned,
     limited,
     pending,
 )
+from palpate.identifiers.kernels.octave_sums import LENGTH, added
 from palpate.identifiers.kernels.positions import (
     COUNT,
+    FASTEST,
     NUMBERS,
     POWER,
     PRODUCT,
@@ -53,7 +55,7 @@ def ticked(state, weights, x, force, out):
     """Takes a tick in; writes the samples that are ready to `out`, rows of a, v, x, 1, force, and counts them."""
     room, own = int(state[ROOM]), state[AT_OWN:AT_CLOCK]
     ring = state[AT_RING : AT_RING + 2 * room]
-    track = Positions(ring, state[AT_POSITIONS:AT_CONTACT], room, int(state[GAP]))
+    track = Positions(ring, state[AT_POSITIONS:AT_CONTACT], room, int(state[GAP]), FASTEST * state[DT])
     if isnan(own[ORIGIN]):
         own[ORIGIN] = x
     placed(track, x - own[ORIGIN])
@@ -64,9 +66,11 @@ def ticked(state, weights, x, force, out):
         own[READ] += 1.0
         _in_contact(state, queue, own)
     taken, contact, most = 0, state[AT_CONTACT:AT_SUMS], state[QUEUE] - 2.0
+    longest = 0.5 * state[QUEUE]
     while own[HEAD] < own[READ]:
         k = int(own[HEAD] % state[QUEUE]) * SAMPLE
-        if queue[k] + state[HOLD] > row or (pending(contact, queue[k]) and own[TAIL] - own[HEAD] < most):
+        waits = row - queue[k] < longest and own[TAIL] - own[HEAD] < most
+        if queue[k] + state[HOLD] > row or (waits and pending(contact, queue[k])):
             break
         own[HEAD] += 1.0
         if queue[k + 5] > 0.0:
@@ -125,6 +129,7 @@ def _in_contact(state, queue, own):
     if not abs(queue[k + 2] + queue[k + 3] + queue[k + 4]) < inf:
         return
     limited(contact, queue[k + 1], queue[k + 4])
+    hear_noise(contact, queue[k + 1])
     if state[TOUCH] < 0.0:
         found(contact, queue, state[QUEUE], own[READ], state[SETTLING])
     elif state[TOUCH] > 0.0:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import Mat3, Vec3, outer, solve, sqrt
+from palpate.identifiers.kernels.square_root import SINGULAR
 
 BLOCK = 100
 """Samples whose noise is summed before it is squared: it may be correlated over less than this."""
@@ -100,7 +101,7 @@ def fed(W, phi, gain):
     z = (1.0 / max(1.0 - phi @ gain, 1e-16)) * solve(W, gain)
     q = z @ z
     left = W - outer(gain, W.T @ phi)
-    return left + outer(((sqrt(1.0 + q) - 1.0) / q) * gain, z) if q > 0.0 else left
+    return left + outer(((sqrt(1.0 + q) - 1.0) / q) * gain, z) if 0.0 < q < SINGULAR else left
 
 
 @law

@@ -7,10 +7,18 @@ from palpate._jit import law, part
 from palpate.arrays import Array
 
 NAN = float("nan")
-ROW, RESOLVED, GOOD, RUN, LAST_SIXTH, POWER, PRODUCT, COUNT, OPEN = range(9)
+ROW, RESOLVED, GOOD, RUN, LAST_SIXTH, POWER, PRODUCT, COUNT, OPEN, SQUARES, CUBES, ALONE, ACCEPTED, BEFORE = (
+    range(14)
+)
 """Last row; last row that is final; last row with a reading; readings in a row; of the sixth differences the last one,
-the sum of squares, of products of neighbours, and how many; and the row before a gap to be filled, -1 for none."""
-NUMBERS = 9
+the sum of squares, of products of neighbours, and how many; the row before a gap to be filled, -1 for none; of
+changes with none before and none after them the sums of squares and of cubes, and how many; the
+last reading that was accepted, and the last one."""
+NUMBERS = 14
+FASTEST = 20.0
+"""No robot's tip moves faster [m/s]: delta robots reach 15."""
+_FEWEST = 10.0
+"""Single counts that show the encoder's step."""
 _SIXTH = (1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0)
 
 
@@ -22,13 +30,15 @@ class Positions(NamedTuple):
         ring: relative to the first reading [m], shape (2 room,).
         numbers: see `ROW` and its like.
         room: rows kept.
-        gap: ticks that may be missing in a row: more leave motion within the low-pass untold (Nyquist).
+        gap: ticks that may be missing in a row: of more, motion within the low-pass cannot be interpolated (Nyquist).
+        reach: farthest way of a tick [m].
     """
 
     ring: Array
     numbers: Array
     room: int
     gap: int
+    reach: float
 
     def put(self, row, x):
         """Writes a row."""
@@ -46,6 +56,7 @@ def placed(positions, x):
     s = positions.numbers
     s[ROW] += 1.0
     row = s[ROW]
+    x = _plausible(s, positions.reach, x)
     positions.put(row, x)
     if s[OPEN] >= 0.0:
         _fill(positions, s[OPEN], row - 1.0, x)
@@ -63,6 +74,20 @@ def placed(positions, x):
         s[RESOLVED] = row
     s[GOOD] = row
     _heard(positions)
+
+
+@law
+def _plausible(numbers, reach, x):
+    """The reading; NaN where it is farther from the last than a tip moves and the one before does not confirm it."""
+    before, numbers[BEFORE] = numbers[BEFORE], x
+    away = abs(x - numbers[ACCEPTED]) > reach * (numbers[ROW] - numbers[GOOD])
+    if away and not abs(x - before) <= reach and numbers[GOOD] >= 0.0:
+        return NAN
+    if away:
+        numbers[RUN], numbers[GOOD] = 0.0, -1.0
+    if not isnan(x):
+        numbers[ACCEPTED] = x
+    return x
 
 
 @law
@@ -89,6 +114,18 @@ def _heard(positions):
     A motion of frequency f counts as (2 pi f dt)^6 of itself: at 40 Hz in 1 kHz, 1/4000.
     """
     s = positions.numbers
+    if s[RUN] >= 4.0:
+        row = s[ROW]
+        x3, x2, x1, x0 = (
+            positions.at(row - 3.0),
+            positions.at(row - 2.0),
+            positions.at(row - 1.0),
+            positions.at(row),
+        )
+        if x3 == x2 and x2 != x1 and x1 == x0:
+            s[SQUARES] += (x1 - x2) ** 2
+            s[CUBES] += abs(x1 - x2) ** 3
+            s[ALONE] += 1.0
     if s[RUN] < 7.0:
         s[LAST_SIXTH] = NAN
         return
@@ -102,3 +139,8 @@ def _heard(positions):
     else:
         s[POWER] -= sixth * sixth
     s[LAST_SIXTH] = sixth
+
+
+def step_in(numbers: Array) -> float:
+    """Step of the encoder [m]; 0 where too few single counts were seen."""
+    return float(numbers[CUBES] / numbers[SQUARES]) if numbers[ALONE] >= _FEWEST else 0.0

@@ -9,6 +9,9 @@ drift stretch it, the bound shrinks it back.
 from palpate._jit import law
 from palpate._vector import outer, solve, sqrt
 
+SINGULAR = 1e300
+"""Square of a solution of a root beyond which the root has lost a direction to rounding."""
+
 
 @law
 def stretch_of(keep):
@@ -18,9 +21,12 @@ def stretch_of(keep):
 
 @law
 def stretched(S, u, s):
-    """S after its direction u is made s times as long: P changes by (s^2 - 1) (S u)(S u)^T / u^T u."""
+    """S after its direction u is made s times as long: P changes by (s^2 - 1) (S u)(S u)^T / u^T u.
+
+    A direction that rounding has taken from a root, and that no number can hold therefore, stays as it is.
+    """
     q = u @ u
-    return S + outer(((s - 1.0) / q) * (S @ u), u) if q > 0.0 else S
+    return S + outer(((s - 1.0) / q) * (S @ u), u) if 0.0 < q < SINGULAR else S
 
 
 @law
