@@ -1,5 +1,8 @@
 """A slice of `make attack`: some seconds of spoiled files, kills and long runs with every run of the tests."""
 
+import os
+import random
+import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
@@ -8,7 +11,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks" / "attack"))
 
+import faults
+import grammar
 import killing
+import reading
 import run
 from lasting import lasted
 from mutate import mutated
@@ -61,6 +67,93 @@ def test_mutations_are_the_same_for_the_same_seed_and_differ():
     data = b"time_s,position_mm,force_N\n0,1,2\n" * 20
     assert mutated(data, 3) == mutated(data, 3)
     assert len({mutated(data, seed) for seed in range(50)} - {data}) > 40
+
+
+FEW = {
+    "flags": 12,
+    "logs of instruments": 25,
+    "models of arms": 10,
+    "experiment, edited": 30,
+    "arm of TOML": 25,
+    "options": 10,
+    "FOUND, tuned": 25,
+    "certificate, checked": 25,
+}
+"""Inputs of kinds that take little time; the slow ones are `long`."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", FEW)
+def test_an_input_of_a_grammar_is_read_or_refused_in_one_line(kind, tmp_path):
+    told = attack(kind, range(FEW[kind]), tmp_path)
+    assert not told.defects
+    assert told.inputs == FEW[kind]
+
+
+def test_a_grammar_makes_the_same_input_for_the_same_seed_and_others_for_others(tmp_path):
+    trees = [
+        grammar.edited({"a": 1, "b": [1, {"c": "x"}]}, random.Random(seed)) for seed in (1, 1, *range(40))
+    ]
+    assert repr(trees[0]) == repr(trees[1])
+    assert len(set(map(repr, trees))) > 25
+    commands = [grammar.flags(random.Random(seed), tmp_path) for seed in (1, 1, *range(40))]
+    assert commands[0] == commands[1]
+    assert len({one[0][0] for one in commands}) > 6
+
+
+def test_coverage_keeps_inputs_that_reach_new_lines(tmp_path):
+    inputs = reading.Spoiled("experiment by coverage", tmp_path)
+    for seed in range(20):
+        inputs.read(seed)
+    assert len(inputs.reached) > 50
+    assert 1 < len(inputs.corpus) < 21
+
+
+def test_each_share_of_time_begins_with_other_inputs():
+    first, second = (run.parts(run.Amount(400, 0, 4, 0.0, seed)) for seed in (1, 2))
+    assert not {part.name for part in first} & {part.name for part in second}
+    assert {part.kept for part in first} == {"read", "killed"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", ["certify", "export"])
+def test_a_fault_at_a_change_of_the_disk_leaves_whole_files(command, tmp_path):
+    told = faults.faulted(command, 10, tmp_path)
+    if "no C compiler" in told:
+        pytest.skip("there is no C compiler")
+    assert told["times"] == 10
+    assert not [word for word in told if word.startswith("defect")], told
+
+
+def test_a_file_that_is_written_in_place_is_a_defect(tmp_path):
+    """What the faults are to find: a command that opens its file and writes it piece by piece."""
+    library = faults.compiled(tmp_path)
+    if library is None:
+        pytest.skip("there is no C compiler")
+    count, place = tmp_path / "count", tmp_path / "place"
+    place.mkdir()
+    found = {}
+    for how in ("", *faults.HOWS):
+        count.unlink(missing_ok=True)
+        code = "f = open('place/x', 'wb', buffering=0); f.write(b'12345678'); f.write(b'abcdefgh')"
+        own = {
+            "ATTACK_FOLDER": f"{place}/",
+            "ATTACK_FAIL": "3" if how else "0",
+            "ATTACK_HOW": how,
+            "ATTACK_COUNT": str(count),
+        }
+        ran = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=tmp_path,
+            env={**os.environ, **own, "LD_PRELOAD": str(library)},
+            capture_output=True,
+            check=False,
+        )
+        found[how] = (ran.returncode, (place / "x").read_bytes(), len(count.read_bytes()))
+    assert found.pop("") == (0, b"12345678abcdefgh", 3)
+    assert found.pop("kill") == (-9, b"12345678", 3)
+    assert found.pop("short") == (0, b"12345678abcd", 3)
+    assert {(code, data) for code, data, _ in found.values()} == {(1, b"12345678")}
 
 
 @pytest.mark.long

@@ -407,3 +407,55 @@ def test_arrays_in_parts_live_as_long_as_they_are_held_and_no_longer(allocations
     del renewed
     after = allocations()
     assert after.mi_alloc - before.mi_alloc == after.mi_free - before.mi_free >= 1000
+
+
+def test_a_stamp_follows_imports_in_the_file_of_a_companion(tmp_path):
+    """A package beside palpate, as palpate_thesis is: what its files import of it counts."""
+    package = tmp_path / "palpate_beside"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "loop.py").write_text("from palpate_beside.laws import law\n")
+    (package / "laws.py").write_text("law = 1\n")
+    before = stamp.sources_stamp(package / "loop.py")
+    (package / "laws.py").write_text("law = 2\n")
+    assert stamp.sources_stamp(package / "loop.py") != before
+
+
+SPOILED = {
+    "cut short": lambda data: data[: len(data) // 2],
+    "empty": lambda data: b"",
+    "a bit in the middle": lambda data: flipped(data, len(data) // 2),
+    "the first byte": lambda data: flipped(data, 0),
+    "the last byte": lambda data: flipped(data, len(data) - 1),
+    "zeros": lambda data: bytes(len(data)),
+}
+
+
+def flipped(data, at):
+    return data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize(
+    "how", [pytest.param(h, marks=pytest.mark.long if h != "zeros" else ()) for h in SPOILED]
+)
+def test_a_spoiled_cache_is_compiled_again_and_never_executed(workshop, how, ending):
+    (workshop.user / "own.py").write_text(OWN.format(number=9.0))
+    workshop.run("own.py")
+    assert workshop.run("own.py") == (10.0, True)
+    (file,) = (workshop.user / "__pycache__").glob(f"own.mine*.{ending}")
+    file.write_bytes(SPOILED[how](file.read_bytes()))
+    assert workshop.run("own.py") == (10.0, False)
+    assert workshop.run("own.py") == (10.0, True)
+
+
+def test_a_kernel_of_other_sources_is_not_taken_for_one_of_these(workshop):
+    """A power cut between two writes leaves an index of the new sources and machine code of the old ones."""
+    held = {}
+    for number in (1.0, 2.0):
+        (workshop.user / "own.py").write_text(OWN.format(number=number))
+        assert workshop.run("own.py") == (number + 1.0, False)
+        (file,) = (workshop.user / "__pycache__").glob("own.mine*.nbc")
+        held[number] = file.read_bytes()
+    file.write_bytes(held[1.0])
+    assert workshop.run("own.py") == (3.0, False)

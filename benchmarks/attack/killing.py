@@ -25,15 +25,15 @@ JUST_DONE = 0.5
 
 
 def run_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
-    """`palpate run --force` over results, killed: the old ones or the new ones are there at the next start."""
-    _experiment(folder)
+    """`palpate run --replace` over results, killed: the old ones or the new ones are there at the next start."""
+    experiment(folder)
     _warm()
     begun = time.monotonic()
     _ran("run", "e.toml", "--seed", "1", "--out", "out", cwd=folder)
     told: Counter[str] = Counter()
     for chance in _moments(count, seed, time.monotonic() - begun):
         _interrupted(
-            signal.SIGKILL, chance, "run", "e.toml", "--seed", "2", "--out", "out", "--force", cwd=folder
+            signal.SIGKILL, chance, "run", "e.toml", "--seed", "2", "--out", "out", "--replace", cwd=folder
         )
         again = _ran(
             "run", "e.toml", "--seed", "3", "--out", "out", cwd=folder
@@ -46,7 +46,7 @@ def run_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
 
 def run_interrupted(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     """`palpate run`, Ctrl-C: code 130 and what was simulated, or nothing because nothing was yet."""
-    _experiment(folder)
+    experiment(folder)
     _warm()
     begun = time.monotonic()
     _ran("run", "e.toml", "--out", "whole", cwd=folder)
@@ -86,7 +86,7 @@ def study_killed(count: int, folder: Path, seed: int = 0) -> Counter[str]:
 
 def disks_full(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     """`palpate run` and `palpate study` where no file may be larger than some bytes: one line, code 2, nothing half."""
-    _experiment(folder)
+    experiment(folder)
     SAMPLES["study"][1](folder / "study.toml")
     told: Counter[str] = Counter()
     chance = random.Random(seed)
@@ -107,7 +107,8 @@ def disks_full(count: int, folder: Path, seed: int = 0) -> Counter[str]:
     return told
 
 
-def _experiment(folder: Path) -> None:
+def experiment(folder: Path) -> None:
+    """Writes the experiment that is killed."""
     from palpate.bench import source
 
     text = source("foam-hybrid").replace("press = 10.0", "press = 20.0")
@@ -118,7 +119,7 @@ def _experiment(folder: Path) -> None:
 def _warm() -> None:
     """Has the loop compiled, so that a moment within a run is not one within that."""
     with TemporaryDirectory() as folder:
-        _experiment(Path(folder))
+        experiment(Path(folder))
         _ran("run", "e.toml", cwd=Path(folder))
 
 

@@ -9,6 +9,7 @@ import contextlib
 import io
 import json
 import os
+import random
 import resource
 import select
 import signal
@@ -20,17 +21,26 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
+from grammar import GRAMMARS, prepare
 from mutate import mutated
-from samples import HEAD, NAMES, SAMPLES
+from samples import COVERED, HEAD, NAMES, SAMPLES, SHARES
 
-SECONDS, BYTES = 20.0, 4 << 30
-"""What one input may take of the processor's time, and a child of memory."""
+from palpate.cli import _streams
+from palpate.errors import LONGEST
+
+SECONDS, BYTES, HELD = 30.0, 6 << 30, 2 << 30
+"""What one input may take of the processor's time, and a child of addresses and of memory."""
+BY_COVERAGE = " by coverage"
+"""Ending of a kind whose inputs descend from those that reached new lines."""
 PATIENCE = 15.0
 """Times as long an input may take by the clock: a machine may be busy, but who sleeps hangs as well."""
 IMPORTS = 60.0
 """What a child may take before its first input [s]."""
 GOOD = ("read", "refused")
+PACKAGE = f"{os.sep}src{os.sep}palpate{os.sep}"
 
 
 @dataclass
@@ -50,6 +60,12 @@ class Told:
     def bad(self) -> int:
         """How many were neither read nor refused in one line."""
         return self.inputs - sum(self.counts[word] for word in GOOD)
+
+
+def kinds() -> dict[str, int]:
+    """All kinds of inputs, each with its share."""
+    by_coverage = {f"{kind}{BY_COVERAGE}": share for kind, share in COVERED.items()}
+    return SHARES | {kind: share for kind, (share, _) in GRAMMARS.items()} | by_coverage
 
 
 def attack(kind: str, seeds: range, folder: Path, seconds: float = SECONDS) -> Told:
@@ -76,8 +92,12 @@ def _child(kind: str, seeds: range, folder: Path, seconds: float) -> Iterator[tu
             ready = _answers(child, allowed)
             line = child.stdout.readline() if ready else b""
             if not line:
-                child.kill()
-                why = f"killed by signal {-child.wait()}" if ready else f"more than {seconds:g} s"
+                if not ready:
+                    child.kill()
+                code = child.wait()
+                said = (child.communicate()[1].decode(errors="replace").splitlines() or [""])[-1]
+                ended = f"killed by signal {-code}" if code < 0 else f"ended with {code}: {said}"
+                why = ended if ready else f"more than {seconds:g} s"
                 yield at, f"{'died' if ready else 'hung'}: {why}", time.monotonic() - begun
                 return
             outcome, took = json.loads(line)
@@ -159,43 +179,119 @@ def _read_by(commands: list[list[str]]) -> str:
     for words in commands:
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            codes.append(main(words))
-        if codes[-1] not in {0, 1, 2} or (codes[-1] == 2 and err.getvalue().count("\n") != 1):
-            return f"defect: {words[0]} ended with {codes[-1]}: {(err.getvalue().splitlines() or ['?'])[-2:]}"
+            codes.append(_arm(words) if words[0] == "@arm" else main(words))
+        said = err.getvalue().splitlines()
+        if codes[-1] not in {0, 1, 2} or (codes[-1] == 2 and len(_errors(said)) != 1):
+            return f"defect: {words} ended with {codes[-1]}: {(said or ['?'])[-3:]}"
+        if any(len(line) > LONGEST + len("palpate: ") for line in _errors(said)):
+            return f"defect: {words[0]} wrote an error of {max(map(len, said))} letters"
         if any(ord(letter) < 32 and letter not in "\n\t" for letter in out.getvalue() + err.getvalue()):
             return f"defect: {words[0]} printed a control character"
     return "refused" if codes[0] == 2 else "read"
+
+
+def _errors(lines: list[str]) -> list[str]:
+    """The lines of errors: others say what is compiled, or proved."""
+    return [line for line in lines if line.startswith("palpate: ")]
+
+
+def _arm(words: list[str]) -> int:
+    """An arm from its file, and its dynamics at home, with the program's edge around them."""
+    from palpate.cli._edge import guarded
+    from palpate.press.prepare import arm_of
+
+    def load() -> int:
+        arm = arm_of(words[1], "l2" if words[1].endswith("urdf") else None)
+        arm.forward_kinematics(arm.home)
+        arm.mass_matrix(arm.home)
+        return 0
+
+    return guarded(load)
 
 
 def _columns(path: Path, columns: tuple[str, ...]) -> tuple[str, ...]:
     return columns if path.suffix in {".csv", ".parquet", ".mat"} else ()
 
 
+class Spoiled:
+    """Inputs of a kind whose bytes are spoiled; by coverage, descendants of those that reached new lines."""
+
+    def __init__(self, kind: str, folder: Path):
+        self.kind = kind.removesuffix(BY_COVERAGE)
+        self.covers = kind != self.kind
+        ending, make = SAMPLES[self.kind]
+        whole = folder / f"whole-{self.kind.replace(' ', '')}{ending}"
+        if not whole.exists():
+            make(whole)
+        self.path, self.corpus, self.reached = (
+            folder / f"log{ending}",
+            [whole.read_bytes()],
+            set[tuple[str, int]](),
+        )
+        assert _read(self.kind, whole) == "read", "what is not spoiled has to be read"
+
+    def read(self, seed: int) -> str:
+        """What becomes of one."""
+        data = mutated(self.corpus[seed % len(self.corpus)] if self.covers else self.corpus[0], seed)
+        self.path.write_bytes(data)
+        if not self.covers:
+            return _read(self.kind, self.path)
+        known = len(self.reached)
+        sys.settrace(self._traced)
+        try:
+            return _read(self.kind, self.path)
+        finally:
+            sys.settrace(None)
+            if len(self.reached) > known and len(data) < 1 << 20:
+                self.corpus.append(data)
+
+    def _traced(self, frame: FrameType, event: str, _: object) -> Any:
+        if PACKAGE not in frame.f_code.co_filename:
+            return None
+        self.reached.add((frame.f_code.co_filename, frame.f_lineno))
+        return self._traced
+
+
+class Formed:
+    """Inputs of a kind that a grammar makes."""
+
+    def __init__(self, kind: str, folder: Path):
+        import webbrowser
+
+        self.kind, self.make, self.folder = kind, GRAMMARS[kind][1], folder
+        prepare(folder)
+        os.chdir(folder)
+        webbrowser.open = lambda *_, **__: True  # type: ignore[assignment]
+
+    def read(self, seed: int) -> str:
+        """What becomes of one."""
+        return _read_by(self.make(random.Random(f"{self.kind} {seed}"), self.folder))
+
+
 def _serve(kind: str, seeds: range, folder: Path) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    ending, make = SAMPLES[kind]
-    whole = folder / f"whole-{kind.replace(' ', '')}{ending}"
-    if not whole.exists():
-        make(whole)
-    data = whole.read_bytes()
     with os.fdopen(os.dup(1), "w") as told, tempfile.TemporaryFile() as chatter:
-        for stream in (1, 2):
-            os.dup2(chatter.fileno(), stream)
-        assert _read(kind, whole) == "read", "what is not spoiled has to be read"
+        os.dup2(chatter.fileno(), 1)
+        inputs = Formed(kind, folder) if kind in GRAMMARS else Spoiled(kind, folder)
+        chatter.truncate(0)
+        _streams.prepare()  # as the program begins
         for seed in seeds:
-            path = folder / f"log{ending}"
-            path.write_bytes(mutated(data, seed))
             begun = sum(os.times()[:4])
             try:
-                outcome = _read(kind, path)
+                outcome = inputs.read(seed)
             except BaseException as error:  # noqa: BLE001 - whatever it is, it is a finding
                 outcome = f"defect: {type(error).__name__}: {' '.join(str(error).split())[:200]}"
             if size := os.fstat(chatter.fileno()).st_size:
                 outcome = f"defect: a library printed {os.pread(chatter.fileno(), 200, 0)!r}, {size} bytes"
                 chatter.truncate(0)
+            held = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            if held > HELD:
+                outcome = f"defect: {held / (1 << 30):.1f} GiB of memory"
             told.write(json.dumps((outcome, sum(os.times()[:4]) - begun)) + "\n")
             told.flush()
+            if held > HELD:
+                return
 
 
 if __name__ == "__main__":

@@ -1,14 +1,16 @@
-"""`make attack`: spoiled files, kills, full disks, long runs; the last result stands in docs/reliability.md.
+"""`make attack`: hostile inputs, faults of the disk, kills, long runs; the last result stands in docs/reliability.md.
 
-    python benchmarks/attack/run.py --inputs 5000 --kills 32 --seconds 3600 --write
+    python benchmarks/attack/run.py --inputs 10000 --faults 200 --kills 75 --seconds 3600 --write
+    python benchmarks/attack/run.py --minutes 2
 
-It goes on where it was stopped, as long as neither palpate nor the attack was changed.
+The first resumes where it was stopped, as long as neither palpate nor the attack was changed. The second begins with a
+new seed each time, prints it, and takes as much of each part as there is time for; `--seed` repeats it.
 """
 
 from __future__ import annotations
 
 import argparse
-import hashlib
+import random
 import sys
 import tempfile
 import time
@@ -16,19 +18,21 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 
 import msgspec
+from faults import COMMANDS, OPTIONAL, faulted
 from killing import KINDS
 from lasting import Lasted, lasted
-from reading import GOOD, Told, attack
-from samples import SAMPLES, SHARES
+from reading import GOOD, Told, attack, kinds
+from samples import ROOT, sources
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE, STATE = ROOT / "docs" / "reliability.md", ROOT / "build" / "attack.json"
-BEGIN, END = "<!-- attack: begin -->", "<!-- attack: end -->"
-SLICE, FEW = 50, 4
+SLICE, FEW = 25, 4
 """Inputs, and kills, after which what was found is saved."""
+FAR = 1_000_000
+"""Between the first inputs of two seeds: no input of the one is an input of the other."""
 
 
 @dataclass
@@ -38,6 +42,7 @@ class Found:
     Args:
         of: hash of the sources that were attacked.
         read: of spoiled files.
+        faulted: of commands whose disk failed at one change.
         killed: of commands that were killed.
         lasted: of long runs, by experiment and its seconds.
         minutes: that it took.
@@ -45,6 +50,7 @@ class Found:
 
     of: str
     read: dict[str, Told] = field(default_factory=dict)
+    faulted: dict[str, Counter[str]] = field(default_factory=dict)
     killed: dict[str, Counter[str]] = field(default_factory=dict)
     lasted: dict[str, Lasted] = field(default_factory=dict)
     minutes: float = 0.0
@@ -59,28 +65,58 @@ class Part:
     find: Callable[[Path], object]
 
 
-def parts(inputs: int, kills: int, seconds: float) -> list[Part]:
-    """All slices, each kind's spread evenly, so that an attack that is stopped has seen something of all."""
-    from palpate.bench import names
+@dataclass(frozen=True)
+class Amount:
+    """How much is attacked.
 
-    share = inputs / sum(SHARES.values())
-    kinds: list[list[Part]] = []
-    for kind in SAMPLES:
-        firsts = range(0, round(share * SHARES[kind]), SLICE)
-        seeds = [range(first, first + SLICE) for first in firsts]
-        kinds.append(
+    Args:
+        inputs: hostile ones, of all kinds together.
+        faults: of the disk, of each command.
+        kills: of each kind of violence.
+        seconds: simulated, of each experiment.
+        seed: of all of it.
+    """
+
+    inputs: int
+    faults: int
+    kills: int
+    seconds: float
+    seed: int = 0
+
+
+def parts(amount: Amount) -> list[Part]:
+    """All slices, each kind's spread evenly, so that an attack that is stopped has seen something of all."""
+    shares = kinds()
+    share, start = amount.inputs / sum(shares.values()), FAR * amount.seed
+    found: list[list[Part]] = []
+    for kind, own in shares.items():
+        count = round(share * own)
+        seeds = [range(start + first, start + min(first + SLICE, count)) for first in range(0, count, SLICE)]
+        found.append(
             [Part("read", f"{kind} {s.start}", lambda f, k=kind, s=s: attack(k, s, f)) for s in seeds]
         )
+    if amount.faults:
+        found += [
+            [Part("faulted", f"{k} {amount.seed}", lambda f, k=k: faulted(k, amount.faults, f, amount.seed))]
+            for k in COMMANDS
+            if find_spec("palpate_thesis") or k not in OPTIONAL
+        ]
     for kind, kill in KINDS.items():
-        counts = {first: min(FEW, kills - first) for first in range(0, kills, FEW)}
-        kinds.append(
+        counts = {start + first: min(FEW, amount.kills - first) for first in range(0, amount.kills, FEW)}
+        found.append(
             [
                 Part("killed", f"{kind} {n}", lambda f, v=kill, c=c, n=n: _many(v, c, f, n))
                 for n, c in counts.items()
             ]
         )
-    kinds.append([Part("lasted", f"{e} {seconds:g}", lambda _, e=e: lasted(e, seconds)) for e in names()])
-    spread = [((i + 0.5) / len(own), part) for own in kinds for i, part in enumerate(own)]
+    if amount.seconds:
+        from palpate.bench import names
+
+        found += [
+            [Part("lasted", f"{e} {amount.seconds:g}", lambda _, e=e: lasted(e, amount.seconds))]
+            for e in names()
+        ]
+    spread = [((i + 0.5) / len(own), part) for own in found for i, part in enumerate(own)]
     return [part for _, part in sorted(spread, key=lambda placed: placed[0])]
 
 
@@ -88,14 +124,6 @@ def _many(
     violence: Callable[[int, Path, int], Counter[str]], count: int, folder: Path, seed: int
 ) -> Counter[str]:
     return Counter(times=count) + violence(count, folder, seed)
-
-
-def sources() -> str:
-    """Hash of what is attacked and of what attacks it."""
-    hashed = hashlib.sha256()
-    for file in sorted([*(ROOT / "src").rglob("*.py"), *Path(__file__).parent.glob("*.py")]):
-        hashed.update(file.relative_to(ROOT).as_posix().encode() + file.read_bytes())
-    return hashed.hexdigest()[:16]
 
 
 def gone_on() -> Found:
@@ -107,13 +135,15 @@ def gone_on() -> Found:
     return found if found.of == sources() else Found(sources())
 
 
-def run(found: Found, wanted: list[Part]) -> None:
-    """Finds what is not found yet, and saves it slice by slice."""
+def run(found: Found, wanted: list[Part], until: float = float("inf")) -> None:
+    """Finds what is not found yet, and saves it slice by slice, until a moment of the clock."""
     STATE.parent.mkdir(exist_ok=True)
     for number, part in enumerate(wanted, 1):
         kept, begun = getattr(found, part.kept), time.monotonic()
         if part.name in kept:
             continue
+        if begun > until:
+            break
         with tempfile.TemporaryDirectory() as folder:
             kept[part.name] = part.find(Path(folder))
         took = (time.monotonic() - begun) / 60.0
@@ -125,11 +155,11 @@ def run(found: Found, wanted: list[Part]) -> None:
 def reading(found: Found) -> tuple[list[str], list[str]]:
     """A row for each kind of file, and what went wrong."""
     rows = [
-        "| file | inputs | read | refused in one line | neither | slowest, processor |",
+        "| input | inputs | read | refused in one line | neither | slowest, processor |",
         "|---|---|---|---|---|---|",
     ]
     everything: list[Told] = []
-    for kind in SAMPLES:
+    for kind in kinds():
         own = [told for name, told in found.read.items() if name.rpartition(" ")[0] == kind]
         if own:
             rows.append(f"| {kind} | {_row(own)} | {max(told.worst for told in own):.1f} s |")
@@ -142,6 +172,24 @@ def _row(slices: list[Told]) -> str:
     counts = sum((told.counts for told in slices), Counter[str]())
     read, refused = (counts[word] for word in GOOD)
     return f"{counts.total()} | {read} | {refused} | {counts.total() - read - refused}"
+
+
+def faulting(found: Found) -> tuple[list[str], list[str]]:
+    """A row for each command, and what went wrong."""
+    rows, defects = ["| command | changes on the disk | failed | outcome |", "|---|---|---|---|"], []
+    for name, told in found.faulted.items():
+        listed = [
+            f"{count} {word}"
+            for word, count in told.items()
+            if word not in {"changes", "times"} and "defect" not in word
+        ]
+        own = [word for word in told if word.startswith("defect")]
+        defects += [f"{name}: {word}" for word in own]
+        bad = f", {len(own)} defects" if own else ""
+        rows.append(
+            f"| {name.rpartition(' ')[0]} | {told['changes']} | {told['times']} | {', '.join(listed)}{bad} |"
+        )
+    return rows, defects
 
 
 def killing(found: Found) -> tuple[list[str], list[str]]:
@@ -173,47 +221,89 @@ def lasting(found: Found) -> tuple[list[str], list[str]]:
     return rows, [f"{one}" for one in found.lasted.values() if not one.good]
 
 
-def told(found: Found, command: str) -> tuple[list[str], int]:
-    """The page's lines, and how many promises were broken."""
-    lines: list[str] = []
-    defects: list[str] = []
-    for title, of in (
-        ("Spoiled files", reading),
-        ("Kills, Ctrl-C and full disks", killing),
-        ("Long runs", lasting),
-    ):
+SECTIONS = {
+    "inputs": ("read", reading),
+    "faults": ("faulted", faulting),
+    "kills": ("killed", killing),
+    "long runs": ("lasted", lasting),
+}
+"""Of the page: what each is made of."""
+
+
+def told(found: Found, command: str) -> tuple[dict[str, list[str]], int]:
+    """The lines of each section that something was found for, and how many promises were broken."""
+    sections: dict[str, list[str]] = {}
+    total = 0
+    for title, (kept, of) in SECTIONS.items():
+        if not getattr(found, kept):
+            continue
         rows, broken = of(found)
-        lines += [f"### {title}", "", *rows, ""]
-        defects += broken
-    lines.append(
-        f"`{command}`, {datetime.now(UTC):%Y-%m-%d}, {found.minutes:.0f} minutes; {len(defects)} promises broken."
-    )
-    return [*lines, *(f"- {defect}" for defect in defects[:40])], len(defects)
+        total += len(broken)
+        last = f"`{command}`, {datetime.now(UTC):%Y-%m-%d}; {len(broken)} promises broken."
+        sections[title] = [*rows, "", last, *(f"- {defect}" for defect in broken[:40])]
+    return sections, total
+
+
+def write(sections: dict[str, list[str]]) -> None:
+    """Puts each section into the page, and leaves the others as they are."""
+    page = PAGE.read_text(encoding="utf-8")
+    for title, lines in sections.items():
+        begin, end = f"<!-- attack, {title}: begin -->", f"<!-- attack, {title}: end -->"
+        head, _, rest = page.partition(begin)
+        _, _, tail = rest.partition(end)
+        assert tail, f"the page has no place for {title}"
+        page = f"{head}{begin}\n\n" + "\n".join(lines) + f"\n\n{end}{tail}"
+    PAGE.write_text(page, encoding="utf-8")
 
 
 def main() -> int:
     """Runs what is asked for; 1 if anything broke a promise."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--inputs", type=int, default=5000, help="spoiled files, of all kinds together")
-    parser.add_argument("--kills", type=int, default=32, help="of each kind of violence")
+    parser.add_argument("--inputs", type=int, default=10000, help="hostile inputs, of all kinds together")
+    parser.add_argument("--faults", type=int, default=200, help="of the disk, of each command")
+    parser.add_argument("--kills", type=int, default=75, help="of each kind of violence")
     parser.add_argument("--seconds", type=float, default=3600.0, help="simulated, of each experiment")
+    parser.add_argument(
+        "--minutes", type=float, help="stop after so long; with a new seed, unless one is given"
+    )
+    parser.add_argument("--seed", type=int, help="of all of it")
+    parser.add_argument("--only", nargs="+", help="these kinds and commands alone")
     parser.add_argument("--write", action="store_true", help="put the result into docs/reliability.md")
     asked = parser.parse_args()
-    found, wanted = gone_on(), parts(asked.inputs, asked.kills, asked.seconds)
-    try:
-        run(found, wanted)
-    except KeyboardInterrupt:
-        print("interrupted; the same command goes on from here")
-    command = (
-        f"benchmarks/attack/run.py --inputs {asked.inputs} --kills {asked.kills} --seconds {asked.seconds:g}"
+    seed = (
+        asked.seed
+        if asked.seed is not None
+        else 0
+        if asked.minutes is None
+        else random.SystemRandom().randrange(10**6)
     )
+    command = (
+        f"benchmarks/attack/run.py --inputs {asked.inputs} --faults {asked.faults} --kills {asked.kills}"
+    )
+    command += f" --seconds {asked.seconds:g} --seed {seed}"
+    command += f" --only {' '.join(asked.only)}" if asked.only else ""
+    print(command, flush=True)
+    amount = Amount(asked.inputs, asked.faults, asked.kills, asked.seconds, seed)
+    found, wanted = gone_on() if asked.minutes is None else Found(sources()), parts(amount)
+    if asked.only:
+        wanted = [part for part in wanted if part.name.rpartition(" ")[0] in asked.only]
+    until = time.monotonic() + 60.0 * asked.minutes if asked.minutes is not None else float("inf")
+    if asked.minutes is not None:  # some of each, and nothing that takes longer than there is time
+        wanted = [part for part in wanted if part.name.rpartition(" ")[0] not in OPTIONAL]
+        random.Random(seed).shuffle(wanted)
+    try:
+        run(found, wanted, until)
+    except KeyboardInterrupt:
+        print("interrupted; the same command resumes")
     missing = sum(part.name not in getattr(found, part.kept) for part in wanted)
-    lines, broken = told(found, command + (f", {missing} of {len(wanted)} parts not run" if missing else ""))
-    print("\n".join(lines))
+    sections, broken = told(
+        found, command + (f", {missing} of {len(wanted)} parts not run" if missing else "")
+    )
+    for title, lines in sections.items():
+        print("\n".join([f"### {title}", "", *lines, ""]))
+    print(f"{broken} promises broken; {command} --minutes 1e9 repeats it" if broken else "0 promises broken")
     if asked.write:
-        head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        _, _, tail = rest.partition(END)
-        PAGE.write_text(f"{head}{BEGIN}\n\n" + "\n".join(lines) + f"\n\n{END}{tail}", encoding="utf-8")
+        write(sections)
     return 1 if broken else 0
 
 

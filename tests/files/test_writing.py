@@ -145,7 +145,7 @@ def test_what_does_not_fit_is_named_and_leaves_nothing(tmp_path):
     with (
         no_room(),
         pytest.raises(OSError, match="too large") as caught,
-        fresh_folder(tmp_path / "b", force=False) as new,
+        fresh_folder(tmp_path / "b", replace=False) as new,
     ):
         write_text(new / "a.toml", f"{MADE} run.\n" + "#" * 1000)
     assert caught.value.filename == str(tmp_path / "b" / "a.toml")

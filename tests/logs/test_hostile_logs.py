@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import contextlib
 import os
+import re
 import sqlite3
 import struct
 import subprocess
@@ -19,10 +20,10 @@ from scipy.io import savemat
 
 from logs.ros_bags import storage, wrench, write_bag
 from palpate.errors import InputError
+from palpate.files.limits import Limits
 from palpate.logs import read_log, read_record
 from palpate.logs.bags import Bag
 from palpate.logs.kinds import kind_of
-from palpate.logs.limits import Limits
 from palpate.logs.listing import list_log
 from palpate.logs.own_runs import measured_by
 
@@ -273,3 +274,45 @@ def test_packed_noise(tmp_path):
     noise = zlib.compress(bytes(np.random.default_rng(1).integers(0, 256, 300, dtype=np.uint8)))
     path.write_bytes(whole[:128] + struct.pack("<II", 15, len(noise)) + noise)
     refused(path, "cannot be read as a MATLAB file")
+
+
+def test_a_bag_that_says_its_plain_messages_are_packed(tmp_path):
+    path = write_bag(tmp_path / "bag", "sqlite", [wrench("/ft", T, np.outer(T, [1, 2, 3]))])
+    about = path / "metadata.yaml"
+    text = about.read_text()
+    about.write_text(re.sub("compression_mode:.*", "compression_mode: message", text))
+    assert "compression_mode: message" in about.read_text()
+    columns = {"force": "/ft.wrench.force.z", "position": "/ft.wrench.force.x"}
+    assert len(read_log(path, **columns)) == len(T)
+    with sqlite3.connect(storage(path)) as own:  # the beginning of what is packed, and no more of it
+        own.execute("UPDATE messages SET data = x'28b52ffdffffffffff'")
+    own.close()
+    refused(path, "cannot be unpacked|a message on /ft is no", **columns)
+
+
+@pytest.mark.parametrize("field", ["name", "type"])
+def test_a_bag_whose_names_are_no_text(tmp_path, field):
+    path = storage(write_bag(tmp_path / "bag", "sqlite", [wrench("/ft", T, np.outer(T, [1, 2, 3]))]))
+    with sqlite3.connect(path) as own:
+        own.execute(f"UPDATE topics SET {field} = x'ff00ff'")
+    own.close()
+    refused(
+        path, "cannot be read as a ROS 2 bag|holds no messages", force="/ft.wrench.force.z", position="/ft.x"
+    )
+    with pytest.raises(InputError):
+        list_log(path)
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"), [(1.2e9, "its libraries need 2 GB"), (2.1e9, "GB of memory to be read")]
+)
+def test_little_memory_is_a_line(tmp_path, limit, words):
+    path = tmp_path / "log.csv"
+    path.write_text("t,x,f\n" + "".join(f"{k},{k},{k}\n" for k in range(50)))
+    with path.open("ab") as file:
+        file.truncate(10**8)  # a file with holes: it takes no room on the disk
+    command = f"ulimit -v {int(limit / 1024)}; exec {sys.executable} -m palpate topics {path}"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, check=False)
+    assert done.returncode == 2
+    assert words in done.stderr.decode()
+    assert done.stderr.count(b"\n") == 1

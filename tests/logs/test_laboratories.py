@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import struct
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import savemat
 
+from logs.books import spreadsheet
 from palpate.errors import InputError
 from palpate.logs import columns_of, read_log
 
 N = 40
 T = np.arange(N) / 1000
-X = 0.5 + 0.01 * np.arange(N)
-F = np.sin(np.arange(N) / 5)
+X = 0.5 + 0.01 * np.arange(N) + 1e-4 * np.arange(N) ** 2
+F = np.sin(np.arange(N) / 25)
 COLUMNS = {"time": "t", "position": "x:mm", "force": "f:N"}
 DDF = Path("../shared/data/skin_indentation/press_250mN.ddf")
 
@@ -354,48 +354,6 @@ def test_objects_of_matlab_are_named_with_the_way_out(tmp_path, kind, way):
     assert columns_of(path) == ["t", "x"]
 
 
-def spreadsheet(path, sheets):
-    """A spreadsheet as Excel writes one, with its words in the cells."""
-    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
-    there = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
-    package = "http://schemas.openxmlformats.org/package/2006/relationships"
-    book = "".join(f'<sheet name="{n}" sheetId="{i}" r:id="r{i}"/>' for i, n in enumerate(sheets, 1))
-    links = "".join(
-        f'<Relationship Id="r{i}" Type="{there}/worksheet" Target="worksheets/sheet{i}.xml"/>'
-        for i in range(1, len(sheets) + 1)
-    )
-    with zipfile.ZipFile(path, "w") as packed:
-        packed.writestr(
-            "_rels/.rels",
-            f'<Relationships xmlns="{package}"><Relationship Id="r1" Type="{there}/officeDocument"'
-            ' Target="xl/workbook.xml"/></Relationships>',
-        )
-        packed.writestr(
-            "[Content_Types].xml",
-            '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"/>',
-        )
-        packed.writestr(
-            "xl/workbook.xml",
-            f'<workbook xmlns="{main}" xmlns:r="{there}"><sheets>{book}</sheets></workbook>',
-        )
-        packed.writestr(
-            "xl/_rels/workbook.xml.rels", f'<Relationships xmlns="{package}">{links}</Relationships>'
-        )
-        for i, rows in enumerate(sheets.values(), 1):
-            cells = "".join(f"<row>{''.join(map(_xml_cell, row))}</row>" for row in rows)
-            packed.writestr(
-                f"xl/worksheets/sheet{i}.xml",
-                f'<worksheet xmlns="{main}"><sheetData>{cells}</sheetData></worksheet>',
-            )
-    return path
-
-
-def _xml_cell(value):
-    if isinstance(value, str):
-        return f'<c t="inlineStr"><is><t>{value}</t></is></c>'
-    return f"<c><v>{value!r}</v></c>"
-
-
 def test_a_spreadsheet_whose_sheets_are_named_like_topics(tmp_path):
     rows = [
         ["pressed by hand"],
@@ -425,5 +383,5 @@ def test_fields_of_structs_in_parquet(tmp_path):
         }
     ).write_parquet(path)
     right(read_log(path, time="t", position="state.x:mm", force="state.ft.z"))
-    with pytest.raises(InputError, match="'raw' holds a list a row"):
+    with pytest.raises(InputError, match="'raw' is a column of lists"):
         read_log(path, time="t", position="raw", force="state.x")

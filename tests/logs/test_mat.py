@@ -75,8 +75,8 @@ WRONG = {
         lambda path: savemat(path, {"t": T, "x": T[:40], "f": T}),
         "one length, got t 50, x 40, f 50",
     ),
-    "complex": (lambda path: savemat(path, {"t": T, "x": T, "f": T * 1j}), "'f' is complex"),
-    "infinite": (lambda path: savemat(path, {"t": T, "x": T, "f": 1 / T.clip(0)}), "row 1 is infinite"),
+    "complex": (lambda path: savemat(path, {"t": T, "x": T, "f": T * 1j}), "'f', row 1 holds '0j'"),
+    "infinite": (lambda path: savemat(path, {"t": T, "x": T, "f": 1 / T.clip(0)}), "row 1 holds 'inf'"),
     "other names": (lambda path: savemat(path, {"t": T, "x": T, "g": T}), "unknown column 'f'"),
 }
 

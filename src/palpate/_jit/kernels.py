@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from typing import Any
 
+from palpate._jit.cache_files import hashed_files
 from palpate._jit.compile_lock import CompileLock
 from palpate._jit.inline_compiler import entry, inside
 from palpate._jit.interrupts import uninterrupted
@@ -113,7 +114,8 @@ def _cache(function: Callable[..., Any], wait: Callable[[], None], lock: Compile
     class PackageCache(caching.FunctionCache):
         def __init__(self, py_func: Callable[..., Any]):
             super().__init__(py_func)
-            self._cache_file._source_stamp = sources_stamp(home_of(py_func))
+            stamp = sources_stamp(home_of(py_func))
+            self._cache_file = hashed_files()(self._cache_path, self._impl.filename_base, stamp)
 
         def _index_key(self, sig: Any, codegen: Any) -> Any:
             # The types as text: an index that holds a user's class cannot be read where that class is not.

@@ -14,7 +14,7 @@ _IMPORT = re.compile(r"^\s*(?:from|import) (palpate[\w.]*)(?: import (\([^)]*\)|
 
 
 def sources_stamp(*files: Path) -> str:
-    """A hash of these files and of all of the package's that they import, directly or not.
+    """A hash of these files and of all that they import of palpate and its companions, directly or not.
 
     A kernel is stale when any file that it may call has changed, which Numba, left alone, does not see.
     """
@@ -24,17 +24,22 @@ def sources_stamp(*files: Path) -> str:
         file = waiting.pop()
         if file not in reached and file.exists():
             reached[file] = file.read_bytes()
-            waiting.extend(_imported(reached[file].decode("utf-8", "replace")))
+            text = reached[file].decode("utf-8", "replace")
+            waiting.extend(p for root in {PACKAGE.parent, _root_of(file)} for p in _imported(text, root))
     digest = hashlib.sha256()
     for file in sorted(reached):
         digest.update(str(file).encode() + b"\0" + reached[file])
     return digest.hexdigest()
 
 
+def _root_of(file: Path) -> Path:
+    """The folder that holds the file's outermost package: beside palpate's own that of a companion."""
+    return next(folder for folder in file.parents if not (folder / "__init__.py").is_file())
+
+
 @functools.cache
-def _imported(text: str) -> list[Path]:
-    """The package's files that a source imports names from, or as modules."""
-    root = PACKAGE.parent
+def _imported(text: str, root: Path) -> list[Path]:
+    """Files under the root that a source imports names from, or as modules."""
     found = []
     for module, names in _IMPORT.findall(text):
         place = root.joinpath(*module.split("."))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from palpate.files.folders import RECORD, fresh_folder, kept_folder
+from palpate.files.folders import RECORD, check_kept_folder, fresh_folder, kept_folder
 from palpate.files.ownership import FORCE, MADE, SIGNATURE, WRITTEN, check_place, ours
-from palpate.files.reading import read_bytes
-from palpate.files.writing import signed, whole, write_json, write_text
+from palpate.files.reading import open_file, read_bytes, read_table, read_text, read_toml
+from palpate.files.writing import as_json, signed, whole, write_json, write_text
 
 __all__ = [
     "FORCE",
@@ -13,11 +13,17 @@ __all__ = [
     "RECORD",
     "SIGNATURE",
     "WRITTEN",
+    "as_json",
+    "check_kept_folder",
     "check_place",
     "fresh_folder",
     "kept_folder",
+    "open_file",
     "ours",
     "read_bytes",
+    "read_table",
+    "read_text",
+    "read_toml",
     "signed",
     "whole",
     "write_json",

@@ -18,7 +18,7 @@ _OLD = ".palpate-old"
 
 
 @contextmanager
-def fresh_folder(path: Path, *, force: bool) -> Iterator[Path]:
+def fresh_folder(path: Path, *, replace: bool) -> Iterator[Path]:
     """Yield a hidden folder beside `path` to write into; it takes its place when the block ends well.
 
     The place is checked before the block runs, so that no long run ends at a closed door. When the block
@@ -27,10 +27,10 @@ def fresh_folder(path: Path, *, force: bool) -> Iterator[Path]:
 
     Args:
         path: where the results shall stand.
-        force: replace existing results.
+        replace: replace existing results.
 
     Raises:
-        InputError: `path` is taken, and `force` is off or there is anything in it that palpate did not write; or
+        InputError: `path` is taken, and `replace` is off or there is anything in it that palpate did not write; or
             another process of palpate is writing to it.
     """
     path = path.absolute()
@@ -43,9 +43,9 @@ def fresh_folder(path: Path, *, force: bool) -> Iterator[Path]:
         try:
             _recovered(path)
             _emptied(draft)
-            _check_fresh(path, force)
+            _check_fresh(path, replace)
             yield draft
-            _check_fresh(path, force)
+            _check_fresh(path, replace)
             _take_place(draft, path)
         except OSError as error:
             if error.filename is not None:
@@ -56,19 +56,19 @@ def fresh_folder(path: Path, *, force: bool) -> Iterator[Path]:
 
 
 @contextmanager
-def kept_folder(path: Path, begun: str, *, force: bool) -> Iterator[None]:
+def kept_folder(path: Path, begun: str, *, replace: bool) -> Iterator[None]:
     """Make a folder, or go on in one, and keep it for this process alone; drafts left in it are removed.
 
     Args:
         path: where the results are, or shall be.
         begun: the file that tells that what is to be done there was begun.
-        force: remove what palpate wrote there.
+        replace: remove what palpate wrote there.
 
     Raises:
-        InputError: it is no folder, or a link; another process has it; it holds other files, and `force` is off or
+        InputError: it is no folder, or a link; another process has it; it holds other files, and `replace` is off or
             there is anything among them that palpate did not write.
     """
-    _check_folder(path)
+    check_kept_folder(path, begun, replace=replace)
     path.mkdir(parents=True, exist_ok=True)
     with locking(path) as handle:
         if handle is None:
@@ -76,15 +76,28 @@ def kept_folder(path: Path, begun: str, *, force: bool) -> Iterator[None]:
         for left in path.rglob(f".*{HIDDEN}"):
             if left.is_file() and not left.is_symlink():
                 left.unlink()
-        if force:
-            check_all_ours(path)
+        check_kept_folder(path, begun, replace=replace)
+        if replace:
             (path / begun).unlink(missing_ok=True)  # first: what is left after a kill is then no results
             _emptied(path)
-        elif not (path / begun).exists() and any(path.iterdir()):
-            raise InputError(
-                f"{path} holds other files; choose another --out, or add --force to replace results"
-            )
         yield
+
+
+def check_kept_folder(path: Path, begun: str, *, replace: bool) -> None:
+    """Refuse a folder that `kept_folder` would refuse, before the work: it may be another's only while it lasts.
+
+    Raises:
+        InputError: as `kept_folder`.
+    """
+    _check_folder(path)
+    if not path.exists():
+        return
+    if replace:
+        check_all_ours(path)
+    elif not (path / begun).exists() and any(not own.name.endswith(HIDDEN) for own in path.iterdir()):
+        raise InputError(
+            f"{path} holds other files; choose another --out, or add --replace to replace results"
+        )
 
 
 def check_all_ours(folder: Path) -> None:
@@ -109,12 +122,12 @@ def _check_folder(path: Path) -> None:
         raise InputError(f"{path} is {kind}; choose another --out")
 
 
-def _check_fresh(path: Path, force: bool) -> None:
+def _check_fresh(path: Path, replace: bool) -> None:
     _check_folder(path)
     if not path.exists():
         return
-    if not force:
-        raise InputError(f"{path} exists; choose another --out, or add --force to replace it")
+    if not replace:
+        raise InputError(f"{path} exists; choose another --out, or add --replace to replace it")
     check_all_ours(path)
 
 

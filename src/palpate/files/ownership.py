@@ -15,10 +15,12 @@ WRITTEN = "written_by"
 """The first key of a JSON object."""
 MADE = f"# Made by {SIGNATURE}"
 """Begins a line of a TOML file or of any other that has such comments."""
+SQLITE_ID = int.from_bytes(b"palp", "big")
+"""The application id of an SQLite file."""
 FORCE = ("time_s", "force_desired_N")
 """The columns of a desired force in a CSV file, which takes no comment."""
 
-_KINDS = {".json": "JSON file", ".png": "PNG", ".html": "HTML file", ".toml": "TOML file"}
+_KINDS = {".json": "JSON file", ".png": "PNG", ".html": "HTML file", ".toml": "TOML file", ".csv": "CSV file"}
 _HEAD, _FOOT, _TAIL = 4096, 1 << 20, 8
 """Bytes that are looked at; the last ones of a Parquet file say how long what stands before them is."""
 _FEET = {
@@ -32,8 +34,10 @@ _MARKS = re.compile(
             rb"Software\x00palpate",
             rb'<meta name="generator" content="palpate">',
             rb'\A\s*\{\s*"written_by": ?"palpate',
-            rb"^(?:#|//|<!--) Made by palpate",
+            rb"^(?:#|//|<!--|%) Made by palpate",
+            rb"\Alog \(palpate\),",  # a table of identifications
             rb"\A%s\r?\n" % ",".join(FORCE).encode(),
+            rb"\ASQLite format 3\x00(?s:.{52})palp",  # where the application id stands
             rb'\A[0-9a-f]{8} \{"title":.*"palpate":',  # the head of a journal of runs
             rb'\A\{"op_code":[^\n]*:"palpate ',  # a search, by Optuna
             rb'\A\[\s*(?:\]|\{\s*"id":[^}]*"claim":[^}]*"verdict":)',  # claims, whose form is fixed

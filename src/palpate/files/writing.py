@@ -11,6 +11,7 @@ from typing import Any
 from palpate.errors import InputError
 from palpate.files.locks import hidden, locking
 from palpate.files.ownership import SIGNATURE, WRITTEN, check_place, ours
+from palpate.text import printable
 
 
 @contextmanager
@@ -44,7 +45,7 @@ def whole(path: Path) -> Iterator[Path]:
 def write_text(path: Path, text: str) -> None:
     """Write a text as UTF-8, atomically."""
     with whole(path) as draft:
-        draft.write_text(text, encoding="utf-8", newline="\n")
+        draft.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -52,7 +53,25 @@ def write_json(path: Path, value: Any) -> None:
     import msgspec
 
     with whole(path) as draft:
-        draft.write_bytes(msgspec.json.format(msgspec.json.encode(value), indent=2) + b"\n")
+        draft.write_bytes(msgspec.json.format(as_json(value), indent=2) + b"\n")
+
+
+def as_json(value: Any) -> bytes:
+    """A value as JSON in UTF-8; what a file's name has that is no letter of it stands there as a visible escape."""
+    import msgspec
+
+    try:
+        return msgspec.json.encode(value)
+    except UnicodeEncodeError:
+        return msgspec.json.encode(_encodable(msgspec.to_builtins(value)))
+
+
+def _encodable(value: Any) -> Any:
+    if isinstance(value, str):
+        return printable(value)
+    if isinstance(value, dict):
+        return {_encodable(key): _encodable(inner) for key, inner in value.items()}
+    return [_encodable(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def signed(value: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from palpate.errors import InputError
 from palpate.logs.missing import find_sentinel
 from palpate.logs.plausibility import epoch_unit
 from palpate.logs.roles import Loaded, check_apart, check_quantity, family, quantity, si_unit
-from palpate.logs.tables import Columns, Stated
+from palpate.logs.tables import Sheet, Stated
 from palpate.units import split_spec, unit, unit_in_name
 
 _LOSSLESS = 2.0**53
@@ -21,7 +21,7 @@ _LOSSLESS = 2.0**53
 
 
 def from_table(
-    table: Columns, columns: Mapping[str, str], rate: float | None, missing: Sequence[str | float]
+    table: Sheet, columns: Mapping[str, str], rate: float | None, missing: Sequence[str | float]
 ) -> Loaded:
     """The columns asked for, by role as `NAME` or `NAME:UNIT`; time from its column or from the rows per second.
 
@@ -54,7 +54,7 @@ def from_table(
     return loaded
 
 
-def _from_first(table: Columns, places: Mapping[str, int], arrays: Mapping[str, Array]) -> float:
+def _from_first(table: Sheet, places: Mapping[str, int], arrays: Mapping[str, Array]) -> float:
     """Take the first row's time off before it is scaled, in whole numbers where floats would lose some.
 
     Returns:
@@ -76,7 +76,7 @@ def _epoch(time: Array, origin: float) -> str | None:
 
 
 def _symbol(
-    role: str, spec: str, table: Columns, place: int, epoch: str | None, notes: list[dict[str, Any]]
+    role: str, spec: str, table: Sheet, place: int, epoch: str | None, notes: list[dict[str, Any]]
 ) -> str:
     """The unit's symbol of one column: said, else stated in the file, else carried by the name, else SI."""
     name, symbol = split_spec(spec)
@@ -91,7 +91,7 @@ def _symbol(
         return "s"
     if symbol is not None:
         check_quantity(role, name, symbol)
-        _contradicted(name, symbol, stated, notes)
+        _contradicted(name, symbol, own, role, stated, notes)
         return symbol
     if stated.unit is not None:
         check_quantity(role, name, stated.unit)
@@ -113,11 +113,16 @@ def _symbol(
     return si_unit(role)
 
 
-def _contradicted(name: str, symbol: str, stated: Stated, notes: list[dict[str, Any]]) -> None:
-    """Say that a unit is another than the file states."""
-    if stated.unit and stated.where and unit(symbol) != unit(stated.unit):
-        text = f"{name!r} is taken in {symbol} as given, but {stated.where} says {stated.unit}"
-        notes.append({"code": "unit-stated", "text": text})
+def _contradicted(
+    name: str, symbol: str, own: str, role: str, stated: Stated, notes: list[dict[str, Any]]
+) -> None:
+    """Note that a unit is another than the column's name carries, or the file states."""
+    other, where = (stated.unit, stated.where) if stated.unit and stated.where else (None, "its name")
+    if other is None and name == own:  # a column that is named by its number is meant so
+        other = unit_in_name(own, quantity(role))
+    if other and unit(symbol) != unit(other):
+        text = f"{name!r} is taken in {symbol} as given, but {where} says {other}: is it {name}:{other}?"
+        notes.append({"code": "unit-doubtful", "text": text})
 
 
 def _other_unit(role: str, name: str) -> str | None:
@@ -150,7 +155,7 @@ def _missing(role: str, values: Array, name: str, given: bool) -> list[dict[str,
     return notes
 
 
-def _time(table: Columns, arrays: dict[str, Array], rate: float | None, loaded: Loaded) -> float:
+def _time(table: Sheet, arrays: dict[str, Array], rate: float | None, loaded: Loaded) -> float:
     """Make time start at 0, so that unix time keeps its digits; make it from the rate where there is no column."""
     if "time" not in arrays:
         arrays["time"] = np.arange(len(next(iter(arrays.values())))) / _rate(table, rate, loaded)
@@ -168,7 +173,7 @@ def _time(table: Columns, arrays: dict[str, Array], rate: float | None, loaded: 
     return origin
 
 
-def _rate(table: Columns, rate: float | None, loaded: Loaded) -> float:
+def _rate(table: Sheet, rate: float | None, loaded: Loaded) -> float:
     """Rows per second: said, or stated in the file."""
     if rate is None and table.rate is not None:
         loaded.facts.append(

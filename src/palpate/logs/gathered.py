@@ -8,7 +8,9 @@ from pathlib import Path
 
 from palpate.errors import InputError
 from palpate.files import RECORD
-from palpate.logs.kinds import STORAGES
+from palpate.files.limits import Limits
+from palpate.logs.kinds import STORAGES, Kind, kind_of
+from palpate.logs.tables import equal_sheets
 
 ENDINGS = {
     ".csv", ".tsv", ".txt", ".dat", ".ddf", ".lvm", ".xlsx", ".parquet", ".mat", ".bag", *STORAGES
@@ -28,6 +30,21 @@ def is_folder_of_logs(path: Path) -> bool:
     if not path.is_dir() or log_of(path) != path:
         return False
     return not any((path / "metadata.yaml").is_file() or file.suffix in STORAGES for file in path.iterdir())
+
+
+def sheets_as_logs(paths: Sequence[Path], names: Sequence[str], limits: Limits) -> tuple[Path, ...]:
+    """The paths, a book whose sheets repeat one test by those sheets.
+
+    Args:
+        paths: of logs.
+        names: of the columns that are read; a book without one of them stays as it is, as `SHEET.NAME` does.
+        limits: of a log.
+    """
+    found: list[Path] = []
+    for path in paths:
+        book = path.is_file() and kind_of(path) is Kind.SHEETS
+        found.extend((equal_sheets(path, limits, names) if book else []) or [path])
+    return tuple(found)
 
 
 def gathered(paths: Sequence[Path]) -> tuple[Path, ...]:

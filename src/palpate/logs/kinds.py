@@ -48,6 +48,8 @@ def kind_of(path: Path) -> Kind:
     Raises:
         InputError: there is no such file; it is empty, a pipe, or a folder that is no bag; it is MATLAB's v7.3.
     """
+    if _is_sheet(path):
+        return Kind.SHEETS
     if not path.exists():
         raise InputError(f"there is no file {path}; check the path")
     if path.is_dir():
@@ -69,6 +71,11 @@ def kind_of(path: Path) -> Kind:
         return Kind.SHEETS
     found = next((kind for magic, kind in _BEGINNINGS.items() if begin.startswith(magic)), Kind.TEXT)
     return Kind.MAT if found is Kind.TEXT and path.suffix.lower() == ".mat" else found
+
+
+def _is_sheet(path: Path) -> bool:
+    """Whether a path is `BOOK.xlsx/SHEET`, a sheet of a book."""
+    return path.parent.is_file() and kind_of(path.parent) is Kind.SHEETS
 
 
 def _is_spreadsheet(path: Path) -> bool:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.files.limits import Limits
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag
 from palpate.logs.bags.fields import leaves
-from palpate.logs.kinds import kind_of
-from palpate.logs.limits import Limits
+from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.own_runs import is_run
 from palpate.logs.plausibility import epoch_unit
 from palpate.logs.proposal import Proposal, Seen, clock_of, for_a_run, from_columns, from_topics
-from palpate.logs.tables import Columns, Stated, open_table
+from palpate.logs.tables import Sheet, Stated, equal_sheets, open_table
+from palpate.text import shortened
 from palpate.units import unit, unit_in_name
 
 
@@ -90,6 +91,12 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     entries = [_of_column(own, clock) for own in seen]
     entries += [Entry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
     proposal = for_a_run() if is_run(path) else from_columns(table, seen, delimiter)
+    repeats = equal_sheets(path, limits or Limits()) if kind is Kind.SHEETS and path.is_file() else []
+    if repeats:
+        one = list_log(repeats[0], limits=limits).proposal
+        text = f"{len(repeats)} sheets have the same columns and are pooled, as repeats of one test: "
+        named = shortened(", ".join(sheet.name for sheet in repeats), 120)
+        proposal = replace(one, guesses=(*one.guesses, text + named))
     facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
     return Listing(entries, unread + [note["text"] for note in table.notes], proposal, facts)
 
@@ -123,7 +130,7 @@ def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
     return " ".join(uses) + (f" (in {topic.parent})" if topic.parent else "")
 
 
-def _seen(table: Columns) -> tuple[list[Seen], list[str]]:
+def _seen(table: Sheet) -> tuple[list[Seen], list[str]]:
     """Every column's values and unit; and why there are no values, where they cannot be read."""
     places = list(range(len(table.names)))
     unread = []

@@ -6,7 +6,8 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 
-_USUAL = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 99999.0)
+_USUAL = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 99999.0, -3.697314e28)
+"""The last is what NDI's trackers write for a marker that they do not see."""
 _LEAST_SHARE = 0.002
 """Of the rows: a reading that is right by accident is rarer, one in the number of steps of its converter."""
 _APART = 0.5

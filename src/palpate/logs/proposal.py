@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +14,10 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag, Topic
+from palpate.logs.missing import find_sentinel
 from palpate.logs.plausibility import epoch_unit, usual_unit
-from palpate.logs.tables import Columns
+from palpate.logs.presets import preset, presets
+from palpate.logs.tables import Sheet
 from palpate.units import known_unit, unit, unit_in_name
 
 _NAMES = {
@@ -29,28 +31,46 @@ _NAMES = {
 """Usual names of columns in laboratories."""
 _SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}
 """Largest plausible range in SI units, and the assumed unit above it."""
+_COUNTS = 20
+"""Steps of its resolution that a position moves over at least: from fewer no stiffness is known to 5 %."""
+_FOLLOWS = 0.3
+"""Rank correlation of a force with its position above which it follows: 1 - (1 - c)^3 where it follows in a share c of
+the rows and is noise in the others, so that a contact over a ninth of the log is seen."""
+_NO_PAIR = "no two columns are a position that moves and a force that follows it"
 _RATE = 1000
 """Of the example [Hz]; nothing is computed with it."""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """Words after `palpate identify LOG`, and what of them is guessed.
+    """Options of `palpate identify LOG`, and what of them is guessed.
 
     Args:
-        words: of the command line; None if the log does not suffice.
+        options: by name, as `wrench_frame`; None if the log does not suffice.
         guesses: a sentence each.
+        facts: what the log shows of itself, likewise.
     """
 
-    words: tuple[str, ...] | None
+    options: Mapping[str, str] | None
     guesses: tuple[str, ...] = ()
+    facts: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> tuple[str, ...] | None:
+        """The options as words of the command line."""
+        if self.options is None:
+            return None
+        return tuple(
+            word for name, value in self.options.items() for word in (f"--{name.replace('_', '-')}", value)
+        )
 
     def command(self, log: Path) -> str | None:
         """The whole command, to be pasted into a shell."""
-        if self.words is None:
+        words = self.words
+        if words is None:
             return None
         place = str(log) if not str(log).startswith("-") else f"./{log}"
-        return " ".join(["palpate identify", *map(shlex.quote, (place, *self.words))])
+        return " ".join(["palpate identify", *map(shlex.quote, (place, *words))])
 
 
 @dataclass(frozen=True)
@@ -70,6 +90,12 @@ class Seen:
     values: Array
     unit: str | None
     clock: bool
+
+    @cached_property
+    def readings(self) -> Array:
+        """The values, shape (n,); NaN too where a number stands for no reading."""
+        mark = find_sentinel(self.values)
+        return self.values if mark is None else np.where(self.values == mark, np.nan, self.values)
 
     @cached_property
     def step(self) -> float:
@@ -96,8 +122,19 @@ class Seen:
     @cached_property
     def changes(self) -> bool:
         """Whether it holds more than two different numbers."""
-        there = self.values[np.isfinite(self.values)]
-        return len(np.unique(there[:100_000])) > 2
+        return self.counts > 1
+
+    @cached_property
+    def counts(self) -> float:
+        """Its range in steps of its own resolution."""
+        there = self.values[np.isfinite(self.values)][:100_000]
+        return float(np.ptp(there) / self.resolution) if self.resolution else 0.0
+
+    @cached_property
+    def resolution(self) -> float:
+        """The smallest difference of two of its numbers; 0 where it holds one only."""
+        steps = np.diff(np.unique(self.values[np.isfinite(self.values)][:100_000]))
+        return float(steps.min()) if len(steps) else 0.0
 
     @cached_property
     def span(self) -> float:
@@ -115,29 +152,60 @@ class Seen:
 
 def for_a_run() -> Proposal:
     """A record that palpate wrote says everything itself."""
-    return Proposal(())
+    return Proposal({})
 
 
-def from_columns(table: Columns, seen: Sequence[Seen], delimiter: str | None = None) -> Proposal:
-    """The command for a log of columns."""
+def from_columns(table: Sheet, seen: Sequence[Seen], delimiter: str | None = None) -> Proposal:
+    """The command for a log of columns: a preset whose columns are all there, a wrench and a pose, or two columns."""
     guesses: list[str] = []
     length = max((len(own.values) for own in seen), default=0)
     own = [column for column in seen if len(column.values) == length]
-    words = [] if delimiter is None else ["--delimiter", delimiter]
+    options = {} if delimiter is None else {"delimiter": delimiter}
+    name = _preset_of({column.name for column in own})
+    if name is not None:
+        time = {} if "time" in preset(name) else _timing(table, own, guesses)[0]
+        return Proposal({**options, "preset": name, **time}, tuple(guesses), _motion(name, own))
     timing, clock = _timing(table, own, guesses)
     others = [column for column in own if column is not clock and column.changes and not column.counts_rows]
     space = _in_space(table, others, guesses)
     if space:
-        return Proposal((*words, *timing, *space), tuple(guesses))
+        return Proposal({**options, **timing, **space}, tuple(guesses))
     pair = _pair(others, guesses)
     if pair is None:
-        return Proposal(None, ("no two columns are a position and a force",))
+        return Proposal(None, (_NO_PAIR,))
     position, force = pair
-    words += [*timing, "--position", _with_unit(table, position, "length", guesses)]
-    return Proposal((*words, "--force", _with_unit(table, force, "force", guesses)), tuple(guesses))
+    place, load = (_with_unit(table, *one, guesses) for one in ((position, "length"), (force, "force")))
+    return Proposal({**options, **timing, "position": place, "force": load}, tuple(guesses))
 
 
-def clock_of(table: Columns, seen: Sequence[Seen]) -> Seen | None:
+def _preset_of(names: Container[str]) -> str | None:
+    """The preset all of whose columns or topics are there."""
+    for name in presets():
+        options = preset(name)
+        needed = [
+            one for key in ("time", "wrench", "pose") for one in str(options.get(key, "")).split(",") if one
+        ]
+        if all(one in names for one in needed):
+            return name
+    return None
+
+
+def _motion(name: str, seen: Sequence[Seen]) -> tuple[str, ...]:
+    """How far the tool moves in a log of a preset's columns, and with which force."""
+    options, by_name = preset(name), {own.name: own for own in seen}
+    columns = [by_name[one] for key in ("wrench", "pose") for one in options[key].split(",")]
+    count = f"all {len(columns) + ('time' in options)} columns of the preset {name} are there"
+    forces, places = columns[:3], columns[6:]
+    if options["rotation"].startswith("matrix"):
+        places = [
+            places[i] for i in ((12, 13, 14) if options["rotation"] == "matrix-by-columns" else (3, 7, 11))
+        ]
+    axis = int(np.argmax([own.span for own in places[:3]]))
+    moved, force = 1e3 * places[axis].span, forces[axis].span
+    return (f"{count}; the tool moves {moved:.3g} mm along {'xyz'[axis]}, with a force of {force:.3g} N",)
+
+
+def clock_of(table: Sheet, seen: Sequence[Seen]) -> Seen | None:
     """The column of the time: one with even steps, preferably with the name or the unit of a time.
 
     One that counts rows is none, unless it is called a time; where the file states its rate, it must be called so too.
@@ -147,14 +215,14 @@ def clock_of(table: Columns, seen: Sequence[Seen]) -> Seen | None:
     return None if best and table.rate is not None and not best.named_time else best
 
 
-def _timing(table: Columns, seen: Sequence[Seen], guesses: list[str]) -> tuple[list[str], Seen | None]:
-    """The words for the time, and its column."""
+def _timing(table: Sheet, seen: Sequence[Seen], guesses: list[str]) -> tuple[dict[str, str], Seen | None]:
+    """The option for the time, and its column."""
     clock = clock_of(table, seen)
     if clock is None and table.rate is not None:
-        return [], None
+        return {}, None
     if clock is None:
         guesses.append(f"the log does not state its rate: --rate {_RATE} is only an example")
-        return ["--rate", f"{_RATE}"], None
+        return {"rate": f"{_RATE}"}, None
     if not clock.named_time:
         guesses.append(f"{clock.name!r} is used as the time: it has even steps")
     call = _call(table, clock)
@@ -166,41 +234,41 @@ def _timing(table: Columns, seen: Sequence[Seen], guesses: list[str]) -> tuple[l
             guesses.append(
                 f"the time is assumed to be in {symbol}: it would be {1 / clock.step:.3g} rows a second in s"
             )
-    return ["--time", call if symbol in {None, "s"} else f"{call}:{symbol}"], clock
+    return {"time": call if symbol in {None, "s"} else f"{call}:{symbol}"}, clock
 
 
 def _pair(seen: Sequence[Seen], guesses: list[str]) -> tuple[Seen, Seen] | None:
-    """Position and force: by units and names, or else the two columns that move together most."""
+    """Position and force: by units and names, or else the two columns that move together most.
+
+    A column that hardly moves is no position, and one that does not follow it is no force.
+    """
+    moving = [own for own in seen if own.counts >= _COUNTS]
     forces = _best(seen, lambda own: own.score("force", "force"))
-    force = forces[0] if forces else None
-    places = _best([own for own in seen if own is not force], lambda own: own.score("position", "length"))
-    position = places[0] if places else None
-    if position and force:
-        if len(forces) > 1 or len(places) > 1:
-            left = [own.name for own in (*forces[1:], *places[1:])]
-            others = ", ".join(left[:8])
-            text = f"{position.name!r} and {force.name!r} are used; the names of {others} fit too"
-            guesses.append(text)
-        return position, force
-    known = position or force
-    if known:
-        other = max(
-            (own for own in seen if own is not known), key=lambda own: _together(own, known), default=None
-        )
-        if other is None:
-            return None
-        guesses.append(f"{other.name!r} is used: of all columns it correlates most with {known.name!r}")
-        return (known, other) if position else (other, known)
-    pairs = [(a, b) for i, a in enumerate(seen[:40]) for b in seen[i + 1 : 40]]
+    places = _best(
+        [own for own in moving if own not in forces[:1]], lambda own: own.score("position", "length")
+    )
+    pairs = [(a, b) for a in places or moving for b in forces or seen if a is not b]
+    by_name = bool(places and forces)
+    if not (places or forces):
+        pairs = [(a, b) for i, a in enumerate(moving[:40]) for b in moving[i + 1 : 40]]
+    pairs = [pair for pair in pairs[:800] if _together(*pair) > _FOLLOWS and not _one_reading(*pair)]
     if not pairs:
         return None
-    found = max(pairs, key=lambda pair: _together(*pair))
-    smooth = sorted(found, key=_roughness)
-    guesses.append(
-        f"the columns have no names: {smooth[0].name!r} and {smooth[1].name!r} move together most,"
-        " and the smoother is taken for the position"
-    )
-    return smooth[0], smooth[1]
+    position, force = max(pairs, key=lambda pair: _together(*pair))
+    left = dict.fromkeys(own.name for pair in pairs for own in pair if own not in (position, force))
+    if by_name and left:
+        more = ", ".join([*left][:8])
+        guesses.append(f"{position.name!r} and {force.name!r} are used; the names of {more} fit too")
+    elif not by_name and (places or forces):
+        known, other = (position, force) if places else (force, position)
+        guesses.append(f"{other.name!r} is used: of all columns it correlates most with {known.name!r}")
+    elif not by_name:
+        position, force = sorted((position, force), key=_roughness)
+        guesses.append(
+            f"the columns have no names: {position.name!r} and {force.name!r} move together most,"
+            " and the smoother is taken for the position"
+        )
+    return position, force
 
 
 def _best(seen: Sequence[Seen], score: Callable[[Seen], int]) -> list[Seen]:
@@ -213,11 +281,26 @@ def _together(one: Seen, other: Seen) -> float:
     """How closely the ranks of two columns agree, from 0 to 1."""
     from scipy.stats import spearmanr
 
-    there = np.isfinite(one.values) & np.isfinite(other.values)
+    a, b = one.readings, other.readings
+    there = np.isfinite(a) & np.isfinite(b)
     rows = np.flatnonzero(there)[:: max(1, int(there.sum()) // 5000)]
-    if len(rows) < 4 or np.ptp(one.values[rows]) == 0 or np.ptp(other.values[rows]) == 0:
+    if len(rows) < 4 or np.ptp(a[rows]) == 0 or np.ptp(b[rows]) == 0:
         return 0.0
-    return abs(float(spearmanr(one.values[rows], other.values[rows]).statistic))
+    return abs(float(spearmanr(a[rows], b[rows]).statistic))
+
+
+def _one_reading(position: Seen, force: Seen) -> bool:
+    """Whether two columns are one reading in two units, as a sensor beside its own volts: exactly a line.
+
+    A position and a force by their units are none, as a simulated spring is a line too.
+    """
+    if position.score("position", "length") > 1 and force.score("force", "force") > 1:
+        return False
+    a, b = position.readings, force.readings
+    there = np.flatnonzero(np.isfinite(a) & np.isfinite(b))[:100_000]
+    slope, offset = np.polyfit(a[there], b[there], 1)
+    apart = np.abs(b[there] - slope * a[there] - offset)
+    return bool(np.max(apart) <= force.resolution + abs(slope) * position.resolution)
 
 
 def _roughness(own: Seen) -> float:
@@ -228,7 +311,7 @@ def _roughness(own: Seen) -> float:
     )
 
 
-def _with_unit(table: Columns, own: Seen, quantity: str, guesses: list[str]) -> str:
+def _with_unit(table: Sheet, own: Seen, quantity: str, guesses: list[str]) -> str:
     """A column's name and unit; an unstated unit is guessed from the size of its values."""
     call = _call(table, own)
     symbol = own.unit or unit_in_name(own.name, quantity)
@@ -244,18 +327,18 @@ def _with_unit(table: Columns, own: Seen, quantity: str, guesses: list[str]) -> 
     return f"{call}:{symbol}"
 
 
-def _call(table: Columns, own: Seen) -> str:
+def _call(table: Sheet, own: Seen) -> str:
     """Identifier of a column: its name, or its number if the name would be misread."""
     plain = re.fullmatch(r"[^\W\d-][^\x00-\x1f\x7f-\x9f,:]*", own.name) is not None
     return own.name if plain and table.names.count(own.name) == 1 else str(own.place)
 
 
-def _in_space(table: Columns, seen: Sequence[Seen], guesses: list[str]) -> list[str]:
-    """The words for a wrench and a pose in three dimensions, where six columns or more are named so."""
+def _in_space(table: Sheet, seen: Sequence[Seen], guesses: list[str]) -> dict[str, str]:
+    """The options for a wrench and a pose in three dimensions, where six columns or more are named so."""
     force = _triple(seen, r"(?:f|force)[_. ]?{}")
     place = _triple(seen, r"(?:(?:pos|position|p|x|tcp|tip)[_. ]?)?{}")
-    if not (force and place):
-        return []
+    if not (force and place and max(own.counts for own in place) >= _COUNTS):
+        return {}
     torque, turn = (
         _triple(seen, r"(?:t|m|torque|moment)[_. ]?{}"),
         _triple(seen, r"(?:q|quaternion|orientation)[_. ]?{}", "xyzw"),
@@ -267,7 +350,7 @@ def _in_space(table: Columns, seen: Sequence[Seen], guesses: list[str]) -> list[
         _call(table, own) for own in torque
     ]
     pose = [_with_unit(table, own, "length", guesses) for own in place] + [_call(table, own) for own in turn]
-    return ["--wrench", ",".join(wrench), "--pose", ",".join(pose), "--wrench-frame", "base"]
+    return {"wrench": ",".join(wrench), "pose": ",".join(pose), "wrench_frame": "base"}
 
 
 def _triple(seen: Sequence[Seen], pattern: str, axes: str = "xyz") -> list[Seen]:
@@ -288,14 +371,17 @@ def from_topics(bag: Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
     guesses: list[str] = []
     wrench = _topic([topic for topic in there if is_wrench(topic.kind)], "wrench", guesses)
     pose = _topic([topic for topic in there if is_pose(topic.kind)], "pose", guesses)
+    name = _preset_of(bag.topics)
+    if name is not None:
+        return Proposal({"preset": name}, (), (f"the topics are those of the preset {name}",))
     if wrench and pose:
-        words = ["--wrench", wrench.name, "--pose", pose.name]
-        named = all(_frame(bag, topic) for topic in (wrench, pose))
-        if not named:
+        options = {"wrench": wrench.name, "pose": pose.name}
+        if not all(_frame(bag, topic) for topic in (wrench, pose)):
+            options["wrench_frame"] = "tool"
             guesses.append(
                 "the wrench's axes are taken for the tool's: say --wrench-frame base if they are the base's"
             )
-        return Proposal((*words, *(() if named else ("--wrench-frame", "tool"))), tuple(guesses))
+        return Proposal(options, tuple(guesses))
     found = _joint(bag, fields, guesses) or _fields_by_name(fields, guesses)
     return (
         Proposal(found, tuple(guesses))
@@ -319,7 +405,7 @@ def _frame(bag: Bag, topic: Topic) -> str:
     return str(getattr(header, "frame_id", ""))
 
 
-def _joint(bag: Bag, fields: Mapping[str, Sequence[str]], guesses: list[str]) -> tuple[str, ...] | None:
+def _joint(bag: Bag, fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
     """Position and effort of the joint whose effort changes most."""
     for name, paths in fields.items():
         if not bag.topics[name].kind.endswith("/JointState"):
@@ -333,18 +419,20 @@ def _joint(bag: Bag, fields: Mapping[str, Sequence[str]], guesses: list[str]) ->
         guesses.append(
             f"joint {joint!r} is taken, whose effort changes most, and to slide: say :rad and :Nm if it turns"
         )
-        return "--position", f"{name}.position.{joint}:m", "--force", f"{name}.effort.{joint}:N"
+        return {"position": f"{name}.position.{joint}:m", "force": f"{name}.effort.{joint}:N"}
     return None
 
 
-def _fields_by_name(fields: Mapping[str, Sequence[str]], guesses: list[str]) -> tuple[str, ...] | None:
+def _fields_by_name(fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
     """Two fields that are called as a force and a position are."""
     paths = [f"{name}.{path}" for name, own in fields.items() for path in own]
     found = []
     for role in ("position", "force"):
-        fits = [path for path in paths if re.search(_NAMES[role], path, re.I) and path not in found]
+        named, left = re.compile(_NAMES[role], re.I), [path for path in paths if path not in found]
+        fits = [path for path in left if named.search(path.rpartition(".")[2])]  # z and fz of one topic
+        fits = fits or [path for path in left if named.search(path)]
         if not fits:
             return None
         found += [next((path for path in fits if path.endswith("z")), fits[0])]
     guesses.append("the two fields are taken by their names")
-    return "--position", f"{found[0]}:m", "--force", f"{found[1]}:N"
+    return {"position": f"{found[0]}:m", "force": f"{found[1]}:N"}

@@ -10,11 +10,11 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
+from palpate.files.limits import Limits
 from palpate.logs.bags import Bag
 from palpate.logs.from_bag import from_bag
 from palpate.logs.from_table import from_table
 from palpate.logs.kinds import kind_of
-from palpate.logs.limits import Limits
 from palpate.logs.plausibility import check_range, implausible_times
 from palpate.logs.roles import Loaded
 from palpate.logs.store import read_record
@@ -25,7 +25,7 @@ from palpate.units import split_spec
 
 # More than seven arguments: the options of a user's call.
 def read_log(
-    path: str | Path,
+    path: str | Path | Any,
     *,
     rate: float | None = None,
     start: float | None = None,
@@ -39,14 +39,16 @@ def read_log(
     """Read columns of a log into a record.
 
     `read_log("press.csv", time="time_s", position="position_mm:mm", force="force_mN:mN")` gives a record
-    with the columns `time` [s, from 0], `position` [m] and `force` [N]. A file that palpate wrote needs no columns.
+    with the columns `time` [s, from 0], `position` [m] and `force` [N]. A file that palpate wrote needs no columns,
+    and no more does one whose names, units and values leave nothing to guess.
     A bag gives fields of its messages, `read_log("press.mcap", position="/pose.pose.position.z",
     force="/wrench.wrench.force.z")`, aligned on the rows of the topic that has most messages.
 
     Args:
         path: text in columns (CSV, LabVIEW's .lvm, Aurora's .ddf, ...), Parquet, a spreadsheet, a MATLAB file (v4 to
             v7), a ROS 1 bag, or a ROS 2 bag (its folder, or an MCAP or SQLite file of it); time may be dates and times
-            (ISO 8601).
+            (ISO 8601). Or a table in memory: a DataFrame of polars or pandas, an Arrow table or stream, a mapping of
+            arrays.
         rate: rows per second [1/s], for a log without a column of time that does not state its rate either.
         start: leave out the rows before it, in seconds from the first row [s].
         end: leave out the rows from it on, likewise [s].
@@ -65,6 +67,12 @@ def read_log(
     Raises:
         InputError: a fault in the file or with these arguments, in one line.
     """
+    if not isinstance(path, str | Path):
+        from palpate.logs.tables.frame import own_columns, read_frame
+
+        frame = read_frame(path)
+        loaded = from_table(frame, columns or own_columns(frame, rate), rate, missing)
+        return _record(loaded, frame.path, start, end)
     path = Path(path)
     if not columns:
         return read_record(path, limits)

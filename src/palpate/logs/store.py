@@ -11,8 +11,8 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
-from palpate.logs.limits import Budget, Limits
-from palpate.logs.tables.parquet import Parquet
+from palpate.files.limits import Budget, Limits
+from palpate.logs.tables.parquet import read_columns, stored_about
 from palpate.records import Record
 
 if TYPE_CHECKING:
@@ -59,8 +59,8 @@ def read_record(path: str | Path, limits: Limits | None = None) -> Record:
     Raises:
         InputError: the file is missing, is no Parquet file, or was not written by palpate.
     """
-    table = Parquet(Path(path), Budget(Path(path), limits or Limits()))
-    if table.about is None:
+    path, limits = Path(path), limits or Limits()
+    about = stored_about(path, limits)
+    if about is None:
         raise InputError(f"{path} carries no units of palpate; read it with read_log and name its columns")
-    columns = table.raw(range(len(table.names)))
-    return Record(dict(zip(table.names, columns, strict=True)), table.about.units, table.about.meta)
+    return Record(read_columns(path, Budget(path, limits)), about.units, about.meta)

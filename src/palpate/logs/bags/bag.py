@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import InputError, unknown
+from palpate.files.limits import Budget, Limits
 from palpate.logs.bags.fields import Stream, finder, leaves, no_field
 from palpate.logs.bags.reading import first_line, open_files
 from palpate.logs.bags.scanning import Channel
 from palpate.logs.kinds import Kind
-from palpate.logs.limits import Budget, Limits
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore

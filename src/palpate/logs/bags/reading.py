@@ -11,13 +11,13 @@ from typing import Any
 import msgspec
 
 from palpate.errors import InputError
+from palpate.files.limits import Budget
 from palpate.logs.bags.scan_bag1 import scan_bag1
 from palpate.logs.bags.scan_mcap import scan_mcap
 from palpate.logs.bags.scan_sqlite import scan_sqlite
 from palpate.logs.bags.scanning import Channel, End, Raw
-from palpate.logs.bags.unpacking import unpack_file, unpack_message
+from palpate.logs.bags.unpacking import ZSTD, unpack_file, unpack_message
 from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
-from palpate.logs.limits import Budget
 
 _SCANS = {Kind.BAG1: scan_bag1, Kind.MCAP: scan_mcap, Kind.SQLITE: scan_sqlite}
 _LATEST = 2**63
@@ -72,10 +72,24 @@ class Storage:
         try:
             for item in self._items():
                 if isinstance(item, Raw) and self.channels[item.channel].topic in topics:
-                    data = unpack_message(item.data, self._budget) if self._packed else item.data
-                    yield self.channels[item.channel], item.received, data
+                    yield self.channels[item.channel], item.received, self._unpacked(item)
         except _DamageError:
             return
+
+    def _unpacked(self, item: Raw) -> bytes:
+        """A message; one that its bag's metadata calls packed may be plain, as recorders pack what gains by it."""
+        if not (self._packed and item.data.startswith(ZSTD)):
+            return item.data
+        try:
+            return unpack_message(item.data, self._budget)
+        except (ImportError, InputError):
+            raise
+        except Exception as error:  # noqa: BLE001 - a damaged message fails in as many ways as there are bytes
+            topic = self.channels[item.channel].topic
+            text = (
+                f"{self.path}: a message on {topic} cannot be unpacked ({first_line(error)}); record it again"
+            )
+            raise InputError(text) from None
 
     def _items(self) -> Iterator[Channel | Raw | End]:
         """Content of the file up to its end, or to the first unreadable part."""

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from palpate.errors import InputError
+from palpate.files.limits import Budget, LimitError
 from palpate.logs.bags.scanning import Channel, End, Raw
 from palpate.logs.bags.unpacking import unpacked
-from palpate.logs.limits import Budget, LimitError
 
 if TYPE_CHECKING:
     from rosbags.rosbag1.reader import Header

@@ -9,9 +9,9 @@ from pathlib import Path
 from struct import unpack_from
 from typing import BinaryIO
 
+from palpate.files.limits import Budget, LimitError
 from palpate.logs.bags.scanning import Channel, End, Raw
 from palpate.logs.bags.unpacking import unpacked
-from palpate.logs.limits import Budget, LimitError
 
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 _MAGIC = 8

@@ -10,14 +10,23 @@ from typing import Any
 from urllib.parse import quote
 
 from palpate.errors import InputError
+from palpate.files.limits import Budget
 from palpate.logs.bags.scanning import Channel, End, Raw
-from palpate.logs.limits import Budget
 
 _TABLES = "SELECT name FROM sqlite_master WHERE type = 'table' AND sql LIKE 'CREATE TABLE%'"
 _OTHERS = "SELECT name, type FROM sqlite_master WHERE name IN ('topics', 'messages', 'message_definitions')"
-_TOPICS = "SELECT id, name, type FROM topics"
-_TYPES = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+# A column of SQLite holds values of any type: what is no name, no number or no message makes no topic.
+_TOPICS = (
+    "SELECT id, name, type FROM topics"
+    " WHERE typeof(id) = 'integer' AND typeof(name) = 'text' AND typeof(type) = 'text'"
+)
+_TYPES = (
+    "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+    " WHERE typeof(topic_type) = 'text' AND typeof(encoding) = 'text'"
+    " AND typeof(encoded_message_definition) = 'text'"
+)
 _MESSAGES = "SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id"
+_MESSAGE = (int, int, bytes)
 _STEPS = 100_000
 """Instructions of SQLite between two looks at the clock."""
 
@@ -32,10 +41,9 @@ def scan_sqlite(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
         left = path.stat().st_size
         try:
             for row in database.execute(_MESSAGES):
-                left -= 0 if None in row else len(row[2])
-                if (
-                    hurt := None in row or left < 0
-                ):  # a page that is there in part is read as if zeros followed
+                plain = all(isinstance(value, kind) for value, kind in zip(row, _MESSAGE, strict=True))
+                left -= len(row[2]) if plain else 0
+                if hurt := not plain or left < 0:  # a page that is there in part is read as if zeros followed
                     break
                 yield Raw(*row)
         except sqlite3.DatabaseError:

@@ -6,7 +6,10 @@ import bz2
 import sys
 from typing import IO, Any
 
-from palpate.logs.limits import Budget
+from palpate.files.limits import Budget
+
+ZSTD = b"\x28\xb5\x2f\xfd"
+"""First bytes of whatever zstd packed."""
 
 
 def unpacked(data: bytes, packing: str, size: int, budget: Budget) -> bytes:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from palpate.files.limits import Budget, Limits
 from palpate.logs.kinds import Kind
-from palpate.logs.limits import Budget, Limits
-from palpate.logs.tables.columns import Columns, Stated
-from palpate.logs.tables.matlab import Matlab
-from palpate.logs.tables.parquet import Parquet
-from palpate.logs.tables.spreadsheet import Spreadsheet
-from palpate.logs.tables.text import Text
+from palpate.logs.tables.matlab import read_matlab
+from palpate.logs.tables.parquet import read_parquet
+from palpate.logs.tables.sheet import Sheet, Stated
+from palpate.logs.tables.spreadsheet import equal_sheets, read_book
+from palpate.logs.tables.text import read_text_sheet
 
-__all__ = ["Columns", "Stated", "open_table"]
+__all__ = ["Sheet", "Stated", "equal_sheets", "open_table"]
 
 
-def open_table(path: Path, kind: Kind, delimiter: str | None = None, limits: Limits | None = None) -> Columns:
+def open_table(path: Path, kind: Kind, delimiter: str | None = None, limits: Limits | None = None) -> Sheet:
     """A file of columns, read where they are asked for.
 
     Raises:
@@ -24,10 +24,10 @@ def open_table(path: Path, kind: Kind, delimiter: str | None = None, limits: Lim
     budget = Budget(path, limits or Limits())
     match kind:
         case Kind.MAT:
-            return Matlab(path, budget)
+            return read_matlab(path, budget)
         case Kind.SHEETS:
-            return Spreadsheet(path, budget)
+            return read_book(path, budget)
         case Kind.PARQUET:
-            return Parquet(path, budget)
+            return read_parquet(path, budget)
         case _:
-            return Text(path, budget, delimiter)
+            return read_text_sheet(path, budget, delimiter)

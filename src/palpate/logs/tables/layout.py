@@ -9,6 +9,7 @@ from itertools import groupby
 from pathlib import Path
 
 from palpate.errors import InputError
+from palpate.files.limits import Budget
 from palpate.logs.tables.lines import Line, Parting
 from palpate.units import known_unit
 
@@ -56,8 +57,14 @@ class Layout:
         return _NAMES.get(self.parting.delimiter, repr(self.parting.delimiter))
 
 
-def find_layout(path: Path, lines: Sequence[Line], delimiter: str | None = None) -> Layout:
+def find_layout(path: Path, lines: Sequence[Line], budget: Budget, delimiter: str | None = None) -> Layout:
     """Look at the first lines of a text log.
+
+    Args:
+        path: of the log.
+        lines: its first.
+        budget: of it; the time is looked at again and again.
+        delimiter: between two cells; found when None.
 
     Raises:
         InputError: they hold no rows of numbers, or a header that does not fit the rows.
@@ -67,7 +74,7 @@ def find_layout(path: Path, lines: Sequence[Line], delimiter: str | None = None)
     plain = [line for line in lines if not line.comment]
     if not plain:
         raise InputError(f"{path} is empty; give a log with a row of numbers for each sample")
-    block = _best(plain, delimiter)
+    block = _best(plain, budget, delimiter)
     if block is None:
         if delimiter is not None:
             told = _NAMES.get(delimiter, repr(delimiter))
@@ -101,18 +108,20 @@ class _Block:
     quoted: bool
 
 
-def _best(lines: Sequence[Line], delimiter: str | None) -> _Block | None:
+def _best(lines: Sequence[Line], budget: Budget, delimiter: str | None) -> _Block | None:
     tried = [p for p in _PARTINGS if delimiter in {None, p.delimiter}]
     if not tried and delimiter is not None:
         tried = [Parting(delimiter), Parting(delimiter, decimal_comma=delimiter != ",")]
-    blocks = [block for block in (_block(lines, parting) for parting in tried) if block is not None]
+    blocks = [block for block in (_block(lines, parting, budget) for parting in tried) if block is not None]
     return max(blocks, key=lambda block: block.score, default=None)
 
 
-def _block(lines: Sequence[Line], parting: Parting) -> _Block | None:
+def _block(lines: Sequence[Line], parting: Parting, budget: Budget) -> _Block | None:
     """The rows of numbers under one parting: the longest run of lines of one width that hold some."""
     cells = [parting.split(line.text) for line in lines]
-    kinds = [[parting.kind(cell) for cell in row] for row in cells]
+    budget.take(0)
+    kinds = parting.kinds(cells)
+    budget.take(0)
     runs = [
         (width, list(group))
         for width, group in groupby(range(len(lines)), lambda i: len(kinds[i]) if 1 in kinds[i] else 0)
@@ -125,12 +134,29 @@ def _block(lines: Sequence[Line], parting: Parting) -> _Block | None:
     numeric = [place for place, kind in enumerate(usual) if kind == 1]
     if not numeric:
         return None
-    first = next(i for i in range(run[0] + 1) if _is_row(kinds[i], width, numeric))
+    first = next((i for i in range(run[-1] + 1) if _is_row(kinds[i], width, numeric)), None)
+    if first is None:
+        return None
+    first = _below_header(kinds, width, first)
     filled = max(place for place in range(width) if any(cells[i][place] for i in run)) + 1
     text = usual.count(-1)
     seen = parting.delimiter != " " and width > 1
     quoted = any('"' in lines[i].text for i in run)
     return _Block(parting, lines[first].number, width, filled, (not text, seen, len(numeric) - text), quoted)
+
+
+def _below_header(kinds: Sequence[Sequence[int]], width: int, first: int) -> int:
+    """The first row: lines between the header and it that hold numbers are rows, though a cell of them is wrong.
+
+    One number beside a word is a label and its value.
+    """
+    begin = first
+    while (
+        begin > 0 and len(kinds[begin - 1]) == width and kinds[begin - 1].count(1) >= (2 if width == 2 else 1)
+    ):
+        begin -= 1
+    named = begin > 0 and len(kinds[begin - 1]) == width and 1 not in kinds[begin - 1]
+    return begin if named else first
 
 
 def _is_row(kinds: Sequence[int], width: int, numeric: Sequence[int]) -> bool:

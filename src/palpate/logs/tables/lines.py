@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,11 +13,11 @@ from palpate.logs.tables.clock import seconds_of_text
 
 LOOK = 4_000_000
 """Bytes at the beginning of a file that are looked at."""
-_LINES, _LETTERS, _FEWEST = 1000, 500_000, 20
-"""Of these, no more lines are parted, or no more letters, but always some lines."""
+_LINES, _LETTERS, _FEWEST = 1000, 500_000, 4
+"""Of these, no more lines are parted, or no more letters, but always a header, its units and two rows."""
 COMMENTS = ("#", "%", "//", ";")
 """Beginnings of a comment line; a semicolon only if it is not the delimiter."""
-NO_READING = {"", "nan", "na", "n/a", "null", "none", "-", "--"}
+NO_READING = {"", "nan", "na", "n/a", "null", "none", "missing", "-", "--"}
 """Words that stand for no reading, in lower case."""
 
 _NO_TEXT = {
@@ -31,9 +32,15 @@ _NO_TEXT = {
     b"TDSm": "is a TDMS file of LabVIEW; write its channels out as CSV or .lvm",
 }
 """First bytes of other file formats."""
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_COMMA_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
-_SPACED = re.compile(r"\[[^\]]*\]|\([^)]*\)|[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?")
+THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?"
+"""A number whose thousands are parted by commas, as testing machines print them: 1,000.12."""
+POINTED_THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:\.\d{3})+,\d*"
+"""Likewise by points, where the comma is decimal: 1.000,12."""
+# No pattern here looks twice at a letter: a hostile line takes as long as any other.
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
+_COMMA_NUMBER = re.compile(rf"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?|{POINTED_THOUSANDS}")
+_THOUSANDS = re.compile(THOUSANDS)
+_SPACED = re.compile(r"\[[^\[\]]*\]|\([^()]*\)|[^\s\[(]+(?:\s*(?:\[[^\[\]]*\]|\([^()]*\)))?")
 """A name in a header parted by spaces, with its unit in brackets: `Force [N]`."""
 
 
@@ -75,14 +82,27 @@ class Parting:
         except csv.Error:  # a cell longer than the library takes, or a quote that never ends
             return [cell.strip() for cell in text.split(self.delimiter)]
 
+    def kinds(self, rows: Sequence[Sequence[str]]) -> list[list[int]]:
+        """The kind of each cell, without doubt: a comma parts thousands if it does so in a cell with a point."""
+        found = [[self.kind(cell) for cell in row] for row in rows]
+        if not any(2 in row for row in found):
+            return found
+        sure = any(_THOUSANDS.fullmatch(cell) and "." in cell for row in rows for cell in row)
+        return [[(1 if sure else -1) if kind == 2 else kind for kind in row] for row in found]
+
     def header(self, text: str) -> list[str]:
         """The cells of a line of names; a unit in brackets belongs to the name before it."""
         return _SPACED.findall(text) if self.delimiter == " " else self.split(text)
 
     def kind(self, cell: str) -> int:
-        """1 for a number, a date or a time; 0 for no reading; -1 for other text."""
+        """1 for a number, a date or a time; 0 for no reading; -1 for other text.
+
+        2 for one such as 1,234, a number with a part of a thousand or of one, as its neighbours tell.
+        """
         if (_COMMA_NUMBER if self.decimal_comma else _NUMBER).fullmatch(cell):
             return 1
+        if not self.decimal_comma and _THOUSANDS.fullmatch(cell):
+            return 1 if "." in cell else 2
         if cell.lower() in NO_READING:
             return 0
         return 1 if seconds_of_text(cell) is not None else -1
@@ -107,23 +127,30 @@ def first_lines(path: Path) -> tuple[list[Line], bool]:
         begin, newline, _ = begin.rpartition(b"\n")
         if not newline:
             raise InputError(f"the first line of {path} has over {LOOK:,} bytes; a table has a line a row")
-    return lines_of(_decoded(begin)), b"\r" in begin and b"\n" not in begin
+    return lines_of(path, _decoded(begin)), b"\r" in begin and b"\n" not in begin
 
 
-def lines_of(text: str) -> list[Line]:
-    """The first lines of a text that hold something."""
+def lines_of(path: Path, text: str) -> list[Line]:
+    """The first lines of a text that hold something, be it behind the mark of a comment.
+
+    Raises:
+        InputError: a line is so long that it is no row of a table.
+    """
     lines: list[Line] = []
     seen = 0
     for number, raw in enumerate(re.split(r"\r\n|\n|\r", text)[:_LINES], 1):
         seen += len(raw)
         if seen > _LETTERS and len(lines) >= _FEWEST:
             break
+        if len(raw) > _LETTERS:
+            raise InputError(
+                f"line {number} of {path} has over {_LETTERS:,} letters; a table has a line a row"
+            )
         stripped = raw.strip("\r\n\ufeff")
-        if not stripped.strip():
-            continue
         mark = next((mark for mark in COMMENTS if stripped.lstrip().startswith(mark)), None)
         body = stripped.lstrip().lstrip(mark).strip() if mark and mark != ";" else stripped
-        lines.append(Line(number, body, mark is not None and mark != ";"))
+        if body.strip():
+            lines.append(Line(number, body, mark is not None and mark != ";"))
     return lines
 
 

@@ -13,11 +13,10 @@ from zlib import decompressobj
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.logs.limits import Budget
-from palpate.logs.tables.columns import Stated, as_counts, finite_words, place_of
-from palpate.logs.tables.confined import read_confined
+from palpate.files.confined import read_confined
+from palpate.files.limits import Budget
+from palpate.logs.tables.sheet import Cells, Sheet, as_counts
 
 _HEADER, _COMPRESSED, _PIECE = 128, 15, 1 << 20
 _MOST = 64
@@ -32,7 +31,7 @@ _EXPORTS = {
 """How MATLAB itself turns an object of a class into plain arrays."""
 
 
-class Matlab:
+def read_matlab(path: Path, budget: Budget) -> Sheet:
     """The numeric variables of a MATLAB file as columns; fields of a struct are `struct.field`.
 
     An array gives a column for each place beside its longest side: `wrench.0` to `wrench.5` for one of 5000 x 6 or
@@ -45,62 +44,27 @@ class Matlab:
     Raises:
         InputError: the file is no MATLAB file of v4 to v7, is damaged, or holds no numbers in columns.
     """
+    arrays, also = read_confined(__name__, path, "a MATLAB file", budget)
+    objects = {name: f"a MATLAB {kind}, which {_export(name, kind)}" for name, kind in also["objects"]}
+    left_out, names = also["images"] | objects, list(arrays)
+    if not names:
+        told = next((f": {name} is {what}" for name, what in left_out.items()), "")
+        raise InputError(f"{path} holds no array of numbers with a value for each sample{told}")
+    return Sheet(
+        path, names, lambda places, missing: ([_cells(arrays[names[i]], missing) for i in places], []),
+        lambda place: as_counts(arrays[names[place]]), left_out=left_out,
+    )  # fmt: skip
 
-    def __init__(self, path: Path, budget: Budget) -> None:
-        self.path = path
-        self.stated: dict[str, Stated] = {}
-        self.rate: float | None = None
-        self.clocks: set[str] = set()
-        self.notes: list[dict[str, Any]] = []
-        self._arrays, also = read_confined("matlab", path, "a MATLAB file", budget)
-        objects = {name: f"a MATLAB {kind}, which {_export(name, kind)}" for name, kind in also["objects"]}
-        self.left_out = also["images"] | objects
-        self.names = list(self._arrays)
-        if not self.names:
-            told = next((f": {name} is {what}" for name, what in self.left_out.items()), "")
-            raise InputError(f"{path} holds no array of numbers with a value for each sample{told}")
 
-    def resolve(self, name: str) -> int:
-        """The place of a variable given by its name, or else by its number from 0."""
-        owner = name.partition(".")[0]
-        if name not in self.names and owner in self.left_out:
-            raise InputError(f"{self.path}: {owner!r} is {self.left_out[owner]}")
-        return place_of(name, self.names, self.path)
-
-    def numbers(self, places: Sequence[int], missing: Sequence[str] = ()) -> list[Array]:
-        """The columns at these places; NaN, and a value of `missing`, is no reading.
-
-        Raises:
-            InputError: they have different lengths, or hold what is no real number.
-        """
-        columns = [self._real(self.names[place], missing) for place in places]
-        lengths = {self.names[place]: len(column) for place, column in zip(places, columns, strict=True)}
-        if len(set(lengths.values())) > 1:
-            listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
-            raise InputError(f"{self.path}: variables of a log must have one length, got {listed}")
-        return columns
-
-    def glance(self, places: Sequence[int]) -> list[Array]:
-        """The same, whatever their length; NaN where a number is complex."""
-        found = [self._arrays[self.names[place]] for place in places]
-        return [np.full(len(a), np.nan) if np.iscomplexobj(a) else a.astype(float) for a in found]
-
-    def counts(self, place: int) -> NDArray[np.int64] | None:
-        """A column of whole numbers, exact; None if it holds others."""
-        return as_counts(self._arrays[self.names[place]])
-
-    def _real(self, name: str, missing: Sequence[str]) -> Array:
-        values = self._arrays[name]
-        if np.iscomplexobj(values):
-            raise InputError(f"{self.path}: {name!r} is complex; give real numbers")
-        column = values.astype(float)
-        if np.isinf(column).any():
-            row = int(np.flatnonzero(np.isinf(column))[0]) + 1
-            raise InputError(
-                f"{self.path}: {name!r}, row {row} is infinite; mend it, or make it NaN if missing"
-            )
-        column[np.isin(column, finite_words(missing))] = np.nan
-        return column
+def _cells(values: NDArray[Any], missing: Sequence[str]) -> Cells:
+    if np.iscomplexobj(values):
+        return Cells(np.full(len(values), np.nan), ("row 1", str(values[0])))
+    column = values.astype(float)
+    infinite = np.flatnonzero(np.isinf(column))
+    texts = ((row, str(values[row])) for row in infinite)
+    wrong = next(((f"row {row + 1}", text) for row, text in texts if text not in missing), None)
+    column[infinite] = np.nan
+    return Cells(column, wrong)
 
 
 def _export(name: str, kind: str) -> str:

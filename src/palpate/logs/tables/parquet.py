@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import SIGNATURE
-from palpate.logs.limits import Budget, Limits
+from palpate.files.confined import read_confined
+from palpate.files.limits import Budget, Limits
 from palpate.logs.tables.clock import seconds_of_cells
-from palpate.logs.tables.columns import Stated, as_counts, finite_words, place_of
-from palpate.logs.tables.confined import read_confined
 from palpate.logs.tables.lines import NO_READING
+from palpate.logs.tables.sheet import Cells, Sheet, Stated, as_counts
 
 if TYPE_CHECKING:
     import polars
@@ -58,7 +58,7 @@ class Head(msgspec.Struct, frozen=True, array_like=True):
     about: str | None
 
 
-class Parquet:
+def read_parquet(path: Path, budget: Budget) -> Sheet:
     """The columns of a Parquet file; a field of a struct is `struct.field`.
 
     Args:
@@ -68,78 +68,51 @@ class Parquet:
     Raises:
         InputError: it cannot be read.
     """
-
-    def __init__(self, path: Path, budget: Budget) -> None:
-        self.path, self._budget = path, budget
-        self.about = stored_about(path, budget.limits)
-        found, self._numbers = _opened(path, budget.limits)
-        self._rows, self.names = found.rows, found.names
-        self.stated = (
-            {name: Stated(symbol) for name, symbol in self.about.units.items()} if self.about else {}
-        )
-        self.left_out = dict.fromkeys(found.lists, "a list")
-        self.rate: float | None = None
-        self.clocks: set[str] = set()
-        self.notes: list[dict[str, Any]] = []
-
-    def resolve(self, name: str) -> int:
-        """The place of a column given by its name, or else by its number from 0."""
-        if name in self.left_out:
-            raise InputError(
-                f"{self.path}: {name!r} holds {self.left_out[name]} a row; give a column of numbers"
-            )
-        return place_of(name, self.names, self.path)
-
-    def numbers(self, places: Sequence[int], missing: Sequence[str] = ()) -> list[Array]:
-        """The columns at these places; null, NaN and a word of `missing` are no reading.
-
-        Raises:
-            InputError: a cell that is not a finite number; its row and its text are named.
-        """
-        own = self._own(places)
-        columns, wrong = (own, ()) if own and np.isfinite(own).all() else self._read(places, missing)
-        for i, row, text in wrong:
-            raise InputError(
-                f"{self.path}: column {self.names[places[i]]!r}, row {row + 1} holds {text!r}, which is no finite"
-                f" number; mend it, or say --missing {text} if it means that there is no reading"
-            )
-        return _finite(columns, finite_words(missing))
-
-    def glance(self, places: Sequence[int]) -> list[Array]:
-        """The same; NaN too where something else than a number stands."""
-        return _finite(self.raw(places))
-
-    def raw(self, places: Sequence[int]) -> list[Array]:
-        """The same; what is infinite is so."""
-        return self._own(places) or self._read(places, ())[0]
-
-    def counts(self, place: int) -> NDArray[np.int64] | None:
-        """A column of whole numbers, exact; None if it holds others."""
-        found = self._asked([place], exact=True)[0]
-        return as_counts(found["counts"]) if found else None
-
-    def _own(self, places: Sequence[int]) -> list[Array]:
-        """Columns that were read with the head."""
-        return [] if self._numbers is None else [self._numbers[i].copy() for i in places]
-
-    def _read(self, places: Sequence[int], missing: Sequence[str]) -> tuple[list[Array], Any]:
-        """Columns; and of each that has one, the first cell that holds something and yet no finite number."""
-        found, also = self._asked(places, missing)
-        self.clocks |= {self.names[places[i]] for i in also["clocks"]}
-        return list(found["numbers"]), also["wrong"]
-
-    def _asked(
-        self, places: Sequence[int], missing: Sequence[str] = (), *, exact: bool = False
-    ) -> tuple[dict[str, NDArray[Any]], Any]:
-        self._budget.check(_BYTES * self._rows * len(places))
-        question = {"places": list(places), "missing": list(missing), "exact": exact}
-        return read_confined("parquet", self.path, "Parquet", self._budget, question)
+    about = stored_about(path, budget.limits)
+    stated = {name: Stated(symbol) for name, symbol in about.units.items()} if about else {}
+    found = head(path, budget.limits)
+    lists = dict.fromkeys(found.lists, "a column of lists; give a column of numbers")
+    return Sheet(
+        path, found.names, lambda places, missing: (_read(path, budget, places, missing), []),
+        lambda place: _counted(path, budget, place), stated, left_out=lists,
+    )  # fmt: skip
 
 
-def _finite(columns: list[Array], missing: Sequence[float] = ()) -> list[Array]:
-    for column in columns:
-        column[~np.isfinite(column) | np.isin(column, missing)] = np.nan
-    return columns
+def _read(path: Path, budget: Budget, places: Sequence[int], missing: Sequence[str]) -> list[Cells]:
+    own = _opened(path, budget.limits)[1]
+    if own is not None and np.isfinite(own[list(places)]).all():
+        return [Cells(own[i]) for i in places]
+    columns, also = _asked(path, budget, places, missing)
+    wrong = {i: (f"row {row + 1}", text) for i, row, text in also["wrong"]}
+    cells = []
+    for i, column in enumerate(columns["numbers"]):
+        column[~np.isfinite(column)] = np.nan
+        cells.append(Cells(column, wrong.get(i), i in also["clocks"]))
+    return cells
+
+
+def _counted(path: Path, budget: Budget, place: int) -> NDArray[np.int64] | None:
+    found = _asked(path, budget, [place], exact=True)[0]
+    return as_counts(found["counts"]) if found else None
+
+
+def read_columns(path: Path, budget: Budget) -> dict[str, Array]:
+    """All columns of a record of palpate's own, what is infinite included.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    found, own = _opened(path, budget.limits)
+    numbers = own if own is not None else _asked(path, budget, range(len(found.names)))[0]["numbers"]
+    return {name: np.array(column) for name, column in zip(found.names, numbers, strict=True)}
+
+
+def _asked(
+    path: Path, budget: Budget, places: Sequence[int], missing: Sequence[str] = (), *, exact: bool = False
+) -> tuple[dict[str, NDArray[Any]], Any]:
+    budget.check(_BYTES * head(path, budget.limits).rows * len(places))
+    question = {"places": list(places), "missing": list(missing), "exact": exact}
+    return read_confined(__name__, path, "Parquet", budget, question)
 
 
 def stored_about(path: Path, limits: Limits | None = None) -> About | None:
@@ -177,7 +150,7 @@ def _opened(path: Path, limits: Limits | None) -> tuple[Head, Array | None]:
 
 @lru_cache(maxsize=_KEPT)
 def _head(path: Path, state: tuple[int, ...], limits: Limits) -> tuple[Head, Array | None]:
-    arrays, also = read_confined("parquet", path, "Parquet", Budget(path, limits))
+    arrays, also = read_confined(__name__, path, "Parquet", Budget(path, limits))
     return msgspec.convert(also, Head), arrays.get("numbers")
 
 

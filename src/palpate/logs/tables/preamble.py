@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from palpate.logs.tables.columns import Stated
+from palpate.logs.tables.sheet import Stated
 from palpate.units import known_unit
 
 _FACTORS = {"hz": 1.0, "khz": 1e3, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -14,6 +14,8 @@ _NUMBER = r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)"
 _UNIT = r"(?P<{}>k?hz|ms|us|sec|s)\b"
 _RATE = re.compile(r"\b(sampl\w*|scan|acquisition|acq|data|logging)[\s_-]*(rate|freq\w*)\b", re.I)
 _STEP = re.compile(r"\b(sampl\w*|scan|acquisition)[\s_-]*(interval|period|time|step)\b|^delta_x\b", re.I)
+_LOOK = 200
+"""Letters of a line in which it may state the rate."""
 _LAST_HEADER = "***End_of_Header***"
 
 
@@ -40,7 +42,7 @@ def read_preamble(lines: Sequence[str], names: Sequence[str]) -> Preamble:
         lines: above the header.
         names: of the columns.
     """
-    rate = next((found for found in map(_rate, lines) if found), None)
+    rate = next((found for found in (_rate(line[:_LOOK]) for line in lines) if found), None)
     rows = {cells[0].lower(): cells[1:] for cells in (line.split("\t") for line in lines) if len(cells) > 1}
     columns = (
         _labview(rows, names) if _LAST_HEADER.lower() in {line.strip().lower() for line in lines} else {}

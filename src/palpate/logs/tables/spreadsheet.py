@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -11,98 +13,112 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.arrays import Array
-from palpate.errors import InputError
-from palpate.logs.limits import Budget
-from palpate.logs.tables.columns import Stated, place_of
-from palpate.logs.tables.confined import read_confined
-from palpate.logs.tables.text import Text
+from palpate.errors import InputError, unknown
+from palpate.files.confined import read_confined
+from palpate.files.limits import Budget, LimitError, Limits
+from palpate.logs.tables.sheet import Cells, Sheet
+from palpate.logs.tables.text import read_text_sheet
+
+_KEPT = 2
+"""Books whose cells are kept: several questions are asked about one."""
 
 
-class Spreadsheet:
+def read_book(path: Path, budget: Budget) -> Sheet:
     """The sheets of an .xlsx, .xlsm or .ods file; a column is `SHEET.NAME`, or `NAME` where only one sheet has it.
 
     Args:
-        path: the file.
+        path: the file; or `BOOK.xlsx/SHEET`, one of its sheets.
         budget: of the log.
 
     Raises:
         InputError: it cannot be read, no sheet of it holds rows of numbers, or its library is not installed.
     """
+    sheets, left_out = sheets_of(path.parent if path.parent.is_file() else path, budget)
+    if path.parent.is_file():
+        if path.name not in sheets:
+            raise InputError(f"{path.parent}: {unknown('sheet with rows of numbers', path.name, sheets)}")
+        return sheets[path.name]
+    return _joined(path, sheets, left_out)
 
-    def __init__(self, path: Path, budget: Budget) -> None:
-        self.path = path
-        contents, _ = read_confined("spreadsheet", path, "a spreadsheet", budget)
-        sheets: dict[str, Text] = {}
-        self.left_out: dict[str, str] = {}
-        for name, content in contents.items():
-            try:
-                sheets[name] = Text(path, budget, "\t", content.tobytes().decode())
-            except InputError:
-                self.left_out[name] = "a sheet without rows of numbers"
-        if not sheets:
-            raise InputError(
-                f"no sheet of {path} holds rows of numbers; give a log with a row for each sample"
-            )
-        self._places = [
-            (sheet, place, name if len(sheets) == 1 else f"{title}.{name}")
-            for title, sheet in sheets.items()
-            for place, name in enumerate(sheet.names)
-        ]
-        self._titles = {id(sheet): title for title, sheet in sheets.items()}
-        self.names = [name for _, _, name in self._places]
-        self.stated: dict[str, Stated] = {
-            name: sheet.stated[sheet.names[place]]
-            for sheet, place, name in self._places
-            if sheet.names[place] in sheet.stated
-        }
-        rates = {sheet.rate for sheet in sheets.values()}
-        self.rate = rates.pop() if len(rates) == 1 else None
-        self.clocks: set[str] = set()
-        self.notes: list[dict[str, Any]] = []
 
-    def resolve(self, name: str) -> int:
-        """The place of a column given by its name, with its sheet's if several sheets have it; or by its number."""
-        plain = [i for i, (sheet, place, _) in enumerate(self._places) if sheet.names[place] == name]
-        if name not in self.names and len(plain) == 1:
-            return plain[0]
-        return place_of(name, self.names, self.path)
+def _joined(path: Path, sheets: dict[str, Sheet], left_out: dict[str, str]) -> Sheet:
+    """The columns of all sheets as one table; a name that only one sheet has is enough."""
+    owners = [(title, place) for title, sheet in sheets.items() for place in range(len(sheet.names))]
+    plain = [sheets[title].names[place] for title, place in owners]
+    names = [
+        name if len(sheets) == 1 else f"{owner[0]}.{name}" for name, owner in zip(plain, owners, strict=True)
+    ]
 
-    def numbers(self, places: Sequence[int], missing: Sequence[str] = ()) -> list[Array]:
-        """The columns at these places, all of one sheet.
+    def read(places: Sequence[int], missing: Sequence[str]) -> tuple[list[Cells], list[dict[str, Any]]]:
+        cells: dict[int, Cells] = {}
+        notes: list[dict[str, Any]] = []
+        for title in dict.fromkeys(owners[i][0] for i in places):
+            own = [i for i in places if owners[i][0] == title]
+            found, more = sheets[title].read([owners[i][1] for i in own], missing)
+            cells |= dict(zip(own, found, strict=True))
+            notes += more
+        return [cells[i] for i in places], notes
 
-        Raises:
-            InputError: they are of several sheets, or a cell is not a finite number.
-        """
-        titles = {self._titles[id(self._places[i][0])] for i in places}
-        if len(titles) > 1:
-            raise InputError(
-                f"{self.path}: the columns of a log must be on one sheet, got {', '.join(sorted(titles))}"
-            )
-        sheet = self._places[places[0]][0]
-        columns = sheet.numbers([self._places[i][1] for i in places], missing)
-        self.notes = sheet.notes
-        self._share_clocks(sheet)
-        return columns
+    rates = {sheet.rate for sheet in sheets.values()}
+    return Sheet(
+        path,
+        names,
+        read,
+        lambda place: sheets[owners[place][0]].counts(owners[place][1]),
+        {name: sheets[o].stated[own] for name, own, (o, _) in zip(names, plain, owners, strict=True)
+         if own in sheets[o].stated},
+        rates.pop() if len(rates) == 1 else None,
+        left_out,
+        shorter={name: i for i, name in enumerate(plain) if plain.count(name) == 1},
+        tables=tuple(title for title, _ in owners),
+    )  # fmt: skip
 
-    def _share_clocks(self, sheet: Text) -> None:
-        self.clocks |= {
-            name for own, place, name in self._places if own is sheet and own.names[place] in own.clocks
-        }
 
-    def glance(self, places: Sequence[int]) -> list[Array]:
-        """The same, of any sheets; NaN too where something else than a number or a date stands."""
-        columns: dict[int, Array] = {}
-        for sheet in dict.fromkeys(self._places[i][0] for i in places):
-            own = [i for i in places if self._places[i][0] is sheet]
-            columns |= dict(zip(own, sheet.glance([self._places[i][1] for i in own]), strict=True))
-            self._share_clocks(sheet)
-        return [columns[i] for i in places]
+def sheets_of(path: Path, budget: Budget) -> tuple[dict[str, Sheet], dict[str, str]]:
+    """The sheets of a book that hold rows of numbers, by title; and the others, with the reason.
 
-    def counts(self, place: int) -> NDArray[np.int64] | None:
-        """A column of whole numbers, exact; None if it holds others."""
-        sheet, own, _ = self._places[place]
-        return sheet.counts(own)
+    Raises:
+        InputError: it cannot be read, or no sheet of it holds rows of numbers.
+    """
+    state = path.stat()
+    contents = _contents(path, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns), budget.limits)
+    sheets: dict[str, Sheet] = {}
+    left_out: dict[str, str] = {}
+    for title, content in contents.items():
+        try:
+            sheets[title] = read_text_sheet(path, budget, "\t", content)
+        except LimitError:
+            raise
+        except InputError:
+            left_out[title] = "a sheet without rows of numbers"
+    if not sheets:
+        raise InputError(f"no sheet of {path} holds rows of numbers; give a log with a row for each sample")
+    return sheets, left_out
+
+
+def equal_sheets(path: Path, limits: Limits, names: Sequence[str] = ()) -> list[Path]:
+    """The sheets with the columns that most sheets of a book have, as `BOOK.xlsx/SHEET`: repeats of one test.
+
+    Args:
+        path: of the book.
+        limits: of it.
+        names: columns that they have; none of the book's where one is missing.
+
+    Returns:
+        Paths that are read as logs; none if fewer than two sheets are equal.
+    """
+    sheets, _ = sheets_of(path, Budget(path, limits))
+    usual, count = Counter(tuple(sheet.names) for sheet in sheets.values()).most_common(1)[0]
+    if count < 2 or not set(names) <= set(usual):
+        return []
+    return [path / title for title, sheet in sheets.items() if tuple(sheet.names) == usual]
+
+
+@lru_cache(maxsize=_KEPT)
+def _contents(path: Path, state: tuple[int, ...], limits: Limits) -> dict[str, str]:
+    """The sheets' text by title; `state` tells a changed file from the one that is kept."""
+    arrays, _ = read_confined(__name__, path, "a spreadsheet", Budget(path, limits))
+    return {title: content.tobytes().decode() for title, content in arrays.items()}
 
 
 def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, NDArray[Any]], None]:

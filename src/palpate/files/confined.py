@@ -1,7 +1,8 @@
 """Readers for formats with crash-prone libraries, in a separate process with limits.
 
-SciPy leaves the process by a segmentation fault at some MATLAB files, polars aborts it at some of Parquet, and a small
-file may unpack to any size. What the process answers is arrays and words, never objects.
+SciPy leaves the process by a segmentation fault at some MATLAB files, polars aborts it at some of Parquet, a small
+file may unpack to any size, and MuJoCo may compile a short model for days. What the process answers is arrays and
+words, never objects.
 """
 
 from __future__ import annotations
@@ -19,14 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.logs.limits import GB, Budget
+from palpate.files.limits import COPIES, OWN, Budget
 
-_OWN = 2 * GB
-"""Address space of the interpreter and its libraries themselves [bytes]."""
 _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
 """Threads that libraries would start, one for each core, take address space of their own."""
-_COPIES = 3
-"""Memory per unpacked byte: the data exist packed, unpacked and as the answer."""
 _MOST = 2**60
 _TOO_LARGE = 3
 """The exit code of the process where the file unpacks to more than it may."""
@@ -38,8 +35,7 @@ def read_confined(
     """Read a file in a process of its own.
 
     Args:
-        reader: `matlab`, `spreadsheet` or `parquet`: a module of this folder with a function
-            `unpack(path, size, question)`.
+        reader: a module of palpate with a function `unpack(path, size, question)`.
         path: of the file.
         what: to call its kind.
         budget: of the log.
@@ -94,7 +90,7 @@ def _confine(size: int) -> None:
     except ImportError:  # not on Windows
         return
     _, allowed = resource.getrlimit(resource.RLIMIT_AS)
-    most = _OWN + _COPIES * size
+    most = OWN + COPIES * size
     most = most if allowed == resource.RLIM_INFINITY else min(most, allowed)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -105,7 +101,7 @@ def main(reader: str, path: str, size: str) -> int:
     from importlib import import_module
 
     _confine(int(size))
-    unpack = import_module(f"palpate.logs.tables.{reader}").unpack
+    unpack = import_module(reader).unpack
     try:
         answer = _answer(*unpack(Path(path), int(size), json.load(sys.stdin)))
         sys.stdout.buffer.write(answer)

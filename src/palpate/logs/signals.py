@@ -1,0 +1,234 @@
+"""Signals of a log, by the names of its columns or topics; what has no name is concluded where nothing is guessed."""
+
+# No annotations from the future: the command line looks for those of a base class where it inherits them.
+import shlex
+from dataclasses import dataclass, replace
+from functools import wraps
+from pathlib import Path
+from typing import Any, Literal
+
+from palpate.errors import InputError
+from palpate.files.limits import Limits
+from palpate.logs import read
+from palpate.logs.arm_logs import read_wrench_and_pose
+from palpate.logs.kinds import Kind, kind_of
+from palpate.logs.listing import list_log
+from palpate.logs.own_runs import is_run, read_run
+from palpate.logs.presets import preset
+from palpate.logs.proposal import Proposal
+from palpate.logs.roles import POSE, WRENCH
+from palpate.logs.tables import open_table
+from palpate.logs.tables.parquet import stored_about
+from palpate.records import Record
+from palpate.units import split_spec
+
+Rotation = Literal["quaternion", "quaternion-wxyz", "rotation-vector", "rpy", "matrix", "matrix-by-columns"]
+GB = 2.0
+"""Largest unpacked size of a log [GB]; the default of `palpate.files.limits`."""
+_SHOWN = 40
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signals:
+    """Columns or topics of a log, and which rows of it."""
+
+    time: str | None = None
+    "Column of the time, in s if no unit is given; dates and times (ISO 8601) too. A bag has its own."
+    rate: float | None = None
+    "Rows per second, for a log without a column of time."
+    position: str | None = None
+    "Column of the position, in m if no unit is given; the unit 1 does not convert. TOPIC.FIELD of a bag."
+    force: str | None = None
+    "Column of the force, in N if no unit is given; g is the reading of a scale. TOPIC.FIELD of a bag."
+    wrench: str | None = None
+    "Topic of the wrench in a bag, if it is not the only one; or columns fx,fy,fz or fx,fy,fz,tx,ty,tz."
+    pose: str | None = None
+    "Topic of the pose in a bag, if it is not the only one; or columns x,y,z or x,y,z,qx,qy,qz,qw."
+    rotation: Rotation = "quaternion"
+    """Representation of the orientation in the pose's columns: quaternion (qx,qy,qz,qw), quaternion-wxyz,
+    rotation-vector (rx,ry,rz as UR does), rpy (roll,pitch,yaw about fixed axes), matrix (by rows) or
+    matrix-by-columns."""
+    start: float | None = None
+    "Leave out the rows before, in seconds from the first row."
+    end: float | None = None
+    "Leave out the rows after, in seconds from the first row."
+    missing: tuple[str, ...] = ()
+    'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
+    delimiter: str | None = None
+    "Between two cells of a text log; detected if not given."
+    max_size: float = GB
+    "Largest unpacked size, in GB; a larger log is refused."
+    max_seconds: float = 600.0
+    "Longest time to read the log; a log that takes longer is refused."
+
+    @property
+    def plain(self) -> bool:
+        """Whether no signal is named."""
+        named = (self.time, self.rate, self.position, self.force, self.wrench, self.pose)
+        return all(name is None for name in named)
+
+    @property
+    def names(self) -> list[str]:
+        """The named columns, without their units."""
+        specs = [self.time, self.position, self.force]
+        specs += [spec for each in (self.wrench, self.pose) if each for spec in each.split(",")]
+        return [split_spec(spec)[0] for spec in specs if spec]
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of size and time."""
+        return Limits(self.max_size * 1e9, self.max_seconds)
+
+    def complete(self, path: Path, *, known_frame: bool = False) -> tuple["Signals", dict[str, Any]]:
+        """The signals with the names that a log's own names, units and values leave no doubt of.
+
+        Args:
+            path: of the log.
+            known_frame: the axes of the wrench are given.
+
+        Returns:
+            These signals; and the other options that follow from the names, as `wrench_frame` of a preset.
+
+        Raises:
+            InputError: the log cannot be read, or something would have to be guessed.
+        """
+        bag = kind_of(path).is_bag
+        if not self.plain or is_run(path) or (not bag and _is_record(self._names(path))):
+            return self, {}
+        proposal = list_log(path, self.delimiter, self.limits).proposal
+        guesses = [guess for guess in proposal.guesses if not (known_frame and "--wrench-frame" in guess)]
+        if bag and (proposal.options is None or guesses):
+            return self, {}  # a bag's only wrench and pose need no names
+        if proposal.options is None or guesses:
+            raise InputError(_undecided(path, proposal))
+        options: dict[str, Any] = dict(proposal.options)
+        if "preset" in options:
+            options = _underscored(preset(options.pop("preset"))) | options
+        own = {name: value for name, value in options.items() if name in Signals.__dataclass_fields__}
+        others = {name: value for name, value in options.items() if name not in own}
+        return replace(self, **own), others | {"read_as": shlex.join(proposal.words or ())}
+
+    def read(self, path: Path, *, samples: bool = False) -> Record:
+        """The record of a log: of force and position, or of wrench and pose.
+
+        Args:
+            path: of the log.
+            samples: keep the force's readings at their own times, for a fit of the sensor's own samples.
+
+        Raises:
+            InputError: the file or an option is wrong.
+        """
+        cut: dict[str, Any] = {
+            "start": self.start, "end": self.end, "missing": self.missing, "limits": self.limits,
+        }  # fmt: skip
+        if self.plain and is_run(path):
+            return read_run(path, **cut)
+        if kind_of(path).is_bag:
+            return self._of_bag(path, cut, samples)
+        return self._of_table(path, cut | {"delimiter": self.delimiter, "rate": self.rate})
+
+    def _names(self, path: Path) -> list[str]:
+        return list(open_table(path, kind_of(path), self.delimiter, self.limits).names)
+
+    def _of_bag(self, path: Path, cut: dict[str, Any], samples: bool) -> Record:
+        one = self._one_axis()
+        if self.time or self.rate:
+            raise InputError(f"the messages of {path} have their own times; leave out --time and --rate")
+        if one is None:
+            held = "force_x" if samples else None
+            return read_wrench_and_pose(path, self.wrench, self.pose, self.rotation, held=held, **cut)
+        return read.read_log(path, held="force" if samples else None, **cut, **one)
+
+    def _of_table(self, path: Path, cut: dict[str, Any]) -> Record:
+        table = open_table(path, kind_of(path), self.delimiter, cut["limits"])
+        there = list(table.names)
+        time = self.time or ("time" if "time" in there and self.rate is None else None)
+        columns: dict[str, Any] = {} if time is None else {"time": time}
+        saved = self.position is None and self.force is None and {*WRENCH[:3], *POSE[:3]} <= set(there)
+        if self.wrench or self.pose or saved:
+            self._one_axis()
+            own = [
+                ",".join(name for name in names if name in there) if saved else None
+                for names in (WRENCH, POSE)
+            ]
+            rotation = "quaternion" if saved and self.pose is None else self.rotation
+            return read_wrench_and_pose(
+                path, self.wrench or own[0], self.pose or own[1], rotation, **cut, **columns
+            )
+        names: dict[str, Any] = {
+            role: getattr(self, role) or (role if role in there else None) for role in ("position", "force")
+        }
+        timed = bool(columns) or self.rate is not None or table.rate is not None
+        lacking = [] if timed else ["time"]
+        lacking += [role for role, name in names.items() if name is None]
+        if lacking:
+            named = {"force": "--force-column"}  # --force of palpate tune is a desired force
+            flags = ", ".join(named.get(role, f"--{role}") for role in lacking)
+            flags += " (or --rate)" if "time" in lacking else ""
+            listed = f"{', '.join(there[:_SHOWN])}{', ...' if len(there) > _SHOWN else ''}"
+            raise InputError(
+                f"name the columns of {path} with {flags}; there are: {listed} (palpate topics {path} proposes a "
+                "command)"
+            )
+        return read.read_log(path, **cut, **columns, **names)
+
+    def _one_axis(self) -> dict[str, Any] | None:
+        """Force and position of one axis, if these were named.
+
+        Raises:
+            InputError: they are mixed with wrench and pose, or one of them is missing.
+        """
+        one = {"position": self.position, "force": self.force}
+        named = {role: name for role, name in one.items() if name is not None}
+        if named and (self.wrench or self.pose):
+            raise InputError(
+                "give --force and --position of one axis, or --wrench and --pose in three, not of both"
+            )
+        if len(named) == 1:
+            other = "force" if "position" in named else "position"
+            raise InputError(f"--{next(iter(named))} needs its --{other}, as TOPIC.FIELD")
+        return named or None
+
+
+@wraps(read.read_log)
+def read_log(path: str | Path | Any, **options: Any) -> Record:
+    """Read a log as `palpate.logs.read.read_log` does, or as what its own names say where no column is named."""
+    if not isinstance(path, str | Path):
+        return read.read_log(path, **options)
+    path = Path(path)
+    own: dict[str, Any] = {
+        name: options[name] for name in ("rate", "start", "end", "missing", "delimiter") if name in options
+    }
+    named = set(options) - {*own, "held", "limits"}
+    if named or (kind_of(path) is Kind.PARQUET and stored_about(path) is not None):
+        return read.read_log(path, **options)
+    if "limits" in options:
+        own |= {"max_size": options["limits"].size / 1e9, "max_seconds": options["limits"].seconds}
+    signals, others = Signals(**own).complete(path)
+    return read_as(signals.read(path), others.get("read_as", ""))
+
+
+def read_as(record: Record, words: str) -> Record:
+    """A record that says as which signals it was read; as it is without words."""
+    if not words:
+        return record
+    facts = [f"read as {words}", *record.meta.get("facts", ())]
+    return Record(record.columns, record.units, {**record.meta, "facts": facts})
+
+
+def _is_record(names: list[str]) -> bool:
+    """Whether the columns are named as a record's own."""
+    there = set(names)
+    return {"force", "position"} <= there or {*WRENCH[:3], *POSE[:3]} <= there
+
+
+def _underscored(options: dict[str, Any]) -> dict[str, Any]:
+    return {name.replace("-", "_"): value for name, value in options.items()}
+
+
+def _undecided(path: Path, proposal: Proposal) -> str:
+    """The guesses of a log whose signals nobody named, and the command that would be tried."""
+    guesses = "; ".join(proposal.guesses)
+    if proposal.options is None:
+        return f"{path}: {guesses}; name them with --time, --position and --force (palpate topics {path} lists them)"
+    return f"{path}: {guesses}. If that is right: {proposal.command(path)}"

@@ -1,0 +1,182 @@
+"""A file of columns: one value that the function of each format fills."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.arrays import Array
+from palpate.errors import InputError, unknown
+from palpate.text import shortened
+
+LONGEST = 200
+"""Letters of a name; what is longer is text, and is shown by its beginning and its end."""
+
+_QUOTED = 60
+"""Letters of a cell that an error quotes."""
+
+
+@dataclass(frozen=True)
+class Stated:
+    """Statements of the file about one of its columns.
+
+    Args:
+        unit: its symbol; None if the file gives none that palpate knows.
+        where: the words for it: "the row of units"; empty where it goes without saying.
+        scale, offset: a value in that unit is (number + offset) x scale.
+    """
+
+    unit: str | None
+    where: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Cells:
+    """One column as it was read.
+
+    Args:
+        numbers: shape (n,); NaN where there is no reading, and where a cell holds no finite number.
+        wrong: the first such cell that holds something: its place, as "row 3", and its text; None if there is none.
+        clock: it holds dates and times, which are seconds here.
+    """
+
+    numbers: Array
+    wrong: tuple[str, str] | None = None
+    clock: bool = False
+
+
+def _no_counts(_: int) -> None:
+    return None
+
+
+def _no_doubt(_: str) -> str:
+    return ""
+
+
+@dataclass
+class Sheet:
+    """Columns of a file by name, read where they are asked for.
+
+    Args:
+        path: of the file.
+        names: of the columns, in the file's order.
+        read: the columns at some places, given the words that mean "no reading"; with what was left out, as in a
+            record's meta.
+        counts: a column of whole numbers, as exact as the file has them; None if it holds others.
+        stated: statements of the file about its columns, by name.
+        rate: rows per second, where the file states it [1/s].
+        left_out: variables that are no columns, by name, with their kinds.
+        doubts: likely reason for a missing column, by its name.
+        shorter: places of columns by further names.
+        tables: title of each column's table, where the file has several: the columns of a log are of one.
+        clocks: columns read so far that hold dates and times.
+        notes: findings while reading, as in a record's meta.
+    """
+
+    path: Path
+    names: list[str]
+    read: Callable[[Sequence[int], Sequence[str]], tuple[list[Cells], list[dict[str, Any]]]]
+    counts: Callable[[int], NDArray[np.int64] | None] = _no_counts
+    stated: dict[str, Stated] = field(default_factory=dict)
+    rate: float | None = None
+    left_out: dict[str, str] = field(default_factory=dict)
+    doubts: Callable[[str], str] = _no_doubt
+    shorter: dict[str, int] = field(default_factory=dict)
+    tables: tuple[str, ...] = ()
+    clocks: set[str] = field(default_factory=set)
+    notes: list[dict[str, Any]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.names = [shortened(name, LONGEST) for name in self.names]
+        self.stated = {shortened(name, LONGEST): own for name, own in self.stated.items()}
+
+    def resolve(self, name: str) -> int:
+        """The place of a column given by its name, or else by its number from 0.
+
+        Raises:
+            InputError: there is no such column (those there are, are listed), or there are two.
+        """
+        owner = next((own for own in (name, name.partition(".")[0]) if own in self.left_out), None)
+        if name not in self.names and owner is not None:
+            raise InputError(f"{self.path}: {owner!r} is {self.left_out[owner]}")
+        places = [i for i, own in enumerate(self.names) if own == name]
+        if len(places) > 1:
+            numbers = ", ".join(map(str, places))
+            raise InputError(
+                f"{self.path} has {len(places)} columns named {name!r}; name one by number: {numbers}"
+            )
+        if places or name in self.shorter:
+            return places[0] if places else self.shorter[name]
+        if not (name.isascii() and name.isdigit()):
+            raise InputError(f"{self.path}: {unknown('column', name, self.names)}{self.doubts(name)}")
+        if len(name) > len(str(len(self.names))) or int(name) >= len(self.names):
+            raise InputError(f"{self.path} has no column {name}; its columns are 0 to {len(self.names) - 1}")
+        return int(name)
+
+    def numbers(self, places: Sequence[int], missing: Sequence[str] = ()) -> list[Array]:
+        """The columns at these places as the file has them, of one length; NaN where there is no reading.
+
+        Args:
+            places: of the columns.
+            missing: words that mean "no reading"; so do empty cells.
+
+        Raises:
+            InputError: a cell that is not a finite number; its row and its text are named.
+        """
+        titles = {self.tables[place] for place in places} if self.tables else set()
+        if len(titles) > 1:
+            listed = ", ".join(sorted(titles))
+            raise InputError(f"{self.path}: the columns of a log must be on one sheet, got {listed}")
+        cells, self.notes = self.read(places, missing)
+        columns = {self.names[place]: own for place, own in zip(places, cells, strict=True)}
+        for name, own in columns.items():
+            if own.wrong:
+                where, text = own.wrong[0], shortened(own.wrong[1], _QUOTED)
+                raise InputError(
+                    f"{self.path}: column {name!r}, {where} holds {text!r}, which is no finite number; mend it,"
+                    f" or say --missing {shlex.quote(text)} if it means that there is no reading"
+                )
+        lengths = {name: len(own.numbers) for name, own in columns.items()}
+        if len(set(lengths.values())) > 1:
+            listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
+            raise InputError(f"{self.path}: the columns of a log must have one length, got {listed}")
+        self._note_clocks(places, cells)
+        none = [float(word) for word in missing if is_finite(word)]
+        found = [own.numbers.copy() for own in cells]
+        for column in found if none else []:
+            column[np.isin(column, none)] = np.nan
+        return found
+
+    def glance(self, places: Sequence[int]) -> list[Array]:
+        """The same, whatever their length; NaN too where something else than a number or a date stands."""
+        cells, self.notes = self.read(places, ())
+        self._note_clocks(places, cells)
+        return [own.numbers for own in cells]
+
+    def _note_clocks(self, places: Sequence[int], cells: Sequence[Cells]) -> None:
+        self.clocks |= {self.names[place] for place, own in zip(places, cells, strict=True) if own.clock}
+
+
+def is_finite(word: str) -> bool:
+    """Whether a word is a finite number."""
+    try:
+        return bool(np.isfinite(float(word)))
+    except ValueError:
+        return False
+
+
+def as_counts(column: NDArray[Any]) -> NDArray[np.int64] | None:
+    """An array of integers as signed ones; None if it holds others, or too large ones."""
+    if column.dtype.kind not in "iu" or (
+        column.dtype.kind == "u" and (column > np.iinfo(np.int64).max).any()
+    ):
+        return None
+    return column.astype(np.int64)
