@@ -43,7 +43,7 @@ for old, new in changes.items():
     text = text.replace(old, new)
 path = Path(sys.argv[2]) / "ten.toml"
 path.write_text(text)
-code = main(["run", str(path), "--force", "--out", str(Path(sys.argv[2]) / "run"), "--json"])
+code = main(["run", str(path), "--replace", "--out", str(Path(sys.argv[2]) / "run"), "--json"])
 print(file=sys.stderr)
 print(time.perf_counter() - wall, time.process_time() - cpu, file=sys.stderr)
 """

@@ -12,7 +12,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from palpate.contact_frame import ContactFrame, described, identify_contact
+from palpate.contact_frame import ContactFrame, describe, identify_contact
 from palpate.logs import read_wrench_and_pose
 
 STIFFNESS, DAMPING = 3000.0, 30.0  # of the foam [N/m], [N s/m]
@@ -76,4 +76,4 @@ for name, parameter in found.parameters.items():
         print(
             f"{name} = {parameter.value:.4g} {parameter.unit} ({low:.4g} to {high:.4g}): {parameter.verdict}"
         )
-print("\n".join(described(along.meta)))
+print("\n".join(describe(along.meta)))

@@ -1,12 +1,13 @@
 """Your own controller and metric in a study: which law is better, on the same random surfaces?
 
-`student.py` is in the same folder. A study's TOML file uses the same names, and `palpate study mine.toml` finds the
-module beside that file.
+`student.py` is in the same folder. A study's TOML file uses the same names, and `palpate study mine.toml --plugins`
+finds the module beside that file. A study is data: code that it names runs only if you permit it.
 """
 
 from student import Damped
 
 from palpate.checks import controller_checks, outcomes
+from palpate.plugins import permit
 from palpate.studies import run
 from palpate.studies.definition.plan import plan
 from palpate.studies.definition.study import parse
@@ -32,6 +33,8 @@ approach = { hold = 0.3, first = 0.467 }
 damped = { controller = { kind = "student:Damped", ki = 5.0 } }
 PI = { controller = { kind = "proportional-integral", ki = 5.0 } }
 """
+
+permit("student:Damped", "student:jerk")
 
 for check in outcomes(controller_checks(Damped())):
     print(f"{check.sentence:36} {check.failed or 'holds'}")

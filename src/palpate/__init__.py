@@ -3,12 +3,13 @@
 The first three lines:
 
     import palpate
-    log = palpate.read_log("press.csv", time="time_s", position="position_mm:mm", force="force_N:N")
-    print(palpate.identify(log))
+    found = palpate.identify("press.csv", time="time_s", position="position_mm:mm", force="force_N:N")
+    print(found.K)
 
-A result is printed, shown by a notebook, drawn (`.plot()`), written as a page (`.report("press.html")`) and
-compared (`==`). A fault in a file or a number is an `InputError`, in one line. Numbers are in SI units; a column's own
-unit follows its name, as `position_mm:mm`.
+A log is a file, a DataFrame, an Arrow table, or a `Record` by `palpate.read_log`; `palpate.pool` takes many. A result
+is printed, shown by a notebook, drawn (`.plot()`), written as a page (`.report("press.html")`) and compared (`==`). A
+fault in a file or a number is an `InputError`, in one line. Numbers are in SI units; a column's own unit follows its
+name, as `position_mm:mm`.
 
 The rooms, each `palpate.ROOM`:
 
@@ -30,7 +31,6 @@ The rooms, each `palpate.ROOM`:
     analysis        a loop as a linear model: margins, boundaries of stability
     studies         many runs: grids, random points, a search
     report          figures, tables, pages
-    thesis          every figure and claim of the thesis, measured again
 
 Names and rooms are imported when they are first used, so that `import palpate` costs next to nothing. The same from
 a shell: `palpate --help`.
@@ -42,9 +42,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from palpate.calls import identify, identify_log, pool, read_log
     from palpate.errors import InputError, PalpateError
-    from palpate.identification import Identification, identify
-    from palpate.logs import read_log
+    from palpate.identification import Identification
     from palpate.records import Record
 
 _HOME = {
@@ -52,8 +52,10 @@ _HOME = {
     "InputError": "palpate.errors",
     "PalpateError": "palpate.errors",
     "Record": "palpate.records",
-    "identify": "palpate.identification",
-    "read_log": "palpate.logs",
+    "identify": "palpate.calls",
+    "identify_log": "palpate.calls",
+    "pool": "palpate.calls",
+    "read_log": "palpate.calls",
 }
 
 _ROOMS = (
@@ -74,11 +76,19 @@ _ROOMS = (
     "report",
     "robots",
     "studies",
-    "thesis",
     "wires",
 )
 
-__all__ = ["Identification", "InputError", "PalpateError", "Record", "identify", "read_log"]
+__all__ = [
+    "Identification",
+    "InputError",
+    "PalpateError",
+    "Record",
+    "identify",
+    "identify_log",
+    "pool",
+    "read_log",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -5,9 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+from palpate.text import shortened
+
+LONGEST = 400
+"""Letters of an error: it may quote a stranger's file, of which nobody reads more."""
+
 
 class PalpateError(Exception):
-    """Base of every error that palpate raises on purpose."""
+    """Base of every error that palpate raises on purpose.
+
+    Args:
+        text: the fault, the place, and the remedy; its middle is left out beyond `LONGEST` letters.
+    """
+
+    def __init__(self, text: object = ""):
+        super().__init__(shortened(str(text), LONGEST))
 
 
 class InputError(PalpateError, ValueError):

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.results import Result
+
+if TYPE_CHECKING:
+    from polars import DataFrame
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,6 +40,30 @@ class Record(Result, shown_by="palpate.report.record"):
         missing = sorted(set(self.columns) - set(self.units))
         if missing:
             raise InputError(f"columns without a unit: {', '.join(missing)}")
+
+    def to_polars(self) -> DataFrame:
+        """The columns as a polars `DataFrame`; units and metadata stay here."""
+        import polars
+
+        return polars.DataFrame({name: np.asarray(column, float) for name, column in self.columns.items()})
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas `DataFrame`; its `attrs` have the units.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError:
+            raise InputError("to_pandas needs pandas; install it, or use to_polars()") from None
+        frame = pd.DataFrame({name: np.asarray(column, float) for name, column in self.columns.items()})
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        """The columns as a stream of Arrow's C interface, which data frames of all kinds read."""
+        return self.to_polars().__arrow_c_stream__(requested_schema)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.text import in_python
+
 
 def same(one: object, other: object) -> bool:
     """Whether two values are equal, arrays by their elements, and no number equal to no number."""
@@ -36,7 +38,23 @@ def _same_arrays(one: object, other: object) -> bool:
     return np.array_equal(one, other, equal_nan=one.dtype.kind in "fc" and other.dtype.kind in "fc")
 
 
-class Compared:
+class Readable:
+    """A value with a `repr` of one line and a view for notebooks; `palpate.report.values` has the facts of each."""
+
+    def __init_subclass__(cls, **others: Any) -> None:
+        super().__init_subclass__(**others)
+        for name in ("__repr__", "_repr_html_"):  # a dataclass writes a repr where its own class has none
+            setattr(cls, name, getattr(cls, name))
+
+    def __repr__(self) -> str:
+        return str(import_module("palpate.report.values").line(self))
+
+    def _repr_html_(self) -> str:
+        """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
+        return str(import_module("palpate.report.values").html(self))
+
+
+class Compared(Readable):
     """A frozen dataclass whose fields may hold arrays: `==` compares these by their elements."""
 
     def __eq__(self, other: object) -> bool:
@@ -62,14 +80,14 @@ class Result(Compared):
         return import_module(self._shown_by)
 
     def __str__(self) -> str:
-        return str(self._looks().text(self))
+        return in_python(str(self._looks().text(self)))
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self._looks().line(self)}>"
+        return in_python(f"<{type(self).__name__}: {self._looks().line(self)}>")
 
     def _repr_html_(self) -> str:
         """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
-        return str(self._looks().html(self))
+        return in_python(str(self._looks().html(self)))
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw it.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import unicodedata
 
 _UNSAFE = {
@@ -11,7 +13,46 @@ _UNSAFE = {
     "Zl",
     "Zp",
 }  # controls, formats (they turn the direction of a line), halves of letters
+_GAP = " ... "
 _KEPT = "\n\t\u200c\u200d"  # the last two join letters of several scripts
+
+
+_KEYWORDS = {
+    name: name.replace("-", "_")
+    for name in (
+        *(
+            "lag",
+            "lag-std",
+            "force-filter",
+            "series-stiffness",
+            "mass",
+            "model",
+            "method",
+            "calibration",
+            "tolerance",
+        ),
+        *("bonded", "cutoff", "rate", "start", "end", "missing", "delimiter", "time", "position", "force"),
+        *("fixed-lag", "normal", "wrench-frame", "force-sign"),
+    )
+} | {"robot-stiffness": "series_stiffness", "force-column": "force"}
+_OPTION = re.compile(
+    rf"(?<![\w-])--({'|'.join(sorted(_KEYWORDS, key=len, reverse=True))})(?![\w-])( [A-Z]+\b)?"
+)
+
+
+_COMMAND = re.compile(r"palpate identify ((?:'[^']*'|[^\s'-]\S*)(?: --[\w-]+ (?:'[^']*'|\S+))+)$")
+
+
+def _call(words: list[str]) -> str:
+    given = zip(words[1::2], words[2::2], strict=True)
+    options = [f"{name.removeprefix('--').replace('-', '_')}={value!r}" for name, value in given]
+    return f"palpate.identify_log({', '.join([repr(words[0]), *options])})"
+
+
+def in_python(text: str) -> str:
+    """Advice for the command line in Python's words: `--force-filter` is `force_filter=`, a whole command a call."""
+    text = _COMMAND.sub(lambda found: _call(shlex.split(found[1])), text)
+    return _OPTION.sub(lambda found: f"{_KEYWORDS[found[1]]}=", text)
 
 
 def printable(text: str) -> str:
@@ -22,6 +63,14 @@ def printable(text: str) -> str:
     if text.isascii() and text.isprintable():
         return text
     return "".join(_visible(letter) for letter in text)
+
+
+def shortened(text: str, most: int) -> str:
+    """The text with its middle left out where it has more letters: its beginning says the fault, its end the remedy."""
+    if len(text) <= most:
+        return text
+    kept = most - len(_GAP)
+    return text[: kept - kept // 3] + _GAP + text[-(kept // 3) :]
 
 
 def _visible(letter: str) -> str:

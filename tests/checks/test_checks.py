@@ -12,6 +12,8 @@ from palpate.checks.of_plugin import checks_of
 from palpate.cli import main
 from palpate.errors import InputError
 
+pytestmark = pytest.mark.usefixtures("permitted")
+
 
 def failing(checks):
     return {one.sentence for one in outcomes(checks) if one.failed}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from pathlib import Path
@@ -231,3 +232,29 @@ def test_a_wrench_of_a_log_of_one_axis(tmp_path, capsys):
     )
     assert main(["identify", "log.csv", "--no-figure"]) == 0
     capsys.readouterr()
+
+
+def test_a_name_that_begins_with_a_bracket_is_a_name(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    t = np.arange(200) / 100
+    rows = "".join(f"{a},{1e-3 * np.sin(9 * a)},{2 + np.sin(9 * a)}\n" for a in t)
+    Path("plain.csv").write_text("t,x,f\nthis is another file\n")
+    for name in ('["plain.csv"]', "[1]press.csv", "{1}.csv"):
+        Path(name).write_text("t,x,f\n" + rows)
+        assert main(["identify", name, "--time", "t", "--position", "x", "--force", "f", "--json"]) in {0, 1}
+        assert f'"file": {json.dumps(name)}' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["topics", "identify"])
+def test_a_name_that_is_not_utf_8_in_every_output(tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    t = np.arange(200) / 100
+    log = Path(os.fsdecode(b"pr\xe9sse.csv"))
+    log.write_text("t,x,f\n" + "".join(f"{a},{1e-3 * np.sin(9 * a)},{2 + np.sin(9 * a)}\n" for a in t))
+    columns = ["--time", "t", "--position", "x", "--force", "f"] if command == "identify" else []
+    assert main([command, str(log), *columns, "--json"]) in {0, 1}
+    printed = json.loads(capsys.readouterr().out)
+    assert "sse.csv" in printed["files"][0]["file"]
+    if columns:
+        assert main([command, str(log), *columns, "--report", "r.html", "--no-figure"]) in {0, 1}
+        assert "sse.csv" in Path("r.html").read_text()

@@ -23,6 +23,10 @@ CASES = [
     (["identify", "--wrench-f"], {"--wrench-frame"}),
     (["export", "found.json", "--to", "mu"], {"mujoco"}),
     (["export", "found.json", "--to", "m"], {"mujoco", "mjcf-spring"}),
+    (["run", "foam-decoupled-"], {"foam-decoupled-printed"}),
+    (["press", "--arm", "u"], {"ur5e"}),
+    (["identify", "--preset", "ur"], {"ur-rtde"}),
+    (["identify", "--model", "h"], {"hunt-crossley"}),
 ]
 
 

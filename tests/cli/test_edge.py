@@ -69,6 +69,12 @@ def test_a_defect_keeps_its_traceback_and_is_not_mistaken_for_an_answer(capsys):
     assert "ZeroDivisionError: in a law" in error
 
 
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["-h"], ["identify", "--help"]])
+def test_help_and_version_ask_no_file_of_options(words, capsys):
+    assert main([*words, "--options=there-is-none.toml"]) == 0
+    assert capsys.readouterr().err == ""
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

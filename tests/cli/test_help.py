@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from palpate.cli import main
 from palpate.cli._help import example, page, wrapped
 from palpate.cli._program import COMMANDS, program
+from palpate.cli.options.names import MODELS
+from palpate.identification.models import NAMES
 
 WIDTH = 80
 PANEL = re.compile(r"^╭─ (.+?) ─*╮$")
@@ -113,9 +115,7 @@ def test_an_example_is_continued_as_a_shell_continues_it():
 @pytest.mark.parametrize(
     "words",
     [
-        ("run", "foam-hybrid", "--forc"),
         ("run", "foam-hybrid", "--replac"),
-        ("thesis", "--forc"),
         ("study", "learning-rate", "--yess"),
         ("export", "found.json", "--to", "newton", "--replce"),
     ],
@@ -151,6 +151,29 @@ def test_completion_imports_nothing_heavy():
     assert not loaded & {"numba", "scipy", "matplotlib", "polars", "mujoco"}
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_short_help_is_usage_examples_and_eight_options(capsys, command):
+    assert main([command, "-h"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(f"Usage: palpate {command}")
+    assert lines[-1] == f"all options: palpate {command} --help"
+    assert 1 <= sum(line.startswith("    palpate ") for line in lines) <= 2
+    options = [line for line in lines if line.startswith("  --")]
+    assert len(options) <= 8
+    assert all(len(line.split()) > 1 for line in options), options
+    assert len(lines) <= 40
+
+
+def test_the_commands_are_in_groups(capsys):
+    assert main(["--help"]) == 0
+    titles = [title[1] for line in capsys.readouterr().out.splitlines() if (title := PANEL.match(line))]
+    assert titles[:3] == ["From a log", "Force loop", "Simulate"]
+
+
+def test_completed_models_are_those_of_the_library():
+    assert MODELS == NAMES
+
+
 def test_json_of_identify_is_complete(capsys, root):
     log = root / "examples" / "data" / "press.csv"
     said = {"time": "time_s", "position": "position_mm:mm", "force": "force_N:N", "lag": 0.0, "bonded": False}
@@ -173,4 +196,4 @@ def test_json_of_identify_is_complete(capsys, root):
     assert said.items() <= told["options"].items()
     assert told["models"]
     assert all({"model", "r2", "note"} <= set(one) for one in told["models"])
-    assert told["model"] in {one["model"] for one in told["models"]} | {"kelvin-voigt"}
+    assert [one["model"] for one in told["models"] if one["chosen"]] == [told["model"]]

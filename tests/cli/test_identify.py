@@ -153,12 +153,16 @@ def test_the_sentence_the_table_and_the_figure(log, capsys):
     assert "figure: press.identify.png" in printed
     picture = log.parent / "press.identify.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
+    assert re.match(r"\d+ ± \d+ N/m stiffness ✓ identified press.csv at ", printed)
+    assert printed.index("To narrow it: ") < printed.index("95 % verdict") < printed.index("One contact, ")
+
+
+def test_all_evidence_is_a_flag_away(log, capsys):
+    assert main(["identify", str(log), *OWN, "--no-figure", "--verbose"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
     assert printed.startswith("The stiffness is ")
-    assert (
-        printed.index("its uncertainty is mostly due to")
-        < printed.index("working point:")
-        < printed.index("value ± 95 %")
-    )
+    order = ("its uncertainty is mostly due to", "working point:", "value ± 95 %", "low-excitation:")
+    assert sorted(order, key=printed.index) == [*order]
 
 
 @pytest.mark.long
@@ -198,10 +202,38 @@ def test_a_figure_of_somebody_else_is_not_written_over(log, capsys):
     assert other.read_bytes() == b"a holiday"
 
 
-def test_a_lag_with_its_std(log, capsys):
-    _, found = ask(capsys, log, *OWN, "--lag", "0.000:0.0005")
+@pytest.mark.parametrize("words", ["0.000:0.0005", "0:0.5:ms"])
+def test_a_lag_with_its_std(log, capsys, words):
+    _, found = ask(capsys, log, *OWN, "--lag", words)
     assert found["lag_s"] == {"value": 0.0, "std": 0.0005, "bound": pytest.approx(0.00098), "kind": "told"}
     assert found["parameters"]["B"]["std"] > 2
+
+
+@pytest.mark.parametrize(
+    ("words", "doubt"),
+    [
+        (("--position", "position_mm:m"), "'position_mm' is taken in m as given, but its name says mm"),
+        (("--position", "1:m"), "is the position in mm?"),
+        (("--time", "time_s:min"), "is taken in min as given, but its name says s"),
+        (("--force", "force_N:mN"), "is taken in mN as given, but its name says N"),
+    ],
+)
+def test_a_doubtful_unit_stands_before_the_answer_which_then_is_no(log, capsys, words, doubt):
+    given = dict(zip(OWN[::2], OWN[1::2], strict=True)) | {words[0]: words[1]}
+    line = [word for pair in given.items() for word in pair]
+    assert main(["identify", str(log), *line, "--no-figure"]) == 1
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0].startswith("! ")
+    head = next(i for i, text in enumerate(printed) if "stiffness" in text)
+    assert any(doubt in text for text in printed[:head])
+    assert "✓" not in "".join(printed)
+
+
+def test_a_column_by_its_number_is_not_doubted_by_its_name(log, capsys):
+    time, position, force = OWN[1], "1:mm", "2:N"
+    words = ("--time", time, "--position", position, "--force", force)
+    assert main(["identify", str(log), *words, "--no-figure"]) == 0
+    assert "!" not in capsys.readouterr().out
 
 
 def test_a_rate_stands_for_the_time(log, capsys):
@@ -224,7 +256,7 @@ def test_the_method_is_that_of_the_library(shaken, capsys, method):
 @pytest.mark.long
 def test_another_method_is_said(shaken, capsys):
     words = ("--model", "kelvin-voigt-mass", "--method", "output-error", "--report", "a.html", "--no-figure")
-    assert main(["identify", str(shaken), *OWN, *words]) == 0
+    assert main(["identify", str(shaken), *OWN, *words, "--verbose"]) == 0
     line = "parameters by output-error; the models were chosen by least-squares"
     assert line in capsys.readouterr().out
     assert line in Path("a.html").read_text()
@@ -245,15 +277,14 @@ def test_a_time_in_ms_that_is_taken_for_seconds_is_suspected(log, capsys):
     rows[:, 0] *= 1e3
     np.savetxt(log, rows, delimiter=",", header="t,position_mm,force_N", comments="", fmt="%.7g")
     _, found = ask(capsys, log, "--time", "t", *OWN[2:])
-    assert "is the time in ms? then say NAME:ms" in next(
-        w["text"] for w in found["warnings"] if w["code"] == "low-rate"
-    )
+    doubts = [w["text"] for w in found["warnings"] if w["code"] == "time-doubtful"]
+    assert any("is the time in ms? then say NAME:ms" in text for text in doubts)
 
 
 WRONG = {
     "unknown column": ([*OWN[:-1], "f:N"], "unknown column 'f'.*position_mm"),
     "unknown unit": ([*OWN[:-1], "force_N:stone"], "unknown unit 'stone'"),
-    "no columns": ([], "name the columns of .*--time, --position, --force.*time_s"),
+    "one column": (OWN[2:4], "name the columns of .*--time, --force.*time_s"),
     "unknown model": ([*OWN, "--model", "hooke"], "unknown model 'hooke'"),
     "unknown method": (
         [*OWN, "--method", "output-eror"],
@@ -269,9 +300,11 @@ WRONG = {
     ),
     "no mass at all": ([*OWN, "--method", "output-error"], "use least squares"),
     "tolerance": ([*OWN, "--tolerance", "2"], r"tolerance must be in \(0, 1\]"),
+    "lag in what": ([*OWN, "--lag", "7.6"], "is 7.6 ms meant.*--lag 7.6:ms"),
+    "lag in N": ([*OWN, "--lag", "7.6:N"], "needs one of time"),
     "lag": ([*OWN, "--lag", "late"], "--lag needs VALUE or VALUE:STD"),
     "lag in ms": (
-        [*OWN, "--lag", "7.7"],
+        [*OWN, "--lag", "7.7:s"],
         "lag of 7.7 s is as long as the whole log .3 s.; give it in seconds",
     ),
     "one row": (
@@ -281,12 +314,12 @@ WRONG = {
     "no shape": ([*OWN, "--indenter", "ball:5:mm"], "needs sphere:RADIUS, punch:RADIUS or cone:HALF_ANGLE"),
     "no size": ([*OWN, "--indenter", "sphere"], "needs sphere:RADIUS"),
     "size of another kind": ([*OWN, "--indenter", "cone:5:mm"], "unit of length; a cone needs one of angle"),
-    "size is none": ([*OWN, "--indenter", "sphere:5e:mm"], "needs a number as its size"),
+    "size is none": ([*OWN, "--indenter", "sphere:5e:mm"], "needs sphere:RADIUS"),
     "no radius": ([*OWN, "--indenter", "punch:0:mm"], "radius of a punch must be more than 0"),
     "flat cone": ([*OWN, "--indenter", "cone:95:deg"], "under 90 deg"),
     "poisson alone": ([*OWN, "--poisson", "0.3"], "add --indenter"),
     "poisson": (
-        [*OWN, "--indenter", "cone:70", "--poisson", "0.7"],
+        [*OWN, "--indenter", "cone:70:deg", "--poisson", "0.7"],
         r"Poisson's ratio must be in \(-1, 0.5\]",
     ),
     "sign": ([*OWN, "--force-sign", "2"], "force-sign"),

@@ -43,7 +43,16 @@ def test_a_bag_with_one_wrench_and_one_pose_needs_no_words(tmp_path, capsys, kin
 def test_what_was_declared_and_found_is_shown(tmp_path, capsys):
     world = press_bag(tmp_path / "press", seed=1)
     x, y, z = 1e3 * world.tcp
-    words = ["--wrench-frame", "tool", "--tcp", f"{x},{y},{z}:mm", "--tool-mass", "0.4:0.01", "--no-figure"]
+    words = [
+        "--wrench-frame",
+        "tool",
+        "--tcp",
+        f"{x},{y},{z}:mm",
+        "--tool-mass",
+        "0.4:0.01",
+        "--no-figure",
+        "--verbose",
+    ]
     assert main(["identify", "press", *words]) == 0
     shown = capsys.readouterr().out
     assert "wrench of /ft, pose of /pose" in shown
@@ -58,7 +67,7 @@ def test_what_was_declared_and_found_is_shown(tmp_path, capsys):
 @pytest.mark.long
 def test_the_page_and_the_figure(tmp_path, capsys):
     press_bag(tmp_path / "press")
-    assert main(["identify", "press", "--report", "press.html", "--figure", "press.png"]) == 0
+    assert main(["identify", "press", "--report", "press.html", "--figure", "press.png", "--verbose"]) == 0
     shown = capsys.readouterr().out
     assert "figure: press.png" in shown
     assert "report: press.html" in shown
@@ -174,7 +183,7 @@ def test_only_free_motion(tmp_path, capsys):
     assert all(parameter["verdict"] != "identified" for parameter in found["parameters"].values())
     assert all(parameter["value"] is None for parameter in found["parameters"].values())
     assert not {"contact-at-start", "normal-uncertain"} & set(codes(found))
-    main(["identify", "press", "--wrench-frame", "tool", "--no-figure"])
+    main(["identify", "press", "--wrench-frame", "tool", "--no-figure", "--verbose"])
     shown = capsys.readouterr().out
     assert "free motion only" in shown
     assert "no free motion" not in shown
@@ -285,7 +294,7 @@ def test_a_tool_that_turns_tells_its_weight(tmp_path, capsys):
     rng = np.random.default_rng(0)
     world, _ = a_press(6, turns=True)
     write_bag(tmp_path / "press", "mcap", topics_of(log_of(world, rng)))
-    words = ["--wrench-frame", "tool", "--tcp", ",".join(map(str, world.tcp)), "--no-figure"]
+    words = ["--wrench-frame", "tool", "--tcp", ",".join(map(str, world.tcp)), "--no-figure", "--verbose"]
     assert main(["identify", "press", *words]) == 0
     shown = capsys.readouterr().out
     assert f"tool's weight {np.linalg.norm(world.weight):.3g} N" in shown

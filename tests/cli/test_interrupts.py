@@ -97,3 +97,45 @@ def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeyp
     assert "the record is in results" in line
     assert len(read_record(tmp_path / "results" / "record.parquet"))
     assert not (tmp_path / "results" / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGUSR1", "SIGALRM", "SIGXCPU", "SIGPWR"]
+)
+def test_within_noticed_no_signal_ends_or_halts_and_each_has_its_code(name):
+    number = getattr(signal, name)
+    before = signal.getsignal(number)
+    with noticed() as came:
+        assert came.reason is None
+        os.kill(os.getpid(), number)
+        os.kill(os.getpid(), signal.SIGTERM)  # the first one counts
+        time.sleep(0.01)
+        assert came()
+        assert (came.code, came.reason) == (128 + number, f"stopped by the user ({name})")
+    assert signal.getsignal(number) == before
+
+
+def test_a_signal_without_a_name_has_its_number():
+    with noticed() as came:
+        os.kill(os.getpid(), signal.SIGRTMIN + 1)
+        time.sleep(0.01)
+        assert came.reason == f"stopped by the user (signal {signal.SIGRTMIN + 1})"
+
+
+def test_a_hang_up_that_is_ignored_and_a_handler_of_somebody_else_are_left():
+    heard = []
+    before = (
+        signal.signal(signal.SIGUSR2, lambda *_: heard.append("other")),
+        signal.signal(signal.SIGHUP, signal.SIG_IGN),
+    )
+    try:
+        with noticed() as came:
+            os.kill(os.getpid(), signal.SIGHUP)
+            os.kill(os.getpid(), signal.SIGUSR2)
+            time.sleep(0.01)
+            assert not came()
+            assert heard == ["other"]
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGUSR2, before[0])
+        signal.signal(signal.SIGHUP, before[1])

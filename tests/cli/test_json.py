@@ -14,7 +14,7 @@ from export import scenes
 from force.gained import gains_of
 from palpate import __version__
 from palpate.cli import main
-from palpate.cli._program import COMMANDS
+from palpate.cli._program import COMMANDS, COMPANIONS
 from studies.small import SMALL
 
 HEAD = {"command", "version", "options", "files"}
@@ -95,7 +95,8 @@ def test_it_is_json_alone_with_the_keys_that_are_documented(
 
 
 def test_every_command_is_documented_or_has_a_reason(documented):
-    assert {name.partition(",")[0] for name in documented} - {"Every command"} == set(COMMANDS) - set(WITHOUT)
+    commands = {*COMMANDS, *COMPANIONS}
+    assert {name.partition(",")[0] for name in documented} - {"Every command"} == commands - set(WITHOUT)
     assert documented["Every command"] == HEAD
 
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cli.asked import ask, refused
 from contact_frame.synthetic_arm import any_world, log_of
-from palpate.cli.options.kept import presets
+from palpate.logs.presets import presets
 
 
 @pytest.fixture

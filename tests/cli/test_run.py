@@ -268,7 +268,7 @@ def test_a_seed_is_a_whole_number_from_zero_on(mine, capsys, seed):
 def test_results_are_not_written_over(mine, done, capsys):
     results = shutil.copytree(done[0] / "results", mine.parent / "results")
     before = (results / "record.parquet").read_bytes()
-    assert "--force" in refused(capsys, "mine.toml", "--seed", "9", "--out", "results")
+    assert "--replace" in refused(capsys, "mine.toml", "--seed", "9", "--out", "results")
     assert (results / "record.parquet").read_bytes() == before
 
 
@@ -277,7 +277,7 @@ def test_results_are_replaced_by_force_and_figures_are_of_the_kinds_asked_for(mi
     results = shutil.copytree(done[0] / "results", mine.parent / "results")
     before = (results / "record.parquet").read_bytes()
     kinds = ("--figures", "svg", "--figures", "pdf")
-    assert main(["run", "mine.toml", "--seed", "9", "--out", "results", "--force", *kinds]) == 0
+    assert main(["run", "mine.toml", "--seed", "9", "--out", "results", "--replace", *kinds]) == 0
     assert (results / "record.parquet").read_bytes() != before
     figures = {
         Path(name).with_suffix(end).name
@@ -298,7 +298,7 @@ def test_force_does_not_replace_a_folder_that_is_not_its_own(mine, capsys):
     (mine.parent / "thesis").mkdir()
     (mine.parent / "thesis" / "chapter1.tex").write_text("years of work")
     assert "chapter1.tex, which palpate did not write" in refused(
-        capsys, "mine.toml", "--out", "thesis", "--force"
+        capsys, "mine.toml", "--out", "thesis", "--replace"
     )
     nothing_but(mine.parent / "thesis", "chapter1.tex")
 

@@ -180,14 +180,16 @@ def test_results_of_another_study_or_version_are_not_mixed(folder, capsys, tmp_p
         capsys, folder / "many.toml", "--out", out
     )
     assert (out / "runs.jsonl").read_bytes() == before
-    assert main(["study", str(folder / "many.toml"), "--out", str(out), "--force"]) == 0
+    assert main(["study", str(folder / "many.toml"), "--out", str(out), "--replace"]) == 0
     assert len(polars.read_parquet(out / "results.parquet")) == 240
 
 
 def test_a_study_of_failures_alone_is_an_answer_and_it_is_no(tmp_path, capsys):
     (tmp_path / "far.toml").write_text(text('"wall.x" = [0.8, 0.9]'))
     assert main(["study", "far.toml", "--out", "far"]) == 1
-    assert "2 of 2 runs: no contact (no contact was detected)" in " ".join(capsys.readouterr().out.split())
+    assert "2 of 2 runs failed: no contact was detected: after 1.5 s the tip is still" in " ".join(
+        capsys.readouterr().out.split()
+    )
 
 
 def test_experiments_are_found_beside_the_study(tmp_path, capsys, monkeypatch):

@@ -91,7 +91,7 @@ def test_viewers_are_served_beside_the_page(record):
     from websockets.sync.client import connect
 
     with running("--record", record, "--foxglove", "--foxglove-port", 0, lines=2) as (_, viewers):
-        assert re.fullmatch(r"viewers: ws://127\.0\.0\.1:\d+", viewers)
+        assert re.fullmatch(r"viewers: ws://127\.0\.0\.1:\d+/[\w-]{24}/", viewers)
         url = viewers.removeprefix("viewers: ")
         with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE) as client:
             offered = channels_of(client)

@@ -1,8 +1,12 @@
 """A surface of the user's on the live page: it has the sliders that it has numbers for."""
 
+import pytest
+
 from palpate.bench import load
 from palpate.bench.experiments.tables import changed
 from palpate.live.simulation import sliders_of
+
+pytestmark = pytest.mark.usefixtures("permitted")
 
 
 def test_sliders_are_those_that_the_part_has():

@@ -289,3 +289,30 @@ def test_threads_end_with_the_block():
         client().until(lambda c: len(c.rows))
     left = [thread.name for thread in threading.enumerate() if thread.name.startswith("live")]
     assert left == []
+
+
+def test_a_shared_page_is_steered_by_the_first_alone():
+    """On the loopback's second address, which stands for one on a network."""
+    player = Player(Clock(), Feed())
+    with player, served(player, host="127.0.0.2") as address:
+        assert str(address).startswith("http://127.0.0.2:")
+        assert asked(address)[0] == 200
+        assert asked(address, Host="palpate.example")[0] == 403
+        first, second = Stream(address), Stream(address)
+        first.until(lambda s: s.state is not None)
+        second.until(lambda s: "watching" in s.kinds)
+        second.ask("set", key="speed", value=3.0)
+        second.until(lambda s: "refused" in s.kinds)
+        assert "only watches" in second.refused
+        first.ask("set", key="speed", value=2.0)
+        first.until(lambda s: s.state["values"]["speed"] == 2.0)
+        assert "watching" not in first.kinds
+        second.until(lambda s: s.state is not None and s.state["values"]["speed"] == 2.0)
+
+
+def test_the_qr_code_is_that_of_the_address():
+    from palpate.live.sharing import qr_code
+
+    drawn = qr_code("http://192.168.0.10:8080/token/").splitlines()
+    assert len(drawn) > 10
+    assert len({len(line) for line in drawn if line.strip()}) <= 2

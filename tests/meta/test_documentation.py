@@ -47,7 +47,6 @@ def test_each_room_that_offers_names_is_in_the_reference(root):
         "logs",
         "signals",
         "studies",
-        "thesis",
         "press",
         "live",
         "report",

@@ -2,7 +2,7 @@
 
 import re
 
-FOLDERS = ("src", "tests", "docs", "examples", "benchmarks", "requirements", ".ci")
+FOLDERS = ("src", "packages", "tests", "docs", "examples", "benchmarks", "requirements", ".ci")
 TEXT = {".py", ".md", ".toml", ".txt", ".in", ".json", ".html", ".css", ".js", ".csv", ".yml", ".yaml", ""}
 MACHINE = re.compile(r"(?<![A-Za-z0-9.])/(?:home|Users|root|work|tmp|opt|mnt)/[A-Za-z0-9_.]")
 
@@ -10,7 +10,8 @@ MACHINE = re.compile(r"(?<![A-Za-z0-9.])/(?:home|Users|root|work|tmp|opt|mnt)/[A
 def files(root):
     tops = [path for path in root.iterdir() if path.is_file() and not path.name.startswith(".")]
     inside = [path for folder in FOLDERS for path in (root / folder).rglob("*") if path.is_file()]
-    return [path for path in tops + inside if path.suffix in TEXT and "__pycache__" not in path.parts]
+    made = re.compile(r"__pycache__|\.egg-info")
+    return [path for path in tops + inside if path.suffix in TEXT and not made.search(str(path))]
 
 
 def test_no_absolute_paths_of_a_machine(root):

@@ -53,3 +53,26 @@ def test_developers_run_what_users_run(root):
     assert run
     for name, requirement in run.items():
         assert dev[name].specifier == requirement.specifier, f"{name} differs; run `make lock`"
+
+
+def test_what_breaks_by_majors_has_an_upper_bound(root):
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"].values()
+    asked = {*project["dependencies"], *(one for extra in extras for one in extra)}
+    assert {one for one in asked if "<" not in one.partition(";")[0]} == {"distributed>=2025.1"}
+
+
+def test_the_licence_of_each_bundled_part_is_in_the_wheels_metadata(root):
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    named = {path for pattern in project["license-files"] for path in root.glob(pattern)}
+    bundled = {
+        path for path in (root / "src").rglob("*") if path.stem.upper() in {"LICENSE", "COPYING", "NOTICE"}
+    }
+    assert bundled < named
+    assert {path.parent.name for path in bundled} == {"arms", "uplot"}
+    heads = [path.read_text() for path in (root / "src/palpate/robots/serial/arms").glob("*.toml")]
+    texts = (root / "src/palpate/robots/serial/arms/LICENSE").read_text()
+    assert all(f"{path.name}" in texts for path in (root / "src/palpate/robots/serial/arms").glob("*.toml"))
+    kinds = {"BSD-3-Clause", "Apache-2.0"}
+    assert all(any(kind in head for kind in kinds) for head in heads)
+    assert all(kind in project["license"] for kind in kinds)

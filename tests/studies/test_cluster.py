@@ -1,8 +1,11 @@
 """A study on a Dask cluster of real processes: the same table as here, whatever dies on the way."""
 
+import contextlib
 import json
 import pickle
 import shutil
+import signal
+import socket
 import subprocess
 import threading
 import time
@@ -96,6 +99,46 @@ def test_no_scheduler_is_told_of(monkeypatch):
 
 
 @pytest.mark.parametrize(
+    "says",
+    [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0-OpenSSH_9.6\r\n", bytes(8192), b"\xff" * 64],
+    ids=["silent", "http", "ssh", "zeros", "huge"],
+)
+def test_another_program_at_the_port_is_told_of_within_the_time(says, monkeypatch):
+    """Dask itself waits for a silent one for ever, and takes the first bytes of any for a size to allocate."""
+    monkeypatch.setattr(clusters, "CONNECT", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as port:
+        held = []
+
+        def answer():
+            with contextlib.suppress(OSError):
+                while True:
+                    held.append(port.accept()[0])
+                    held[-1].sendall(says)
+
+        threading.Thread(target=answer, daemon=True).start()
+        began = time.monotonic()
+        with pytest.raises(InputError, match="no Dask scheduler answers at") as refused:
+            Cluster(f"tcp://127.0.0.1:{port.getsockname()[1]}")
+        assert time.monotonic() - began < 5.0
+        assert "\n" not in str(refused.value)
+        for one in held:
+            one.close()
+
+
+@pytest.mark.long
+def test_a_scheduler_that_stands_still_is_told_of(tmp_path, monkeypatch):
+    monkeypatch.setattr(clusters, "CONNECT", 2.0)
+    with local_cluster(tmp_path, workers=0) as empty:
+        runner = Cluster(empty.address)
+        empty.scheduler.send_signal(signal.SIGSTOP)
+        began = time.monotonic()
+        with pytest.raises(InputError, match="disappeared"):
+            list(runner.run(jobs(1)))
+        runner.close()
+        assert time.monotonic() - began < 10.0
+
+
+@pytest.mark.parametrize(
     "address",
     ["nonsense://x", "127.0.0.1:notaport", "tcp://127.0.0.1", "tcp://[::1", "tcp://a:8786/x", "", "tcp://:1"],
 )
@@ -184,7 +227,7 @@ def test_workers_run_a_controller_of_ones_own(tmp_path, capsys, monkeypatch, roo
     source = text(f"[parameters.law.cases]\n{cases}", metrics=metrics)
     (tmp_path / "mine.toml").write_text(source, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    words = ["study", "mine.toml", "--yes", "--json"]
+    words = ["study", "mine.toml", "--plugins", "--yes", "--json"]
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     with local_cluster(elsewhere, workers=2, place=elsewhere) as running:

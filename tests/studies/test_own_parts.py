@@ -16,6 +16,8 @@ from palpate.studies.running.run_one import Job, run_one
 from palpate.studies.running.sources import sources
 from studies.small import NEAR, text
 
+pytestmark = pytest.mark.usefixtures("permitted")
+
 METRIC = '["force_rms", "own_parts:mean_force"]'
 OWN = text(
     '[parameters.law.cases]\nmine = { controller = { kind = "own_parts:Push" } }\nPI = {}',
@@ -44,7 +46,7 @@ def module(tmp_path, monkeypatch, request):
 def refused(capsys, tmp_path, source):
     """The one line with which a study is refused, before anything is written."""
     (tmp_path / "mine.toml").write_text(source, encoding="utf-8")
-    assert main(["study", "mine.toml", "--out", "out"]) == 2
+    assert main(["study", "mine.toml", "--plugins", "--out", "out"]) == 2
     told = capsys.readouterr().err
     assert told.count("palpate: ") == 1
     assert told.rstrip("\n").rpartition("\n")[2].startswith("palpate: ")

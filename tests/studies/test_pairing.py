@@ -57,8 +57,8 @@ def test_the_law_wins_and_not_the_easiest_surface():
     assert pair.won == 0.0
     assert pair.decided
     assert (pair.won_low, pair.won_high) == pytest.approx(stats.binomtest(0, N).proportion_ci(0.95))
-    assert sentence(first).startswith("C has the least force_rms")
-    assert "100 % (94 to 100) of 64 surfaces" in sentence(first)
+    assert sentence(first).startswith("C has the smaller force_rms")
+    assert "on 64 of 64 surfaces, by" in sentence(first)
 
 
 def test_the_interval_of_the_median_is_that_of_the_sign_test():
@@ -125,7 +125,7 @@ def test_page_and_summary_say_which_is_better(tmp_path):
     plan = planned(RANDOM)
     found = present(frame_of(plan), plan, tmp_path, RANDOM, "palpate study x")
     page = (tmp_path / "report.html").read_text()
-    assert "C has the least force_rms" in page
+    assert "C has the smallest force_rms" in page
     assert found.summary["compared"][0]["settings"][0]["name"] == "C"
     assert {"clouds-force_rms.png", "clouds-overshoot.png", "clouds-K_matched.png"} <= {
         p.name for p in tmp_path.iterdir()

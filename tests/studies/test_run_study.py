@@ -84,22 +84,22 @@ def test_another_study_in_the_folder_is_refused_unless_it_is_to_go(tmp_path, uni
     with pytest.raises(InputError, match="another study"):
         work(other, tmp_path / "whole", Formula(formula)).done()
     assert table(tmp_path / "whole") == uninterrupted
-    assert len(work(other, tmp_path / "whole", Formula(formula)).done(force=True)) == 40
+    assert len(work(other, tmp_path / "whole", Formula(formula)).done(replace=True)) == 40
 
 
 def test_a_folder_of_other_files_is_never_touched(tmp_path):
     (tmp_path / "thesis.docx").write_text("years of work")
-    for force, said in ((False, "holds other files"), (True, "thesis.docx, which palpate did not write")):
+    for replace, said in ((False, "holds other files"), (True, "thesis.docx, which palpate did not write")):
         with pytest.raises(InputError, match=said):
-            work(GRID, tmp_path, Formula(formula)).done(force=force)
+            work(GRID, tmp_path, Formula(formula)).done(replace=replace)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.docx"]
 
 
-def test_a_journal_of_other_making_is_not_removed_by_force(tmp_path):
+def test_a_journal_of_other_making_is_not_removed_by_replace(tmp_path):
     (tmp_path / "runs.jsonl").write_text("mine\n")
-    for force in (False, True):
+    for replace in (False, True):
         with pytest.raises(InputError, match="palpate did not write"):
-            work(GRID, tmp_path, Formula(formula)).done(force=force)
+            work(GRID, tmp_path, Formula(formula)).done(replace=replace)
     assert (tmp_path / "runs.jsonl").read_text() == "mine\n"
 
 
@@ -236,6 +236,6 @@ def test_stopping_stops_the_runs_under_way():
         time.sleep(0.01)
 
 
-def test_force_in_a_new_folder_has_nothing_to_remove(tmp_path, uninterrupted):
-    work(GRID, tmp_path / "new", Formula(formula)).done(force=True)
+def test_replace_in_a_new_folder_has_nothing_to_remove(tmp_path, uninterrupted):
+    work(GRID, tmp_path / "new", Formula(formula)).done(replace=True)
     assert table(tmp_path / "new") == uninterrupted

@@ -69,7 +69,7 @@ def _same(one: Array, other: Array) -> bool:
     return np.array_equal(one, other, equal_nan=True)
 
 
-def fed(identifier: Any, phi: Any, force: Any) -> Any:
+def feed(identifier: Any, phi: Any, force: Any) -> Any:
     """The identifier after these samples, one by one."""
     for row, f in zip(phi, force, strict=True):
         identifier.update(row, f)
@@ -82,7 +82,7 @@ def its_estimate_is_finite(make: Callable[[], Any]) -> None:
     for part in range(4):
         phi, force = foam(400)
         rows = slice(100 * part, 100 * part + 100)
-        estimate = fed(identifier, phi[rows], force[rows]).estimate()
+        estimate = feed(identifier, phi[rows], force[rows]).estimate()
         theta, P = np.asarray(estimate.theta), np.asarray(estimate.covariance)
         require(theta.shape == (3,), f"theta has shape {theta.shape}, not (3,)")
         require(P.shape == (3, 3), f"the covariance has shape {P.shape}, not (3, 3)")
@@ -92,7 +92,7 @@ def its_estimate_is_finite(make: Callable[[], Any]) -> None:
 def it_finds_the_foam(make: Callable[[], Any]) -> None:
     """Two seconds of three tones identify the stiffness within a quarter."""
     phi, force = foam(2000)
-    K = float(np.asarray(fed(make(), phi, force).estimate().theta)[2])
+    K = float(np.asarray(feed(make(), phi, force).estimate().theta)[2])
     require(
         abs(K - TRUTH[2]) <= 0.25 * TRUTH[2],
         f"after 2 s on a foam of {TRUTH[2]:g} N/m it estimates K = {K:.5g} N/m",
@@ -104,7 +104,7 @@ def many_updates_are_updates_one_by_one(make: Callable[[], Any]) -> None:
     phi, force = foam(300)
     if not hasattr(make(), "update_many"):
         return
-    one, many, mixed = fed(make(), phi, force), make(), make()
+    one, many, mixed = feed(make(), phi, force), make(), make()
     many.update_many(phi, force)
     mixed.update_many(phi[:100].tolist(), force[:100].tolist())
     mixed.update(list(phi[100]), force[100])
@@ -121,14 +121,14 @@ def a_regressor_may_be_any_sequence_of_numbers(make: Callable[[], Any]) -> None:
     phi = np.array([1.0, -2.0, 3.0])
     fixed = phi.copy()
     fixed.flags.writeable = False
-    plain = fed(make(), [[1.0, -2.0, 3.0]], [4.0])
+    plain = feed(make(), [[1.0, -2.0, 3.0]], [4.0])
     for kind, row in (
         ("strided", np.repeat(phi, 2)[::2]),
         ("read-only", fixed),
         ("of integers", phi.astype(int)),
     ):
         require(
-            _same(answers(fed(make(), [row], [4.0])), answers(plain)),
+            _same(answers(feed(make(), [row], [4.0])), answers(plain)),
             f"a regressor {kind} gives another result",
         )
 
@@ -136,7 +136,7 @@ def a_regressor_may_be_any_sequence_of_numbers(make: Callable[[], Any]) -> None:
 def the_same_samples_give_the_same_estimate(make: Callable[[], Any]) -> None:
     """It has no memory outside itself, and draws no random number of its own."""
     phi, force = foam(200)
-    first, second = fed(make(), phi, force), fed(make(), phi, force)
+    first, second = feed(make(), phi, force), feed(make(), phi, force)
     require(_same(answers(first), answers(second)), "two instances differ after the same samples")
 
 
@@ -149,27 +149,27 @@ def a_bad_sample_is_refused_and_changes_nothing(make: Callable[[], Any]) -> None
 def refuses(make: Callable[[], Any], kind: str, sample: tuple[Any, Any]) -> None:
     """One such sample is refused, and changes nothing."""
     phi, force = foam(120)
-    bad, good = fed(make(), phi[:60], force[:60]), fed(make(), phi[:60], force[:60])
+    bad, good = feed(make(), phi[:60], force[:60]), feed(make(), phi[:60], force[:60])
     try:
         bad.update(*sample)
     except (ValueError, TypeError):
         pass
     else:
         raise AssertionError(f"a sample that is {kind}, {sample}, is accepted; raise a ValueError")
-    same = _same(answers(fed(bad, phi[60:], force[60:])), answers(fed(good, phi[60:], force[60:])))
+    same = _same(answers(feed(bad, phi[60:], force[60:])), answers(feed(good, phi[60:], force[60:])))
     require(same, f"a sample that is {kind} changes the state")
 
 
 def a_copy_goes_its_own_way_and_a_pickle_goes_on(make: Callable[[], Any]) -> None:
     """So that it can be sent to another process."""
     phi, force = foam(200)
-    identifier = fed(make(), phi[:100], force[:100])
+    identifier = feed(make(), phi[:100], force[:100])
     copied, thawed = copy.deepcopy(identifier), pickle.loads(pickle.dumps(identifier))  # noqa: S301 - its own
     before = answers(identifier)
-    fed(copied, phi[100:], force[100:])
+    feed(copied, phi[100:], force[100:])
     require(_same(answers(identifier), before), "an update of a copy changes the original")
     require(
-        _same(answers(fed(thawed, phi[100:], force[100:])), answers(copied)),
+        _same(answers(feed(thawed, phi[100:], force[100:])), answers(copied)),
         "a pickled copy continues differently",
     )
 

@@ -27,16 +27,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     import sys
 
     from palpate.cli._edge import guarded
-    from palpate.cli._program import EXPANDED, TYPED, program
+    from palpate.cli._help import short_help
+    from palpate.cli._program import COMMANDS, EXPANDED, TYPED, program
+    from palpate.cli._terminal import print_lines
     from palpate.cli.options.kept import expanded
+    from palpate.files.limits import check_address_space
 
     TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
 
     def run() -> int:
         words = list(TYPED.get())
         app = program(*words[:1])
+        check_address_space()
         if any(word.startswith(("--options", "--preset")) for word in words):
             words = expanded(words, app)
+        if words[1:] == ["-h"] and words[0] in COMMANDS:
+            print_lines(*short_help(app, words[0]))
+            return 0
         EXPANDED.set(tuple(words))
         return app(words)
 

@@ -13,8 +13,8 @@ from typing import Any
 from cyclopts import CycloptsError
 
 from palpate.cli import _streams
-from palpate.errors import PalpateError
-from palpate.text import printable
+from palpate.errors import LONGEST, PalpateError
+from palpate.text import printable, shortened
 
 DONE = 0
 WRONG_INPUT = 2
@@ -22,7 +22,7 @@ DEFECT = 70  # EX_SOFTWARE of sysexits.h; not 1, which means "ran, and the answe
 INTERRUPTED = 130  # 128 + SIGINT, as a shell reports it
 READER_GONE = 141  # 128 + SIGPIPE
 
-_DANGEROUS = {"--force", "--replace", "--yes"}
+_DANGEROUS = {"--replace", "--yes"}
 """Flags that remove results, or start an arm or a long run without a question."""
 _REMEDIES = {
     errno.ENOSPC: "free some space, or choose another place",
@@ -85,7 +85,7 @@ def _code_of(error: BaseException) -> int:
 
 
 def _say(text: str, code: int) -> int:
-    line = printable(" ".join(text.split()))
+    line = printable(shortened(" ".join(text.split()), LONGEST))
     with suppress(OSError):  # standard error is full or closed: the code still tells
         print(f"palpate: {line}", file=sys.stderr)  # noqa: T201
     return code
@@ -98,18 +98,9 @@ def _without_danger(error: CycloptsError) -> str:
     """
     text = str(error)
     guess = re.search(r" ?Did you mean \"?(--[\w-]+)\"?\??", text)
-    if guess is None or guess[1].replace("--no-", "--") not in _DANGEROUS or _takes_value(error, guess[1]):
+    if guess is None or guess[1].replace("--no-", "--") not in _DANGEROUS:
         return text
     return text.replace(guess[0], "")
-
-
-def _takes_value(error: CycloptsError, flag: str) -> bool:
-    """Whether an option takes a value: --force of identify is a column."""
-    from palpate.cli._program import program
-
-    chain = error.command_chain or ()
-    found = program()[chain[-1]].assemble_argument_collection() if chain else ()
-    return any(flag in own.names and own.hint is not bool for own in found)
 
 
 def _where_help_is(error: CycloptsError) -> str:

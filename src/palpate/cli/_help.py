@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts.help import DefaultFormatter
 
 if TYPE_CHECKING:
+    from cyclopts import App
     from cyclopts.help import HelpPanel
     from rich.console import Console, ConsoleOptions, RenderResult
 
@@ -16,6 +17,8 @@ EXAMPLE = "palpate "
 """Begins a paragraph that is an example."""
 _INDENT = 4
 """Letters by which a command stands in from the text."""
+_WIDTH = 80
+"""Letters of a line of the short help."""
 _PHRASE = (".", ",", ";", ":", ")", "]")
 """Last characters of a phrase."""
 _BROKEN = 0.3
@@ -127,3 +130,34 @@ def _plain(description: Any) -> str:
     """The letters of what cyclopts makes of a text."""
     inner = getattr(description, "primary_renderable", description)
     return getattr(inner, "plain", str(inner) if inner else "").strip()
+
+
+_SHOWN = {
+    "identify": ("time", "position", "force-column", "lag", "indenter", "report", "table", "verbose"),
+    "tune": ("arm", "force", "stiffness", "damping-max", "out", "report", "verbose", "json"),
+    "press": ("arm", "force", "surface", "gains", "wire", "dry-run", "out", "json"),
+}
+"""Options that a short help shows, where they are not the first eight."""
+_MOST = 8
+
+
+def short_help(app: App, command: str) -> list[str]:
+    """Usage, what a command does, two examples and eight options."""
+    description, *rest = re.split(r"\n\s*\n", app[command].help)
+    examples = [part for part in rest if part.startswith(EXAMPLE)][:2]
+    arguments = [one for one in app[command].assemble_argument_collection(parse_docstring=True) if one.show]
+    named = {name.removeprefix("--"): one for one in reversed([*arguments]) for name in one.names[:1]}
+    places = [one.names[0] for one in arguments if not one.names[0].startswith("-")]
+    options = [name for name, one in reversed(named.items()) if one.names[0].startswith("--")]
+    required = [name for name in options if named[name].required]
+    wanted = [name for name in _SHOWN.get(command, ()) if name in named] or [*required, *options]
+    width = 2 + max((len(name) for name in wanted), default=0)
+    lines = [
+        f"Usage: palpate {' '.join([command, *places])} [OPTIONS]", "", *wrapped(description, _WIDTH), "",
+        *(line for text in examples for line in (*example(text, _WIDTH), "")),
+    ]  # fmt: skip
+    for name in [*dict.fromkeys(wanted)][:_MOST]:
+        first = re.split(r"[.;](?: |$)", str(named[name].parameter.help or ""), maxsplit=1)[0]
+        begin, *more = wrapped(first, _WIDTH - width - 4) or [""]
+        lines += [f"  --{name:<{width}}{begin}", *(" " * (width + 4) + line for line in more)]
+    return [*lines, "", f"all options: palpate {command} --help"]

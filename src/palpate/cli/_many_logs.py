@@ -13,7 +13,7 @@ from palpate.cli._edge import INTERRUPTED
 from palpate.cli._one_log import OneLog, answered
 from palpate.cli._program import command
 from palpate.cli._progress import bar
-from palpate.cli._terminal import console, place, say
+from palpate.cli._terminal import KINDS, STYLE, console, place, say
 from palpate.errors import InputError, PalpateError
 from palpate.files import write_text
 
@@ -28,6 +28,7 @@ def many(
     asked: OneLog,
     figure: Path | None,
     page: Path | None,
+    table: Path | None,
     *,
     json: bool,
     dpi: int | None = None,
@@ -45,6 +46,7 @@ def many(
     from rich.progress import MofNCompleteColumn
 
     from palpate.identification.pooling import pool
+    from palpate.report.identification.words import unit_warnings
 
     rows: list[LogRow] = []
     interrupted = False
@@ -63,11 +65,13 @@ def many(
         )
     pooled = pool([row.found for row in rows], asked.fitted.tolerance, [row.source.title for row in rows])
     if rows:
-        _print(rows, pooled, _write(rows, pooled, figure, page, dpi), json=json)
+        _print(rows, pooled, _write(rows, pooled, figure, page, table, dpi), json=json)
     if interrupted:
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
         return INTERRUPTED
-    return 0 if pooled.found or any(row.found and answered(row.found) for row in rows) else 1
+    doubtful = any(row.found and unit_warnings(row.found) for row in rows)
+    known = pooled.found or any(row.found and answered(row.found) for row in rows)
+    return 0 if known and not doubtful else 1
 
 
 def _row(log: Path, asked: OneLog) -> LogRow:
@@ -97,7 +101,12 @@ def _light(found: Identification) -> Identification:
 
 
 def _write(
-    rows: Sequence[LogRow], pooled: Pooled, figure: Path | None, page: Path | None, dpi: int | None
+    rows: Sequence[LogRow],
+    pooled: Pooled,
+    figure: Path | None,
+    page: Path | None,
+    table: Path | None,
+    dpi: int | None,
 ) -> list[Path]:
     if figure is not None:
         from palpate.report.many.forest import write_figure
@@ -107,7 +116,11 @@ def _write(
         from palpate.report.many.page import page as page_of
 
         write_text(page, page_of(rows, pooled))
-    return [path for path in (figure, page) if path is not None]
+    if table is not None:
+        from palpate.report.many.paper_table import write_table
+
+        write_table(rows, pooled, table)
+    return [path for path in (figure, page, table) if path is not None]
 
 
 def _print(rows: Sequence[LogRow], pooled: Pooled, written: Sequence[Path], *, json: bool) -> None:
@@ -121,9 +134,13 @@ def _print(rows: Sequence[LogRow], pooled: Pooled, written: Sequence[Path], *, j
             }
         )
         return
+    from palpate.report.identification.words import unit_warnings
     from palpate.report.many.table import show
 
     screen = console()
+    for row in rows:
+        for text in unit_warnings(row.found) if row.found else ():
+            screen.print(f"! {row.source.title}: {text}", style=STYLE, soft_wrap=True)
     show(rows, pooled, screen)
     for path in written:
-        place(screen, "report:" if path.suffix.lower() == ".html" else "figure:", path)
+        place(screen, f"{KINDS.get(path.suffix.lower(), 'figure')}:", path)

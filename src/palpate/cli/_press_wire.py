@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import sys
+import threading
+from contextlib import suppress
 from pathlib import Path
+from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
-from palpate.cli import _interrupts
+from palpate.cli import _interrupts, _streams
 from palpate.cli._answer import print_answer
 from palpate.cli._program import command
 from palpate.cli._terminal import print_lines, say
@@ -15,7 +18,8 @@ from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.contact_frame import Payload
-    from palpate.wires import AtRest, Order, Outcome, Rows, Wire
+    from palpate.force.gains import Gains
+    from palpate.wires import AtRest, Limits, Order, Outcome, Wire
 
 _WORD = "press"
 
@@ -24,7 +28,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
     """Press with a real arm, or only read it.
 
     Returns:
-        0 if it pressed for the requested time, 1 if not.
+        0 if it pressed for the requested time, 1 if not, 128 and the number of a signal that ended it.
 
     Raises:
         InputError: a fault found before the arm moves.
@@ -35,7 +39,8 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
     if options.record is not None and options.record.exists():
         raise InputError(f"{options.record} exists; choose another place for --record")
     from palpate.force import ForceLoop
-    from palpate.wires import Rows, checked, look, open_wire
+    from palpate.wires import checked, look, open_wire
+    from palpate.wires.at_rest import with_noise_of
     from palpate.wires.tool import notes_on
 
     assert asked.gains is not None
@@ -48,18 +53,16 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
             print_lines(*plan)
         if options.dry_run or tool is not None:
             air = look(arm, order)
-            notes = [] if tool is None else notes_on(tool, air)
+            _, note = with_noise_of(air, order)
+            notes = [*([] if note is None else [note]), *([] if tool is None else notes_on(tool, air))]
             if options.dry_run:
                 return _looked(air, [*plan, *notes], notes, json)
             if not json:
                 print_lines(*notes)
         _ask(options.yes)
-        rows = Rows(options.record, order.most, _about(arm, order, tool))
-        outcome, words = _pressed(arm, order, rows, options.ordinary_priority)
+        return _pressed(arm, order, options, _about(arm, order, tool), json)
     finally:
         arm.close()
-    where = rows.finish(outcome.to_json() | {"priority": words})
-    return _print(outcome, words, where, json)
 
 
 def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
@@ -74,17 +77,49 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
     }
 
 
-def _pressed(arm: Wire, order: Order, rows: Rows, ordinary: bool) -> tuple[Outcome, str]:
-    from palpate.wires import press
+def _pressed(arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], json: bool) -> int:
+    """Press, keep the record and print the outcome, whatever signal comes; returns the exit code."""
+    with _interrupts.noticed() as came:
+        outcome, words, where = _recorded(arm, order, options, about, came)
+        try:
+            code = _print(outcome, words, where, json)
+        except OSError:  # nobody reads any more: a terminal that hung up
+            if not came():
+                raise
+            _streams.drop(sys.stdout)
+    return came.code if came() else code
+
+
+def _recorded(
+    arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], came: _interrupts.Noticed
+) -> tuple[Outcome, str, Path | None]:
+    """The outcome, the priority that was given, and where the record is; its rows are kept whatever happens."""
+    from palpate.wires import Rows, press
     from palpate.wires.realtime import hurried
 
+    rows = Rows(options.record, order.most, about)
     try:
-        with _interrupts.noticed() as came, hurried(not ordinary) as words:
-            return press(arm, order, rows, came), words
+        with hurried(not options.ordinary_priority) as words:
+            outcome = press(arm, order, rows, lambda: came.reason, _live().put)
     except BaseException as error:
         if rows.count or rows.folder is not None:
             rows.finish({"ended": str(error) or type(error).__name__, "ok": False})
         raise
+    arm.close()
+    return outcome, words, rows.finish(outcome.to_json() | {"priority": words})
+
+
+def _live() -> SimpleQueue[str]:
+    """A queue of sentences for standard error; a thread of its own prints them, as a terminal may block."""
+    said: SimpleQueue[str] = SimpleQueue()
+
+    def run() -> None:
+        with suppress(OSError, ValueError):
+            while True:
+                say(said.get())
+
+    threading.Thread(target=run, daemon=True).start()
+    return said
 
 
 def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
@@ -100,14 +135,33 @@ def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
         f" back {1e3 * task.retreat:g} mm, rests"
     )
     stops = (
-        f"stops at {limits.force:g} N, {1e3 * limits.speed:g} mm/s, {1e3 * limits.travel:g} mm from here, after"
-        f" {limits.seconds:g} s, on Ctrl-C, and {last:.3g} ms after the last reading at the latest"
+        f"stops at {limits.force:g} N, {1e3 * limits.speed:g} mm/s, {1e3 * limits.travel:.3g} mm from here, after"
+        f" {limits.seconds:g} s, on Ctrl-C and every other signal that can be caught, and {last:.3g} ms after the last"
+        " reading at the latest"
     )
     kept = f"record: {record}" if record is not None else "no record is kept (--record DIR keeps one)"
     arms = f"arm: {arm.title}; gains for {gains.arm.title}"
     massless = mass_note(gains)
     notes = [] if massless is None else [f"note: {massless}"]
-    return [arms, does, stops, f"if this process dies: {arm.watchdog}", kept, *notes]
+    if gains.arm.sensor.accuracy is not None:
+        notes.append(
+            f"note: a force is as true as its sensor, ± {gains.arm.sensor.accuracy:g} N by its maker"
+        )
+    return [arms, does, stops, f"if this process dies: {arm.watchdog}", _lies(gains, limits), kept, *notes]
+
+
+def _lies(gains: Gains, limits: Limits) -> str:
+    """The force that a sensor that lies leads to."""
+    from palpate.wires.order import stiffest, travel_for
+
+    cap, travel, short = stiffest(gains), limits.travel, travel_for(gains, limits.force)
+    less = ""
+    if travel > short:
+        less = f"; --travel-limit {1e3 * short:.2g}:mm, or none, keeps that below the force limit"
+    return (
+        f"if the sensor lies (frozen, or its gain too small): at most K_cap x travel, {cap:.3g} N/m x"
+        f" {1e3 * travel:.3g} mm = {cap * travel:.3g} N, unless the arm's own safety stops it before{less}"
+    )
 
 
 def _ask(yes: bool) -> None:
@@ -124,9 +178,18 @@ def _ask(yes: bool) -> None:
 
 def _looked(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
     bias = ", ".join(f"{b + 0.0:.3g}" for b in air.bias.round(4))
-    found = f"in the air: bias {bias} N, noise {air.noise:.2g} N, {air.rate:.4g} Hz"
+    drift = f"drift {air.drift:.2g} ± {air.drift_std:.2g} N/s"
+    found = f"in free motion: bias {bias} N, noise {air.noise:.2g} N, {drift}, {air.rate:.4g} Hz"
     if json:
-        print_answer({"plan": plan, "bias_N": air.bias.tolist(), "noise_N": air.noise, "rate_Hz": air.rate})
+        print_answer(
+            {
+                "plan": plan,
+                "bias_N": air.bias.tolist(),
+                "noise_N": air.noise,
+                "drift_N_per_s": air.drift,
+                "rate_Hz": air.rate,
+            }
+        )
     else:
         print_lines(found, *notes, "dry run: nothing was moved")
     return 0
@@ -137,6 +200,7 @@ def _print(outcome: Outcome, words: str, where: Path | None, json: bool) -> int:
         print_answer(outcome.to_json() | {"priority": words, "record": None if where is None else str(where)})
         return 0 if outcome.ok else 1
     lines = [f"ended: {outcome.ended}; the arm rests"]
+    lines += [f"trouble in {ticks} ticks: {trouble}" for trouble, ticks in outcome.troubles.items()]
     if outcome.force is not None:
         settled = (
             f"within 5 % after {outcome.settled:.2g} s" if outcome.settled is not None else "never within 5 %"

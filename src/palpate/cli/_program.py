@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shlex
+from contextlib import suppress
 from contextvars import ContextVar
 from importlib import import_module
+from importlib.util import find_spec
 from inspect import getdoc
+from pathlib import Path
 
-from cyclopts import App, Group
+from cyclopts import App, Group, Parameter
 
 from palpate.cli._help import PhraseFormatter
+from palpate.cli.options.flags import checked
+from palpate.errors import InputError
 
 TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
 """The words after the program's name, as they were typed."""
@@ -32,11 +38,23 @@ COMMANDS = {
     "live": "Show a pressing arm, or a log, in the browser.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "checks": "Check a controller, surface or identifier of your own.",
-    "thesis": "Measure every figure and every claim of the thesis again.",
-    "laboratory": "Infer the thesis' laboratory from its own sentences; resumable.",
     "speed": "Measure the time of one tick of the closed loop on this machine.",
     "completion": "Print a shell's completion script for commands, options and files.",
 }
+
+
+GROUPS = {
+    Group("From a log", sort_key=1): ("identify", "topics", "payload", "excite"),
+    Group("Force loop", sort_key=2): ("tune", "certify", "press"),
+    Group("Simulate", sort_key=3): ("run", "live", "study", "export", "checks"),
+    Group("Thesis", sort_key=4): ("thesis", "laboratory"),
+}
+"""Commands by what a user begins with."""
+_PROGRAM = Group("The program itself", sort_key=5)
+# Commands of other distributions, by the distribution that has them.
+COMPANIONS = {"thesis": "palpate-thesis", "laboratory": "palpate-thesis"}
+ENTRY_POINTS = "palpate.commands"
+"""The group of entry points by which a distribution adds a command: its name, and module:function."""
 
 
 def command() -> str:
@@ -50,18 +68,42 @@ def _version() -> str:
     return str(__version__)
 
 
-def _described(own: str) -> str:
+def _described(place: str) -> str:
     """A command's docstring before its parameters, each paragraph on one line for the terminal to wrap."""
-    text = getdoc(getattr(import_module(f"palpate.cli.{own}"), own)) or ""
-    said = re.split(r"\n(?:Parameters\n-|Args:\n|Returns:\n)", text)[0]
-    return "\n\n".join(" ".join(part.split()) for part in said.split("\n\n")).strip()
+    module, _, function = place.partition(":")
+    text = getdoc(getattr(import_module(module), function)) or ""
+    description = re.split(r"\n(?:Parameters\n-|Args:\n|Returns:\n)", text)[0]
+    return "\n\n".join(" ".join(part.split()) for part in description.split("\n\n")).strip()
+
+
+def added_commands() -> dict[str, str]:
+    """Commands of other installed distributions: by name, the place of the function as module:function."""
+    from importlib.metadata import entry_points
+
+    return {e.name: e.value for e in sorted(entry_points(group=ENTRY_POINTS)) if e.name not in COMMANDS}
+
+
+def _first_line(place: str) -> str:
+    """The first line of a function's docstring, from its source: the module is not imported."""
+    module, _, function = place.partition(":")
+    with suppress(ImportError, OSError, SyntaxError, ValueError):
+        spec = find_spec(module)
+        source = Path(spec.origin).read_bytes() if spec is not None and spec.origin else b""
+        for node in ast.parse(source).body:
+            if isinstance(node, ast.FunctionDef) and node.name == function:
+                return (ast.get_docstring(node) or "").partition("\n")[0]
+    return "Not readable; install its distribution again."
 
 
 def program(asked: str = "") -> App:
     """The whole command line; errors are raised, not printed, and results are returned.
 
     Args:
-        asked: the typed command, whose help is its docstring with the examples.
+        asked: the typed command, whose help is its docstring with the examples. Other distributions are searched for
+            commands only if it is none of palpate's own.
+
+    Raises:
+        InputError: a command of a distribution that is not installed.
     """
     app = App(
         name="palpate",
@@ -70,13 +112,21 @@ def program(asked: str = "") -> App:
         help_format="plaintext",
         help_formatter=PhraseFormatter(),
         group_parameters=Group("Options", sort_key=0),
+        group_commands=_PROGRAM,
         exit_on_error=False,
         print_error=False,
         result_action="return_value",
         suppress_keyboard_interrupt=False,
+        # A name that begins with a bracket is a name, not a list in JSON.
+        default_parameter=Parameter(converter=checked, json_list=False, json_dict=False),
     )
-    for order, (name, line) in enumerate(COMMANDS.items()):
-        own = name.replace("-", "_")
-        text = _described(own) if name == asked else line
-        app.command(f"palpate.cli.{own}:{own}", name=name, help=text, sort_key=order)
+    own = {name: f"palpate.cli.{name.replace('-', '_')}:{name.replace('-', '_')}" for name in COMMANDS}
+    added = {} if asked in COMMANDS else added_commands()
+    if asked in COMPANIONS and asked not in added:
+        package = COMPANIONS[asked]
+        raise InputError(f"{asked} is a command of {package}, which is not installed: pip install {package}")
+    for order, (name, place) in enumerate((own | added).items()):
+        group = next((group for group, names in GROUPS.items() if name in names), _PROGRAM)
+        text = _described(place) if name == asked else COMMANDS.get(name) or _first_line(place)
+        app.command(place, name=name, help=text, sort_key=order, group=group)
     return app

@@ -1,11 +1,15 @@
-"""Standard output and standard error, even if closed, full, or with a limited encoding."""
+"""Standard output and standard error, even if closed, full, or with a limited encoding; and palpate's own alone."""
 
 from __future__ import annotations
 
 import codecs
+import faulthandler
 import logging
 import os
 import sys
+import threading
+import traceback
+import warnings
 from contextlib import suppress
 from io import TextIOWrapper
 from typing import TextIO
@@ -20,7 +24,6 @@ def prepare() -> None:
     A stream that was closed before the program began is opened to the null device: otherwise the next opened file
     would take its descriptor. A letter that the encoding lacks is escaped.
     """
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a home that cannot be written is no trouble
     codecs.register_error(_ERRORS, _plainly)
     for name, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
         if getattr(sys, name) is None:
@@ -29,6 +32,31 @@ def prepare() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors=_ERRORS)
+    if not (sys.warnoptions or faulthandler.is_enabled()):  # `python -X dev -m palpate` shows all
+        _silence_libraries()
+
+
+def _silence_libraries() -> None:
+    """Let nothing reach standard error but what palpate writes there.
+
+    A library warns, logs, writes to the descriptor from compiled code, or dies in a thread of its own: of all that the
+    reader of a command can change nothing, and what concerns them palpate says in its own line.
+    """
+    warnings.showwarning = lambda *_, **__: None
+    logging.disable()
+    threading.excepthook = _in_a_thread
+    own = os.dup(2)
+    encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
+    sys.stderr = open(own, "w", buffering=1, encoding=encoding, errors=_ERRORS)  # noqa: SIM115, PTH123 - a number
+    _to_nowhere(2)
+
+
+def _in_a_thread(died: threading.ExceptHookArgs) -> None:
+    """A thread's error, where it is a defect of palpate."""
+    package = os.path.dirname(os.path.dirname(__file__))  # noqa: PTH120 - as frames have it
+    frames = traceback.extract_tb(died.exc_traceback)
+    if any(frame.filename.startswith(package) for frame in frames):
+        threading.__excepthook__(died)
 
 
 def flush(stream: TextIO) -> None:

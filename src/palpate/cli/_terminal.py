@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli._streams import flush
+from palpate.files import as_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
 STYLE = "yellow"
 """Style of warnings."""
+
+
+KINDS = {".html": "report", ".csv": "table", ".md": "table", ".tex": "table"}
+"""Written files of an identification, by their endings; the others are figures."""
 
 
 def print_lines(*lines: str) -> None:
@@ -33,7 +38,7 @@ def print_json(value: Any) -> None:
 
     import msgspec
 
-    plain = msgspec.json.decode(msgspec.json.encode(value))
+    plain = msgspec.json.decode(as_json(value))
     sys.stdout.write(json.dumps(plain, allow_nan=False) + "\n")
 
 
@@ -53,6 +58,17 @@ def console(*, stderr: bool = False) -> Console:
                 yield segment if segment.control else segment._replace(text=printable(segment.text))
 
     return Plain(stderr=stderr, markup=False, emoji=False, highlight=False)
+
+
+def confirmed(console: Console, question: str) -> bool:
+    """Whether a person at the terminal agrees; an end of the input is a no."""
+    from rich.prompt import Confirm
+
+    try:
+        return Confirm.ask(question, console=console, default=False)
+    except EOFError:
+        console.print()
+        return False
 
 
 def head(console: Console, title: str, rest: str) -> None:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import console, show_table
+from palpate.cli.options.plugins import PluginOptions
 from palpate.cli.options.written import JsonOption
 from palpate.errors import InputError
 
 
-def checks(name: str | None = None, /, *, output: JsonOption | None = None) -> int:
+def checks(
+    name: str | None = None,
+    /,
+    *,
+    own: PluginOptions | None = None,
+    output: JsonOption | None = None,
+) -> int:
     """Run palpate's conformance suite on your own controller, surface or identifier.
 
     palpate checks student:Damped
@@ -17,7 +24,8 @@ def checks(name: str | None = None, /, *, output: JsonOption | None = None) -> i
     ----------
     name
         Your part, module:Class, or an experiment's TOML file that names some. The module is searched among the
-        installed ones, beside the file and in the current folder; naming it imports it.
+        installed ones, beside the file and in the current folder. Its name here imports it; a name in a file only with
+        --plugins.
     """
     if name is None:
         raise InputError(
@@ -26,7 +34,8 @@ def checks(name: str | None = None, /, *, output: JsonOption | None = None) -> i
     from palpate.checks.check import outcomes
     from palpate.checks.of_plugin import checks_of
 
-    found = {subject: list(outcomes(some)) for subject, some in checks_of(name).items()}
+    with (own or PluginOptions()).consent(given=name):
+        found = {subject: list(outcomes(some)) for subject, some in checks_of(name).items()}
     failed = sum(bool(one.failed) for some in found.values() for one in some)
     if output is not None and output.json:
         parts = {

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from palpate.excitation import Budget, Design, ForceLoop, Problem, Remedy, Sensors, SurfaceRange
 
 
+_FASTEST = 200_000
+"""Rows or readings a second [Hz]: no sensor of force is read faster."""
+
+
 @Parameter(name="*", group=Group("The surfaces", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SurfaceOptions:
@@ -162,8 +166,8 @@ class SensorOptions:
         from palpate.signals.low_pass import LowPass
 
         for option, value in (("--sampling", self.sampling), ("--rate", self.rate)):
-            if value < 1:
-                raise InputError(f"{option} must be at least 1 Hz, got {value}")
+            if not 1 <= value <= _FASTEST:
+                raise InputError(f"{option} must be between 1 and {_FASTEST} Hz, got {value}")
         # A sensor as fast as its log, or faster, gives one reading a row; its phase is then a part of the lag.
         open_phase = phase_std(self.sampling, self.rate) if self.sampling < self.rate else 0.0
         chain = ForceChain(

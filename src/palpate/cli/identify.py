@@ -10,16 +10,17 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
 from palpate.cli._one_log import OneLog, answered
-from palpate.cli._terminal import console, place
+from palpate.cli._terminal import KINDS, console
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import SIGNED
+from palpate.cli.options.flags import FLAG, SIGNED
 from palpate.cli.options.indenter import IndenterOptions
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.values import with_std
+from palpate.cli.options.names import QUIET, Method, Model
+from palpate.cli.options.values import lag_of, with_std
 from palpate.cli.options.written import WRITTEN, PictureOptions
 from palpate.errors import InputError
-from palpate.files import write_text
+from palpate.files import check_place, write_text
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
@@ -37,7 +38,7 @@ class ModelOptions:
         kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic; chosen if
         not given.
     lag
-        Calibrated lag of the force behind the position, SECONDS or SECONDS:STD.
+        Calibrated lag of the force behind the position, as 0.0076, 7.6:ms or 7.6:0.2:ms (with its standard deviation).
     force_filter
         Low-pass of the force before sampling, as butterworth3:120 (order and Hz), joined by +; or none.
     mass
@@ -54,7 +55,7 @@ class ModelOptions:
         least-squares; or instrumental-variables or output-error, if noise of the position would bias it.
     """
 
-    model: str | None = None
+    model: Annotated[Model | None, QUIET] = None
     lag: Annotated[str | None, SIGNED] = None
     force_filter: str | None = None
     mass: str | None = None
@@ -62,16 +63,12 @@ class ModelOptions:
     calibration: float = 0.0
     bonded: bool | None = None
     cutoff: float | None = None
-    method: str = "least-squares"
+    method: Annotated[Method, QUIET] = "least-squares"
 
-    def known(self, log: Path, options: LogOptions) -> dict[str, Any]:
-        """The keywords of `palpate.identify`; the record of a run states its own instruments."""
-        from palpate.logs.own_runs import is_run, measured_by
-
-        known: dict[str, Any] = measured_by(log) if options.plain and is_run(log) else {}
-        if self.method != ModelOptions.method:
-            known.pop("force_filter", None)  # only least squares make use of it
-        lag = with_std("lag", self.lag)
+    def known(self) -> dict[str, Any]:
+        """The keywords of `palpate.identify`."""
+        known: dict[str, Any] = {}
+        lag = lag_of(self.lag)
         if lag is not None:
             known |= {"lag": lag[0], "lag_std": lag[1]}
         if self.force_filter is not None:
@@ -94,10 +91,26 @@ class OutputOptions(PictureOptions):
         (of many logs, pooled.identify.png).
     dpi
         Of a PNG; 110 if not given.
+    table
+        Where to write a table for a paper, as CSV, Markdown or LaTeX by its ending (.csv, .md, .tex): value and 95 %
+        of each log; of several, n, mean, next press and deviation, too.
+    verbose
+        Print all evidence: each reason, each warning, both intervals, the slopes of the press.
     """
 
     figure: Path | None = None
     dpi: int | None = None
+    table: Path | None = None
+    verbose: Annotated[bool, FLAG] = False
+
+    def paper_table(self) -> Path | None:
+        """Path of the table, checked before any work is done."""
+        from palpate.report.many.paper_table import ENDINGS
+
+        if self.table is not None:
+            ending = self.table.suffix.lower()
+            check_place(self.table, "--table", ending=ending if ending in ENDINGS else ENDINGS[0])
+        return self.table
 
     def png(self, name: str) -> Path | None:
         """Path of the figure, checked before any work is done."""
@@ -119,9 +132,13 @@ def identify(
 ) -> int:
     """Identify the touched surface from a log: stiffness, damping, mass.
 
+    A log whose names and units leave nothing to guess needs no options; the output says as what it was read:
+
+    palpate identify press.csv
+
     Columns are given as NAME or NAME:UNIT, where NAME may be a number from 0:
 
-    palpate identify press.csv --time time_s --position position_mm:mm --force force_mN:mN
+    palpate identify press.csv --time t --position x:mm --force-column f:mN
 
     A bag with one wrench and one pose needs no names; palpate topics LOG lists the signals of a log:
 
@@ -129,7 +146,7 @@ def identify(
 
     Several logs, or a folder of them, are pooled: one table, the mean, and an interval for the next press:
 
-    palpate identify presses/ --time time_s --position position_mm:mm --force force_mN:mN
+    palpate identify presses/ --table presses.csv
 
     Options of a cell can be saved and loaded again:
 
@@ -141,9 +158,9 @@ def identify(
     ----------
     logs
         Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the folder
-        of a run or a press, or its record.parquet; a folder of logs.
+        of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book are logs of their own.
     """
-    from palpate.logs.gathered import gathered, is_folder_of_logs, log_of
+    from palpate.logs.gathered import gathered, is_folder_of_logs, log_of, sheets_as_logs
 
     output, cell = output or OutputOptions(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
@@ -156,15 +173,17 @@ def identify(
         raise InputError(
             "no log is named; name a log, several, or a folder of them (see: palpate identify --help)"
         )
+    logs = sheets_as_logs(logs, source.names, source.limits)
     if len(logs) == 1 and not is_folder_of_logs(logs[0]):
         return _one(log_of(logs[0]), asked, output)
     from palpate.cli._many_logs import many
 
-    return many(gathered(logs), asked, output.png("pooled"), output.page(), json=output.json, dpi=output.dpi)
+    figure, page, table = output.png("pooled"), output.page(), output.paper_table()
+    return many(gathered(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
 
 
 def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
-    figure, page = output.png(log.stem), output.page()
+    figure, page, table = output.png(log.stem), output.page(), output.paper_table()
     found, origin = asked.identified(log)
     if found.traces is None:
         figure = None
@@ -176,21 +195,29 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
         from palpate.report.identification.page import page as page_of
 
         write_text(page, page_of(found, origin))
-    _print(found, origin, [path for path in (figure, page) if path is not None], output.json)
+    if table is not None:
+        from palpate.report.many.paper_table import write_table
+        from palpate.report.many.rows import LogRow
+
+        write_table([LogRow(origin, found)], None, table)
+    _print(found, origin, [path for path in (figure, page, table) if path is not None], output)
     return 0 if answered(found) else 1
 
 
-def _print(found: Identification, origin: Source, written: list[Path], json: bool) -> None:
-    if json:
+def _print(found: Identification, origin: Source, written: list[Path], output: OutputOptions) -> None:
+    if output.json:
         from palpate.report.identification.source import as_json
 
         print_answer({"files": [{"file": origin.file, "sha256": origin.sha256}], **as_json(found, origin)})
         return
-    from palpate.report.identification.table import show
+    from palpate.report.identification import answer, table
 
     screen = console()
-    show(found, origin.title, screen)
-    for line in origin.notes:
+    places = [f"{KINDS.get(path.suffix.lower(), 'figure')}: {path}" for path in written]
+    if not output.verbose:
+        more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
+        answer.show(found, origin.title, screen, origin.notes, "   ".join([*places, f"all evidence: {more}"]))
+        return
+    table.show(found, origin.title, screen)
+    for line in (*origin.notes, *places):
         screen.print(line, soft_wrap=True)
-    for path in written:
-        place(screen, "report:" if path.suffix.lower() == ".html" else "figure:", path)

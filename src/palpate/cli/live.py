@@ -16,6 +16,8 @@ from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE
 from palpate.cli.options.log import LogOptions
+from palpate.cli.options.names import QUIET, Experiment, SerialArm
+from palpate.cli.options.plugins import PluginOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -47,8 +49,8 @@ class ShownOptions:
         Begin at the start of the approach, not shortly before the touch.
     """
 
-    run: str | None = None
-    arm_: Annotated[str | None, Parameter(name="--arm")] = None
+    run: Annotated[Experiment | None, QUIET] = None
+    arm_: Annotated[SerialArm | None, Parameter(name="--arm"), QUIET] = None
     log: Path | None = None
     record: Path | None = None
     seed: Annotated[int, WHOLE] = 0
@@ -78,21 +80,28 @@ class ServedOptions:
         Port of the page; a free one if not given, or 0.
     open_
         Open the page in the browser.
+    share
+        Share the page on the network of this machine, for a lecture: the first page steers, others only watch.
     foxglove
         Serve Foxglove, Lichtblick and PlotJuggler too.
     foxglove_port
         Port of those viewers.
+    foxglove_origin
+        Origin of a viewer that is a web page, such as https://app.foxglove.dev; other pages are refused.
     """
 
     port: Annotated[int, SIGNED] = 0
     open_: Annotated[bool, FLAG, Parameter(name="--open")] = False
+    share: Annotated[bool, FLAG] = False
     foxglove: Annotated[bool, FLAG] = False
     foxglove_port: Annotated[int, SIGNED] = 8765
+    foxglove_origin: str = ""
 
 
 def live(
     *,
     shown: ShownOptions | None = None,
+    own: PluginOptions | None = None,
     at: ServedOptions | None = None,
     source: LogOptions | None = None,
     frame: FrameOptions | None = None,
@@ -112,14 +121,15 @@ def live(
     palpate live --log press.csv --time time_s --position position_mm:mm --force force_mN:mN
 
     The first line printed is the page's address. It works on this machine only and without a network. It holds a
-    secret token: requests without it are refused.
+    secret token: requests without it are refused. --share prints the address on the network, and its QR code.
     """
     shown, at = shown or ShownOptions(), at or ServedOptions()
     path = shown.file()
     if shown.arm_ is not None:
         return _serve(_pressing(shown.arm_, shown.seed), at)
     if path is None:
-        return _serve(_simulation(shown.run or _DEFAULT, shown.seed, shown.whole_approach), at)
+        with (own or PluginOptions()).consent():
+            return _serve(_simulation(shown.run or _DEFAULT, shown.seed, shown.whole_approach), at)
     from palpate.cli._one_log import OneLog
 
     asked = OneLog(
@@ -161,14 +171,19 @@ def _replay(path: Path, asked: Any, whole: bool) -> Source:
 def _serve(shown: Source, at: ServedOptions) -> int:
     from palpate.live.feed import Feed
     from palpate.live.player import Player, made_ready
-    from palpate.live.server import served
+    from palpate.live.server import HOST, served
+    from palpate.live.sharing import WARNING, network_address, qr_code
 
+    host = network_address() if at.share else HOST
+    if at.share:
+        qr_code(host)  # what it needs is there before anything starts
+        say(WARNING)
     made_ready()
     with _stability(shown) as (changed, latest, tell):
         player = Player(shown, Feed(), changed, latest)
         tell.append(player.news)
-        with player, served(player, at.port) as address, _viewers(player, at) as more:
-            print_lines(str(address), *more)
+        with player, served(player, at.port, host) as address, _viewers(player, at) as more:
+            print_lines(str(address), *more, *(qr_code(str(address)).splitlines() if at.share else ()))
             if at.open_:
                 import webbrowser
 
@@ -204,4 +219,4 @@ def _viewers(player: Player, at: ServedOptions) -> Any:
         return nullcontext(())
     from palpate.live.foxglove import viewers
 
-    return viewers(player, at.foxglove_port)
+    return viewers(player, at.foxglove_port, at.foxglove_origin)

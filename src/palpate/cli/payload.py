@@ -12,7 +12,7 @@ from palpate.cli._answer import print_answer
 from palpate.cli._terminal import place, show_answer
 from palpate.cli.options.arm import FrameOptions
 from palpate.cli.options.kept import CellOptions
-from palpate.cli.options.log import LogOptions, read
+from palpate.cli.options.log import LogOptions
 from palpate.cli.options.written import WRITTEN, FileOptions, ReportOption
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -73,7 +73,7 @@ def payload(
     from palpate.contact_frame import ContactFrame, weigh
 
     cell.save((source or LogOptions(), frame or FrameOptions()))
-    record = read(log, source or LogOptions(), samples=False)
+    record = (source or LogOptions()).read(log)
     if "force_x" not in record.columns:
         raise InputError(
             f"{log}: weighing a tool needs a wrench and a pose in three dimensions; name them with --wrench and --pose"

@@ -80,7 +80,7 @@ def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> in
     from palpate.press.prepare import prepared
 
     question, folder = simulated.question(asked), simulated.folder
-    with noticed() as interrupted, fresh_folder(folder, force=simulated.replace) as fresh:
+    with noticed() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
         pressing = prepared(question)
         start = "starting (the first run compiles, which takes some seconds)"
         with _progress.simulated(console(stderr=json), interrupted, start) as show:
@@ -88,7 +88,7 @@ def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> in
         summary = _written(record, pressing, fresh)
     _show(pressing, summary, folder, json)
     if interrupted() or summary["end"] == INTERRUPTED:
-        return 130
+        return interrupted.code
     return 0 if summary["end"] == DONE else 1
 
 

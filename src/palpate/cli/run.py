@@ -18,6 +18,8 @@ from palpate.cli._terminal import console, place, show_answer
 from palpate.cli.options.figures import DRAWN, FigureOptions
 from palpate.cli.options.flags import FLAG, WHOLE
 from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
+from palpate.cli.options.names import QUIET, Experiment
+from palpate.cli.options.plugins import PluginOptions
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, signed, write_json, write_text
 from palpate.text import printable
@@ -44,11 +46,12 @@ class DrawnOptions(FigureOptions):
 
 
 def run(
-    name: str | None = None,
+    name: Annotated[Experiment | None, QUIET] = None,
     /,
     *,
     seed: Annotated[int, WHOLE] = 0,
     known: KnownOptions | None = None,
+    own: PluginOptions | None = None,
     output: FolderOptions | None = None,
     drawn: DrawnOptions | None = None,
 ) -> int:
@@ -66,7 +69,7 @@ def run(
         Of the noise; the same seed gives the same numbers.
     """
     known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or DrawnOptions()
-    from palpate.bench.any_experiment import FILES, load_any
+    from palpate.bench.any_experiment import FILES, load_any, parse_any
 
     if known.list_:
         listed(FILES, lambda one: load_any(one).title)
@@ -78,14 +81,16 @@ def run(
     from palpate.bench.ending import DONE, INTERRUPTED
 
     drawn.check()
-    with noticed() as interrupted:
-        ran = _run(name, source, seed, folder, output, drawn, interrupted)
+    with (own or PluginOptions()).consent():
+        experiment = parse_any(source, name)  # before a Ctrl-C is only noted, which a question would wait for
+        with noticed() as interrupted:
+            ran = _run(_Asked(name, source, experiment, seed), folder, output, drawn, interrupted)
     # All is in its place, so that a reader of the output who has gone loses nothing.
     _show(ran, folder, output.json)
     if ran.undrawn:
         raise InputError(f"{ran.undrawn}; the record is in {folder}")
     if interrupted() or ran.summary["end"] == INTERRUPTED:
-        return 130
+        return interrupted.code
     return 0 if ran.summary["end"] == DONE else 1
 
 
@@ -100,10 +105,18 @@ class _Ran:
     record: Record
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """The experiment to run: its name or file, the text of that, and its numbers; and the seed of the noise."""
+
+    name: str
+    source: str
+    experiment: Any
+    seed: int
+
+
 def _run(
-    name: str,
-    source: str,
-    seed: int,
+    asked: _Asked,
     folder: Path,
     output: FolderOptions,
     drawn: DrawnOptions,
@@ -111,29 +124,27 @@ def _run(
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise
-    from palpate.bench.any_experiment import parse_any
     from palpate.bench.one_direction.tables import OneDirection
     from palpate.logs import write_record
 
-    with fresh_folder(folder, force=output.force) as fresh:
-        experiment = parse_any(source, name)
-        command = printable(f"palpate run {shlex.quote(name)} --seed {seed}")
-        record = _record(console(stderr=output.json), name, experiment, seed, interrupted)
+    with fresh_folder(folder, replace=output.replace) as fresh:
+        command = printable(f"palpate run {shlex.quote(asked.name)} --seed {asked.seed}")
+        record = _record(console(stderr=output.json), asked, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / RECORD)
-        alone = isinstance(experiment, OneDirection)  # nothing excites it, and no estimator watches
+        alone = isinstance(asked.experiment, OneDirection)  # nothing excites it, and no estimator watches
         found, why = (None, "") if alone else _identified(fresh / RECORD)
         said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
-        about = {"experiment": printable(Path(name).stem), "command": command}
+        about = {"experiment": printable(Path(asked.name).stem), "command": command}
         summary = signed({**about, **summarise(record), **said})
         write_json(fresh / "summary.json", summary)
         undrawn = ""
         try:
             if len(record):
-                _draw(record, fresh, summary, found, source, drawn)
+                _draw(record, fresh, summary, found, asked.source, drawn)
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
             undrawn = f"not enough memory or disk space to draw it ({printable(str(error)) or type(error).__name__})"
-    return _Ran(experiment.title, summary, found, undrawn, record)
+    return _Ran(asked.experiment.title, summary, found, undrawn, record)
 
 
 def _draw(
@@ -176,26 +187,26 @@ def _identified(record: Path) -> tuple[Identification | None, str]:
         return None, printable(str(error).replace(str(record), record.name))
 
 
-def _record(
-    screen: Console, name: str, experiment: Any, seed: int, interrupted: Callable[[], bool]
-) -> Record:
+def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> Record:
     from palpate.bench.any_experiment import build_any
     from palpate.bench.part_check import check_parts
 
+    experiment = asked.experiment
     try:
         bench = build_any(experiment)
         check_parts(bench, lambda: screen.print(COMPILING))
     except InputError as error:
-        raise InputError(f"{name}: {error}") from error
+        raise InputError(f"{asked.name}: {error}") from error
     waiting = partial(screen.print, COMPILING)
     with simulated(screen, interrupted) as show:
         return bench.run(
-            experiment.run.duration, seed, press=experiment.run.press, progress=show, waiting=waiting
+            experiment.run.duration, asked.seed, press=experiment.run.press, progress=show, waiting=waiting
         )
 
 
 def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
     from palpate.report.run.table import notes, tables
+    from palpate.report.run.words import sentence
 
     summary = ran.summary
     if as_json:
@@ -207,7 +218,7 @@ def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
         shown_tables = one_direction_tables(ran.record, summary)
     else:
         shown_tables = tables(summary, ran.found)
-    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated\n{sentence(summary)}"
     screen = show_answer(ran.title, rest, shown_tables, notes(summary))
     report = folder / "report.html"
     if report.exists():

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,9 +15,12 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
 from palpate.cli._progress import COMPILING, counted
-from palpate.cli._terminal import console, place, say, show_answer
+from palpate.cli._terminal import confirmed, console, place, say, show_answer
+from palpate.cli.options.figures import FigureOptions
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
+from palpate.cli.options.names import QUIET, Study
+from palpate.cli.options.plugins import PluginOptions
 from palpate.errors import InputError
 from palpate.text import printable
 
@@ -27,6 +31,10 @@ if TYPE_CHECKING:
     from palpate.studies.findings.summary import Findings
     from palpate.studies.running.cluster import Cluster
     from palpate.studies.running.run_study import Runner
+
+
+_SHOWN = 3
+"""Tables that the terminal shows; the page has all."""
 
 
 @Parameter(name="*", group=Group("A cluster", sort_key=1))
@@ -68,13 +76,15 @@ class ClusterOptions:
 
 
 def study(
-    name: str | None = None,
+    name: Annotated[Study | None, QUIET] = None,
     /,
     *,
     yes: Annotated[bool, FLAG] = False,
     where: ClusterOptions | None = None,
     known: KnownOptions | None = None,
+    own: PluginOptions | None = None,
     output: FolderOptions | None = None,
+    drawn: FigureOptions | None = None,
 ) -> int:
     """Run an experiment many times over a grid, a range or a random choice of parameters, or search for the best.
 
@@ -88,9 +98,10 @@ def study(
     name
         A study (see --list), or a TOML file of your own (see --print).
     yes
-        Do not ask for confirmation before a very long study.
+        Do not try each case before hundreds of runs, and do not ask before a very long study.
     """
-    known, output = known or KnownOptions(), output or FolderOptions()
+    known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or FigureOptions()
+    drawn.check()
     from palpate.studies.definition import study as studies
 
     if known.list_:
@@ -101,7 +112,8 @@ def study(
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"study-{Path(name).stem}"
     try:
-        found = _done(name, source, folder, where or ClusterOptions(), yes, output.force)
+        with (own or PluginOptions()).consent():
+            found = _done(_Asked(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn)
     except KeyboardInterrupt:
         kept = f"the finished runs are saved in {folder}; the same command resumes"
         say(f"interrupted; {kept}")
@@ -110,27 +122,44 @@ def study(
     return 0 if found.summary["results"].get("done") else 1
 
 
-def _done(name: str, source: str, folder: Path, where: ClusterOptions, yes: bool, force: bool) -> Findings:
+@dataclass(frozen=True)
+class _Asked:
+    """A study's name, its text and its folder; whether to ask before a long one, and to replace what is there."""
+
+    name: str
+    source: str
+    folder: Path
+    yes: bool
+    replace: bool
+
+
+def _done(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Findings:
     """Do the missing runs, and write table, page and summary."""
     from palpate.studies.definition.part_check import check_parts_of
     from palpate.studies.definition.plan import plan
     from palpate.studies.definition.study import parse
     from palpate.studies.findings.summary import present
-    from palpate.studies.running.run_study import Work, begun
+    from palpate.studies.running.dry_run import check_cases
+    from palpate.studies.running.run_study import Work, begun, check_folder
 
-    screen = console(stderr=True)
+    screen, name, folder = console(stderr=True), asked.name, asked.folder
+    waiting = partial(screen.print, COMPILING)
+    new = asked.replace or not begun(folder)
     try:
-        planned = plan(parse(source, name), name)
-        check_parts_of(planned, lambda: screen.print(COMPILING))
+        planned = plan(parse(asked.source, name), name)
+        check_folder(folder, planned, replace=asked.replace)
+        check_parts_of(planned, waiting)
+        if new and not asked.yes:
+            check_cases(planned, waiting)
     except InputError as error:
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
-    if not yes and (force or not begun(folder)):
+    if new and not asked.yes:
         _ask(planned, screen, here=where.scheduler is None)
     with _runner(where, screen) as runner, counted(screen) as show:
-        frame = Work(planned, source, folder, runner, lambda done: show("runs", done, len(planned))).done(
-            force=force
-        )
-    return present(frame, planned, folder, source, printable(f"palpate study {shlex.quote(name)}"))
+        work = Work(planned, asked.source, folder, runner, lambda done: show("runs", done, len(planned)))
+        frame = work.done(replace=asked.replace)
+    told = printable(f"palpate study {shlex.quote(name)}")
+    return present(frame, planned, folder, asked.source, told, drawn.endings, drawn.dpi)
 
 
 def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
@@ -144,9 +173,7 @@ def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
         return
     if not sys.stdin.isatty():
         raise InputError(f"{warning}; make it smaller, or add --yes")
-    from rich.prompt import Confirm
-
-    if not Confirm.ask(f"{warning}. Begin?", console=screen, default=False):
+    if not confirmed(screen, f"{warning}. Begin?"):
         raise InputError("not started; make the study smaller: fewer points, fewer seeds")
 
 
@@ -168,5 +195,11 @@ def _show(found: Findings, folder: Path, as_json: bool) -> None:
     if as_json:
         print_answer(found.summary)
         return
-    screen = show_answer(found.summary["study"], f", {found.summary['runs']} runs", found.tables, found.notes)
+    rest = f", {found.summary['runs']} runs\n{chr(10).join(found.summary['answer'])}"
+    few = (
+        [found.tables[0], *found.tables[1:2], found.tables[-1]]
+        if len(found.tables) > _SHOWN
+        else found.tables
+    )
+    screen = show_answer(found.summary["study"], rest, few, found.notes)
     place(screen, "report:", folder / "report.html")

@@ -10,8 +10,8 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import print_lines
-from palpate.cli.options.log import GB, limits_of
 from palpate.cli.options.written import WRITTEN
+from palpate.logs.signals import GB, Signals
 
 if TYPE_CHECKING:
     from palpate.logs.listing import Entry, Listing
@@ -48,7 +48,7 @@ def topics(
     """
     from palpate.logs.listing import list_log
 
-    found = list_log(log, delimiter, limits_of(max_size, max_seconds))
+    found = list_log(log, delimiter, Signals(max_size=max_size, max_seconds=max_seconds).limits)
     command = found.proposal.command(log)
     if json:
         proposal = {"command": command, "guesses": list(found.proposal.guesses)}
@@ -91,6 +91,7 @@ def _proposed(found: Listing, command: str | None) -> list[str]:
         "",
         "to identify it:" if not guesses else "to identify it (guessed parts are listed below):",
         f"  {command}",
+        *(f"  {fact}" for fact in found.proposal.facts),
         *guesses,
     ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from palpate.cli._answer import print_answer
 from palpate.cli._identified import read_found
@@ -12,11 +12,10 @@ from palpate.cli._terminal import console, place
 from palpate.cli.options.force import (
     ArmOptions,
     ColumnOptions,
-    OutputOptions,
     PressOptions,
     SurfaceOptions,
+    TuningOutputOptions,
 )
-from palpate.cli.options.log import LogOptions
 from palpate.cli.options.written import ReportOption
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -34,7 +33,7 @@ def tune(
     press: PressOptions,
     surface: SurfaceOptions | None = None,
     columns: ColumnOptions | None = None,
-    output: OutputOptions | None = None,
+    output: TuningOutputOptions | None = None,
     page: ReportOption | None = None,
 ) -> int:
     """Tune a force loop for an arm, and prove on which surfaces it is stable.
@@ -43,7 +42,7 @@ def tune(
 
     palpate tune found.json --arm ur5e --force 20 --out gains.toml
 
-    palpate tune press.csv --time time_s --position position_mm:mm --log-force force_N:N --arm ur5e --force 20
+    palpate tune press.csv --time time_s --position position_mm:mm --force-column force_N:N --arm ur5e --force 20
 
     palpate tune --stiffness 1e2:1e6 --arm fr3 --force 10 --out gains.toml
 
@@ -60,7 +59,7 @@ def tune(
         The output of palpate identify --json, as a .json file; or a log.
     """
     surface, columns = surface or SurfaceOptions(), columns or ColumnOptions()
-    output, page = output or OutputOptions(), page or ReportOption()
+    output, page = output or TuningOutputOptions(), page or ReportOption()
     output.check_new(output.out, ending=".toml")
     report = page.page()
     from palpate.force import tune as tuned
@@ -69,50 +68,33 @@ def tune(
     told = tuned(
         one,
         press.desired,
-        _known(found, surface.stiffness, columns.of_press, columns.payload),
+        _known(found, surface, columns),
         cap=surface.cap,
         peak=press.highest,
         surface_speed=surface.surface_speed,
     )
     written = _written(told, output.out, report)
-    _print(told, inner, written, output.json)
+    _print(told, inner, written, output)
     return 0 if told.proved else 1
 
 
-def _known(
-    found: Path | None, stiffness: str | None, source: LogOptions, payload: Path | None
-) -> Known | None:
-    from palpate.excitation.quantities import spread
+def _known(found: Path | None, surface: SurfaceOptions, columns: ColumnOptions) -> Known | None:
     from palpate.force import Known, known_from
+    from palpate.from_log import log_identifier
 
-    if found is not None and stiffness is not None:
+    highest = surface.highest_damping
+    if found is not None and surface.stiffness is not None:
         raise InputError("give a file or --stiffness, not both")
+    if surface.stiffness is not None:
+        return Known.stated(surface.range, highest)
     if found is None:
-        if stiffness is None:
-            raise InputError(
-                "the surface is missing; give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"
-            )
-        low, high = spread("--stiffness", stiffness, "stiffness")
-        return Known((low, high))
-    if found.suffix.lower() == ".json":
-        return known_from(read_found(found), str(found))
-    return known_from(_identified(found, source, payload), str(found))
-
-
-def _identified(log: Path, source: LogOptions, payload: Path | None) -> dict[str, Any]:
-    from palpate.cli.options.arm import ArmOptions as PayloadOptions
-    from palpate.cli.options.log import read
-    from palpate.contact_frame import identify_contact
-    from palpate.logs.own_runs import is_run, measured_by
-
-    record = read(log, source, samples=False)
-    if "force" not in record.columns or "position" not in record.columns:
         raise InputError(
-            f"{log}: tune takes a log of one axis; run palpate identify --json on it and give its output"
+            "the surface is missing; give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"
         )
-    known: dict[str, Any] = measured_by(log) if source.plain and is_run(log) else {}
-    found, _ = identify_contact(record, None, PayloadOptions(payload=payload).arm(), **known)
-    return found.to_json()
+    if found.suffix.lower() == ".json":
+        return known_from(read_found(found), str(found)).with_damping_up_to(highest)
+    identified, _ = log_identifier(columns.of_press).identify(found)
+    return known_from(identified.to_json(), str(found)).with_damping_up_to(highest)
 
 
 def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
@@ -125,13 +107,16 @@ def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     return [path for path in (out, page) if path is not None]
 
 
-def _print(told: Tuning, inner: InnerLoop | None, written: list[Path], json: bool) -> None:
-    if json:
+def _print(told: Tuning, inner: InnerLoop | None, written: list[Path], output: TuningOutputOptions) -> None:
+    if output.json:
         print_answer(told.to_json() | {"inner_loop": None if inner is None else inner.to_json()})
         return
-    from palpate.report.tuning.table import show
+    from palpate.report.tuning.table import show, show_all
 
     screen = console()
-    show(told, screen)
+    if not output.verbose:
+        show(told, screen, written)
+        return
+    show_all(told, screen)
     for path in written:
         place(screen, "written:", path)

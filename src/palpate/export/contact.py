@@ -99,15 +99,19 @@ def contact_from(
     model = str(own.get("model") or "kelvin-voigt" if "logs" in found else own.get("model"))
     point = own.get("working_point")
     K = _stiffness(parameters, point, model, source, working_point)
-    B = _given("damping", damping, "N s/m") or _identified(parameters, "B", "N s/m", source, _GIVE_DAMPING)
-    M = _given("mass", mass, "kg") or _if_identified(parameters.get("M"), "kg")
-    return Contact(K, B, M, _force(point), model, source, _assumed(parameters, point, model, working_point))
+    B = _given_quantity("damping", damping, "N s/m") or _identified_quantity(
+        parameters, "B", "N s/m", source, _GIVE_DAMPING
+    )
+    M = _given_quantity("mass", mass, "kg") or _if_identified(parameters.get("M"), "kg")
+    return Contact(
+        K, B, M, _force(point), model, source, _assumptions(parameters, point, model, working_point)
+    )
 
 
 _GIVE_DAMPING = "give one with --damping (0 for a pure spring), or excite more (palpate excite)"
 
 
-def _given(name: str, value: float | None, unit: str) -> Quantity | None:
+def _given_quantity(name: str, value: float | None, unit: str) -> Quantity | None:
     if value is None:
         return None
     if not (isfinite(value) and value >= 0.0 and (value > 0.0 or name == "damping")):
@@ -122,7 +126,9 @@ def _stiffness(
     measured = point.get("stiffness") if isinstance(point, Mapping) else None
     known = _if_identified(measured, "N/m")
     if at_point:
-        return known or _identified({"K": measured or {}}, "K", "N/m", source, "export the model's K instead")
+        return known or _identified_quantity(
+            {"K": measured or {}}, "K", "N/m", source, "export the model's K instead"
+        )
     remedy = (
         f"the stiffness at the working point is: {known.value:.6g} N/m; take it with --working-point"
         if known
@@ -132,15 +138,17 @@ def _stiffness(
         raise InputError(
             f"{source}: the force of {model} is not K x + B v, as that of a simulator's contact is; {remedy}"
         )
-    return _identified(parameters, "K", "N/m", source, remedy)
+    return _identified_quantity(parameters, "K", "N/m", source, remedy)
 
 
-def _identified(parameters: Mapping[str, Any], name: str, unit: str, source: str, remedy: str) -> Quantity:
+def _identified_quantity(
+    parameters: Mapping[str, Any], name: str, unit: str, source: str, remedy: str
+) -> Quantity:
     own = parameters.get(name)
     found = _if_identified(own, unit)
     if found is not None:
         return found
-    if isinstance(own, Mapping) and own.get("unit") not in {None, unit}:
+    if isinstance(own, Mapping) and own.get("unit") is not None and own["unit"] != unit:
         raise InputError(
             f"{source}: {name} is in {own['unit']}, not {unit}; name the units of the log's columns"
         )
@@ -176,7 +184,7 @@ def _force(point: object) -> float | None:
     return sum(whole) / len(whole) if whole and len(whole) == len(values) else None
 
 
-def _assumed(parameters: Mapping[str, Any], point: object, model: str, at_point: bool) -> tuple[str, ...]:
+def _assumptions(parameters: Mapping[str, Any], point: object, model: str, at_point: bool) -> tuple[str, ...]:
     lines = ["the force is K x + B v of the penetration x, and never pulls"]
     force = _force(point)
     if force is not None:

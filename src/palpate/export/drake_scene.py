@@ -99,7 +99,7 @@ def load_scene(path: Path) -> Scene:
         InputError: no SDF or URDF.
         OSError: no such file.
     """
-    text = read_bytes(path, _LARGEST, "no SDF or URDF file")
+    text = read_bytes(path, _LARGEST, "an SDF or URDF file")
     try:
         text.decode()
     except UnicodeDecodeError as error:
@@ -203,7 +203,7 @@ def notes(probe: bool) -> tuple[str, ...]:
     return (_PLANT, other)
 
 
-def edited(scene: Scene, surface: Collision, probe: Collision | None, contact: Contact) -> bytes:
+def edit(scene: Scene, surface: Collision, probe: Collision | None, contact: Contact) -> bytes:
     """The file with the contact in it."""
     numbers = {surface.path: (contact.stiffness.value, contact.relaxation_time)}
     if probe is not None:
@@ -227,15 +227,15 @@ def _with(text: bytes, own: Collision, lines: str) -> bytes:
     """The text with these lines among a collision's proximity properties, in place of those of the same names."""
     if own.properties is None:
         new = f"<{_PROPERTIES}>{lines}</{_PROPERTIES}>".encode()
-        return _inserted(text, own.end, new, "collision")
+        return _insert(text, own.end, new, "collision")
     at = own.properties
-    text = _inserted(text, at, lines.encode(), _PROPERTIES)
+    text = _insert(text, at, lines.encode(), _PROPERTIES)
     for begin, end in reversed(own.taken):
         text = text[:begin] + text[end:]
     return text
 
 
-def _inserted(text: bytes, at: int, new: bytes, tag: str) -> bytes:
+def _insert(text: bytes, at: int, new: bytes, tag: str) -> bytes:
     """Before the closing tag at a byte; an element that closes itself is opened for it."""
     if text.startswith(b"</", at):
         return text[:at] + new + text[at:]

@@ -192,7 +192,7 @@ def check(exported: Exported, path: Path) -> list[Checked]:
     return exported.check(path)
 
 
-def _judged(probe: str, pressed: Pressed | None, contact: Contact, note: str = "") -> Checked:
+def _judge(probe: str, pressed: Pressed | None, contact: Contact, note: str = "") -> Checked:
     if pressed is None:
         return Checked(
             probe,
@@ -255,7 +255,7 @@ def _pressed_pair(model: Any, scene: Any, pair: Any, contact: Contact) -> Checke
     rig = MuJoCoRig(model, scene.geom(scene.surface), scene.geom(pair.probe))
     if touched(rig) is None:
         return _out_of_reach(pair.probe)
-    return _judged(pair.probe, press(rig, contact.stiffness.value, _force(contact)), contact)
+    return _judge(pair.probe, press(rig, contact.stiffness.value, _force(contact)), contact)
 
 
 def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
@@ -272,7 +272,7 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
         own = scene.collision(request.name)
         other = scenes.probe_of(scene, own, request.probe)
         surface, probe = own.path, other.path if other else None
-        text = scenes.edited(scene, own, other, contact).decode()
+        text = scenes.edit(scene, own, other, contact).decode()
         named = other.path[-1] if other else "palpate's sphere"
 
     def pressed(path: Path) -> list[Checked]:
@@ -282,7 +282,7 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
         if touch(rig) is None:
             return [_out_of_reach(named)]
         note = f"SAP, point contact, {rig.time_step:g} s a step"
-        return [_judged(named, press(rig, contact.stiffness.value, _force(contact)), contact, note)]
+        return [_judge(named, press(rig, contact.stiffness.value, _force(contact)), contact, note)]
 
     numbers = {"point_contact_stiffness": contact.stiffness.value, "relaxation_time": contact.relaxation_time}
     return Exported(contact, request.target, text, scenes.notes(probe is not None), numbers, check=pressed)
@@ -297,7 +297,7 @@ def _newton(contact: Contact, request: Request, _out: Path) -> Exported:
         rig = NewtonRig(path)
         touch(rig)
         ways = press(rig, contact.stiffness.value, _force(contact), inward=True)
-        return [_judged("palpate's sphere", ways, contact, "SolverSemiImplicit, going in")]
+        return [_judge("palpate's sphere", ways, contact, "SolverSemiImplicit, going in")]
 
     numbers = {"ke": contact.stiffness.value, "kd": contact.damping.value}
     return Exported(contact, request.target, shapes.python(contact), shapes.NOTES, numbers, check=pressed)
@@ -310,8 +310,8 @@ def _spring(contact: Contact, request: Request, _out: Path) -> Exported:
     text = spring.xml(contact, request.name)
 
     def pressed(_path: Path) -> list[Checked]:
-        found = spring.pressed(text, contact, request.name, _force(contact))
-        return [_judged("palpate's sphere", found, contact, "of the plate's own displacement")]
+        found = spring.press_plate(text, contact, request.name, _force(contact))
+        return [_judge("palpate's sphere", found, contact, "of the plate's own displacement")]
 
     numbers = {"stiffness": contact.stiffness.value, "damping": contact.damping.value}
     return Exported(contact, request.target, text, spring.NOTES, numbers, check=pressed)

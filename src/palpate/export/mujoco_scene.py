@@ -23,7 +23,9 @@ from palpate.errors import InputError, unknown
 from palpate.export.contact import Contact
 from palpate.export.mujoco_rig import MuJoCoRig
 from palpate.export.rig import touch
+from palpate.files import open_file
 from palpate.robots.serial._extra import mujoco, refusals
+from palpate.robots.serial._loading import load_mjcf
 
 IMPEDANCE = 1e-4
 """d, the least that MuJoCo takes (mjMINIMP)."""
@@ -111,19 +113,18 @@ def load_scene(path: Path, surface: str) -> Scene:
         InputError: MuJoCo refuses it; it has no such geom.
         OSError: no such file.
     """
-    model = _compiled(path)
+    model = _compile(path)
     names = [model.geom(i).name for i in range(model.ngeom)]
     if surface not in names:
         raise _no_geom(path, surface, names, model)
     return Scene(path, model, surface)
 
 
-def _compiled(path: Path) -> Any:
-    with path.open("rb") as file:
+def _compile(path: Path) -> Any:
+    with open_file(path, "a scene of MuJoCo") as file:
         if b"<mujoco" not in file.read(_HEAD):
             raise InputError(f"{path}: no MJCF, which begins with <mujoco>; give a scene of MuJoCo")
-    with refusals(str(path)):
-        return mujoco().MjModel.from_xml_path(str(path))
+    return load_mjcf(path, published=False)[0]
 
 
 def _no_geom(path: Path, name: str, names: list[str], model: Any) -> InputError:
@@ -157,7 +158,7 @@ def pairs(scene: Scene, probe: str | None) -> tuple[list[Pair], list[str]]:
         raise InputError(f"{scene.path}: nothing that has a name can touch {scene.surface!r}{why}")
     notes = [f"{unnamed} geoms without a name keep the scene's own contact with it"] if unnamed else []
     rough = _rough(scene, reach)
-    found = [_measured(rough, scene, name, own) for name, own in reach.items()]
+    found = [_measure_pair(rough, scene, name, own) for name, own in reach.items()]
     return found, notes + [note for pair in found for note in _notes(pair, _round(scene, pair.probe))]
 
 
@@ -224,7 +225,7 @@ def _reach(scene: Scene, probe: str | None) -> tuple[dict[str, tuple[int, tuple[
     return {probe: found[probe]}, 0
 
 
-def _measured(rough: Any, scene: Scene, probe: str, own: tuple[int, tuple[float, ...]]) -> Pair:
+def _measure_pair(rough: Any, scene: Scene, probe: str, own: tuple[int, tuple[float, ...]]) -> Pair:
     """A pair with its R, read off the engine with the contact made: at the touch, or else from afar."""
     rig = MuJoCoRig(rough, scene.geom(scene.surface), scene.geom(probe))
     mass = touched(rig)

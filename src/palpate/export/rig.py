@@ -159,7 +159,7 @@ def press(rig: Rig, stiffness: float, force: float, *, inward: bool = False) -> 
         held = row[2]
         rows.append(row)
     table = np.array(rows)
-    return _fitted(table[table[:, 1] > 0.0] if inward else table, mass, rig.time_step)
+    return _fit(table[table[:, 1] > 0.0] if inward else table, mass, rig.time_step)
 
 
 def _drive(rig: Rig, path: tuple[Array, float, Array], asked: float, held: float, natural: float) -> Array:
@@ -188,7 +188,7 @@ def _path(rig: Rig) -> tuple[Array, float, Array] | None:
     return way, float(way @ inertia @ way), rates[0]
 
 
-def _fitted(rows: Array, mass: float, time_step: float) -> Pressed | None:
+def _fit(rows: Array, mass: float, time_step: float) -> Pressed | None:
     held = rows[(rows[:, 2] > 0.0) & (rows[:, 0] > 0.0)]
     if len(held) < _FINEST:
         return None

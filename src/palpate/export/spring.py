@@ -61,7 +61,7 @@ def xml(contact: Contact, name: str) -> str:
 """
 
 
-def pressed(text: str, contact: Contact, name: str, force: float) -> Pressed | None:
+def press_plate(text: str, contact: Contact, name: str, force: float) -> Pressed | None:
     """Press the plate with a sphere, and read K and B of the plate's displacement."""
     probe = (
         '<body name="palpate-probe" pos="0 0 0.1"><joint type="slide" axis="0 0 1"/>'

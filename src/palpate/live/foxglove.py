@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
-import threading
+import re
+import struct
+from base64 import b64encode
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any
+
+import msgspec
 
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.live.player import Player
-from palpate.live.server import HOST
+from palpate.live.server import GuardedServer
 from palpate.live.view import AT, COLUMNS, JOINTS, View
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
 
 TOPIC = "/palpate/contact"
 ARM = "/palpate/arm"
@@ -33,83 +41,112 @@ _UNITS = {
     **{f"q{i}": "rad" for i in range(1, JOINTS + 1)},
 }
 _SECOND = 1_000_000_000
+_MOST = 16
+"""Subscriptions of a viewer."""
+
+
+_KINDS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
+"""Names of the protocol: of Foxglove's newer viewers, and of the others."""
+_CONTACT, _ARM = 1, 2
+"""Numbers of the channels."""
+_HEAD = struct.Struct("<BIQ")
+"""Of a message: 1, the number of the subscription, nanoseconds."""
+_ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[^/\s]*\Z")
 
 
 @contextmanager
-def viewers(player: Player, port: int) -> Iterator[tuple[str, ...]]:
+def viewers(player: Player, port: int, origin: str = "") -> Iterator[tuple[str, ...]]:
     """Serves viewers within the block; yields the line that says where.
 
     Args:
         player: whose rows they get: `TOPIC` in JSON, and the arm as line strips of a scene on `ARM`.
         port: of this machine; 0 takes a free one.
+        origin: of a viewer that is a page, as https://app.foxglove.dev; any other page is refused.
 
     Raises:
-        InputError: the port cannot be taken, or foxglove-sdk is not installed.
+        InputError: the port cannot be taken, the origin is none, or foxglove-sdk is not installed.
     """
-    if not 0 <= port <= 65535:
-        raise InputError(f"--foxglove-port must be from 0 to 65535, got {port}")
+    if origin and not _ORIGIN.match(origin):
+        raise InputError(f"--foxglove-origin must be like https://app.foxglove.dev, got {origin!r}")
     try:
-        import foxglove
+        import foxglove  # noqa: F401
     except ImportError:
         raise InputError('viewers need foxglove-sdk: pip install "palpate[foxglove]"') from None
-    context = foxglove.Context()
-    try:
-        server = foxglove.start_server(name="palpate", host=HOST, port=port, context=context)
-    except RuntimeError as error:
-        raise InputError(
-            f"port {port} cannot be taken ({error}); name another with --foxglove-port"
-        ) from None
-    sender = _Sender(player, context)
-    silence = player.feed.listen(sender.news.set)
-    sender.start()
-    player.watch()
-    try:
-        yield (f"viewers: ws://{HOST}:{server.port}",)
-    finally:
-        silence()
-        sender.end()
-        server.stop()
+    with _Viewers(player, port, "--foxglove-port", origin) as address:
+        yield (f"viewers: {address}",)
 
 
-class _Sender(threading.Thread):
-    """Sends new rows, in its own thread."""
+class _Subscribe(msgspec.Struct, tag="subscribe", tag_field="op"):
+    """Channels to send, each under a number of the viewer's."""
 
-    def __init__(self, player: Player, context: Any):
-        import foxglove
-        from foxglove.channels import SceneUpdateChannel
+    subscriptions: list[dict[str, int]]
 
-        super().__init__(name="viewers", daemon=True)
-        self.news = threading.Event()
-        self._player, self._ended = player, False
-        shown = {name: _UNITS[name] for name in COLUMNS if name in player.source.view.shown}
-        schema = {
-            "type": "object",
-            "title": "palpate.Contact",
-            "properties": {name: {"type": "number", "description": unit} for name, unit in shown.items()},
-        }
-        self._contact = foxglove.Channel(TOPIC, schema=schema, context=context)
-        self._arm = SceneUpdateChannel(ARM, context=context) if _drawn(player.source.view) else None
 
-    def end(self) -> None:
-        """Ends the thread."""
-        self._ended = True
-        self.news.set()
-        self.join()
+class _Unsubscribe(msgspec.Struct, tag="unsubscribe", tag_field="op"):
+    """Numbers of no further interest."""
 
-    def run(self) -> None:
-        """Until `end`."""
+    subscriptionIds: list[int]
+
+
+class _Viewers(GuardedServer):
+    """Foxglove's protocol, behind the same door as the page.
+
+    The server of foxglove-sdk is not used: it answers any page of any origin.
+    """
+
+    scheme = "ws"
+    subprotocols = _KINDS
+
+    def __init__(self, *words: Any):
+        super().__init__(*words)
+        self._wanted: dict[ServerConnection, dict[int, int]] = {}
+        """Of each viewer: channels by its own numbers."""
+
+    async def _reader(self, connection: ServerConnection) -> None:
+        self._wanted[connection] = {}
+        try:
+            await super()._reader(connection)
+        finally:
+            del self._wanted[connection]
+
+    async def _hear(self, connection: ServerConnection, message: str | bytes) -> None:
+        wanted = self._wanted[connection]
+        with suppress(
+            msgspec.DecodeError, RecursionError, UnicodeDecodeError
+        ):  # other requests have no answer
+            match msgspec.json.decode(message, type=_Subscribe | _Unsubscribe):
+                case _Subscribe(subscriptions=some):
+                    asked = {one["id"]: one["channelId"] for one in some if {"id", "channelId"} <= set(one)}
+                    wanted.update({k: v for k, v in asked.items() if 0 <= k < 1 << 32})
+                    while len(wanted) > _MOST:
+                        wanted.popitem()
+                case _Unsubscribe(subscriptionIds=numbers):
+                    for number in numbers:
+                        wanted.pop(number, None)
+        self._wake()
+
+    async def _send_news(self, connection: ServerConnection, news: asyncio.Event) -> None:
+        wanted = self._wanted[connection]
+        view = self._player.source.view
+        info = {"name": "palpate", "capabilities": [], "supportedEncodings": [], "metadata": {}}
+        await connection.send(_text("serverInfo", **info, sessionId=self._token[:8]))
+        await connection.send(_text("advertise", channels=_channels(view)))
         epoch, count = -1, 0
-        while self.news.wait() and not self._ended:
-            self.news.clear()
-            epoch, count, rows, _ = self._player.feed.since(epoch, count)
-            for row in rows:
-                # JSON has no word for what is no number: a viewer shows a gap where a field is left out.
-                known = {name: float(v) for name, v in zip(COLUMNS, row, strict=True) if math.isfinite(v)}
-                self._contact.log(known, log_time=_stamp(known["t"]))
-            if self._arm is not None and len(rows):
-                self._draw(rows[-1])
+        while True:
+            news.clear()
+            rows: Any = ()
+            if wanted:  # who asks for a channel gets what is kept of it
+                epoch, count, rows, _ = self._player.feed.since(epoch, count)
+            for number, channel in list(wanted.items()):
+                if channel == _CONTACT:
+                    for row in rows:
+                        await connection.send(_message(number, row, _contact(row)))
+                elif channel == _ARM and len(rows) and _drawn(view):
+                    await connection.send(_message(number, rows[-1], self._scene(rows[-1])))
+            await news.wait()
 
-    def _draw(self, row: Array) -> None:
+    def _scene(self, row: Array) -> bytes:
+        """The arm and the surface as lines, by Foxglove's own protobuf."""
         from foxglove.messages import (
             Color,
             LinePrimitive,
@@ -119,26 +156,61 @@ class _Sender(threading.Thread):
             SceneUpdate,
         )
 
-        view = self._player.source.view
-        points = [Point3(x=float(x), y=float(y), z=float(z)) for x, y, z in self._player.source.bones(row)]
-        wall = [
-            Point3(x=float(x), y=float(y), z=float(z)) for x, y, z in _surface(view, float(row[AT["wall"]]))
-        ]
+        source = self._player.source
         lines = [
             LinePrimitive(
                 type=LinePrimitiveLineType.LineStrip,
                 thickness=thick,
-                points=own,
+                points=[Point3(x=float(x), y=float(y), z=float(z)) for x, y, z in points],
                 color=Color(r=r, g=g, b=b, a=1.0),
             )
-            for own, thick, (r, g, b) in (
-                (points, 0.012, (0.35, 0.38, 0.42)),
-                (wall, 0.004, (0.15, 0.55, 0.37)),
+            for points, thick, (r, g, b) in (
+                (source.bones(row), 0.012, (0.35, 0.38, 0.42)),
+                (_surface(source.view, float(row[AT["wall"]])), 0.004, (0.15, 0.55, 0.37)),
             )
         ]
-        assert self._arm is not None
-        entity = SceneEntity(frame_id="base", id="arm", lines=lines)
-        self._arm.log(SceneUpdate(entities=[entity]), log_time=_stamp(float(row[AT["t"]])))
+        return bytes(SceneUpdate(entities=[SceneEntity(frame_id="base", id="arm", lines=lines)]).encode())
+
+
+def _channels(view: View) -> list[dict[str, Any]]:
+    """Advertised: the rows, and the arm if there is one."""
+    shown = {name: _UNITS[name] for name in COLUMNS if name in view.shown}
+    schema = {
+        "type": "object",
+        "title": "palpate.Contact",
+        "properties": {name: {"type": "number", "description": unit} for name, unit in shown.items()},
+    }
+    found = [
+        _channel(
+            _CONTACT, TOPIC, "json", "palpate.Contact", "jsonschema", msgspec.json.encode(schema).decode()
+        )
+    ]
+    if _drawn(view):
+        from foxglove.messages import SceneUpdate
+
+        own = SceneUpdate.get_schema()
+        found.append(_channel(_ARM, ARM, "protobuf", own.name, own.encoding, b64encode(own.data).decode()))
+    return found
+
+
+def _channel(number: int, topic: str, encoding: str, name: str, kind: str, schema: str) -> dict[str, Any]:
+    return {
+        "id": number, "topic": topic, "encoding": encoding,
+        "schemaName": name, "schemaEncoding": kind, "schema": schema,
+    }  # fmt: skip
+
+
+def _text(op: str, **more: Any) -> str:
+    return msgspec.json.encode({"op": op, **more}).decode()
+
+
+def _message(number: int, row: Array, payload: bytes) -> bytes:
+    return _HEAD.pack(1, number, _stamp(float(row[AT["t"]]))) + payload
+
+
+def _contact(row: Array) -> bytes:
+    """A row in JSON, which has no word for what is no number: a viewer shows a gap where a field is left out."""
+    return msgspec.json.encode({k: float(v) for k, v in zip(COLUMNS, row, strict=True) if math.isfinite(v)})
 
 
 def _drawn(view: View) -> bool:

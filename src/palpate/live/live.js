@@ -214,6 +214,7 @@
       const told = JSON.parse(data);
       if (told.kind === "clear") { forget(); fresh = true; }
       else if (told.kind === "state") { live.state = told; stand(); }
+      else if (told.kind === "watching") document.body.classList.add("watching");
       else if (told.kind === "refused" && live.state) { live.state.said = told.why; stand(); }
     });
     socket.addEventListener("close", () => {

@@ -66,19 +66,20 @@ def quantity(value: float, unit: str, half: float | None = None, digits: int = 3
         half: half-width of its 95 % interval.
         digits: of a value without one.
     """
-    factor, prefix = _prefix(value, unit)
+    factor, prefix = prefixed(value, unit)
     number = plain(value / factor, digits) if half is None else with_half(value / factor, half / factor)
     return f"{number} {prefix}{unit}" if unit != "1" else number
 
 
 def quantity_between(low: float, high: float, unit: str) -> str:
     """`5139 to 5348 N/m`: the ends of an interval, with the prefix of the larger."""
-    factor, prefix = _prefix(max(abs(low), abs(high)), unit)
+    factor, prefix = prefixed(max(abs(low), abs(high)), unit)
     text = between(low / factor, high / factor)
     return f"{text} {prefix}{unit}" if unit != "1" else text
 
 
-def _prefix(value: float, unit: str) -> tuple[float, str]:
+def prefixed(value: float, unit: str) -> tuple[float, str]:
+    """The factor and the letter of the SI prefix that keeps a number short."""
     size = abs(value)
     if unit in _PREFIXED:
         found = next(((f, p) for f, p in _PREFIXES if size >= 9.9995 * f), None)

@@ -20,12 +20,14 @@ class FigureOptions:
     Parameters
     ----------
     figures
-        Format: png, svg, pdf; may be repeated.
+        Formats: png, svg, pdf, one or more.
     dpi
         Of a PNG; 110 if not given.
     """
 
-    figures: Annotated[tuple[str, ...], Parameter(negative=(), show_default=", ".join)] = ("png",)
+    figures: Annotated[
+        tuple[str, ...], Parameter(negative=(), show_default=", ".join, consume_multiple=True)
+    ] = ("png",)
     dpi: int | None = None
 
     @property

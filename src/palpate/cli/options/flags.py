@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isnan
 from typing import Any
 
 from cyclopts import Parameter, Token
@@ -13,6 +14,19 @@ FLAG = Parameter(negative=())
 """A switch without a `--no-` of its own."""
 SIGNED = Parameter(allow_leading_hyphen=True)
 """A value that may begin with a minus: it is a number below zero, not another option."""
+
+
+def checked(kind: Any, tokens: Sequence[Token]) -> Any:
+    """The value of any option or argument: a number must be one, and not beyond what the machine counts."""
+    from cyclopts import convert
+
+    try:
+        value = convert(kind, tokens)
+    except OverflowError:
+        raise InputError(f"it must be a finite number, got {tokens[0].value!r}") from None
+    if isinstance(value, float) and isnan(value):
+        raise InputError(f"it must be a number, got {tokens[0].value!r}")
+    return value
 
 
 def _whole_number(_: Any, tokens: Sequence[Token]) -> int:

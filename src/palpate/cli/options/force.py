@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import SIGNED, in_si, in_si_if_given
-from palpate.cli.options.log import LogOptions
+from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
+from palpate.cli.options.names import QUIET, LoopArm
 from palpate.cli.options.written import WRITTEN, FileOptions
 from palpate.errors import InputError
 
@@ -31,7 +31,7 @@ class ArmOptions:
         A log of commanded and measured position in free motion: it identifies the arm's inner loop and delay.
     """
 
-    arm: str
+    arm: Annotated[LoopArm, QUIET]
     loop_from: Path | None = None
 
     def named(self, columns: ColumnOptions) -> tuple[Arm, InnerLoop | None]:
@@ -56,13 +56,28 @@ class SurfaceOptions:
         Range of its stiffness, LOW:HIGH in N/m or LOW:HIGH:UNIT.
     stiffness_cap
         Largest possible stiffness, N/m.
+    damping_max
+        Largest possible damping, N s/m; if not given, the upper end of the interval that the log gives.
     surface_speed
         Speed of a moving surface, m/s.
     """
 
     stiffness: Annotated[str | None, SIGNED] = None
     stiffness_cap: Annotated[str | None, SIGNED] = None
+    damping_max: Annotated[str | None, SIGNED] = None
     surface_speed: Annotated[float | None, SIGNED] = None
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Lowest and highest stiffness [N/m]."""
+        from palpate.excitation.quantities import spread
+
+        return spread("--stiffness", str(self.stiffness), "stiffness")
+
+    @property
+    def highest_damping(self) -> float | None:
+        """The largest B [N s/m]."""
+        return in_si_if_given("--damping-max", self.damping_max, "damping")
 
     @property
     def cap(self) -> float | None:
@@ -110,7 +125,7 @@ class ColumnOptions:
         Rows per second, for a log without a column of time.
     position
         Column of the measured position, as position_mm:mm.
-    log_force
+    force_column
         Column of the force in the log of a press, as force_mN:mN.
     command
         Column of the commanded position in the log of --loop-from, as target_mm:mm.
@@ -121,14 +136,15 @@ class ColumnOptions:
     time: str | None = None
     rate: float | None = None
     position: str | None = None
-    log_force: str | None = None
+    force_column: str | None = None
     command: str | None = None
     payload: Path | None = None
 
     @property
-    def of_press(self) -> LogOptions:
-        """The columns, as for `palpate identify`."""
-        return LogOptions(time=self.time, rate=self.rate, position=self.position, force=self.log_force)
+    def of_press(self) -> dict[str, Any]:
+        """The columns and the payload, as for `palpate.identify_log`."""
+        own = {"time": self.time, "rate": self.rate, "position": self.position, "force": self.force_column}
+        return {name: value for name, value in {**own, "payload": self.payload}.items() if value is not None}
 
 
 @Parameter(name="*", group=WRITTEN)
@@ -143,6 +159,20 @@ class OutputOptions(FileOptions):
     """
 
     out: Path | None = None
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class TuningOutputOptions(OutputOptions):
+    """Files to write, and how much to print.
+
+    Parameters
+    ----------
+    verbose
+        Print every figure, every warning, and the cases that no proof covers.
+    """
+
+    verbose: Annotated[bool, FLAG] = False
 
 
 def inner_loop(log: Path, columns: ColumnOptions) -> InnerLoop:

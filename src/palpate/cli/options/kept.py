@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options.names import QUIET, Preset
 from palpate.errors import InputError, unknown
-from palpate.files import check_place, read_bytes, write_text
+from palpate.files import check_place, read_text, read_toml, write_text
 from palpate.files.ownership import MADE
+from palpate.logs.presets import preset
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -24,14 +24,14 @@ _NEVER = {
     "wire", "yes", "dry-run", "record", "recover",
 }  # fmt: skip
 """Options of a single call rather than of a cell, above all those that move an arm."""
+_ASKS_HELP = {"--help", "-h"}
+"""Words that ask for a page of help, which no file of options changes."""
 _TYPED = {"press": {"force", "position", "seconds"}}
 """By command, what is of a call there, though the same word is of the cell elsewhere."""
 _PATHS = {"payload", "robot-stiffness-from", "gains", "certificate"}
 """Options that name a file: beside the options' own file, unless the path is absolute."""
 _KNOWN_BY = ("identify", "press")
 """Commands that take one file together: what one of them knows is no mistake to the other."""
-_LARGEST = 1 << 16
-"""Bytes that are read: a file with every option is a hundredth of it."""
 
 
 @Parameter(name="*", group=Group("Options from a file", sort_key=7))
@@ -50,7 +50,7 @@ class CellOptions:
     """
 
     options: Path | None = None
-    preset: str | None = None
+    preset: Annotated[Preset | None, QUIET] = None
     save_options: Path | None = None
 
     def check(self) -> None:
@@ -74,16 +74,18 @@ class CellOptions:
 def options_given(parts: Iterable[Any]) -> dict[str, Any]:
     """Options that differ from their defaults, by name."""
     return {
-        field.name.replace("_", "-"): value
+        _name(part, field.name): value
         for part in parts
         for field in fields(part)
         if (value := getattr(part, field.name)) != field.default
     }
 
 
-def presets() -> list[str]:
-    """Names of the presets that come with palpate."""
-    return sorted(f.name.removesuffix(".toml") for f in files("palpate.cli").joinpath("presets").iterdir())
+def _name(part: Any, field: str) -> str:
+    """The first name of an option on the command line."""
+    hint = get_type_hints(type(part), include_extras=True)[field]
+    said = [name for one in getattr(hint, "__metadata__", ()) for name in getattr(one, "name", None) or ()]
+    return said[0].removeprefix("--") if said else field.replace("_", "-")
 
 
 def expanded(argv: Sequence[str], app: App) -> list[str]:
@@ -94,7 +96,8 @@ def expanded(argv: Sequence[str], app: App) -> list[str]:
     """
     words = list(argv)
     given = {name: _value_of(words, flag) for flag, name in _SAID.items()}
-    if not words or (given["options"] is None and given["preset"] is None) or words[0] not in _commands(app):
+    nothing = given["options"] is None and given["preset"] is None
+    if not words or nothing or words[0] not in _commands(app) or _ASKS_HELP & set(words):
         return words
     flags = _flags(app, words[0])
     if "options" not in flags:
@@ -112,7 +115,7 @@ def expanded(argv: Sequence[str], app: App) -> list[str]:
 
 
 def _commands(app: App) -> list[str]:
-    return [str(name) for name in app]
+    return [str(name) for name in app if not str(name).startswith("-")]
 
 
 def _flags(app: App, command: str) -> dict[str, tuple[str, ...]]:
@@ -137,18 +140,11 @@ def _value_of(words: Sequence[str], flag: str) -> str | None:
 
 
 def _preset(name: str, known: set[str]) -> dict[str, Any]:
-    if name not in presets():
-        raise unknown("preset", name, presets())
-    text = files("palpate.cli").joinpath("presets", f"{name}.toml").read_text(encoding="utf-8")
-    return _checked(tomllib.loads(text), f"preset {name}", known)
+    return _checked(preset(name), f"preset {name}", known)
 
 
 def _file(path: Path, known: set[str]) -> dict[str, Any]:
-    data = read_bytes(path, _LARGEST, "no options")
-    try:
-        table = tomllib.loads(data.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not TOML: {error}") from None
+    table = read_toml(read_text(path, "options"), str(path))
     kept = _checked(table, str(path), known)
     if "preset" in table:
         kept = _preset(str(table["preset"]), known) | kept

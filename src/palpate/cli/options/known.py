@@ -45,14 +45,14 @@ class FolderOptions:
     ----------
     out
         Folder for results; when left out, one in runs/ with the name of the run.
-    force
+    replace
         Replace existing results.
     json
         Print the summary as JSON and nothing else.
     """
 
     out: Path | None = None
-    force: Annotated[bool, FLAG] = False
+    replace: Annotated[bool, FLAG] = False
     json: Annotated[bool, FLAG] = False
 
 

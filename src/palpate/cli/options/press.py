@@ -10,6 +10,7 @@ from cyclopts import Group, Parameter
 
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
 from palpate.cli.options.kept import options_given
+from palpate.cli.options.names import QUIET, Controller, Mode, Physics, SerialArm
 from palpate.cli.options.values import vector
 from palpate.errors import InputError
 
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from palpate.contact_frame import Payload
     from palpate.press.prepare import Question
     from palpate.wires import Limits, Task
+
+
+RETREAT = 0.002
+"""Distance of the retreat if none is given [m]."""
 
 
 @Parameter(name="*", group=Group("The press", sort_key=1))
@@ -98,12 +103,12 @@ class SimulatedOptions:
         Replace the results at --out.
     """
 
-    arm: str | None = None
+    arm: Annotated[SerialArm | None, QUIET] = None
     surface: str | None = None
     site: str | None = None
-    mode: str | None = None
-    physics: str = "own"
-    controller: str = "cautious"
+    mode: Annotated[Mode | None, QUIET] = None
+    physics: Annotated[Physics, QUIET] = "own"
+    controller: Annotated[Controller, QUIET] = "cautious"
     at: Annotated[str | None, SIGNED] = None
     seed: Annotated[int, WHOLE] = 0
     out: Path | None = None
@@ -113,9 +118,13 @@ class SimulatedOptions:
         """The press to simulate."""
         from palpate.press.prepare import Question, surface_of
 
-        if self.arm is None or self.surface is None:
+        if self.arm is None:
             raise InputError(
-                "no arm is named; give --arm and --surface for a simulated arm, or --wire for a real one"
+                "no arm is named; give --arm for a simulated one, as ur5e, or --wire for a real one"
+            )
+        if self.surface is None:
+            raise InputError(
+                "the surface is missing; add --surface, as --surface K=5000,B=50 in N/m and N s/m"
             )
         return Question(
             arm=self.arm, force=asked.desired, surface=surface_of(self.surface), site=self.site, mode=self.mode,
@@ -154,7 +163,7 @@ class WireOptions:
     certificate
         File of palpate certify; without it the lateness is measured, and nothing is proved.
     retreat
-        Distance of the retreat.
+        Distance of the retreat; 2 mm if left out, or the travel limit if that is shorter.
     ordinary_priority
         Do not request real-time priority from the system.
     recover
@@ -166,12 +175,12 @@ class WireOptions:
     yes: Annotated[bool, FLAG] = False
     record: Path | None = None
     certificate: Path | None = None
-    retreat: Annotated[str, SIGNED] = "2:mm"
+    retreat: Annotated[str | None, SIGNED] = None
     ordinary_priority: Annotated[bool, FLAG] = False
     recover: Path | None = None
 
 
-@Parameter(name="*", group=Group("Limits at which a real arm stops; they have no default", sort_key=4))
+@Parameter(name="*", group=Group("Limits at which a real arm stops", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class LimitOptions:
     """Limits that end a press over a wire.
@@ -183,7 +192,8 @@ class LimitOptions:
     speed_limit
         Largest commanded speed, as 20:mm/s; at twice this speed the arm stops.
     travel_limit
-        Distance from the start, as 10:mm.
+        Distance from the start, as 10:mm. If left out, the force limit divided by the stiffness of the gains' stiffest
+        surface: so far a sensor that lies does no harm. Start that close to the surface.
     time_limit
         Total duration, as 20:s.
     """
@@ -211,23 +221,30 @@ def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple
     Raises:
         InputError: one is missing or invalid.
     """
+    from palpate.force.gains import load_gains
     from palpate.wires import Limits, Task
+    from palpate.wires.order import travel_for
 
     needed = {
         "--wire": wire.wire, "--gains": asked.gains, "--force": asked.force, "--normal": asked.normal,
         "--force-limit": limits.force_limit, "--speed-limit": limits.speed_limit,
-        "--travel-limit": limits.travel_limit, "--time-limit": limits.time_limit,
+        "--time-limit": limits.time_limit,
     }  # fmt: skip
     lacking = [name for name, value in needed.items() if value is None]
     if lacking:
         raise InputError(f"a press with a real arm needs {', '.join(lacking)}; none of them has a default")
     normal = vector("normal", asked.normal, "number")
     assert normal is not None
+    force = in_si("--force-limit", str(limits.force_limit), "force")
+    if limits.travel_limit is None:
+        travel = travel_for(load_gains(Path(str(asked.gains))), force)
+    else:
+        travel = in_si("--travel-limit", limits.travel_limit, "length")
     most = Limits(
-        in_si("--force-limit", str(limits.force_limit), "force"),
+        force,
         in_si("--speed-limit", str(limits.speed_limit), "velocity"),
-        in_si("--travel-limit", str(limits.travel_limit), "length"),
+        travel,
         in_si("--time-limit", str(limits.time_limit), "time"),
     )
-    retreat = in_si("--retreat", wire.retreat, "length")
+    retreat = min(RETREAT, travel) if wire.retreat is None else in_si("--retreat", wire.retreat, "length")
     return Task(asked.desired, normal, asked.seconds, retreat, asked.probe or 0.0), most

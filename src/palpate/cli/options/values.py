@@ -8,6 +8,31 @@ from palpate.errors import InputError
 from palpate.units import unit
 
 
+def lag_of(text: str | None) -> tuple[float, float] | None:
+    """`VALUE`, `VALUE:STD`, either with a unit of time behind it, as two numbers in s.
+
+    Raises:
+        InputError: no numbers, another unit, or seconds where milliseconds seem to be meant.
+    """
+    if text is None:
+        return None
+    plain, _, symbol = text.rpartition(":")
+    factor = 1.0
+    if plain and _numbers([symbol]) is None:
+        if unit(symbol).quantity != "time":
+            raise InputError(
+                f"{symbol!r} of --lag is a unit of {unit(symbol).quantity}; it needs one of time"
+            )
+        text, factor = plain, unit(symbol).factor
+    found = with_std("lag", text)
+    if found is not None and factor == 1.0 and not symbol.isalpha() and abs(found[0]) >= _LONGEST_LAG:
+        raise InputError(
+            f"--lag {text} is {found[0]:g} s, and no sensor is so late: is {text} ms meant? Then say --lag {text}:ms,"
+            f" if not --lag {text}:s"
+        )
+    return None if found is None else (factor * found[0], factor * found[1])
+
+
 def with_std(option: str, text: str | None, example: str = "0.0076:0.0002") -> tuple[float, float] | None:
     """`VALUE` or `VALUE:STD` as two numbers."""
     if text is None:
@@ -52,6 +77,8 @@ def span(option: str, text: str | None) -> tuple[float, float] | None:
     return found[0], found[1]
 
 
+_LONGEST_LAG = 1.0
+"""A lag without a unit [s] from which on milliseconds are meant: no sensor of force is a second late."""
 _DEFAULTS = {"length": "m", "angle": "deg", "number": "1"}
 _EXAMPLES = {"length": "0,0,0.12 or 0,0,120:mm", "angle": "0,0,45 (degrees)", "number": "0,0,-1"}
 

@@ -10,6 +10,7 @@ from palpate.arrays import Array, Mask
 from palpate.identification.result import DynamicStiffness, Identification, Press, Tangent, Traces
 from palpate.report import style
 from palpate.report.identification.fit_panels import empty, labelled, length_of
+from palpate.report.look.columns import thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,6 +22,8 @@ _HEAD = 1.25
 _ENDS = 2**0.5
 _KILO = 2e3
 """N/m from which on an axis is in kN/m."""
+_POINTS, _BREAK = 3000, 5.0
+"""Points of the whole contact, about; and times of a usual step from which on a line is broken."""
 
 
 def storage(axes: Axes, found: Identification, traces: Traces) -> None:
@@ -107,7 +110,7 @@ def _silent(axes: Axes, frequency: Array, told: Mask) -> None:
 
 
 def press(axes: Axes, found: Identification, traces: Traces) -> None:
-    """Force over depth: loading and unloading, its slopes with their bands, the working point."""
+    """Force over depth: all of the contact, loading and unloading, its slopes with their bands, the working point."""
     own = found.press
     if own is None:
         empty(axes, "no loading in this log")
@@ -119,7 +122,11 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
         labelled("depth from touch" if _touches(found) else "position", unit),
     )
     x, f = own.loading
+    _whole(axes, traces, scale)
     _band_of(axes, own, scale)
+    low, high = (float(end(traces.fitted_force)) for end in (np.min, np.max))
+    edge = 0.08 * (high - low) or 1.0
+    axes.set_ylim(min(low, 0.0) - edge, high + edge)
     axes.plot(scale * x, f, color=style.INK, lw=1.6, label="loading")
     if own.unloading.shape[1]:
         axes.plot(scale * own.unloading[0], own.unloading[1], color=style.MEASURED, lw=1.6, label="unloading")
@@ -127,6 +134,23 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
     if point is not None:
         _ring(axes, scale * point.depth_m, point.force_N)
     style.legend_above(axes)
+
+
+def _whole(axes: Axes, traces: Traces, scale: float) -> None:
+    """Every loading and unloading of the log, broken where there is no contact."""
+    rows = thinned(traces.fitted_force, _POINTS)
+    t = traces.fitted_time[rows]
+    steps = np.diff(t, prepend=t[0])
+    gap = steps > _BREAK * max(float(np.median(steps)), float(np.ptp(traces.fitted_time)) / _POINTS)
+    position = np.where(gap, np.nan, scale * traces.fitted_position[rows])
+    axes.plot(
+        position,
+        traces.fitted_force[rows],
+        color=style.MEASURED,
+        lw=0.8,
+        alpha=0.7,
+        label="all of the contact",
+    )
 
 
 def _touches(found: Identification) -> bool:
@@ -148,8 +172,6 @@ def _band_of(axes: Axes, own: Press, scale: float) -> None:
         half = np.minimum(tangent.half * np.abs(u), high - low)
         axes.fill_between(scale * (at + u), line - half, line + half, color=style.K, **_BAND)
         axes.plot(scale * (at + u), line, color=style.K, lw=2.4, label="slope, 95 %" if i == 0 else None)
-    edge = 0.08 * (high - low) or 1.0
-    axes.set_ylim(min(low, 0.0) - edge, high + edge)
 
 
 def _depth_at(own: Press, tangent: Tangent) -> float:

@@ -8,8 +8,8 @@ from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter
 from palpate.report.identification import figure
 from palpate.report.identification import page as pages
+from palpate.report.identification.answer import show
 from palpate.report.identification.source import Source
-from palpate.report.identification.table import show
 from palpate.report.identification.words import formatted, sentence
 from palpate.report.result_text import as_html, printed
 from palpate.text import printable
@@ -28,7 +28,7 @@ def line(found: Identification) -> str:
 
 
 def text(found: Identification) -> str:
-    """The output of `palpate identify`."""
+    """The output of `palpate identify`; `report` has all evidence."""
     return printed(lambda console: show(found, NAME, console))
 
 

@@ -57,9 +57,10 @@ def as_json(found: Identification, source: Source) -> dict[str, Any]:
 
 
 def sha256_of(path: Path) -> str:
-    """Of a file; of a folder that is a log, of all its files in the order of their names."""
+    """Of a file; of a sheet, of its book; of a folder that is a log, of all its files in the order of their names."""
     total = hashlib.sha256()
     files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    files = [path.parent] if path.parent.is_file() else files  # a sheet of a book
     for name in files:
         with name.open("rb") as file:
             while chunk := file.read(_CHUNK):

@@ -1,4 +1,4 @@
-"""An identification on the terminal: the sentence, the working point, the parameters, then reasons and warnings."""
+"""All evidence of an identification on the terminal: working point, parameters, reasons, warnings."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from palpate.identification.result import Identification, Parameter, Verdict
+from palpate.report.identification.answer import STYLES
 from palpate.report.identification.words import (
     facts_of,
     formatted,
@@ -23,13 +24,12 @@ from palpate.report.identification.words import (
 from palpate.report.numbers import NONE, between, plain, quantity
 from palpate.text import printable
 
-STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 _MANY = 6
 """Contacts that a line names."""
 
 
 def show(found: Identification, name: str, console: Console) -> None:
-    """Print an identification.
+    """Print an identification with every reason and warning.
 
     Args:
         found: what to print.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from palpate.contact_frame.arm import LOWER_BOUND
 from palpate.identification.causes import Cause, cause_of
 from palpate.identification.result import Identification, Parameter, Verdict, WorkingPoint
 from palpate.identification.warning_codes import Code
@@ -38,6 +39,7 @@ ADVICE = {
     Code.IRREGULAR_TIME: "Log with the sensor's own clock if you can.",
     Code.SATURATED: "Press less, or use a sensor of a larger range.",
     Code.UNIT_GUESS: "Say the units, as in --position position_mm:mm.",
+    Code.UNIT_DOUBTFUL: "Correct the unit; or name the column by its number, if its name is wrong.",
     Code.FORCE_DRIFTS: "Let the sensor warm up and tare it; it is removed as far as the log shows it.",
     Code.TOOL_INERTIA: "None, if the tool moves beyond the sensor; below zero: correct its compensation.",
     Code.FORCE_SIGN_REVERSED: "None, if the column is the right one.",
@@ -63,11 +65,16 @@ UNTOUCHED = "Nothing is touched in this log"
 def sentence(found: Identification) -> str:
     """The stiffness, its place, its largest cause of uncertainty, and the next step."""
     if not found.contacts:
-        return f"{UNTOUCHED}: {_first_reason(found)}."
+        return f"{UNTOUCHED}: {first_reason(found)}."
     point = found.working_point
     if point is None:
         return "The log shows no stiffness: no stretch in contact is long enough; log longer or press deeper."
     own, where = point.stiffness, place_of(found, point)
+    if behind_the_arm(found):
+        return (
+            f"The stiffness of surface and arm in series is {formatted(own)} {where}, a lower bound of the surface's:"
+            " give --robot-stiffness."
+        )
     limit = limited_by(found)
     by_model = _known_by_model(found)
     if by_model is not None:
@@ -90,12 +97,9 @@ def sentence(found: Identification) -> str:
 
 def _known_by_model(found: Identification) -> str | None:
     """The stiffness of a model of one constant stiffness, where the working point is known less well."""
-    K, point = found.parameters.get("K"), found.working_point
-    constant = found.model in ("kelvin-voigt", "kelvin-voigt-mass")
-    if K is None or point is None or not constant or K.verdict is not Verdict.IDENTIFIED:
+    if not by_the_model(found):
         return None
-    if point.stiffness.verdict is Verdict.IDENTIFIED:
-        return None
+    K = found.parameters["K"]
     limit = cause_of(next(iter(K.budget), None))
     return f"By the model {found.model} the stiffness is {formatted(K)}; {_mostly(limit)}."
 
@@ -140,7 +144,7 @@ def lost(share: float) -> str:
     """A sentence about the lost share of the work of a press."""
     if share < 0:
         return f"{-100 * share:.2g} % more work comes back than was put in: the force is probably read late"
-    return f"{100 * share:.2g} % of the work put in does not come back"
+    return f"{100 * share:.2g} % of the work of loading is lost"
 
 
 def limited_by(found: Identification) -> Cause:
@@ -231,6 +235,31 @@ def _share(p: Parameter) -> str:
     return f"{50 * (p.ci95[1] - p.ci95[0]) / abs(p.value):.2g} %"
 
 
-def _first_reason(found: Identification) -> str:
+UNIT_WARNINGS = (Code.UNIT_DOUBTFUL, Code.TIME_DOUBTFUL, Code.COLUMNS_SWAPPED)
+"""Warnings by which the answer may be in another unit, or of another column."""
+
+
+def unit_warnings(found: Identification) -> list[str]:
+    """The warnings that ask for a unit or a column to be corrected, the first of each kind of sentence."""
+    return [warn.text for code in UNIT_WARNINGS for warn in found.warnings if warn.code is code]
+
+
+def behind_the_arm(found: Identification) -> bool:
+    """Whether the arm's own compliance is in the stiffness, which then is a lower bound of the surface's."""
+    K = found.parameters.get("K")
+    return Code.SERIES_COMPLIANCE.word in found.codes and K is not None and K.reason.startswith(LOWER_BOUND)
+
+
+def by_the_model(found: Identification) -> bool:
+    """Whether a model of one constant stiffness knows it, and the working point does not."""
+    K, point = found.parameters.get("K"), found.working_point
+    constant = found.model in ("kelvin-voigt", "kelvin-voigt-mass")
+    if K is None or point is None or not constant or K.verdict is not Verdict.IDENTIFIED:
+        return False
+    return point.stiffness.verdict is not Verdict.IDENTIFIED
+
+
+def first_reason(found: Identification) -> str:
+    """Why nothing was touched."""
     own = next((warn.text for warn in found.warnings if warn.code is Code.NO_CONTACT), "")
     return own.partition(":")[0].rstrip(".") or "the force does not leave its rest"

@@ -10,7 +10,8 @@ from rich.text import Text
 
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.identification.result import Parameter, Verdict
-from palpate.report.identification.table import STYLES, note
+from palpate.report.identification.answer import STYLES
+from palpate.report.identification.table import note
 from palpate.report.identification.words import facts_of, formatted, interval, number, unit
 from palpate.report.many.rows import POINT, LogRow, drawn, quantities
 from palpate.report.many.words import failures, sentence

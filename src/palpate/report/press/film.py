@@ -31,7 +31,7 @@ def _sheet() -> str:
     light, dark = ("".join(f"--{name}:{PAIRS[name][i]};" for name in names) for i in (0, 1))
     return (
         f":root{{{light}--tip:{DATA['F']}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n"
-        "text{font:13px system-ui,sans-serif;fill:var(--quiet)} .arm{fill:none;stroke:var(--ink);stroke-width:11;"
+        "text{font:15px system-ui,sans-serif;fill:var(--quiet)} .arm{fill:none;stroke:var(--ink);stroke-width:11;"
         "stroke-linejoin:round;stroke-linecap:round} .joint{fill:var(--card);stroke:var(--ink)}\n"
         ".surface{fill:var(--line);stroke:var(--quiet)} .flat{fill:none;stroke:var(--line);stroke-width:1}\n"
         ".force{fill:none;stroke:var(--tip);stroke-width:1.6}\n"
@@ -60,24 +60,28 @@ class _View:
         return np.asarray(self.origin + self.scale * flat)
 
 
-def film(record: Record, arm: SerialArm, place: Place) -> str:
+def film(record: Record, arm: SerialArm, place: Place, half: str = "") -> str:
     """The film of a press.
 
     Args:
         record: of the press.
         arm: what moved.
         place: where.
+        half: `arm` or `tip` for that half alone, which is legible on a telephone; both if empty.
     """
     rows = _frames(record)
     seconds = float(record["t"][rows[-1]] - record["t"][rows[0]])
     q = np.column_stack([record[f"q{i}"] for i in range(1, arm.joints + 1)])[rows]
+    left, width = {"": (0.0, _WIDE), "arm": (0.0, _TIP[0] - 20.0), "tip": (_TIP[0] - 20.0, _TIP[2] + 40.0)}[
+        half
+    ]
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDE:g} {_HIGH:g}">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left:g} 0 {width:g} {_HIGH:g}">',
         "<!-- Made by palpate -->",
         f"<style>{_sheet()}</style>",
-        *_arm_panel(arm, place, q, seconds),
-        *_tip_panel(record, rows, seconds),
-        *_force_panel(record, rows, seconds),
+        *(_arm_panel(arm, place, q, seconds) if half != "tip" else ()),
+        *(_tip_panel(record, rows, seconds) if half != "arm" else ()),
+        *(_force_panel(record, rows, seconds) if half != "arm" else ()),
         "</svg>\n",
     ]
     return "\n".join(parts)

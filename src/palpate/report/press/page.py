@@ -9,61 +9,105 @@ import numpy as np
 
 from palpate.bench.sequence import CONTACT
 from palpate.files import write_text
+from palpate.identification.result import Verdict
 from palpate.press.summary import Asked
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.figure_panels.panels import panels_of, shown_in
-from palpate.report.numbers import NONE, plain, with_half
-from palpate.report.page import Table, embedded, render
+from palpate.report.answer import Answer, Card, answer_page
+from palpate.report.figure_panels.panels import panels_of
+from palpate.report.identification.page import TONES
+from palpate.report.identification.words import CALLED
+from palpate.report.numbers import NONE, plain, quantity, with_half
+from palpate.report.page import Table, embedded
 from palpate.report.press.film import film
+from palpate.report.run.cards import force_cards
+from palpate.report.run.words import alerts, settling
+from palpate.report.run.words import sentence as outcome
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: Path) -> None:
     """Writes figures, film.svg and report.html into a folder."""
     figures = []
-    for name, draw in (("force", _force), ("torque", _torque), ("arm", _arm)):
+    for name, draw in (("touch", _touch), ("force", _force), ("torque", _torque)):
         with style.inked():
             drawing, caption = draw(record, asked)
             style.save(drawing, folder / f"{name}.png")
             figures.append({"panels": panels_of(drawing), "caption": caption})
-    moving = film(record, asked.arm, asked.place)
-    write_text(folder / "film.svg", moving)
-    first = {
-        "source": embedded(moving.encode(), "image/svg+xml"),
-        "caption": "The press in real time, from shortly before the touch. The tip's motion is enlarged; the arm is to "
-        "scale.",
+    write_text(folder / "film.svg", film(record, asked.arm, asked.place))
+    captions = {
+        "arm": "The arm, to scale, in real time.",
+        "tip": "The tip, its motion enlarged; and the force.",
     }
-    loop = summary["loop"]
-    about = (
-        f"{asked.arm.title}, {asked.gains.arm.kind}s at {loop['rate_hz']:g} Hz, {asked.controller} control, "
-        f"{'MuJoCo' if asked.physics == 'mujoco' else 'own'} physics, seed {asked.seed}."
+    halves = [
+        {
+            "source": embedded(film(record, asked.arm, asked.place, half).encode(), "image/svg+xml"),
+            "caption": told,
+        }
+        for half, told in captions.items()
+    ]
+    loop, parameters = summary["loop"], (summary["identified"] or {}).get("parameters", {})
+    contact = summary["force"] is not None
+    wanted = f" with {plain(summary['force']['desired_N'], 3)} N" if contact else ""
+    answer = Answer(
+        title=f"A press of {asked.arm.title}{wanted}",
+        sentence=sentence(summary, parameters),
+        about=f"{asked.arm.title}, {asked.gains.arm.kind}s at {loop['rate_hz']:g} Hz, {asked.controller} control, "
+        f"{'MuJoCo' if asked.physics == 'mujoco' else 'own'} physics, simulated, seed {asked.seed}.",
+        alerts=_alerts(summary),
+        cards={
+            "": force_cards(summary) if contact else [],
+            "The surface, by palpate identify": _surface(parameters, summary["truth"]),
+        },
+        pairs=halves,
+        figures=figures if contact else (),
+        folds=[(table.title, "all numbers", table.rows) for table in tables(summary)],
     )
-    page = render(
-        "page.html",
-        title="A press in simulation",
-        about=about,
-        notes=notes(summary),
-        tables=tables(summary),
-        **shown_in([first, *figures]),
-        source="",
-        room="press",
-        command=summary["command"],
-    )
-    write_text(folder / "report.html", page)
+    write_text(folder / "report.html", answer_page(answer, room="press", command=summary["command"]))
+
+
+def sentence(summary: dict[str, Any], parameters: dict[str, Any]) -> str:
+    """How the force went, and the stiffness that was identified."""
+    found = parameters.get("K")
+    if found is None or found["value"] is None or not found["ci95"]:
+        return outcome(summary)
+    half = 0.5 * (found["ci95"][1] - found["ci95"][0])
+    return f"{outcome(summary)} The stiffness of the surface is {quantity(found['value'], 'N/m', half)}."
+
+
+def _surface(found: dict[str, Any], truth: dict[str, Any]) -> list[Card]:
+    """A card a parameter: value, verdict, its limit, and the truth of the simulation."""
+    cards = []
+    for name in (name for name in ("K", "B", "M") if name in found):
+        p, number, unit, half = found[name], "", "", ""
+        known = f" Truth: {quantity(truth[name]['value'], p['unit'])}." if name in truth else ""
+        if p["value"] is not None and p["ci95"]:
+            text = quantity(p["value"], p["unit"], 0.5 * (p["ci95"][1] - p["ci95"][0]))
+            number, _, rest = text.partition(" ± ")
+            half, _, unit = rest.partition(" ")
+        why, tone = f"{p['reason']}.{known}", TONES[Verdict(p["verdict"])]
+        cards.append(Card(f"{name}, {CALLED[name]}", number, unit, half, why, tone, p["verdict"], name))
+    return cards
+
+
+def _alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
+    """Failures first, then the notes of the press."""
+    shown = alerts(summary)
+    told = {_joined(alert) for alert in shown}
+    others = [note for note in notes(summary) if note not in told]
+    return [*shown, *({"tone": "warn", "title": "", "text": note, "advice": ""} for note in others)]
+
+
+def _joined(alert: dict[str, str]) -> str:
+    return " ".join(part for part in (alert["title"], alert["text"], alert["advice"]) if part)
 
 
 def notes(summary: dict[str, Any]) -> list[str]:
     """Warnings of the page."""
-    end = summary["end"]
-    found = [] if end == "done" else [f"{end}: {summary['why']}."]
-    if summary["contacts_lost"]:
-        found.append(f"Contact was lost {summary['contacts_lost']} times.")
-    joint, share = max(summary["saturated"].items(), key=lambda item: item[1])
-    if share > 0.01:
-        found.append(f"The motor of {joint} was at its limit in {100 * share:.1f} % of the ticks.")
+    found = [_joined(alert) for alert in alerts(summary)]
     if summary["sensor_saturated"]:
         share = f"{100 * summary['sensor_saturated']:.2g} % of the ticks"
         found.append(f"The force sensor was saturated in {share}: its reading is not the force.")
@@ -89,7 +133,6 @@ def tables(summary: dict[str, Any]) -> list[Table]:
 
 def _force_table(summary: dict[str, Any]) -> Table:
     f, loop = summary["force"], summary["loop"]
-    settling = "not within the press" if f["settling_s"] is None else f"{f['settling_s']:.3f} s"
     return Table(
         "Force",
         ("", "value"),
@@ -98,7 +141,7 @@ def _force_table(summary: dict[str, Any]) -> Table:
             ("approach", f"{1e3 * loop['approach_speed_m_s']:.2f} mm/s"),
             ("desired at the end", f"{f['desired_N']:.2f} N"),
             ("error, last second", f"{f['error_N']:+.3f} N, standard deviation {f['std_N']:.3f} N"),
-            ("settling to 5 %", settling),
+            ("settling to 5 %", settling(f)),
             ("overshoot", NONE if f["overshoot_N"] is None else f"{f['overshoot_N']:.2f} N"),
             ("noise of the measured force", f"{f['measured_std_N']:.3f} N"),
             ("tip slipped by", f"{summary['tip']['slipped_mm']:.3f} mm"),
@@ -119,34 +162,30 @@ def _identified_table(found: dict[str, Any], truth: dict[str, Any]) -> Table:
     return Table("The surface, as palpate identify finds it", ("", "95 %", "verdict", "truth", "why"), rows)
 
 
-def _arm(record: Record, asked: Asked) -> tuple[Figure, str]:
-    """The arm from two sides at the end."""
-    joints = [record[f"q{i}"] for i in range(1, asked.arm.joints + 1)]
-    bones = asked.arm.joint_places([column[-1] for column in joints])
-    drawing, axes = style.grid((9.0, 4.2), 1, 2)
-    centre = asked.place.pose[:3, 3]
-    for axis, (i, j), names in zip(axes, ((0, 2), (1, 2)), ("xz", "yz"), strict=True):
-        along = np.array([-0.15, 0.15])
-        flat = asked.place.axes[1:][:, [i, j]]
-        for direction in flat:
-            ends = centre[[i, j]] + along[:, None] * direction
-            axis.plot(ends[:, 0], ends[:, 1], color=style.MEASURED, linewidth=2)
-        axis.plot(bones[:, i], bones[:, j], "-o", color=style.INK, linewidth=4, markersize=6)
-        axis.plot(bones[-1, i], bones[-1, j], "o", color=style.F)
-        axis.set(xlabel=f"{names[0]} [m]", ylabel=f"{names[1]} [m]", aspect="equal")
-    caption = "The arm at the end of the press from two sides: joints, tip, and the surface around it."
-    return drawing, caption
+def _touch(record: Record, asked: Asked) -> tuple[Figure, str]:
+    """The force about the touch."""
+    drawing, (axis,) = style.figure(1, height=2.6)
+    t, pressing = record["t"], record["phase"] == CONTACT
+    touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
+    _forces(axis, record)
+    axis.set(xlabel="time [s]", ylabel="force [N]", xlim=(max(touch - 0.1, t[0]), min(touch + 0.5, t[-1])))
+    return drawing, "The force in the first half second after the touch."
+
+
+def _forces(axis: Axes, record: Record) -> None:
+    t = record["t"]
+    axis.plot(t, record["force_sampled"], color=style.MEASURED, linewidth=0.7, label="reading")
+    axis.plot(t, record["force"], color=style.F, linewidth=1.6, label="true")
+    wanted = np.where(record["phase"] == CONTACT, record["force_desired"], np.nan)
+    axis.plot(t, wanted, **style.KNOWN, label="desired")
+    style.legend(axis)
 
 
 def _force(record: Record, asked: Asked) -> tuple[Figure, str]:
     drawing, (force, depth) = style.figure(2, height=2.1)
-    t, pressing = record["t"], record["phase"] == CONTACT
-    force.plot(t, record["force_sampled"], color=style.MEASURED, linewidth=0.7, label="reading")
-    force.plot(t, record["force"], color=style.F, linewidth=1.4, label="true")
-    wanted = np.where(pressing, record["force_desired"], np.nan)
-    force.plot(t, wanted, **style.KNOWN, label="desired")
+    t = record["t"]
+    _forces(force, record)
     force.set_ylabel("force [N]")
-    style.legend(force)
     depth.plot(t, 1e3 * record["penetration"], color=style.F, linewidth=1.4, label="true")
     seen = record["x_measured"] - asked.place.place
     depth.plot(t, 1e3 * seen, color=style.MEASURED, linewidth=1.0, label="by the encoders")
@@ -161,9 +200,20 @@ def _force(record: Record, asked: Asked) -> tuple[Figure, str]:
 
 
 def _torque(record: Record, asked: Asked) -> tuple[Figure, str]:
-    drawing, (axis,) = style.figure(1, height=2.8)
-    for i, name in enumerate(asked.arm.names, start=1):
-        axis.plot(record["t"], record[f"torque{i}"], linewidth=1.0, label=style.literal(name))
-    axis.set(xlabel="time [s]", ylabel="torque [N m]")
-    style.legend(axis, ncols=4)
-    return drawing, "Torque on each link, its weight included."
+    """A panel a joint, in per cent of its motor's limit; in N m where nobody says how much that is."""
+    n = asked.arm.joints
+    drawing, axes = style.grid((9.0, 1.9 * -(-n // 3)), -(-n // 3), 3)
+    limits = np.asarray(asked.arm.torque, dtype=float)
+    known = bool(np.isfinite(limits).all())
+    for i, (axis, name) in enumerate(zip(axes, asked.arm.names, strict=False)):
+        scale = 100.0 / limits[i] if known else 1.0
+        axis.plot(record["t"], scale * record[f"torque{i + 1}"], color=style.INK, linewidth=1.2)
+        if known:
+            axis.set_ylim(-110.0, 110.0)
+            for end in (-100.0, 100.0):
+                axis.axhline(end, color=style.MEASURED, linewidth=1.0, linestyle="--")
+        axis.set_title(style.literal(name), loc="left")
+        axis.set(ylabel="of the limit [%]" if known else "torque [N m]", xlabel="time [s]")
+    for axis in axes[n:]:
+        axis.remove()
+    return drawing, "Torque of each joint, the arm's weight included."

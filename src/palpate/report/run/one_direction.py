@@ -15,7 +15,7 @@ from palpate.report.numbers import NONE, quantity
 from palpate.report.page import Table, page
 from palpate.report.run.figures import around_contact
 from palpate.report.run.table import notes
-from palpate.report.run.words import sentence
+from palpate.report.run.words import sentence, settling
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -67,14 +67,13 @@ def one_direction_tables(record: Record, summary: dict[str, Any]) -> list[Table]
     f = summary["force"]
     if f is None:
         return []
-    never = NONE if f["overshoot_N"] is None else "not within the run"
     over = NONE
     if f["overshoot_N"] is not None:
         first = float(record["force_desired"][record["phase"] == CONTACT][0])
         over = f"{f['overshoot_N']:.2f} N, {100.0 * f['overshoot_N'] / first:.1f} %"
     force = (
         ("touch at", f"{summary['contact_at_s']:.3f} s"),
-        ("settling to 5 %", never if f["settling_s"] is None else f"{f['settling_s']:.3f} s"),
+        ("settling to 5 %", settling(f)),
         ("overshoot", over),
         ("error, last second", f"{f['error_N']:+.3f} ± {f['std_N']:.3f} N"),
         ("error since the touch, RMS", f"{f['rms_error_N']:.3f} N"),

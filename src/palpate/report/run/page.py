@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +13,14 @@ from palpate.bench.sequence import CONTACT, LOST
 from palpate.identification.result import Identification
 from palpate.records import Record
 from palpate.report import style
+from palpate.report.answer import Card
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, formatted
 from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts, text_of
 from palpate.report.look.columns import packed, thinned
-from palpate.report.numbers import plain, quantity
+from palpate.report.numbers import quantity
 from palpate.report.page import embedded, render
+from palpate.report.run.cards import force_cards
 from palpate.report.run.figures import drawings
 from palpate.report.run.table import force_rows, thesis_table
 from palpate.report.run.words import alerts, motors, sentence
@@ -92,35 +94,13 @@ def run_page(record: Record, content: Content) -> str:
 
 
 def _cards(content: Content) -> list[dict[str, str]]:
-    summary, f = content.summary, content.summary["force"]
-    if f is None:
+    if content.summary["force"] is None:
         return []
-    lost, end = summary["contacts_lost"], summary["end"]
-    kept = not lost and end not in {"lost contact", "diverged"}
-    why = f"from {summary['contact_at_s']:.2f} s on" if kept else printable(summary["why"])
-    cards = [_card("Contact", "kept" if kept else "lost", why=why, tone="ok" if kept else "fail", verdict="")]
-    never = "of a changing force there is none" if f["overshoot_N"] is None else "not within the run"
-    settled = None if f["settling_s"] is None else plain(f["settling_s"], 3)
-    cards.append(
-        _card(
-            "Settled in",
-            settled or "",
-            "s" if settled else "",
-            why="within 5 % of the first force" if settled else never,
-        )
-    )
-    if f["overshoot_N"] is not None:
-        share = 100 * f["overshoot_N"] / abs(f["desired_N"]) if f["desired_N"] else 0.0
-        cards.append(_card("Overshoot", plain(f["overshoot_N"], 2), "N", why=f"{share:.0f} % of the step"))
-    error = f"{f['error_N']:+.2f}".replace("-", "−")
-    cards.append(
-        _card("Error, last second", error, "N", why=f"RMS since contact {plain(f['rms_error_N'], 2)} N")
-    )
-    return [*cards, _stiffness(content)]
+    return [*(asdict(card) for card in force_cards(content.summary)), _stiffness(content)]
 
 
 def _card(name: str, number: str, unit: str = "", **more: str) -> dict[str, str]:
-    return {"name": name, "number": number, "unit": unit, **more}
+    return asdict(Card(name, number, unit, **more))
 
 
 def _stiffness(content: Content) -> dict[str, str]:

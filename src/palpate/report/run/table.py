@@ -8,7 +8,7 @@ from palpate.identification.result import Identification
 from palpate.report.identification.words import CALLED, formatted
 from palpate.report.numbers import NONE, plain, quantity, with_half
 from palpate.report.page import Table
-from palpate.report.run.words import alerts
+from palpate.report.run.words import alerts, settling
 
 
 def tables(summary: dict[str, Any], found: Identification | None) -> list[Table]:
@@ -27,15 +27,13 @@ def notes(summary: dict[str, Any]) -> list[str]:
 def force_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """How the force went, a number a row."""
     f, tip = summary["force"], summary["tip"]
-    never = NONE if f["overshoot_N"] is None else "not within the run"
-    settling = never if f["settling_s"] is None else f"{f['settling_s']:.3f} s"
     return [
         ("contact at", f"{summary['contact_at_s']:.3f} s"),
         ("desired at the end", f"{f['desired_N']:.2f} N"),
         ("error, mean over the last second", f"{f['error_N']:+.3f} N"),
         ("standard deviation in it", f"{f['std_N']:.3f} N"),
         ("error since contact, RMS", f"{f['rms_error_N']:.3f} N"),
-        ("settling to 5 %", settling),
+        ("settling to 5 %", settling(f)),
         ("overshoot", NONE if f["overshoot_N"] is None else f"{f['overshoot_N']:.2f} N"),
         ("noise of the measured force", f"{f['measured_std_N']:.3f} N"),
         ("tip off in y", f"{tip['y_error_mm']:+.2f} mm"),

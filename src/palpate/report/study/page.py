@@ -17,7 +17,7 @@ class StudyPage:
 
     Args:
         title, about: of the study.
-        sentence: the answer.
+        sentence, answers: the answer, and further ones.
         notes: warnings.
         tables: in the order to be read.
         below: tables that stand below the figures.
@@ -31,6 +31,7 @@ class StudyPage:
     title: str
     about: str
     sentence: str
+    answers: Sequence[str]
     notes: Sequence[str]
     tables: Sequence[Table]
     below: Sequence[Table]
@@ -52,6 +53,7 @@ def study_page(of: StudyPage) -> str:
         title=of.title,
         about=of.about,
         sentence=of.sentence,
+        answers=of.answers,
         notes=of.notes,
         tables=of.tables,
         below=of.below,

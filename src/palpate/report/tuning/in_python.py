@@ -33,7 +33,7 @@ def html(told: Tuning) -> str:
 
 def draw(told: Tuning) -> Figure:
     """The press on the softest and on the stiffest surface, its stiffness known."""
-    return pages.one(pages.steps, told, 2.6)
+    return pages.first_touch(told)
 
 
 def page(told: Tuning) -> str:

@@ -1,101 +1,151 @@
-"""The page of a tuned force loop: proved surfaces and the estimate, the press at both ends, Nyquist's curve."""
+"""The page of a tuned force loop: the proved surfaces, the first touch, the margins, the gains."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import isfinite
-from typing import TYPE_CHECKING, Any
+from math import inf, isfinite
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.force.describe import UNCOVERED
-from palpate.force.steps import BAND, frequency_response
+from palpate.force.steps import BAND
 from palpate.force.tuning import RIGID, Tuning
 from palpate.report import style
-from palpate.report.figure_panels.panels import panels_of, shown_in
-from palpate.report.page import Table, render
+from palpate.report.answer import Answer, Card, Extent, answer_page, log_scale
+from palpate.report.figure_panels.panels import panels_of
+from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.tuning.table import rows
-from palpate.text import printable
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_SHOWN = (1.0, 1e7)
-"""Stiffnesses that the figure shows [N/m]."""
 
 
 def page(told: Tuning, command: str = "palpate tune") -> str:
     """The page as HTML; `command` is what made it."""
-    return render(
-        "page.html",
-        title=f"A force loop for {told.gains.arm.title}",
-        about="Gains, their predicted performance, and the surfaces of the stability proof.",
-        notes=[text for _, text in told.warnings],
-        tables=[
-            Table("Notes", ("", ""), rows(told)),
-            Table("Not covered by a proof", ("",), [(text,) for text in UNCOVERED]),
+    gains = told.gains
+    answer = Answer(
+        title=f"Gains for {gains.arm.title}, {quantity(gains.force, 'N')}",
+        sentence=sentence(told),
+        about=f"For surfaces up to {quantity(gains.cap, 'N/m')} (K + B/theta), with a lag theta of "
+        f"{quantity(gains.theta, 's')}.",
+        alerts=[
+            {"tone": "warn", "title": "", "text": f"{text[0].upper()}{text[1:]}."}
+            for _, text in told.warnings
         ],
-        **shown_in(
-            [
-                _figure("Proved stable surfaces, and the surface to press on", one(_intervals, told, 1.6)),
-                _figure("The press at both ends, with known stiffness", one(steps, told, 2.6)),
-                _figure("Nyquist's curve on the stiffest surface", one(_nyquist, told, 4.0)),
-            ]
-        ),
-        source=told.gains.to_toml(),
-        source_title="The gains",
-        room="tune",
-        command=printable(command),
+        cards={"": _cards(told)},
+        lower={"Margins on the stiffest surface": _margins(told)},
+        scale=_scale(told),
+        figures=[{"panels": panels_of(first_touch(told)), "caption": _touch_caption(told)}],
+        folds=[
+            ("All numbers", "and the proof's own statements", rows(told)),
+            ("Not proved", f"{len(UNCOVERED)} cases", [(text,) for text in UNCOVERED]),
+        ],
+        source=("The gains", gains.to_toml()),
     )
+    return answer_page(answer, room="tune", command=command)
 
 
-def one(drawn: Callable[[Axes, Tuning], None], told: Tuning, height: float) -> Figure:
-    """A figure of one panel."""
+def sentence(told: Tuning) -> str:
+    """Whether it is proved, how high a first touch goes, and how soon it settles."""
+    bound, slowest = told.peak_bound, _slowest(told)
+    proved = "Proved stable." if told.proved else "Nothing is proved."
+    peak = f"The first touch peaks at {quantity(told.peak, 'N')}"
+    below = f", by proof below {quantity(bound, 'N')}" if bound is not None else ""
+    settles = f", and settles within {quantity(slowest, 's')}" if isfinite(slowest) else ""
+    return f"{proved} {peak}{below}{settles}."
+
+
+def _ends(low: float, high: float) -> str:
+    """Both ends in three digits, each with its own unit: a bound is no value with an uncertainty."""
+    return f"{quantity(low, 'N/m')} to {quantity(high, 'N/m')}"
+
+
+def _slowest(told: Tuning) -> float:
+    return max(step.settling for step in told.steps)
+
+
+def _cards(told: Tuning) -> list[Card]:
+    gains, held = told.gains, told.surface_stiffness("held")
+    number, _, unit = _ends(*held).rpartition(" ") if held else ("", "", "")
+    cards = [
+        Card(
+            "Stable, proved", number, unit, why="stiffness of the surface, with constant gain",
+            tone="ok" if held else "fail", verdict="proved" if held else "nothing",
+        ),
+        Card("Approach", plain(1e3 * gains.approach, 3), "mm/s", why="at most, before a force is felt"),
+        Card("Gain", plain(1e3 * gains.gain, 3), "mm/s per N", why="on the stiffest surface"),
+    ]  # fmt: skip
+    known = told.known
+    if known is not None:
+        number, _, unit = quantity_between(*known.stiffness, "N/m").rpartition(" ")
+        why = "given" if known.source == "told" else f"from {known.source}"
+        cards.append(Card("Surface", number, unit, why=why, colour="K"))
+    return cards
+
+
+def _margins(told: Tuning) -> list[Card]:
+    at = told.margins
+    cards = [Card("Gain", f"× {plain(at.gain, 3)}", why="the gain may be so many times as high")]
+    if isfinite(at.phase):
+        cards.append(Card("Phase", f"{at.phase:.0f}°", why="until it rings for ever"))
+    if isfinite(at.delay):
+        cards.append(
+            Card("Delay", plain(1e3 * at.delay, 3), "ms", why="so much more lag before it rings for ever")
+        )
+    return cards
+
+
+def _scale(told: Tuning) -> dict[str, object]:
+    """Every bound on one axis: stiffness of the surface itself."""
+    extents = []
+    if told.known is not None:
+        low, high = told.known.stiffness
+        extents.append(Extent("this surface", low, high, "estimate", quantity_between(low, high, "N/m")))
+        if told.gains.cap > high:
+            upper = quantity(told.gains.cap, "N/m")
+            extents.append(
+                Extent(
+                    "assumed for its damping", high, told.gains.cap, "assumed", f"K + B/theta up to {upper}"
+                )
+            )
+    held, adapting = told.surface_stiffness("held"), told.surface_stiffness("adapting")
+    if held is not None:
+        extents.append(Extent("proved, constant gain", *held, "proved", _ends(*held)))
+    if adapting is not None and told.gains.arm.kind == "position":
+        extents.append(Extent("proved, while the gain adapts", 0.0, inf, "proved", "any constant stiffness"))
+    elif adapting is not None:
+        text = quantity_between(*adapting, "N/m")
+        extents.append(Extent("proved, while the gain adapts", *adapting, "proved", text))
+    low, high = told.exact
+    high = inf if high >= RIGID else high
+    unstable = f"unstable from {quantity(high, 'N/m')}" if isfinite(high) else "never unstable"
+    extents.append(Extent("stable, exact, without damping", low, high, "exact", unstable))
+    caption = "The dashed line is the stiffest surface that the gains are made for; at an arrowhead nothing bounds it."
+    return log_scale("Where it is stable", caption, "N/m", extents, told.gains.cap)
+
+
+def first_touch(told: Tuning) -> Figure:
+    """The force after the touch on the softest and on the stiffest surface, and the proved bound of its peak."""
     with style.inked():
-        figure, (axis,) = style.figure(height=height)
-        drawn(axis, told)
+        figure, (axis,) = style.figure(height=2.9)
+        axis.set(xlabel="time from the touch [s]", ylabel="force [N]")
+        force = told.gains.force
+        for step, name, colour in zip(
+            told.steps, ("softest", "stiffest"), (style.MEASURED, style.F), strict=True
+        ):
+            axis.plot(step.time, force * step.force, color=colour, linewidth=1.6, label=name)
+        axis.axhline(force, **style.KNOWN, label="desired")
+        axis.axhspan(force * (1.0 - BAND), force * (1.0 + BAND), color=style.MEASURED, alpha=0.2, linewidth=0)
+        if told.peak_bound is not None:
+            axis.axhline(told.peak_bound, color=style.INK, linewidth=1.6, label="proved: below")
+        longest = max(step.settling if isfinite(step.settling) else 0.0 for step in told.steps)
+        axis.set(
+            xlim=(0.0, max(2.5 * longest, 0.1)), ylim=(0.0, 1.15 * max(told.peak_bound or 0.0, told.peak))
+        )
+        style.legend(axis)
     return figure
 
 
-def _figure(caption: str, drawing: Figure) -> dict[str, Any]:
-    return {"panels": panels_of(drawing), "caption": caption}
-
-
-def _intervals(axis: Axes, told: Tuning) -> None:
-    spans = [("stable, exact", told.exact, style.LINE)]
-    for kind, name in (("adapting", "proved, adapting"), ("held", "proved, gain held")):
-        found = told.surface_stiffness(kind)
-        if found is not None and kind == "adapting" and told.gains.arm.kind == "position":
-            found = (_SHOWN[0], RIGID)
-        if found is not None:
-            spans.append((name, found, style.OK if kind == "held" else style.SERIES[0]))
-    if told.known is not None:
-        spans.append(("surface", told.known.stiffness, style.K))
-    for i, (_, (low, high), colour) in enumerate(spans):
-        ends = [max(low, _SHOWN[0]), min(max(high, 1.02 * low), _SHOWN[1])]
-        axis.plot(ends, [i, i], color=colour, linewidth=9, solid_capstyle="butt")
-    axis.set(xlim=_SHOWN, xlabel="stiffness of the surface [N/m]", ylim=(-0.6, len(spans) - 0.4))
-    axis.set_yticks(range(len(spans)), [name for name, _, _ in spans])
-    style.logarithmic(axis, "x")
-
-
-def steps(axis: Axes, told: Tuning) -> None:
-    """The force after the touch on the softest and on the stiffest surface."""
-    for step, name, colour in zip(told.steps, ("softest", "stiffest"), style.SERIES[:2], strict=True):
-        axis.plot(step.time, told.gains.force * step.force, color=colour, label=name)
-    for edge in (1.0 - BAND, 1.0 + BAND):
-        axis.axhline(edge * told.gains.force, color=style.MEASURED, linewidth=0.7, linestyle="--")
-    longest = max(step.settling if isfinite(step.settling) else 0.0 for step in told.steps)
-    axis.set(xlabel="time from the touch [s]", ylabel="force [N]", xlim=(0.0, max(2.5 * longest, 0.1)))
-    style.legend(axis)
-
-
-def _nyquist(axis: Axes, told: Tuning) -> None:
-    _, L = frequency_response(told.gains, told.gains.seen_cap)
-    shown = L[np.abs(L) < 4.0]
-    angle = np.linspace(0.0, 2.0 * np.pi, 200)
-    axis.plot(np.cos(angle), np.sin(angle), color=style.LINE, linewidth=1.0)
-    axis.plot(shown.real, shown.imag, color=style.SERIES[0])
-    axis.plot([-1.0], [0.0], color=style.FAIL, marker="+", markersize=12, linestyle="")
-    axis.set(xlabel="real part", ylabel="imaginary part", xlim=(-2.5, 1.5), ylim=(-2.0, 1.2), aspect="equal")
+def _touch_caption(told: Tuning) -> str:
+    over = 100.0 * float(np.max([told.overshoot, 0.0]))
+    return f"The first touch, its stiffness known: at most {plain(over, 2)} % over. Grey: within 5 % of the force."

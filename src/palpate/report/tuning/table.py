@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from rich.text import Text
+
 from palpate.force.describe import UNCOVERED, sentence
 from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
-from palpate.force.tuning import Tuning
+from palpate.force.tuning import RIGID, Tuning
+from palpate.report.numbers import quantity
+from palpate.report.terminal import print_hanging
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -69,8 +75,47 @@ def _peak(told: Tuning) -> str:
     return f"{told.peak:.4g} N predicted; at most {bound:.4g} N for K_u >= K, without noise and damping"
 
 
-def show(told: Tuning, console: Console) -> None:
-    """Prints it."""
+def show(told: Tuning, console: Console, written: Sequence[object] = ()) -> None:
+    """Print the answer: the surfaces that the proof covers, the first touch, the margins, what is assumed."""
+    print_hanging(lines(told, written), console)
+
+
+def lines(told: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
+    """The answer, a line each."""
+    gains, at = told.gains, told.margins
+    places = f"   written: {', '.join(map(str, written))}" if written else ""
+    title = f"Gains for {gains.arm.title}: {quantity(gains.force, 'N')}, surfaces up to {quantity(gains.cap, 'N/m')}."
+    mark = Text("✓ proved stable", "green") if told.proved else Text("✕ nothing could be proved", "red")
+    yield Text(printable(f"{title}   "), "bold").append(mark).append(printable(places))
+    slowest = max(step.settling for step in told.steps)
+    bound = "" if told.peak_bound is None else f" (proved below {quantity(told.peak_bound, 'N')})"
+    touch = [
+        f"at most {quantity(gains.approach, 'm')}/s",
+        f"peak {quantity(told.peak, 'N')}{bound}",
+        f"settles in {slowest:.2g} s" if isfinite(slowest) else "does not settle",
+        f"overshoot {100 * told.overshoot:.2g} %",
+    ]
+    yield Text(f"First touch: {', '.join(touch)}.")
+    delay = f"{1e3 * at.delay:.3g} ms" if isfinite(at.delay) else "any"
+    phase = f"{at.phase:.3g}°" if isfinite(at.phase) else "any"
+    yield Text(f"Margins on the stiffest surface: gain × {at.gain:.2g}, phase {phase}, delay {delay}.")
+    held = told.surface_stiffness("held")
+    if held is not None:
+        high = "up" if held[1] >= RIGID else f"to {quantity(held[1], 'N/m')}"
+        span = f"from {quantity(held[0], 'N/m')} {high}"
+        yield Text(f"Proved for surfaces with K + B/theta {span} (theta {1e3 * gains.theta:.2g} ms).")
+    for name, assumed in (told.known.assumed if told.known else {}).items():
+        value = f"{quantity(assumed.value, assumed.unit)} assumed" if isfinite(assumed.value) else "no bound"
+        why = {"damping": "B is unknown", "stiffness": "K of the surface alone is unknown"}.get(name, name)
+        yield Text(printable(f"! {why}: {value} ({assumed.why})."), "yellow")
+    codes = dict.fromkeys(code for code, _ in told.warnings)
+    if codes:
+        yield Text(printable(f"Seen, too: {', '.join(codes)} (--verbose explains each)."), "yellow")
+    yield Text(f"Not proved: {len(UNCOVERED)} cases, which --verbose lists.")
+
+
+def show_all(told: Tuning, console: Console) -> None:
+    """Print every figure, warning and case that no proof covers."""
     from rich.table import Table
 
     table = Table(box=None, show_header=False, pad_edge=False)

@@ -9,9 +9,10 @@ from typing import Any, TypeVar
 import msgspec
 
 from palpate.bench.experiments.error_messages import explained, not_finite
-from palpate.bench.experiments.toml_files import TomlFiles, decoded
+from palpate.bench.experiments.toml_files import TomlFiles
 from palpate.bench.metrics import metric_of
 from palpate.errors import InputError, unknown
+from palpate.files import read_toml
 from palpate.plugins import look_in
 from palpate.studies.definition.tables import Against, Curves, Map, Parameter, Study
 
@@ -36,7 +37,7 @@ def parse(text: str, where: str) -> Study:
     """A study from TOML; `where` names the text in errors, and the user's own parts and metrics lie beside it."""
     if where.endswith(".toml"):
         look_in(Path(where).parent)
-    tables = decoded(text, where)
+    tables = read_toml(text, where)
     try:
         study = _converted(tables)
         _check(study)

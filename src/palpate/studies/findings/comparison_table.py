@@ -20,28 +20,25 @@ SHOWN = 12
 
 
 def sentence(comparison: Comparison) -> str:
-    """Which setting is the best, and how sure that is."""
+    """Which setting is the best, on how many surfaces, by how much."""
     first, metric = comparison.entrants[0], metric_of(comparison.metric)
-    n, pair = len(first.values), comparison.pair(0, 1)
-    next_one = comparison.entrants[1].name
-    unit = "" if metric.unit == "1" else f" {metric.unit}"
-    side = "most" if comparison.most else "least"
+    pair, next_one = comparison.pair(0, 1), comparison.entrants[1].name
+    n, unit = pair.surfaces, "" if metric.unit == "1" else f" {metric.unit}"
     place = "".join(f" for {name} {short(value)}" for name, value in comparison.of.items())
+    count = f"{round(pair.won * n)} of {n} surfaces"
     if not pair.decided:
         return (
-            f"Over {n} surfaces no setting has significantly the {side} {comparison.metric}{place}: {first.name} "
-            f"and {next_one} do not differ ({won(pair)} against {100 * pair.lost:.0f} % of the surfaces)."
+            f"{first.name} and {next_one} do not differ significantly in {metric.called}{place}: {first.name} is "
+            f"better on {count}, worse on {round(pair.lost * n)}."
         )
-    lead = f"{first.name} has the {side} {comparison.metric}{place}"
-    better = f"it is better on {won(pair)} of {n} surfaces"
-    if pair.median is None or not all(map(math.isfinite, (pair.median, pair.low or 0.0, pair.high or 0.0))):
-        return f"{lead}: against {next_one}, the next, {better}."
-    how = "more" if comparison.most else "less"
-    low, high = sorted((abs(pair.low or 0.0), abs(pair.high or 0.0)))
-    return (
-        f"{lead}: on the same surface {number(abs(pair.median))}{unit} {how} than {next_one}, the next (95 %: "
-        f"{number(low)} to {number(high)}); {better}."
-    )
+    more = "larger" if comparison.most else "smaller"
+    which = "" if len(comparison.entrants) == 2 else f" than {next_one}, the next,"
+    lead = f"{first.name} has the {more} {metric.called}{place}{which} on {count}"
+    ends = (pair.median, pair.low, pair.high)
+    if not all(end is not None and math.isfinite(end) for end in ends):
+        return f"{lead}; on the others {first.name} or {next_one} fails." if pair.lost else f"{lead}."
+    middle, low, high = (abs(end or 0.0) for end in ends)
+    return f"{lead}, by {number(middle)}{unit} (95 %: {number(min(low, high))} to {number(max(low, high))})."
 
 
 def won(pair: Pair) -> str:
@@ -70,7 +67,7 @@ def comparison_table(comparison: Comparison) -> Table:
         "setting",
         "median",
         "worst tenth",
-        "less the best's",
+        "difference from the best",
         "better than the best on",
         "mean rank",
         "failed or without it",

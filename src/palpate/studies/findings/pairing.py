@@ -115,13 +115,13 @@ def comparisons(frame: DataFrame, plan: Plan) -> list[Comparison]:
         return []
     sides = {best.metric: bool(best.most)}
     for name in plan.study.metrics:
-        better = metric_of(name).better
+        better = metric_of(name).side
         if better and name not in sides:
             sides[name] = better == "most"
     found = []
     for of, rows in _groups(frame, plan, conditions):
         if len(rows) > 1:
-            found += [_comparison(of, rows, name, most, conditions) for name, most in sides.items()]
+            found += [comparison_of(of, rows, name, most, conditions) for name, most in sides.items()]
     return found
 
 
@@ -160,9 +160,18 @@ def _name(plan: Plan, part: Part, at: Mapping[str, Any]) -> str:
     return ", ".join([*own, *named]) or plan.study.title
 
 
-def _comparison(
+def comparison_of(
     of: dict[str, Label], rows: Rows, metric: str, most: bool, conditions: Sequence[str]
 ) -> Comparison:
+    """Settings compared by a metric, one difference for each combination of the conditions.
+
+    Args:
+        of: the values of the parameters for which it is.
+        rows: of each setting its values and its runs.
+        metric: its name.
+        most: whether more of it is better.
+        conditions: columns that say which runs belong together.
+    """
     places = sorted({key for _, one in rows.values() for key in one.select(conditions).iter_rows()}, key=str)
     entrants = [
         Entrant(name, at, *_values(one, metric, conditions, places)) for name, (at, one) in rows.items()
@@ -187,8 +196,9 @@ def _values(
     """A setting's metric on each surface, and where it has none."""
     import polars
 
+    mean = polars.col(metric).mean()
     grouped = rows.group_by(conditions).agg(
-        polars.col(metric).mean().alias("_value"),
+        (mean.abs() if metric_of(metric).signed else mean).alias("_value"),
         ((polars.col("result") != DONE) | polars.col(metric).is_null()).any().alias("_failed"),
     )
     known = {row[:-2]: row[-2:] for row in grouped.select([*conditions, "_value", "_failed"]).iter_rows()}

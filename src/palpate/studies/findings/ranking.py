@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench.ending import DONE
+from palpate.bench.metrics import metric_of
 from palpate.studies.definition.parameters import Label
 from palpate.studies.definition.plan import MAIN, Plan
 
@@ -109,7 +110,8 @@ def _settings(
     columns = [polars.col("seed"), polars.col("result"), polars.col(metric).alias("of")]
     grouped = frame.group_by(names, maintain_order=True).agg(*columns) if names else None
     rows = grouped.rows(named=True) if grouped is not None else [_lone(frame, metric)]
-    return [({name: row[name] for name in names}, _by_seed(row)) for row in rows]
+    signed = metric_of(metric).signed
+    return [({name: row[name] for name in names}, _by_seed(row, signed=signed)) for row in rows]
 
 
 def _lone(frame: DataFrame, metric: str) -> dict[str, Any]:
@@ -118,10 +120,11 @@ def _lone(frame: DataFrame, metric: str) -> dict[str, Any]:
     }
 
 
-def _by_seed(row: Mapping[str, Any]) -> dict[int, float] | None:
+def _by_seed(row: Mapping[str, Any], *, signed: bool) -> dict[int, float] | None:
     if any(result != DONE for result in row["result"]) or any(value is None for value in row["of"]):
         return None
-    return dict(zip(row["seed"], row["of"], strict=True))
+    values = map(abs, row["of"]) if signed else row["of"]
+    return dict(zip(row["seed"], values, strict=True))
 
 
 def _ranked(

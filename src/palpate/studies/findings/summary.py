@@ -16,7 +16,7 @@ from palpate.files import signed, write_json, write_text
 from palpate.report.page import Table
 from palpate.report.study.page import StudyPage, study_page
 from palpate.studies.definition.plan import MAIN, Plan
-from palpate.studies.findings import comparison_table
+from palpate.studies.findings import comparison_table, effects
 from palpate.studies.findings.charts import charts
 from palpate.studies.findings.figures.draw import draw, figures
 from palpate.studies.findings.figures.rows import short, with_unit
@@ -30,6 +30,8 @@ PAGE, SUMMARY = "report.html", "summary.json"
 SHOWN = 8
 """Settings in the table of the best."""
 NONE = "-"
+FAILURES = 5
+"""Failures come first where they are one in so many runs, or more."""
 EXAMPLES = 2
 """Reasons told of each result that is not the wanted one."""
 
@@ -49,23 +51,45 @@ class Findings:
     notes: list[str]
 
 
-def present(frame: DataFrame, plan: Plan, folder: Path, source: str, command: str) -> Findings:
-    """Writes figures, page and summary into the folder."""
+def present(
+    frame: DataFrame,
+    plan: Plan,
+    folder: Path,
+    source: str,
+    command: str,
+    endings: Sequence[str] = (),
+    dpi: int | None = None,
+) -> Findings:
+    """Writes figures (PNG, and those of `endings`), page and summary into the folder."""
     compared = comparisons(frame, plan)
     ranked = [] if compared else rankings(frame, plan)
-    told = signed({"command": command, **summary(frame, plan, ranked, compared)})
-    found = Findings(told, tables(frame, plan, ranked, compared), notes(frame, plan, ranked, compared))
+    apart = effects.effects(frame, plan)
+    answer = headline(frame, plan, ranked, compared, apart)
+    told = signed(
+        {
+            "command": command,
+            "answer": answer,
+            **summary(frame, plan, ranked, compared),
+            "factors": comparison_table.as_json(apart),
+        }
+    )
+    own = tables(frame, plan, ranked, compared)
+    results = own.pop()
+    shown = [*([effects.effects_table(apart)] if apart else []), *own]
+    shown = [results, *shown] if _failed(frame) else [*shown, results]
+    found = Findings(told, shown, notes(frame, plan, ranked, compared))
     drawn = list(figures(frame, plan))
     described = Table("Metrics", ("metric", "meaning"), [(m, _description(m)) for m in plan.study.metrics])
     page = StudyPage(
         title=plan.study.title,
         about=plan.study.about,
-        sentence=headline(frame, plan, ranked, compared),
+        sentence=answer[0],
+        answers=answer[1:],
         notes=found.notes,
-        tables=found.tables[:-1],
-        below=[found.tables[-1], described],
+        tables=found.tables,
+        below=[described],
         charts=charts(plan, compared, drawn),
-        figures=draw(drawn, folder),
+        figures=draw(drawn, folder, endings, dpi),
         command=command,
         study=source,
         origin=[
@@ -79,18 +103,42 @@ def present(frame: DataFrame, plan: Plan, folder: Path, source: str, command: st
     return found
 
 
-def headline(frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison]) -> str:
-    """The answer in a sentence."""
-    best = plan.study.best
-    if compared:
-        return comparison_table.sentence(compared[0])
-    if best is not None and len(ranked) == 1 and ranked[0].settings:
+def headline(
+    frame: DataFrame,
+    plan: Plan,
+    ranked: Sequence[Ranking],
+    compared: Sequence[Comparison],
+    apart: Sequence[Comparison] = (),
+) -> list[str]:
+    """The answer, a sentence each: failures first where they are many, the effect of each factor, the best setting."""
+    best, what = plan.study.best, "surfaces" if compared and len(apart) == 1 else "pairs of runs"
+    parts = [_failures(frame)] if _failed(frame) else []
+    parts += [effects.sentence(one, what) for one in apart[: effects.SHOWN]]
+    if compared and len(apart) != 1:
+        parts.append(comparison_table.sentence(compared[0]))
+    elif not compared and best is not None and len(ranked) == 1 and ranked[0].settings:
         one = ranked[0].settings[0]
         at = ", ".join(f"{name} {short(value)}" for name, value in one.at.items())
         side = "least" if best.least else "most"
-        return f"The {side} {with_unit(metric_of(best.metric))} is {interval(one.metric)}, with {at}."
-    done = sum(result == DONE for result in frame["result"].to_list())
-    return f"{done} of {len(frame)} runs were completed."
+        parts.append(f"The {side} {with_unit(metric_of(best.metric))} is {interval(one.metric)}, with {at}.")
+    elif not parts:
+        done = sum(result == DONE for result in frame["result"].to_list())
+        parts.append(f"{done} of {len(frame)} runs were completed.")
+    return parts
+
+
+def _failed(frame: DataFrame) -> bool:
+    """Whether failures come first: a fifth of the runs or more."""
+    return FAILURES * sum(result != DONE for result in frame["result"].to_list()) >= len(frame)
+
+
+def _failures(frame: DataFrame) -> str:
+    """How many runs failed, and the most frequent cause."""
+    results = [result for result in frame["result"].to_list() if result != DONE]
+    result, count = Counter(results).most_common(1)[0]
+    why = frame["why"].filter(frame["result"] == result).to_list()[0]
+    most = f", {count} of them so" if count < len(results) else ""
+    return f"{len(results)} of {len(frame)} runs failed{most}: {why}."
 
 
 def _seeds(plan: Plan) -> str:

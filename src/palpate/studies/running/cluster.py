@@ -8,6 +8,7 @@ import pickle
 import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
@@ -35,6 +36,8 @@ PATIENCE = 30.0
 CONNECT = 10.0
 """How long a scheduler may take to answer [s]."""
 POLL = 1.0
+_GREETING, _LARGEST_GREETING = b"pickle-protocol", 4096
+"""A word of the first message of a scheduler, and that message's largest size [bytes]; it has some 100."""
 
 
 def run_batch(packed: bytes, stamp: str, plugins: Sequence[Plugin] = ()) -> list[Done]:
@@ -100,15 +103,18 @@ class Cluster:
             import distributed
         except ImportError as error:
             raise InputError("a cluster needs the extra: pip install 'palpate[cluster]'") from error
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told once, in our words
+        logging.getLogger("distributed").setLevel(
+            logging.CRITICAL + 1
+        )  # what is lost is told once, in our words
         self.address, self._patience = address, patience
         self._client: Any
+        security = _security(certificates)
         try:
-            socket.create_connection((host, port), CONNECT).close()  # Dask would ask again and again
+            _check_greeting(host, port, security)
             self._client = _untyped(distributed).Client(
-                address, timeout=CONNECT, set_as_default=False, security=_security(certificates)
+                address, timeout=CONNECT, set_as_default=False, security=security
             )
-        except (OSError, ValueError, RuntimeError, TimeoutError) as error:
+        except Exception as error:
             raise InputError(
                 f"no Dask scheduler answers at {address} ({_line(error)}); check the address"
             ) from error
@@ -172,6 +178,29 @@ def _parsed(address: str, certificates: Certificates | None) -> tuple[str, int]:
             else f"certificates are for tls://HOST:PORT, not for {address}"
         )
     return host, port
+
+
+def _check_greeting(host: str, port: int, security: Any) -> None:
+    """A scheduler speaks first, and says which pickles it takes; Dask would wait for that for ever, and at any length.
+
+    Raises:
+        OSError: nothing there, or not in time.
+        ValueError: something else is there.
+    """
+    latest = time.monotonic() + CONNECT
+    with ExitStack() as held:
+        stream = held.enter_context(socket.create_connection((host, port), CONNECT))
+        if security is not None:
+            context = security.get_connection_args("client")["ssl_context"]
+            stream = held.enter_context(context.wrap_socket(stream, server_hostname=host))
+        said = b""
+        while _GREETING not in said:
+            stream.settimeout(max(1e-3, latest - time.monotonic()))
+            piece = stream.recv(4096)
+            said += piece
+            size = int.from_bytes(said[:8], "little") if len(said) >= 8 else 0  # it begins with its size
+            if not piece or max(size, len(said)) > _LARGEST_GREETING:
+                raise ValueError("another program is there")
 
 
 def _security(certificates: Certificates | None) -> Any:
@@ -299,7 +328,8 @@ class Hand:
         if self.client.status != "running":
             raise self._gone(None)
         try:
-            threads = sum(self.client.nthreads().values())
+            asked = self.client.sync(self.client.scheduler.ncores, callback_timeout=CONNECT)
+            threads = sum(asked.values())
         except Exception as error:
             raise self._gone(error) from error
         self._room = AHEAD * threads
@@ -335,7 +365,7 @@ class Hand:
             ) from error
 
     def _gone(self, error: Exception | None) -> InputError:
-        what = f" ({_line(error)})" if error is not None else ""
+        what = f" ({_line(error)})" if isinstance(error, OSError) else ""
         return InputError(
             f"the cluster at {self.address} disappeared{what}; the finished runs are saved, and the same "
             "command resumes"

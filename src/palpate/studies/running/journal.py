@@ -124,5 +124,5 @@ def _check(path: Path, head: Head) -> None:
         else f"{there.palpate} {there.sources}"
     )
     raise InputError(
-        f"{path.parent} holds the results of {other} ({which}); choose another --out, or add --force to start again"
+        f"{path.parent} holds the results of {other} ({which}); choose another --out, or add --replace to start again"
     )

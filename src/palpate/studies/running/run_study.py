@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from palpate.files import MADE, kept_folder, write_text
+from palpate.files import MADE, check_kept_folder, kept_folder, write_text
 from palpate.logs import write_record
 from palpate.studies.definition.part_check import check_parts_of
 from palpate.studies.definition.plan import Plan, Setting, plan, resolved
@@ -53,14 +53,14 @@ class Work:
     runner: Runner
     progress: Progress = lambda _: None
 
-    def done(self, *, force: bool = False) -> DataFrame:
+    def done(self, *, replace: bool = False) -> DataFrame:
         """Does the missing runs, and writes and returns the table.
 
         Raises:
-            InputError: the folder holds something else and `force` is off, or the disk is full, or the cluster is gone.
+            InputError: the folder holds something else and `replace` is off; the disk is full; the cluster is gone.
         """
         with (
-            kept_folder(self.folder, journal.NAME, force=force),
+            kept_folder(self.folder, journal.NAME, replace=replace),
             journal.opened(self.folder / journal.NAME, head(self.plan)) as book,
         ):
             write_text(self.folder / SOURCE, f"{MADE} study, as it was asked for.\n{self.source}")
@@ -129,6 +129,18 @@ def run(text: str, out: str | Path, *, where: str = "study", runner: Runner | No
 def begun(folder: Path) -> bool:
     """Whether a study has been begun in this folder."""
     return (folder / journal.NAME).exists()
+
+
+def check_folder(folder: Path, plan: Plan, *, replace: bool) -> None:
+    """Refuse a folder before anything is compiled: it holds other files, or another study.
+
+    Raises:
+        InputError: one line says which.
+    """
+    check_kept_folder(folder, journal.NAME, replace=replace)
+    if begun(folder) and not replace:
+        with journal.opened(folder / journal.NAME, head(plan)):
+            pass
 
 
 def head(plan: Plan) -> Head:

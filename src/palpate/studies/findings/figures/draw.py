@@ -20,9 +20,24 @@ if TYPE_CHECKING:
     from polars import DataFrame
 
 
-def draw(drawn: Sequence[Drawn], folder: Path) -> dict[Path, str]:
-    """Draws figures into a study's folder: file and caption of each."""
-    return {style.save(one.draw(), folder / f"{one.name}.png"): one.caption for one in drawn}
+def draw(
+    drawn: Sequence[Drawn], folder: Path, endings: Sequence[str] = (), dpi: int | None = None
+) -> dict[Path, str]:
+    """Draws figures into a study's folder: the PNG, and the caption of each.
+
+    Args:
+        drawn: the figures.
+        folder: that is there.
+        endings: of the files, each of `style.FORMATS`; a PNG is written in any case.
+        dpi: of a PNG; `style.DPI` if none is given.
+    """
+    made = {}
+    for one in drawn:
+        with style.inked():
+            figure = one.draw()
+            for ending in dict.fromkeys((*endings, ".png")):
+                made[style.save(figure, folder / f"{one.name}{ending}", dpi)] = one.caption
+    return {path: caption for path, caption in made.items() if path.suffix == ".png"}
 
 
 def figures(frame: DataFrame, plan: Plan) -> Iterator[Drawn]:

@@ -1,0 +1,84 @@
+"""Draws the film and the pictures of the README and of the first page of the documentation.
+
+Run from the project's root by `make pictures`; a Chromium takes the pictures of the pages.
+"""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PALPATE = str(Path(sys.executable).with_name("palpate"))
+LOG = [
+    str(ROOT / "examples/data/press.csv"),
+    *["--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N"],
+]
+WIDTH, HEIGHT = 1200, 760
+
+
+def palpate(folder: Path, *words: str) -> str:
+    """Run the program in a folder; its output."""
+    run = subprocess.run([PALPATE, *words], cwd=folder, check=False, capture_output=True, text=True)  # noqa: S603 - our own program
+    if run.returncode not in {0, 1}:
+        raise SystemExit(run.stderr)
+    return run.stdout
+
+
+def picture(page: Page, address: str, name: str, seconds: float) -> None:
+    """The top of a page, after some seconds."""
+    page.goto(address)
+    page.wait_for_timeout(1e3 * seconds)
+    page.screenshot(path=DOCS / f"{name}.png", clip={"x": 0, "y": 0, "width": WIDTH, "height": HEIGHT})
+    print(f"{name}.png: {(DOCS / f'{name}.png').stat().st_size // 1024} kB")
+
+
+def main() -> None:
+    """Draw them all."""
+    with tempfile.TemporaryDirectory() as place, sync_playwright() as browsers:
+        folder = Path(place)
+        palpate(folder, "identify", *LOG, "--report", "identify.html")
+        (folder / "found.json").write_text(palpate(folder, "identify", *LOG, "--json"))
+        palpate(
+            folder,
+            *[
+                "tune",
+                "found.json",
+                "--arm",
+                "ur5e",
+                "--force",
+                "15",
+                "--out",
+                "gains.toml",
+                "--report",
+                "tune.html",
+            ],
+        )
+        palpate(
+            folder,
+            *["press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50", "--out", "press"],
+        )
+        shutil.copy(folder / "press/film.svg", DOCS / "film.svg")
+        browser = browsers.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
+        for name, file in (
+            ("identify", "identify.html"),
+            ("tune", "tune.html"),
+            ("press", "press/report.html"),
+        ):
+            picture(page, (folder / file).as_uri(), name, 2.0)
+        live = subprocess.Popen([PALPATE, "live", "--arm", "fr3"], stdout=subprocess.PIPE, text=True)  # noqa: S603
+        assert live.stdout is not None
+        try:
+            picture(page, live.stdout.readline().strip(), "live", 8.0)
+        finally:
+            live.terminate()
+            live.wait()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""The calls of `import palpate`: read and identify a record, a file or a table, and pool many, in one line each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from inspect import signature
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+from palpate.errors import InputError, unknown
+from palpate.from_log import identify_log as identify_log_file
+from palpate.identification import Identification, Pooled
+from palpate.identification import identify as identify_record
+from palpate.identification import pool as pool_found
+from palpate.logs import read_log as read
+from palpate.records import Record
+from palpate.text import in_python
+
+_READ = {name for name, own in signature(read).parameters.items() if own.kind is own.KEYWORD_ONLY}
+_OPTIONS = {
+    name for name, own in signature(identify_record).parameters.items() if own.kind is own.KEYWORD_ONLY
+}
+_WORDS = {"model", "method", "force_filter", "bonded"}
+_PAIRS = {"mass", "series_mass"}
+
+
+def identify(source: Record | Any, **options: Any) -> Identification:
+    """Find what a probe touched, and how far to trust it.
+
+    `palpate.identify("press.csv", time="time_s", position="position_mm:mm", force="force_N:N", lag=(5e-3, 1e-3))`
+
+    Args:
+        source: a `Record`; or a log that `palpate.read_log` reads: a path, a DataFrame, an Arrow table.
+        options: of `palpate.identification.identify` (lag, force_filter, mass, ...), and for a log those of
+            `palpate.read_log`, its columns among them. A lag may be a pair, its value and its standard deviation [s].
+
+    Raises:
+        InputError: the log or an option is wrong, in one line.
+    """
+    with _in_python():
+        if isinstance(source, str | Path) and not {*options} - _OPTIONS:
+            return identify_log_file(source, **_sorted(options, columns=True)[1])
+        reading, fitting = _sorted(options, columns=not isinstance(source, Record))
+        return _identified(source if isinstance(source, Record) else read(source, **reading), fitting)
+
+
+def identify_log(path: str | Path, **options: Any) -> Identification:
+    """As `palpate.from_log.identify_log`: what `palpate identify` does with a file, in one call."""
+    with _in_python():
+        return identify_log_file(path, **options)
+
+
+def read_log(path: Any, **options: Any) -> Record:
+    """As `palpate.logs.read_log`; what is wrong is told in Python's words."""
+    with _in_python():
+        for name, value in options.items():
+            if name not in _READ and not isinstance(value, str):
+                raise unknown("option", name, _READ)
+        return read(path, **options)
+
+
+def pool(logs: Sequence[Any], **options: Any) -> Pooled:
+    """One stiffness, damping and mass of many presses, with an interval for the next press.
+
+    Args:
+        logs: identifications, records, or logs that `palpate.identify` takes.
+        options: for those that are not identified yet, see `palpate.identify`.
+
+    Raises:
+        InputError: a log or an option is wrong, in one line.
+    """
+    if isinstance(logs, str | Mapping) or not isinstance(logs, Sequence):
+        raise InputError(f"pool takes a list of logs, got a {type(logs).__name__}")
+    fitting = {name: value for name, value in options.items() if name in _OPTIONS}
+    results = [
+        log
+        if isinstance(log, Identification)
+        else identify(log, **(fitting if isinstance(log, Record) else options))
+        for log in logs
+    ]
+    with _in_python():
+        return pool_found(results)
+
+
+def _identified(record: Record, options: dict[str, Any]) -> Identification:
+    """Along the contact's normal where the record has a wrench and a pose."""
+    from palpate.contact_frame import identify_contact
+
+    return (
+        identify_contact(record, **options)[0]
+        if "force_x" in record.columns
+        else identify_record(record, **options)
+    )
+
+
+def _sorted(options: dict[str, Any], *, columns: bool) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Options of reading, and of fitting, each of the right kind."""
+    reading = {name: value for name, value in options.items() if name not in _OPTIONS}
+    for name, value in reading.items():
+        if not columns or (name not in _READ and not isinstance(value, str)):
+            raise unknown("option", name, {*_OPTIONS, *(_READ if columns else ())})
+    fitting = {name: value for name, value in options.items() if name in _OPTIONS}
+    if isinstance(fitting.get("lag"), tuple | list):
+        _checked("lag", fitting["lag"], pair=True)
+        fitting["lag"], fitting["lag_std"] = fitting["lag"]
+    for name, value in fitting.items():
+        if value is not None and name not in _WORDS:
+            _checked(name, value, pair=name in _PAIRS)
+    return reading, fitting
+
+
+def _checked(name: str, value: Any, *, pair: bool) -> None:
+    numbers = value if pair and isinstance(value, tuple | list) else (value,)
+    if (
+        pair != isinstance(value, tuple | list)
+        or len(numbers) != 1 + pair
+        or not all(map(_is_number, numbers))
+    ):
+        wanted = "a pair, its value and its standard deviation" if pair else "a number in SI units"
+        raise InputError(f"{name} must be {wanted}, got {value!r}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+@contextmanager
+def _in_python() -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise type(error)(in_python(str(error))) from error.__cause__

@@ -1,0 +1,163 @@
+"""From a log file to an identification in one call: its signals, the arm between sensors and surface, the indenter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from inspect import signature
+from pathlib import Path
+from typing import Any
+
+from palpate.contact_frame import Arm, ContactFrame, Payload, identify_contact, load_payload, robot_stiffness
+from palpate.errors import InputError, unknown
+from palpate.identification import Identification, identify
+from palpate.identification.indenter import Indenter, with_modulus
+from palpate.identification.options import LEAST_SQUARES
+from palpate.logs.gathered import log_of
+from palpate.logs.own_runs import is_run, measured_by
+from palpate.logs.presets import preset
+from palpate.logs.signals import Signals, read_as
+from palpate.records import Record
+
+_SIDES = {None: None, "action": 1, "reaction": -1}
+
+
+@dataclass(frozen=True)
+class LogIdentifier:
+    """Everything that an identification takes besides the log.
+
+    Args:
+        signals: columns or topics, and which rows.
+        frame: of wrench and pose.
+        arm: between sensors and surface.
+        payload: on the sensor, if it was weighed.
+        wall: a log of a press on a rigid wall, from which the arm's stiffness is identified.
+        indenter: shape of the probe, for Young's modulus.
+        poisson: Poisson's ratio with its standard deviation; None for 0 to 0.5.
+        options: of `palpate.identify`.
+    """
+
+    signals: Signals = field(default_factory=Signals)
+    frame: ContactFrame = field(default_factory=ContactFrame)
+    arm: Arm = field(default_factory=Arm)
+    payload: Payload | None = None
+    wall: Path | None = None
+    indenter: Indenter | None = None
+    poisson: tuple[float, float] | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def identify(self, log: Path) -> tuple[Identification, Record]:
+        """Read and identify a log.
+
+        Returns:
+            The identification, and the record of force and position along the normal that it is of.
+
+        Raises:
+            InputError: the log or an option is wrong, in one line.
+        """
+        own, words = self._completed(log)
+        known: dict[str, Any] = measured_by(log) if own.signals.plain and is_run(log) else {}
+        if self.options.get("method", LEAST_SQUARES) != LEAST_SQUARES:
+            known.pop("force_filter", None)  # only least squares make use of it
+        known |= self.options
+        samples = known.get("force_filter") is not None
+        record = read_as(own.signals.read(log, samples=samples), words)
+        in_space = "force_x" in record.columns
+        if not in_space:
+            if replace(self.frame, force_sign=None) != ContactFrame():
+                raise InputError(
+                    "--wrench-frame, --tcp, --normal and the like need a wrench and a pose; this log has one axis"
+                )
+            known["force_sign"] = _SIDES[self.frame.force_sign]
+        frame = replace(own.frame, payload=self.payload) if in_space else None
+        found, along = identify_contact(record, frame, _between(own, known, samples), **known)
+        if self.indenter is not None:
+            found = with_modulus(found, self.indenter, self.poisson, known.get("tolerance", 0.25))
+        return found, along
+
+    def _completed(self, log: Path) -> tuple[LogIdentifier, str]:
+        """These with what the log's own names leave no doubt of; what is given goes first."""
+        signals, others = self.signals.complete(log, known_frame=self.frame.wrench_frame is not None)
+        frame, arm = self.frame, self.arm
+        if frame.wrench_frame is None and "wrench_frame" in others:
+            frame = replace(frame, wrench_frame=others["wrench_frame"])
+        if others.get("gravity_compensated"):
+            frame = replace(frame, gravity_compensated=True)
+        if arm.position_from is None and "position_from" in others:
+            arm = replace(arm, position_from=others["position_from"])
+        return replace(self, signals=signals, frame=frame, arm=arm), others.get("read_as", "")
+
+
+def _between(job: LogIdentifier, known: dict[str, Any], samples: bool) -> Arm:
+    """The arm; with the stiffness from a press on a wall, if one is given."""
+    if job.wall is None:
+        return job.arm
+    whole = replace(job.signals, start=None, end=None).read(job.wall, samples=samples)
+    in_space = "force_x" in whole.columns
+    frame = replace(job.frame, payload=job.payload, free=None) if in_space else None
+    pressed, _ = identify_contact(whole, frame, replace(job.arm, position_from="tip"), **known)
+    return replace(job.arm, stiffness=robot_stiffness(pressed, job.wall.name))
+
+
+_OWN = {
+    "payload",
+    "robot_stiffness",
+    "robot_mass",
+    "robot_stiffness_from",
+    "indenter",
+    "poisson",
+    "preset",
+    "lag",
+}
+
+
+def identify_log(path: str | Path, **options: Any) -> Identification:
+    """Read a log and identify what was touched, as `palpate identify` does.
+
+    `identify_log("press.csv")` is enough where the names of the columns, their units and values leave nothing to guess;
+    `identify_log("press.csv", time="t", position="x:mm", force="f:N", lag=(5e-3, 1e-3))` names them.
+
+    Args:
+        path: of the log, as for `read_log`; or of the record of a run or a press, or its folder.
+        options: columns, topics and rows as for `read_log` and `read_wrench_and_pose`, and `preset`; the fields of
+            `contact_frame.ContactFrame`; `tool_mass`, `robot_stiffness` and `robot_mass`, each (value, std) [kg, N/m,
+            kg], `position_from`, `payload` and `robot_stiffness_from` (files); `indenter` as "sphere:5:mm" and
+            `poisson`; the options of `palpate.identify`, where `lag` may be (value, std) [s].
+
+    Raises:
+        InputError: the log or an option is wrong, or something would have to be guessed, in one line.
+    """
+    known = {f.name for kind in (Signals, ContactFrame, Arm) for f in fields(kind)} - {"stiffness"}
+    for name in options:
+        if name not in known | _OWN | {*signature(identify).parameters}:
+            raise unknown("option", name, known | _OWN | {*signature(identify).parameters})
+    return log_identifier(options).identify(log_of(Path(path)))[0]
+
+
+def log_identifier(options: Mapping[str, Any]) -> LogIdentifier:
+    """The options of `identify_log`, sorted by what they are of."""
+    given = dict(options)
+    if "preset" in given:
+        named = preset(given.pop("preset"))
+        given = {name.replace("-", "_"): value for name, value in named.items()} | given
+
+    def taken(*names: str) -> dict[str, Any]:
+        return {name: given.pop(name) for name in names if name in given}
+
+    signals = Signals(**taken(*Signals.__dataclass_fields__))
+    payload = given.pop("payload", None)
+    payload = load_payload(Path(payload)) if isinstance(payload, str | Path) else payload
+    frame = ContactFrame(**taken(*ContactFrame.__dataclass_fields__))
+    wall, shape = given.pop("robot_stiffness_from", None), given.pop("indenter", None)
+    arm = Arm(
+        stiffness=given.pop("robot_stiffness", None),
+        mass=given.pop("robot_mass", None),
+        tool_mass=given.pop("tool_mass", payload.beyond if payload else None),
+        **taken("position_from"),
+    )
+    if isinstance(given.get("lag"), tuple):
+        given["lag"], given["lag_std"] = given["lag"]
+    return LogIdentifier(
+        signals, frame, arm, payload, None if wall is None else Path(wall),
+        Indenter.parse(shape) if isinstance(shape, str) else shape, given.pop("poisson", None), given,
+    )  # fmt: skip

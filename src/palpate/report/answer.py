@@ -1,0 +1,168 @@
+"""A result as a page shows it: a sentence, what is wrong, cards, a scale, figures, and the rest folded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from math import ceil, floor, inf, isfinite, log10
+from typing import Any
+
+from palpate.report.figure_panels.panels import shown_in
+from palpate.report.numbers import quantity
+from palpate.report.page import render
+from palpate.text import printable
+
+
+@dataclass(frozen=True)
+class Card:
+    """One number: its name, its unit and half-width, its verdict, and what limits it or what it is of.
+
+    Args:
+        name: of the quantity.
+        number: text; empty for none.
+        unit, half: of it.
+        why: a sentence.
+        tone: `ok`, `warn`, `none` or `fail`; empty without a verdict.
+        verdict: the word for it.
+        colour: the quantity's, `K`, `B` or `M`.
+    """
+
+    name: str
+    number: str = ""
+    unit: str = ""
+    half: str = ""
+    why: str = ""
+    tone: str = ""
+    verdict: str = ""
+    colour: str = ""
+
+
+@dataclass(frozen=True)
+class Extent:
+    """A stretch of a logarithmic scale.
+
+    Args:
+        name: of the row.
+        low, high: ends; 0 and infinite are open.
+        kind: `proved`, `estimate`, `assumed` or `exact`.
+        text: what stands at the row's right.
+    """
+
+    name: str
+    low: float
+    high: float
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Content of a page.
+
+    Args:
+        title: what it is of.
+        sentence: the answer.
+        about: how it came about.
+        alerts: what is wrong: tone, title, text and advice.
+        cards: groups of cards, by the title of each, which may be empty.
+        lower: likewise, below the figures.
+        scale: `log_scale`; None without.
+        pairs: pictures that stand beside each other: source and caption.
+        figures: as `shown_in` takes them.
+        folds: tables that are folded: title, a word about them, rows.
+        source: a file's text, and its title.
+    """
+
+    title: str
+    sentence: str
+    about: str = ""
+    alerts: Sequence[Mapping[str, str]] = ()
+    cards: Mapping[str, Sequence[Card]] = field(default_factory=dict)
+    lower: Mapping[str, Sequence[Card]] = field(default_factory=dict)
+    scale: Mapping[str, Any] | None = None
+    pairs: Sequence[Mapping[str, str]] = ()
+    figures: Sequence[Mapping[str, Any]] = ()
+    folds: Sequence[tuple[str, str, Sequence[Sequence[str]]]] = ()
+    source: tuple[str, str] = ("", "")
+
+
+def answer_page(answer: Answer, *, room: str, command: str) -> str:
+    """The page as HTML.
+
+    Args:
+        answer: its content.
+        room: what it is of, in the page's head.
+        command: that made it.
+    """
+    return render(
+        "page.html",
+        title=printable(answer.title),
+        sentence=printable(answer.sentence),
+        about=printable(answer.about),
+        alerts=answer.alerts,
+        cards=_groups(answer.cards),
+        lower=_groups(answer.lower),
+        scale=answer.scale,
+        pairs=answer.pairs,
+        folds=[{"title": title, "about": about, "rows": rows} for title, about, rows in answer.folds if rows],
+        source=answer.source[1],
+        source_title=answer.source[0],
+        notes=(),
+        tables=(),
+        room=room,
+        command=printable(command),
+        **shown_in(answer.figures),
+    )
+
+
+def _groups(groups: Mapping[str, Sequence[Card]]) -> list[dict[str, Any]]:
+    return [
+        {"title": title, "cards": [asdict(card) for card in cards]}
+        for title, cards in groups.items()
+        if cards
+    ]
+
+
+def log_scale(
+    title: str, caption: str, unit: str, extents: Sequence[Extent], mark: float | None = None
+) -> dict[str, Any]:
+    """Stretches under each other over one logarithmic axis, as plain values in per cent of its width.
+
+    Args:
+        title: of the whole.
+        caption: under it.
+        unit: of the axis.
+        extents: the rows.
+        mark: where a line goes through all of them; None for none.
+    """
+    ends = [end for e in extents for end in (e.low, e.high) if 0.0 < end < inf] + ([mark] if mark else [])
+    low, high = floor(log10(min(ends)) - 0.2), ceil(log10(max(ends)) + 0.2)
+
+    def place(value: float) -> float:
+        if not isfinite(value):
+            return 100.0
+        return (
+            round(100.0 * min(max((log10(value) - low) / (high - low), 0.0), 1.0), 2) if value > 0.0 else 0.0
+        )
+
+    rows = [
+        {
+            "name": e.name,
+            "text": e.text,
+            "kind": e.kind,
+            "left": place(e.low),
+            "width": round(place(e.high) - place(e.low), 2),
+            "open_low": e.low <= 10.0**low,
+            "open_high": e.high >= 10.0**high,
+        }
+        for e in extents
+    ]
+    powers = range(low, high + 1)
+    ticks = [{"at": place(10.0**n), "text": quantity(10.0**n, unit)} for n in powers]
+    return {
+        "title": title,
+        "caption": caption,
+        "rows": rows,
+        "ticks": ticks,
+        "mark": place(mark) if mark else None,
+    }

@@ -1,0 +1,283 @@
+"""An identification in a few lines: the stiffness and what would narrow it, then a row for each parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import hypot, sqrt
+
+from rich.console import Console
+from rich.text import Text
+
+from palpate.identification.causes import cause_of
+from palpate.identification.result import Identification, Parameter, Verdict
+from palpate.identification.warning_codes import Code
+from palpate.report.identification.words import (
+    ADVICE,
+    CALLED,
+    MARKS,
+    UNIT_WARNINGS,
+    UNTOUCHED,
+    behind_the_arm,
+    by_the_model,
+    first_reason,
+    formatted,
+    interval,
+    limited_by,
+    place_of,
+    unit_warnings,
+)
+from palpate.report.numbers import NONE, plain, quantity, with_half
+from palpate.report.terminal import print_hanging
+from palpate.text import printable
+
+STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
+VERDICTS = {
+    Verdict.IDENTIFIED: "identified",
+    Verdict.NOT_IDENTIFIABLE: "not identified",
+    Verdict.REJECTED: "rejected",
+}
+MOST = 14
+"""Lines of an answer, which a reader sees at once."""
+_BOUND = Text("! lower bound", style="yellow")
+_BOUND_OF_SURFACE = Text("! lower bound of the surface", style="yellow")
+_IN_DOUBT = Text("? in doubt, see above", style="yellow")
+_REMEDIES = {
+    "lag": "--lag SECONDS",
+    "noise": "press deeper or more often",
+    "other forces": "begin and end in free motion",
+    "touch": "approach more slowly",
+    "octaves": "excite a wider band",
+    "blocks": "press longer, at one depth",
+    "repetition": "press more often",
+    "strokes": "press more slowly",
+    "unexplained": "keep near one depth",
+    "curvature": "press about one force",
+    "position noise": "a finer position",
+    "calibration": "calibrate both scales",
+    "unseen way": "log faster, or --bonded",
+    "Poisson's ratio": "--poisson",
+}
+"""Remedies by cause, in a few letters; --verbose has them in full."""
+_CAUSES = {
+    "other forces": "drift or friction",
+    "blocks": "parts of the log differ",
+    "repetition": "presses differ",
+    "strokes": "loading and unloading",
+    "octaves": "frequencies differ",
+    "touch": "the touch",
+    "unseen way": "the first reading",
+}
+"""Causes whose names in a budget need an explanation."""
+_PARTS = {
+    "kelvin-voigt": "Spring and damper",
+    "kelvin-voigt-mass": "Spring, damper and mass",
+    "standard-linear-solid": "A spring, and a spring and damper in series, together",
+    "hunt-crossley": "A power law with damping",
+    "quasi-linear-viscoelastic": "Tissue that stiffens and relaxes",
+}
+_MINOR = {"Fc", "x0"}
+"""Parameters that stand in the answer only if they are identified."""
+_SHOWN_OTHERWISE = {
+    *(
+        Code.LAG_DAMPING_CONFOUNDED,
+        Code.LOW_EXCITATION,
+        Code.SERIES_COMPLIANCE,
+        Code.UNIT_GUESS,
+        Code.NO_CONTACT,
+    ),
+    Code.MODEL_REJECTED,
+}
+
+
+def show(
+    found: Identification, name: str, console: Console, notes: Sequence[str] = (), end: str = ""
+) -> None:
+    """Print the answer in at most fourteen lines; the warnings that ask for a correction first.
+
+    Args:
+        found: what to print.
+        name: of the log.
+        console: where to; lines are wrapped at its width, but in a pipe or a file.
+        notes: how the log was read, a sentence each.
+        end: the last line.
+    """
+    printed = [*lines(found, name, notes), *([Text(printable(end))] if end else [])]
+    if len(printed) > MOST:
+        printed = [line for line in printed if line.plain]
+    print_hanging(printed, console)
+
+
+def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterator[Text]:
+    """The lines, with their styles."""
+    for text in unit_warnings(found):
+        yield Text(printable(f"! {text}"), style="bold yellow")
+    point = found.working_point
+    if not found.contacts or point is None:
+        reason = (
+            f": {first_reason(found)}" if not found.contacts else ": no stretch in contact is long enough"
+        )
+        title = UNTOUCHED.replace("this log", name) if not found.contacts else f"{name} shows no stiffness"
+        yield Text(printable(f"{title}{reason}."), style="bold")
+        yield Text(ADVICE[Code.NO_CONTACT] if not found.contacts else "Log longer, or press deeper.")
+    else:
+        modulus = found.parameters.get("E")
+        if modulus is not None:
+            mark = _IN_DOUBT if unit_warnings(found) else _mark(modulus)
+            yield from _head(modulus, "Young's modulus", name, f"{_sentence(modulus.reason)}.", mark)
+            name = ""
+        yield from _stiffness(found, name)
+        yield Text("")
+        yield from _rows(found)
+        yield from _reasons(found)
+        yield Text("")
+        yield Text(printable(_contact(found)))
+        if found.lag is not None and found.lag.kind == "prior" and found.n:
+            yield Text(_assumed_lag(found))
+    yield from _foot(found, notes)
+
+
+def _stiffness(found: Identification, name: str) -> Iterator[Text]:
+    point = found.working_point
+    assert point is not None
+    own, what, at = point.stiffness, "stiffness", place_of(found, point)
+    mark = _IN_DOUBT if unit_warnings(found) else _mark(own)
+    detail = f"{at}. To narrow it: {limited_by(found).remedy}."
+    if behind_the_arm(found):
+        what, mark = "stiffness of surface and arm in series", _BOUND_OF_SURFACE
+        detail = f"{at}. The arm's own compliance is inside: give --robot-stiffness."
+    elif by_the_model(found):
+        own, what = found.parameters["K"], f"stiffness by the model {found.model}"
+        mark = _IN_DOUBT if unit_warnings(found) else _mark(own)
+        detail = f"{at}. To narrow it: {cause_of(next(iter(own.budget), None)).remedy}."
+    elif own.value is not None and own.ci95 is not None and own.ci95[1] < 0:
+        detail = (
+            f"{at}: the force falls as the probe goes in. The surface yields, or the probe's support moves."
+        )
+    elif own.value is None:
+        detail = f"{at}: {_sentence(own.reason)}."
+    yield from _head(own, what, name, detail, mark)
+
+
+def _head(p: Parameter, what: str, name: str, detail: str, mark: Text) -> Iterator[Text]:
+    """The value, what it is and its verdict; below, what it belongs to."""
+    value = "no number" if p.value is None else formatted(p)
+    line = Text(value, style="bold").append(f"   {what}   ").append(mark)
+    yield line.append(printable(f"        {name}") if name else "")
+    yield Text(printable(f"{' ' * (len(value) + 3)}{detail}"))
+
+
+def _sentence(reason: str) -> str:
+    """A reason up to its first remedy or comment."""
+    return (
+        reason.partition("; ")[0].partition(": ")[0]
+        if not reason.startswith("95 %")
+        else reason.partition(". ")[0]
+    )
+
+
+def _mark(p: Parameter) -> Text:
+    return Text(f"{MARKS[p.verdict]} {VERDICTS[p.verdict]}", style=STYLES[p.verdict])
+
+
+def _rows(found: Identification) -> Iterator[Text]:
+    """A row a parameter: its interval, verdict, largest cause, and what makes it narrower."""
+    cells = [[Text(title) for title in ("", "95 %", "verdict", "limited by", "remedy")]]
+    for name, p in found.parameters.items():
+        if name != "E" and (name not in _MINOR or p.verdict is Verdict.IDENTIFIED):
+            cells.append(_cells(name, p, found))
+    widths = [max(cell.cell_len for cell in column) for column in zip(*cells, strict=True)]
+    for row in cells:
+        line = Text()
+        for cell, width in zip(row, widths, strict=True):
+            line.append(cell).append(" " * (width - cell.cell_len + 3))
+        line.rstrip()
+        yield line
+
+
+def _reasons(found: Identification) -> Iterator[Text]:
+    """Why a parameter is rejected, each reason once."""
+    names: dict[str, list[str]] = {}
+    for name, p in found.parameters.items():
+        if p.verdict is Verdict.REJECTED and name not in {*_MINOR, "E"}:
+            names.setdefault(_sentence(p.reason), []).append(name)
+    for reason, own in names.items():
+        yield Text(printable(f"{', '.join(own)}: {reason}."))
+
+
+def _cells(name: str, p: Parameter, found: Identification) -> list[Text]:
+    bound = name == "K" and behind_the_arm(found)
+    cause = next(iter(p.budget), "")
+    why = (
+        f"lag, ± {1e3 * _lag_half(found):.2g} ms"
+        if cause == "lag" and found.lag
+        else _CAUSES.get(cause, cause)
+    )
+    remedy = "--robot-stiffness" if bound else _REMEDIES.get(cause, "")
+    if p.verdict is not Verdict.NOT_IDENTIFIABLE:
+        remedy = ""
+    texts = (name, _interval(p, bound), "", why, remedy)
+    cells = [Text(printable(text)) for text in texts]
+    cells[2] = _BOUND if bound else _mark(p)
+    if unit_warnings(found) and p.verdict is Verdict.IDENTIFIED:
+        cells[2] = Text("? in doubt", style="yellow")
+    return cells
+
+
+def _interval(p: Parameter, bound: bool) -> str:
+    if p.value is not None and (bound or p.verdict is Verdict.IDENTIFIED):
+        return formatted(p)
+    if p.ci95 is None or p.verdict is Verdict.REJECTED:
+        return NONE
+    low, high = p.ci95
+    if low < 0 < high and p.unit in {"N/m", "N s/m", "kg", "Pa", "1"}:
+        return f"below {quantity(high, p.unit, digits=2)}"
+    return interval(p.ci95, p.unit)
+
+
+def _lag_half(found: Identification) -> float:
+    return 0.0 if found.lag is None else found.lag.bound or 1.96 * found.lag.std
+
+
+def _contact(found: Identification) -> str:
+    """When it touched, and how much of the force the model explains."""
+    count = len(found.contacts)
+    span = f"{plain(found.contacts[0][0], 2)} to {plain(found.contacts[-1][1], 2)} s"
+    start = f"{'One contact' if count == 1 else f'{count} contacts'}, {span}."
+    if not found.n:
+        return start
+    explained = 100 * max(found.r2, 0.0)
+    share = f"{explained:.3g} %" if explained < 99.95 else "more than 99.9 %"
+    parts = _PARTS.get(found.model, found.model)
+    if Code.MODEL_REJECTED.word in found.codes:
+        return (
+            f"{start} No model explains the log; {parts[0].lower()}{parts[1:]} explain {share} of the force."
+        )
+    return f"{start} {parts} explain {share} of the force ({found.model})."
+
+
+def _foot(found: Identification, notes: Sequence[str]) -> Iterator[Text]:
+    """The other warnings, and how the log was read."""
+    shown = {*_SHOWN_OTHERWISE, *UNIT_WARNINGS}
+    others = dict.fromkeys(warn.code.word for warn in found.warnings if warn.code not in shown)
+    if others:
+        yield Text(f"Seen, too: {', '.join(others)} (--verbose explains each).", style="yellow")
+    read = next((note for note in notes if note.startswith("read as ")), None)
+    if read is not None:
+        yield Text(printable(f"R{read[1:]}"))
+
+
+def _assumed_lag(found: Identification) -> str:
+    """That the lag is assumed, and what a calibration of it is worth."""
+    lag = found.lag
+    assert lag is not None
+    text = f"The lag of the force sensor is assumed, {with_half(1e3 * lag.value, 1e3 * _lag_half(found))} ms"
+    for name in ("B", "M"):
+        p = found.parameters.get(name)
+        if p is None or p.ci95 is None or next(iter(p.budget), "") != "lag":
+            continue
+        whole = hypot(*p.budget.values())
+        rest = sqrt(max(whole**2 - p.budget["lag"] ** 2, 0.0))
+        if rest:
+            called = CALLED[name]
+            return f"{text}: calibrate it, and the {called} is known {whole / rest:.2g} times as well."
+    return f"{text}."
