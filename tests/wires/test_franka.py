@@ -239,7 +239,7 @@ class RestingRobot:
 
 
 @pytest.mark.parametrize(
-    "request_, answer", [(link.text(link.TARE), link.TARED), (link.begin(0.1), link.BEGUN)]
+    ("request_", "answer"), [(link.text(link.TARE), link.TARED), (link.begin(0.1), link.BEGUN)]
 )
 def test_an_answer_is_kept_while_nobody_reads(request_, answer):
     """A loop that is busy for a third of a second leaves its socket full of states: what it asks then is answered."""
