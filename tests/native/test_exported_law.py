@@ -178,7 +178,9 @@ def test_bad_input_is_one_line(gains, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     own = str(gains)
     assert "nothing to do" in refused(capsys, own, "--to", "c")
-    assert "gains file of palpate tune" in refused(capsys, "--to", "c", "--out", "a").replace("the file", "gains file")
+    assert "gains file of palpate tune" in refused(capsys, "--to", "c", "--out", "a").replace(
+        "the file", "gains file"
+    )
     assert "takes no gains" in refused(capsys, own, "--to", "c", "--law", "contact-identifier", "--out", "a")
     assert "did you mean" in refused(capsys, own, "--to", "c", "--law", "force-lop", "--out", "a")
     assert "3 or 4" in refused(

@@ -107,7 +107,7 @@ class Expressions:
         value: Value = method(node)
         return value
 
-    def ordered(self, node: ast.expr) -> Value:
+    def statement_value(self, node: ast.expr) -> Value:
         """The C of an expression which is all of a statement, so that a call in it may write to an array."""
         self._ordered.add(id(node))
         return self.expression(node)
@@ -115,7 +115,7 @@ class Expressions:
     def truth(self, node: ast.expr) -> Value:
         """The C of a condition."""
         self._conditions.add(id(node))
-        return self.cast(self.ordered(node), self.whole.boolean, node)
+        return self.cast(self.statement_value(node), self.whole.boolean, node)
 
     def cast(self, value: Value, kind: Any, node: ast.AST) -> Value:
         """A value as one of another type."""
@@ -128,7 +128,7 @@ class Expressions:
             self.refuse(node, f"{value.type} where {kind} is asked for", "give all branches the same type")
         return Value(f"({name}){value.at(UNARY)}", kind, UNARY)
 
-    def known(self, node: ast.expr) -> Any:
+    def python_object(self, node: ast.expr) -> Any:
         """The Python object that a name, or a name in a module, stands for; None for a variable or a value."""
         if isinstance(node, ast.Name) and node.id not in self.variables:
             code = self.function.__code__
@@ -139,7 +139,7 @@ class Expressions:
                     return names[node.id]
             self.refuse(node, f"the name {node.id!r}", "assign it before, at every way to this line")
         if isinstance(node, ast.Attribute):
-            module = self.known(node.value)
+            module = self.python_object(node.value)
             return getattr(module, node.attr) if isinstance(module, ModuleType) else None
         return None
 
@@ -155,7 +155,7 @@ class Expressions:
     def _name(self, node: ast.Name) -> Value:
         if node.id in self.variables:
             return self.variables[node.id]
-        value = self.known(node)
+        value = self.python_object(node)
         file = self.function.__code__.co_filename
         if isinstance(value, float) and not math.isfinite(value):
             return self._literal(value, node)
@@ -163,7 +163,7 @@ class Expressions:
         return constant if constant is not None else self._literal(value, node)
 
     def _attribute(self, node: ast.Attribute) -> Value:
-        fixed = self.known(node)
+        fixed = self.python_object(node)
         if fixed is not None:
             return self._literal(float(fixed) if isinstance(fixed, float) else fixed, node)
         part = self.expression(node.value)
@@ -179,7 +179,7 @@ class Expressions:
     def _tuple(self, node: ast.Tuple) -> Value:
         from numba import types
 
-        values = [self.ordered(one) for one in node.elts]
+        values = [self.statement_value(one) for one in node.elts]
         return self.struct(values, plain(types.Tuple([value.type for value in values])), node)
 
     def struct(self, values: list[Value], kind: Any, node: ast.AST) -> Value:
@@ -190,9 +190,9 @@ class Expressions:
 
     def _subscript(self, node: ast.Subscript) -> Value:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
-            array, place = self.expression(node.value.value), self._fixed(node.slice)
+            array, place = self.expression(node.value.value), self._field_number(node.slice)
             return Value(f"{array.at(ATOM)}.shape[{place}]", self.whole.integer)
-        table = None if isinstance(node.value, ast.Subscript) else self.known(node.value)
+        table = None if isinstance(node.value, ast.Subscript) else self.python_object(node.value)
         if isinstance(table, np.ndarray) or (type(table) is tuple and isinstance(node.value, ast.Name)):
             name = self.whole.constants.table(ast.unparse(node.value), np.array(table), self.function)
             return self._element(name, [str(n) for n in np.shape(table)], node)
@@ -233,7 +233,7 @@ class Expressions:
             array.type,
         )
 
-    def _fixed(self, node: ast.expr) -> int:
+    def _field_number(self, node: ast.expr) -> int:
         value = node.value if isinstance(node, ast.Constant) else None
         if not isinstance(value, int):
             self.refuse(node, f"the place {ast.unparse(node)}", "write the number of the field")
@@ -242,11 +242,11 @@ class Expressions:
     def _field(self, base: Value, node: ast.Subscript) -> Value:
         inner = members(base.type)
         if isinstance(node.slice, ast.Constant):
-            return base.member(*inner[self._fixed(node.slice)])
+            return base.member(*inner[self._field_number(node.slice)])
         if any(kind != inner[0][1] for _, kind in inner):
             self.refuse(node, "a field of a part by a variable", "name the field")
         return Value(
-            f"{self.whole.selector(base.type)}({self.passed(base)}, {self._index(node.slice).text})",
+            f"{self.whole.selector(base.type)}({self.argument(base)}, {self._index(node.slice).text})",
             inner[0][1],
         )
 
@@ -293,7 +293,7 @@ class Expressions:
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         sign, rank = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
-        values = [self.ordered(one) for one in node.values]
+        values = [self.statement_value(one) for one in node.values]
         if id(node) not in self._conditions and any(value.type != self.whole.boolean for value in values):
             self.refuse(node, f"{ast.unparse(node)} as a value", "write a if b else c")
         texts = [self.cast(value, self.whole.boolean, node).at(EQUAL) for value in values]
@@ -307,14 +307,14 @@ class Expressions:
         for op, left, right in zip(node.ops, pairs, node.comparators, strict=False):
             if type(op) not in _COMPARE:
                 self.refuse(node, f"the comparison {ast.unparse(node)}", "compare numbers")
-            texts.append(self._compared(op, self.expression(left), self.expression(right), node))
+            texts.append(self._comparison(op, self.expression(left), self.expression(right), node))
         if len(texts) == 1:
             return texts[0]
         if any(isinstance(one, ast.Call) for node in pairs[1:-1] for one in ast.walk(node)):
             self.refuse(node, "a call between two comparisons", "assign it to a name first")
         return Value(" && ".join(text.at(AND + 1) for text in texts), self.whole.boolean, AND)
 
-    def _compared(self, op: ast.cmpop, a: Value, b: Value, node: ast.AST) -> Value:
+    def _comparison(self, op: ast.cmpop, a: Value, b: Value, node: ast.AST) -> Value:
         sign, meaning, rank = _COMPARE[type(op)]
         if is_struct(a.type) or is_struct(b.type):
             self.refuse(node, "a comparison of parts", "compare their numbers")
@@ -327,20 +327,24 @@ class Expressions:
         if not isinstance(values, ast.Tuple):
             self.refuse(node, "in", "give a tuple of numbers")
         value, equal = self.expression(node.left), ast.Eq()
-        texts = [self._compared(equal, value, self.expression(one), node).at(EQUAL) for one in values.elts]
+        texts = [self._comparison(equal, value, self.expression(one), node).at(EQUAL) for one in values.elts]
         either = Value(" || ".join(texts), self.whole.boolean, OR)
         if isinstance(node.ops[0], ast.In):
             return either
         return Value(f"!({either.text})", self.whole.boolean, UNARY)
 
     def _ifexp(self, node: ast.IfExp) -> Value:
-        condition, a, b = self.truth(node.test), self.ordered(node.body), self.ordered(node.orelse)
+        condition, a, b = (
+            self.truth(node.test),
+            self.statement_value(node.body),
+            self.statement_value(node.orelse),
+        )
         kind = a.type if a.type == b.type else plain(self.whole.typing.unify_types(a.type, b.type) or a.type)
         a, b = self.cast(a, kind, node), self.cast(b, kind, node)
         return Value(f"{condition.at(OR)} ? {a.at(OR)} : {b.at(CHOICE)}", kind, CHOICE)
 
     def _call(self, node: ast.Call) -> Value:
-        callee = self.known(node.func)
+        callee = self.python_object(node.func)
         if callee is None and isinstance(node.func, ast.Attribute):
             part = self.expression(node.func.value)
             method = inspect.getattr_static(getattr(part.type, "instance_class", None), node.func.attr, None)
@@ -437,9 +441,9 @@ class Expressions:
         arrays = [value for value in values if getattr(value.type, "ndim", 0) or is_struct(value.type)]
         given = any(value.text not in self.scratch for value in arrays)
         self.writes = self.writes or (known.writes and given)
-        return Value(f"{known.name}({', '.join(self.passed(value) for value in values)})", known.result)
+        return Value(f"{known.name}({', '.join(self.argument(value) for value in values)})", known.result)
 
-    def passed(self, value: Value) -> str:
+    def argument(self, value: Value) -> str:
         """A value as the argument of a function: itself, or the address of a large struct."""
         if not by_pointer(value.type):
             return value.at(CHOICE)

@@ -150,7 +150,7 @@ class _Writer:
         return kind, leaves(kind)
 
     def sources(self) -> Sources:
-        """Both files."""
+        """The texts of both files of the module."""
         self._init()
         for entry in self.module.entries:
             self._entry(entry)
@@ -247,7 +247,7 @@ class _Writer:
             *self.declared,
             f"#ifdef __cplusplus\n}}\n#endif\n\n#endif /* {guard} */\n",
         ]
-        return _folded("\n\n".join(parts))
+        return _fold("\n\n".join(parts))
 
     def _source(self, table: str) -> str:
         parts = [
@@ -260,7 +260,7 @@ class _Writer:
             table,
             *self.functions,
         ]
-        return _folded("\n\n".join(parts) + "\n")
+        return _fold("\n\n".join(parts) + "\n")
 
     def _head(self, file: str) -> str:
         lines = [f"// Made by palpate: {file}, {self.module.title}.", *self.module.notes]
@@ -297,7 +297,7 @@ _BREAKS = (", ", " && ", " || ", " + ", " ? ", " : ", " /* ", " = ")
 """Where a line of C may be broken, the best places first."""
 
 
-def _folded(text: str) -> str:
+def _fold(text: str) -> str:
     """Lines of C broken behind commas and before operators of conditions where they are too long."""
     return "\n".join(piece for line in text.split("\n") for piece in _pieces(line))
 

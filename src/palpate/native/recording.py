@@ -49,7 +49,7 @@ class Recording:
 
 
 @kernel
-def _mixed(words, prime, after):
+def _fnv(words, prime, after):
     for word in words:
         after = (after ^ word) * prime
     return after
@@ -58,7 +58,7 @@ def _mixed(words, prime, after):
 def digest_of(state: Array) -> float:
     """A hash of a state's bits (FNV-1a by words), as a number of the same bits; every NaN counts as the same."""
     words = np.where(np.isnan(state), np.uint64(1), state.view(np.uint64))
-    whole = _mixed(words, np.uint64(1099511628211), np.uint64(14695981039346656037))
+    whole = _fnv(words, np.uint64(1099511628211), np.uint64(14695981039346656037))
     return float(np.uint64(whole).view(np.float64))
 
 

@@ -107,7 +107,7 @@ def first_sentence(text: str) -> str:
 
 
 def field_notes(cls: type) -> dict[str, str]:
-    """What a part's class says of each field, meaning and unit: in `Args:` or in the comment beside it."""
+    """Meaning and unit of each field, as a part's class has them: in `Args:` or in the comment beside it."""
     notes: dict[str, str] = {}
     names: list[str] = []
     for line in (inspect.getdoc(cls) or "").split("\n"):

@@ -34,7 +34,7 @@ def names_of(statement: ast.stmt) -> Iterator[ast.Name]:
         waiting += [one for one in ast.iter_child_nodes(node) if id(one) not in inside]
 
 
-class Body(Expressions):
+class FunctionBody(Expressions):
     """Translates the statements of one function.
 
     Args:
@@ -132,7 +132,7 @@ class Body(Expressions):
         if isinstance(node, ast.Return):
             return self._return(node)
         if isinstance(node, ast.Expr):
-            return [f"{self.ordered(node.value).text};"]
+            return [f"{self.statement_value(node.value).text};"]
         if isinstance(node, ast.Assign):
             return self._assign(node, path)
         if isinstance(node, ast.AugAssign):
@@ -164,7 +164,9 @@ class Body(Expressions):
     def _for(self, node: ast.For, path: Blocks, depth: int) -> list[str]:
         call, target = node.iter, node.target
         if not (
-            isinstance(call, ast.Call) and self.known(call.func) is range and isinstance(target, ast.Name)
+            isinstance(call, ast.Call)
+            and self.python_object(call.func) is range
+            and isinstance(target, ast.Name)
         ):
             self.refuse(node, "this loop", "count with range")
         values = [self.cast(self.expression(one), self.whole.integer, one) for one in call.args]
@@ -195,14 +197,14 @@ class Body(Expressions):
         if node.value is None:
             return ["return;"]
         if isinstance(node.value, ast.Tuple) and is_struct(self.result):
-            values = [self.ordered(one) for one in node.value.elts]
+            values = [self.statement_value(one) for one in node.value.elts]
             return [f"return {self.struct(values, self.result, node).text};"]
-        value = self.cast(self.ordered(node.value), self.result, node)
+        value = self.cast(self.statement_value(node.value), self.result, node)
         return [f"return {value.at(0)};"]
 
     def _augment(self, node: ast.AugAssign, path: Blocks) -> list[str]:
         target = self.expression(node.target)
-        value = self.ordered(node.value)
+        value = self.statement_value(node.value)
         whole = self.binary(node.op, target, value, node)
         if is_struct(target.type) or isinstance(node.target, ast.Name):
             return self._store(node.target, whole, path)
@@ -222,7 +224,7 @@ class Body(Expressions):
                 for target in node.targets
                 for line in self._store(target, self.expression(node.value), path)
             ]
-        value = self.ordered(node.value)
+        value = self.statement_value(node.value)
         lines = []
         if isinstance(first, ast.Name):
             lines = self._store(first, value, path)
@@ -242,7 +244,7 @@ class Body(Expressions):
     def _store_value(self, target: ast.expr, node: ast.expr, path: Blocks) -> list[str]:
         """Assigns an expression; of a tuple each element, and none before all are read that another's place is in."""
         if not (isinstance(target, ast.Tuple) and isinstance(node, ast.Tuple)):
-            return self._store(target, self.ordered(node), path)
+            return self._store(target, self.statement_value(node), path)
         pairs = list(zip(target.elts, node.elts, strict=True))
         waits = any(
             _may_read(later, stored) for i, (stored, _) in enumerate(pairs) for _, later in pairs[i + 1 :]
@@ -254,7 +256,7 @@ class Body(Expressions):
             elif isinstance(one, ast.Constant):
                 values.append(self.expression(one))
             else:
-                more, value = self._temporary(self.ordered(one))
+                more, value = self._temporary(self.statement_value(one))
                 lines += more
                 values.append(value)
         for (stored, _), value in zip(pairs, values, strict=False):
@@ -333,7 +335,7 @@ class Body(Expressions):
             pairs = list(zip(node.targets[0].elts, node.value.elts, strict=True))
         lines = []
         for target, call in pairs:
-            makes = isinstance(call, ast.Call) and self.known(call.func) in (np.empty, np.zeros)
+            makes = isinstance(call, ast.Call) and self.python_object(call.func) in (np.empty, np.zeros)
             if not makes or not isinstance(target, ast.Name) or not isinstance(call, ast.Call):
                 return []
             lines += self._new_array(target, call, path)

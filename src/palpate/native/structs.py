@@ -111,7 +111,7 @@ class Structs:
         return self._names[kind]
 
     @property
-    def taken(self) -> set[str]:
+    def names_in_use(self) -> set[str]:
         """Names that types have."""
         return set(self._names.values())
 
@@ -131,7 +131,7 @@ class Structs:
             return self._public.get(name, name)
         if kind not in self._names:
             inner = [(field, self.publish(one)) for field, one in members(kind)]
-            short = self._unused(self._basis(kind))
+            short = self._free_name(self._basis(kind))
             public = name or f"{self.prefix}_{short}"
             self.header.append(self._text(kind, inner, public))
             self.definitions.append(f"typedef {public} {short};")
@@ -149,7 +149,7 @@ class Structs:
 
     def _define(self, kind: Any) -> str:
         inner = [(field, self.name(one)) for field, one in members(kind)]
-        short = self._unused(self._basis(kind))
+        short = self._free_name(self._basis(kind))
         self.definitions.append(self._text(kind, inner, short))
         return short
 
@@ -159,9 +159,9 @@ class Structs:
             return c_name(cls.__name__)
         return "_and_".join(self.name(one).removesuffix("_t") for _, one in members(kind))
 
-    def _unused(self, basis: str) -> str:
+    def _free_name(self, basis: str) -> str:
         return next(
-            name for name in (basis, *(f"{basis}{i}" for i in range(2, 99))) if name not in self.taken
+            name for name in (basis, *(f"{basis}{i}" for i in range(2, 99))) if name not in self.names_in_use
         )
 
     def _text(self, kind: Any, inner: list[tuple[str, str]], name: str) -> str:

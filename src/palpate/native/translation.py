@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from palpate._jit.typing_rules import TypingRules
 from palpate.native.constants import Constants
 from palpate.native.source import place_of, refuse, syntax_of
-from palpate.native.statements import Body
+from palpate.native.statements import FunctionBody
 from palpate.native.structs import Structs, by_pointer, c_name, is_struct, members, plain
 
 HELPERS = {
@@ -112,7 +112,7 @@ class Translation:
 
     def _translate(self, function: Callable[..., Any], kinds: tuple[Any, ...]) -> Translated:
         result = plain(self.rules.result(function, kinds))
-        body = Body(self, function, kinds, result)
+        body = FunctionBody(self, function, kinds, result)
         try:
             for kind in (*kinds, result):
                 self.structs.name(kind)
@@ -169,7 +169,7 @@ class Translation:
     def _claim(self, name: str, beside: str) -> str:
         """A name that nothing else of the file has: the name, that with another beside it, or with a number."""
         choices = (name, f"{name}_{beside}", *(f"{name}_{beside}{k}" for k in range(2, 999)))
-        taken = {*self._claimed, *self.structs.taken}
+        taken = {*self._claimed, *self.structs.names_in_use}
         own = next(choice for choice in choices if choice not in taken)
         self._claimed.add(own)
         return own
