@@ -143,7 +143,8 @@ def _run(
             if len(record):
                 _draw(record, fresh, summary, found, asked.source, drawn)
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
-            undrawn = f"not enough memory or disk space to draw it ({printable(str(error)) or type(error).__name__})"
+            why = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            undrawn = f"not enough memory or disk space to draw it ({printable(why)})"
     return _Ran(asked.experiment.title, summary, found, undrawn, record)
 
 
