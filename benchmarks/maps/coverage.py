@@ -151,7 +151,7 @@ def calibration(scores: Sequence[Score]) -> float:
 def table(worlds: int, seed: int, counts: Sequence[int]) -> list[str]:
     """Rows of the table, one a kind, a way to choose and a number of presses."""
     rows = [
-        "| surface | chosen by | presses | 95 %: surface | 95 %: next press | rms of log K | F1 of lumps | probability off |",
+        "| surface | chosen by | presses | 95 %: surface | 95 %: next press | rms of log K | F1 of lumps | P off |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for kind in KINDS:

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from palpate.maps.presses import Presses
     from palpate.maps.result import MapRequest, MapResult
 
-_MAP = Group("The map", sort_key=2)
+MAP = Group("The map", sort_key=2)
 
 
-@Parameter(name="*", group=_MAP)
+@Parameter(name="*", group=MAP)
 @dataclass(frozen=True, kw_only=True)
 class PlaceOptions:
     """Where the presses are.
@@ -53,9 +53,9 @@ class PlaceOptions:
     place: str | None = None
 
 
-@Parameter(name="*", group=_MAP)
+@Parameter(name="*", group=MAP)
 @dataclass(frozen=True, kw_only=True)
-class WantedOptions:
+class MapOptions:
     """What is asked of the map.
 
     Parameters
@@ -146,7 +146,7 @@ class OutputOptions(ReportOption, JsonOption):
 def map(  # noqa: A001 - the command's name
     *logs: Path,
     places: PlaceOptions | None = None,
-    asked: WantedOptions | None = None,
+    asked: MapOptions | None = None,
     source: LogOptions | None = None,
     frame: FrameOptions | None = None,
     arm: ArmOptions | None = None,
@@ -173,7 +173,7 @@ def map(  # noqa: A001 - the command's name
     """
     places, output = places or PlaceOptions(), output or OutputOptions()
     output.check()
-    request = (asked or WantedOptions()).request()
+    request = (asked or MapOptions()).request()
     if (places.table is None) == (not logs):
         raise InputError("palpate map needs logs or a folder of them, or --table with places and stiffnesses")
     from palpate.maps.result import map_of

@@ -169,7 +169,8 @@ def _named_place(log: Path, columns: Sequence[str]) -> Array:
 
 def _pose_of(log: Path, identifier: LogIdentifier) -> Array:
     """The median position of the pose while the force is above half of its largest."""
-    record = identifier.signals.read(log)
+    known_frame = identifier.frame.wrench_frame is not None
+    record = identifier.signals.complete(log, known_frame=known_frame)[0].read(log)
     if "force_x" not in record.columns:
         raise InputError(
             f"{log} has no place: it holds one axis; name its columns with --place x,y, or give a log with a pose"

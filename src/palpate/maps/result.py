@@ -78,9 +78,13 @@ class MapResult:
     @cached_property
     def next(self) -> NextPresses:
         """Where to press next."""
+        return self.choose(max(self.request.next, 1), None, start=self.request.start)
+
+    def choose(self, count: int, candidates: Array | None, *, start: Any) -> NextPresses:
+        """The next presses among candidates (m, d) [m], for a robot that stands at `start` (d,) [m]."""
         r = self.request
         return self.map.next(
-            max(r.next, 1), goal=r.goal, stiffer_than=r.stiffer_than, start=r.start, way=r.way
+            count, candidates, goal=r.goal, stiffer_than=r.stiffer_than, start=start, way=r.way
         )
 
     @cached_property
@@ -131,6 +135,13 @@ class MapResult:
         lines += [
             ",".join([str(i + 1), *(f"{value:.6g}" for value in row.values())]) for i, row in enumerate(rows)
         ]
+        write_text(path, "\n".join(lines) + "\n")
+
+    def write_presses(self, path: Path) -> None:
+        """The presses as a table that `palpate map --table` reads, in m and N/m."""
+        rows = zip(self.presses.places, self.presses.stiffness, self.presses.half, strict=True)
+        lines = [",".join(["map (palpate)", *AXES[: self.presses.places.shape[1]], "stiffness", "half"])]
+        lines += [",".join(f"{v:.9g}" for v in (i + 1, *at, k, half)) for i, (at, k, half) in enumerate(rows)]
         write_text(path, "\n".join(lines) + "\n")
 
     def write_ply(self, path: Path) -> None:
