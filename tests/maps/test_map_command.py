@@ -89,6 +89,34 @@ def test_logs_of_presses_are_identified_and_placed(tmp_path, capsys):
     assert answer["places"][0]["stiffness"] == pytest.approx(5240.0, rel=0.02)
 
 
+def test_each_contact_of_a_log_is_a_press_at_its_own_place(tmp_path, capsys):
+    """The same press four times in one log, a place each."""
+    press = polars.read_csv(PRESS)
+    length = press["time_s"][-1] + 0.002
+    parts = [
+        press.with_columns(
+            (polars.col("time_s") + k * length), polars.lit(x).alias("x_mm"), polars.lit(y).alias("y_mm")
+        )
+        for k, (x, y) in enumerate([(0.0, 0.0), (20.0, 0.0), (0.0, 20.0)])
+    ]
+    polars.concat(parts).write_csv(tmp_path / "all.csv")
+    words = [
+        "--time",
+        "time_s",
+        "--position",
+        "position_mm:mm",
+        "--force-column",
+        "force_N:N",
+        "--place",
+        "x_mm,y_mm",
+    ]
+    assert main(["map", str(tmp_path / "all.csv"), *words, "--each-contact", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [(row["x"], row["y"]) for row in answer["places"]] == [(0.0, 0.0), (0.02, 0.0), (0.0, 0.02)]
+    for row in answer["places"]:
+        assert row["stiffness"] == pytest.approx(5240.0, rel=0.02)
+
+
 def test_logs_without_a_place_are_refused_in_one_line(tmp_path, capsys):
     shutil.copy(PRESS, tmp_path / "a.csv")
     assert main(["map", str(tmp_path / "a.csv")]) == 2

@@ -18,6 +18,7 @@ from palpate.cli._terminal import console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.options.flags import FLAG
 from palpate.cli.options.log import LogOptions
 from palpate.cli.options.names import QUIET
 from palpate.cli.options.written import WRITTEN, JsonOption, ReportOption
@@ -46,17 +47,20 @@ class PlaceOptions:
         Columns of the table, as x:mm,y:mm,K:N/mm,half:N/mm.
     place
         Columns of a log that hold its place, as x:mm,y:mm or x,y,z; the pose's position if not given.
+    each_contact
+        Each contact of a log is a press of its own, at its own place; else a log is one press.
     """
 
     table: Path | None = None
     columns: str | None = None
     place: str | None = None
+    each_contact: Annotated[bool, FLAG] = False
 
 
 @Parameter(name="*", group=MAP)
 @dataclass(frozen=True, kw_only=True)
 class MapOptions:
-    """What is asked of the map.
+    """Options of the map itself.
 
     Parameters
     ----------
@@ -207,7 +211,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
             return progress.track(paths, description="identifying")
 
         named = places.place.split(",") if places.place else ()
-        return read_logs(gathered(logs), one.identifier, named, track)
+        return read_logs(gathered(logs), one.identifier, named, places.each_contact, track)
 
 
 def _write(result: MapResult, output: OutputOptions, name: str) -> None:

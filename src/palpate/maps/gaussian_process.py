@@ -138,7 +138,7 @@ class Conditioned:
 
 
 @dataclass(frozen=True)
-class Prior:
+class LogPrior:
     """Normal prior of the logarithms of the parameters.
 
     Args:
@@ -150,7 +150,7 @@ class Prior:
     std: Array
 
 
-def prior_of(distance: Array, values: Array, noise: Array) -> Prior:
+def prior_of(distance: Array, values: Array, noise: Array) -> LogPrior:
     """A prior from the scales of the data: a factor of e or more either way about what the presses themselves show.
 
     The field varies as the values do; the long scale is half the region, the short one twice the spacing of presses;
@@ -160,7 +160,7 @@ def prior_of(distance: Array, values: Array, noise: Array) -> Prior:
     nearest = np.sort(distance + np.diag(np.full(len(distance), np.inf)), axis=1)[:, 0]
     region, spacing = float(distance.max()), float(np.median(nearest[nearest > 0.0]))
     middle = (spread, region / 2.0, spread / 2.0, min(2.0 * spacing, region / 2.0), float(np.median(noise)))
-    return Prior(np.log(middle), np.array([1.0, 0.7, 1.0, 0.7, 1.5]))
+    return LogPrior(np.log(middle), np.array([1.0, 0.7, 1.0, 0.7, 1.5]))
 
 
 def loss(theta: Array, distance: Array, values: Array, noise: Array) -> tuple[float, Array]:

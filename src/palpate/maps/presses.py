@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from palpate.arrays import Array
 from palpate.errors import InputError, PalpateError
 from palpate.from_log import LogIdentifier
 from palpate.logs.kinds import kind_of
+from palpate.logs.read import read_log
+from palpate.logs.roles import POSE
+from palpate.logs.signals import Signals
 from palpate.logs.tables import Sheet, open_table
 from palpate.units import split_spec, unit, unit_in_name
 
@@ -110,18 +114,20 @@ def read_logs(
     logs: Sequence[Path],
     identifier: LogIdentifier,
     place: Sequence[str] = (),
+    each_contact: bool = False,
     track: Callable[[Sequence[Path]], Iterable[Path]] = iter,
 ) -> Presses:
-    """Identify presses, one a log, each at the place of its pose while it presses.
+    """Identify presses, each at the place of its pose while it presses.
 
     Args:
         logs: their paths.
         identifier: options of reading and identification.
         place: columns of the place, x,y or x,y,z, each NAME or NAME:UNIT; the pose's position if none are given.
+        each_contact: whether each contact of a log is a press of its own; else a log is one press.
         track: shows the progress.
 
     Returns:
-        The presses with a stiffness; a log without one is refused with its reason.
+        The presses with a stiffness; a log or a contact without one is refused with its reason.
 
     Raises:
         InputError: no log has a place and a stiffness.
@@ -129,14 +135,18 @@ def read_logs(
     places, numbers, names, refused = [], [], [], dict[str, str]()
     for log in track(logs):
         try:
-            result, _ = identifier.identify(log)
-            where = _named_place(log, place) if place else _pose_of(log, identifier)
-            numbers.append(_stiffness(result))
+            parts = _contacts(log, identifier) if each_contact else {log.name: identifier}
         except (PalpateError, OSError) as error:
-            refused[log.name] = " ".join(str(error).split())
-            continue
-        places.append(where)
-        names.append(log.name)
+            parts, refused[log.name] = {}, " ".join(str(error).split())
+        for name, part in parts.items():
+            try:
+                where = _named_place(log, part, place) if place else _pose_of(log, part)
+                numbers.append(_stiffness(part.identify(log)[0]))
+            except (PalpateError, OSError) as error:
+                refused[name] = " ".join(str(error).split())
+                continue
+            places.append(where)
+            names.append(name)
     if not places:
         raise InputError(
             f"none of {len(logs)} logs gives a press with a place: {next(iter(refused.values()))}"
@@ -145,6 +155,20 @@ def read_logs(
         raise InputError("some logs have a place of two coordinates and some of three; a map has one frame")
     stiffness, half = np.array(numbers).T
     return Presses(np.array(places), stiffness, half, names, refused)
+
+
+def _contacts(log: Path, identifier: LogIdentifier) -> dict[str, LogIdentifier]:
+    """An identifier of each contact with half of the free motion before and after it."""
+    contacts = identifier.identify(log)[0].contacts
+    ends = [0.5 * (before + after) for (_, before), (after, _) in pairwise(contacts)]
+    first = identifier.signals.start or 0.0
+    cuts = [identifier.signals.start, *(first + end for end in ends), identifier.signals.end]
+    return {
+        f"{log.name}, contact {k + 1}": replace(
+            identifier, signals=replace(identifier.signals, start=start, end=end)
+        )
+        for k, (start, end) in enumerate(pairwise(cuts))
+    }
 
 
 def _stiffness(result: Identification) -> tuple[float, float]:
@@ -157,20 +181,27 @@ def _stiffness(result: Identification) -> tuple[float, float]:
     raise InputError("its stiffness is not identified; palpate identify says why")
 
 
-def _named_place(log: Path, columns: Sequence[str]) -> Array:
-    """The median of each column of the place."""
+def _named_place(log: Path, identifier: LogIdentifier, columns: Sequence[str]) -> Array:
+    """The median of each column of the place over the rows that are read."""
     if len(columns) not in (2, 3):
         raise InputError(f"--place needs the columns x,y or x,y,z, got {len(columns)}")
-    sheet = open_table(log, kind_of(log))
-    at = [sheet.resolve(split_spec(spec)[0]) for spec in columns]
-    factors = [_factor(axis, spec, sheet.names[i]) for axis, spec, i in zip(AXES, columns, at, strict=False)]
-    return np.array([np.nanmedian(column) for column in sheet.numbers(at, ())]) * factors
+    signals = _completed_signals(log, identifier)
+    options: dict[str, Any] = {
+        "start": signals.start,
+        "end": signals.end,
+        "missing": signals.missing,
+        "limits": signals.limits,
+    }
+    if signals.time is not None:
+        options["time"] = signals.time
+    named: dict[str, Any] = dict(zip(POSE, columns, strict=False))
+    record = read_log(log, rate=signals.rate, delimiter=signals.delimiter, **options, **named)
+    return np.array([np.nanmedian(record[role]) for role in named])
 
 
 def _pose_of(log: Path, identifier: LogIdentifier) -> Array:
     """The median position of the pose while the force is above half of its largest."""
-    known_frame = identifier.frame.wrench_frame is not None
-    record = identifier.signals.complete(log, known_frame=known_frame)[0].read(log)
+    record = _completed_signals(log, identifier).read(log)
     if "force_x" not in record.columns:
         raise InputError(
             f"{log} has no place: it holds one axis; name its columns with --place x,y, or give a log with a pose"
@@ -179,3 +210,9 @@ def _pose_of(log: Path, identifier: LogIdentifier) -> Array:
     size = np.linalg.norm(force - np.nanmedian(force[: max(len(force) // 50, 1)], axis=0), axis=1)
     pressed = size >= 0.5 * np.nanmax(size)
     return np.array([np.nanmedian(record[f"position_{axis}"][pressed]) for axis in AXES])
+
+
+def _completed_signals(log: Path, identifier: LogIdentifier) -> Signals:
+    """The signals with what the log's own names leave no doubt of."""
+    known_frame = identifier.frame.wrench_frame is not None
+    return identifier.signals.complete(log, known_frame=known_frame)[0]

@@ -24,7 +24,7 @@ SHOWN = 2500
 
 @dataclass(frozen=True)
 class MapRequest:
-    """What is asked of a map.
+    """Options of a map.
 
     Args:
         next: number of next presses.

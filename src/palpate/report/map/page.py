@@ -59,7 +59,7 @@ def place(where: Any) -> str:
 
 
 def warnings(result: MapResult) -> list[str]:
-    """What is wrong with the presses."""
+    """Faults of the presses."""
     lines = []
     if result.presses.refused:
         name, why = next(iter(result.presses.refused.items()))
