@@ -135,30 +135,16 @@ def watched(law, state, starts, force):
     drift = w.drift + law.tick / MEMORY * ((rest - w.rest) / law.tick - w.drift)
     peak = min(max((1.0 - law.tick / FADING) * w.peak, abs(slow - rest)), law.bias)
     return Watch(
-        force,
-        former,
-        mean,
-        slow,
-        slower,
-        rest,
-        drift,
-        peak,
-        variance,
-        tide,
-        evidence,
-        many,
-        age,
-        gap,
-        steepest,
-    )
+        force, former, mean, slow, slower, rest, drift, peak, variance, tide, evidence, many, age, gap, steepest,
+    )  # fmt: skip
 
 
 @law
 def steepest_of(law, state, force):
     """The largest rise within half of theta with this tick's reading; in free motion it fades as fast as the bias.
 
-    A quarter of theta is longer than the sensor's low-pass takes for an edge: a step that begins in one quarter is
-    whole between the quarters beside it.
+    A step that begins in one quarter is whole between the quarters beside it, as far as the sensor's low-pass is done
+    with it in a quarter.
     """
     s, span = state.watch.steepest, max(0.25 * law.theta // law.tick, 1.0)
     fading = 1.0 - law.tick / MEMORY if state.stage.phase == AIR else 1.0
