@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +50,7 @@ ALONE = (
 )
 """Of DDS, which is kept on the loopback."""
 DOMAIN = 20 + os.getpid() % 180
-PATIENCE = 20.0
+PATIENCE = 60.0
 """For which a process may take to start, or to end [s]."""
 LATE = re.compile(
     r"late, more than the loop's lag|no reading[^;]* for \S+ ms|stood still for|clock runs too slow"
@@ -58,7 +58,7 @@ LATE = re.compile(
 )
 """How a press says that this machine was late; that is no fault of the press, which is to stop then."""
 WORDS = ("--force", "10:N", "--normal", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",
-         "--travel-limit", "30:mm", "--time-limit", "20:s", "--ordinary-priority")  # fmt: skip
+         "--travel-limit", "30:mm", "--time-limit", "20:s")  # fmt: skip
 
 
 def cell(folder: Path, **changed: float) -> Path:
@@ -104,6 +104,12 @@ def child(*words: str, **environment: str):
 def arm(folder: Path, *words: str):
     """The arm's process and its address."""
     return child("-m", "palpate.wires.sim_arm", "--arm", str(folder / "arm.toml"), "--seconds", "60", *words)
+
+
+def prompt() -> None:
+    """Real-time priority for this thread, where the system gives it: a relay is not to be late by itself."""
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(40))
 
 
 def rows_came(path, rows=40) -> bool:
@@ -155,6 +161,7 @@ class Relay(threading.Thread):
         self.commands, self.rests, self.done = [], [], threading.Event()
 
     def run(self):
+        prompt()
         master, begun, held = None, None, []
         while not self.done.is_set():
             ready, _, _ = select.select([self._near, self._far], [], [], 0.002)

@@ -18,6 +18,8 @@ from palpate.errors import InputError
 from palpate.wires import link
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError
 
+_START = 60.0
+"""For which the start of our own process may take on a busy computer [s]: the arm has not been asked yet."""
 _ANSWER = 12.0
 """For which opening, taring and beginning may take: a script of a UR is uploaded and started within eight [s]."""
 _PATIENCE = 2.0
@@ -50,6 +52,7 @@ class ApartWire:
         theirs.close()
         self._link.setblocking(False)
         try:
+            self._answered(link.STARTED, _START)
             about = self._answered(link.READY, self.answer)
         except BaseException as error:
             self._driver.kill()  # nothing moves yet
