@@ -185,7 +185,7 @@ def main() -> None:
     with Path(trace).open("ab", buffering=0) as file:
         install(fault, file)
         stamped(module, fault)
-        rehearsal.run(importlib.import_module(f"palpate.wires.{module}").main)
+        importlib.import_module(f"palpate.wires.{module}").main()
 
 
 if __name__ == "__main__":

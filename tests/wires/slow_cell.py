@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -106,12 +106,6 @@ def arm(folder: Path, *words: str):
     return child("-m", "palpate.wires.sim_arm", "--arm", str(folder / "arm.toml"), "--seconds", "60", *words)
 
 
-def prompt() -> None:
-    """Real-time priority for this thread, where the system gives it: a relay is not to be late by itself."""
-    with suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(40))
-
-
 def rows_came(path, rows=40) -> bool:
     """Whether a press has kept so many, as soon as it has."""
     for _ in range(round(2.0 * PATIENCE / 0.02)):
@@ -161,7 +155,6 @@ class Relay(threading.Thread):
         self.commands, self.rests, self.done = [], [], threading.Event()
 
     def run(self):
-        prompt()
         master, begun, held = None, None, []
         while not self.done.is_set():
             ready, _, _ = select.select([self._near, self._far], [], [], 0.002)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.errors import InputError
-from palpate.wires.rehearsal import OneDirection, arm_of, loopback, paced, ready, run, words_of
+from palpate.wires.rehearsal import OneDirection, arm_of, loopback, paced, ready, words_of
 
 _Q = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
 _RATE = 1000.0
@@ -121,4 +121,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    run(main)
+    main()

@@ -96,24 +96,18 @@ def ready(line: str) -> None:
 def paced(arm: OneDirection, seconds: float, wait: Callable[[float], None] = time.sleep) -> Iterator[None]:
     """Each tick when it is due, at real time, until the seconds of the arm are over.
 
+    With real-time priority, where the system gives it: a controller is not late because the loop's computer is busy.
+
     Args:
         arm: whose clock it is.
         seconds: of the arm's time.
         wait: called before each tick with the seconds that are left until it is due.
     """
-    begun = time.monotonic()
-    while arm.time < seconds:
-        left = begun + arm.time - time.monotonic()
-        wait(max(left, 0.0))
-        if left < -_BEHIND:
-            begun -= left
-        yield
-
-
-def run(main: Callable[[], None]) -> None:
-    """Run a simulated controller with real-time priority, where the system gives it, all its threads included.
-
-    A controller is not late because the computer of the loop is busy.
-    """
     with hurried(True):
-        main()
+        begun = time.monotonic()
+        while arm.time < seconds:
+            left = begun + arm.time - time.monotonic()
+            wait(max(left, 0.0))
+            if left < -_BEHIND:
+                begun -= left
+            yield

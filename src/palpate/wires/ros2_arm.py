@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.press.setting import place_of
 from palpate.robots import SerialArm
-from palpate.wires.rehearsal import START, OneDirection, arm_of, paced, ready, run, words_of
+from palpate.wires.rehearsal import START, OneDirection, arm_of, paced, ready, words_of
 from palpate.wires.ros2 import SENT
 
 _REST = 10
@@ -141,4 +141,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    run(main)
+    main()

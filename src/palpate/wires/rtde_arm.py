@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from palpate.wires.rehearsal import START, OneDirection, arm_of, loopback, paced, ready, run, words_of
+from palpate.wires.rehearsal import START, OneDirection, arm_of, loopback, paced, ready, words_of
 
 RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
 _VERSION = (5, 15, 0, 0)
@@ -327,4 +327,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    run(main)
+    main()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.wires import sim_protocol as protocol
-from palpate.wires.rehearsal import OneDirection, arm_of, paced, ready, run, words_of
+from palpate.wires.rehearsal import OneDirection, arm_of, paced, ready, words_of
 
 _REST = 10
 """Ticks without a command after which it rests."""
@@ -116,4 +116,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    run(main)
+    main()
