@@ -149,13 +149,27 @@ def test_a_curved_surface_is_mapped_in_its_own_places():
         ([[0.0, np.nan]], [1.0], [0.1], "places must be finite"),
         ([[0.0, 0.0]], [-1.0], [0.1], "stiffness must be finite and above 0"),
         ([[0.0, 0.0]], [1.0], [0.0], "half must be finite and above 0"),
-        ([[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]], [500.0, 510.0, 5000.0], [5.0, 5.0, 5.0], "at one place"),
+        (
+            [[0.0, 0.0], [0.1, 0.0], [0.0, 0.0], [0.0, 0.1]],
+            [500.0, 510.0, 5000.0, 530.0],
+            [5.0, 5.0, 5.0, 5.0],
+            "at one place",
+        ),
     ],
 )
 def test_bad_presses_are_refused_in_one_line(places, stiffness, half, words):
     with pytest.raises(InputError, match=words) as error:
         StiffnessMap().update(places, stiffness, half)
     assert "\n" not in str(error.value)
+
+
+def test_presses_that_repeat_worse_than_they_state_are_no_contradiction():
+    rng = np.random.default_rng(4)
+    places = np.repeat(rng.uniform(0.0, 0.1, (12, 2)), 2, axis=0)
+    value = 1e3 * np.exp(0.1 * rng.normal(size=24))
+    result = StiffnessMap()
+    result.update(places, value, 0.01 * value)
+    assert result.process.repeat == pytest.approx(0.1, rel=0.5)
 
 
 def test_presses_in_one_line_or_at_one_place_make_no_map():
