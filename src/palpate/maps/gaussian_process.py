@@ -157,8 +157,8 @@ def prior_of(distance: Array, values: Array, noise: Array) -> LogPrior:
     presses repeat as they say.
     """
     spread = max(float(np.std(values)), float(np.median(noise)))
-    nearest = np.sort(distance + np.diag(np.full(len(distance), np.inf)), axis=1)[:, 0]
-    region, spacing = float(distance.max()), float(np.median(nearest[nearest > 0.0]))
+    nearest = np.where(distance > 0.0, distance, np.inf).min(axis=1)
+    region, spacing = float(distance.max()), float(np.median(nearest))
     middle = (spread, region / 2.0, spread / 2.0, min(2.0 * spacing, region / 2.0), float(np.median(noise)))
     return LogPrior(np.log(middle), np.array([1.0, 0.7, 1.0, 0.7, 1.5]))
 
