@@ -11,7 +11,7 @@ from presses import FIELDS, NAMES, SPREAD, log_of
 
 from palpate.bench import ForceSensor, given_motion, load
 from palpate.environments import KelvinVoigt
-from palpate.excitation.fisher_information import ForceChain, bound, phase_std
+from palpate.excitation.spectra import ForceChain, bound, phase_std
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 

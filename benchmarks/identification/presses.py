@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.bench import build, load
 from palpate.bench.experiments.tables import changed
-from palpate.excitation.fisher_information import ForceChain, bound, phase_std
+from palpate.excitation.spectra import ForceChain, bound, phase_std
 from palpate.identification import Identification, identify
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.worlds import surface
 from palpate.analysis import linearise, stable_intervals, stable_stiffness
-from palpate.analysis.stability_cells import growth, stable_pieces
+from palpate.analysis.boundaries import growth, stable_pieces
 from palpate.bench import build
 from palpate.bench.experiments.tables import changed
 from palpate.errors import InputError

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from palpate.analysis.equilibrium import at_equilibrium, pressing
-from palpate.analysis.flatten import leaves, rebuilt, vector
-from palpate.analysis.motion import Motion
+from palpate.analysis.linear_loop import Motion, leaves, rebuilt, vector
+from palpate.analysis.linear_model import at_equilibrium, pressing
 from palpate.bench import build, load, start_at
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.excitation.fisher_information import (
+from palpate.excitation.spectra import (
     NAMES,
     ForceChain,
     bound,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.excitation.phases import low_peak, schroeder, summed
+from palpate.excitation.multisine import low_peak, schroeder, summed
 from palpate.references.waves import Multisine
 
 

@@ -7,9 +7,8 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.excitation import Sensors, Surface
-from palpate.excitation.fisher_information import ForceChain, bound
-from palpate.excitation.sensors import LAG_UNIT
-from palpate.excitation.spectra import covariance
+from palpate.excitation.problem import LAG_UNIT
+from palpate.excitation.spectra import ForceChain, bound, covariance
 
 FOAM = Surface(5200.0, 200.0, 0.1)
 

@@ -162,7 +162,7 @@ class SensorOptions:
     def sensors(self) -> Sensors:
         """The sensors."""
         from palpate.excitation import Sensors
-        from palpate.excitation.fisher_information import ForceChain, phase_std
+        from palpate.excitation.spectra import ForceChain, phase_std
         from palpate.signals.low_pass import LowPass
 
         for option, value in (("--sampling", self.sampling), ("--rate", self.rate)):
@@ -300,10 +300,10 @@ def excite(
 
 
 def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | None) -> int:
-    from palpate.excitation import design, remedies
+    from palpate.excitation import design
 
     found = design(problem)
-    helps = [] if found.feasible else remedies(found)
+    helps = [] if found.feasible else design(found)
     if found.feasible:
         _write(found, rate, output.out, output.experiment)
     if picture is not None:

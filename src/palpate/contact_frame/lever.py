@@ -9,13 +9,11 @@ from palpate.contact_frame.declared import ContactFrame
 from palpate.contact_frame.signals_in_base import Signals
 from palpate.contact_frame.vectors import FEWEST, read_rows
 
-Rows = Mask
-
 _LEAST = 0.3
 """Of the largest force: the line of a weaker one is three times as uncertain, for the same noise of the torque."""
 
 
-def line_misses_tcp(signals: Signals, free: Rows, inside: Rows, frame: ContactFrame) -> float | None:
+def line_misses_tcp(signals: Signals, free: Mask, inside: Mask, frame: ContactFrame) -> float | None:
     """How far the contact force's line of action passes from the tool centre point [m]; the median over the contact.
 
     A force f at r gives the torque r x f about the point that the torque is about, so the line is at

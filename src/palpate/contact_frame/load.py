@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array
 from palpate.contact_frame.free_motion.inertia import BLOCKS
 
 if TYPE_CHECKING:
     from palpate.contact_frame.payload import Payload
 
-Rows = Mask
 
 _TOLD = np.radians(3.0) ** 2
 """Least eigenvalue for which a weight is told from a bias: by a smaller turn, a pose that errs by 0.3 deg makes a tenth
@@ -30,7 +29,7 @@ of the weight."""
 _ROUNDS = 30
 """Of reweighting. The load that they find only begins the search for the free rows, which finds it anew."""
 _ENOUGH = 20_000
-"""Rows that are looked at, of a longer log evenly: that is a matter of time, not of what is found."""
+"""Mask that are looked at, of a longer log evenly: that is a matter of time, not of what is found."""
 
 
 @dataclass(frozen=True)

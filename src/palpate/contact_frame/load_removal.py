@@ -15,8 +15,6 @@ from palpate.contact_frame.saturation import saturated_rows
 from palpate.contact_frame.signals_in_base import Signals
 from palpate.contact_frame.vectors import read_rows
 
-Rows = Mask
-
 _ROUNDS = 4
 """At most: the weight tells the free rows and they the weight, until neither changes."""
 
@@ -34,9 +32,9 @@ class Unloaded:
     """
 
     force: Array
-    there: Rows
-    inside: Rows
-    free: Rows
+    there: Mask
+    inside: Mask
+    free: Mask
     load: Load
 
 
@@ -66,7 +64,7 @@ def _remove_load(signals: Signals, frame: ContactFrame) -> Unloaded:
     return Unloaded(load.taken_off(signals.force, signals.rotations), there, inside, free, load)
 
 
-def _load(signals: Signals, free: Rows, frame: ContactFrame) -> Load:
+def _load(signals: Signals, free: Mask, frame: ContactFrame) -> Load:
     """Weight and bias by the free rows; the weight is the payload's where there is one."""
     force, rotations = signals.force[free], signals.rotations[free]
     if frame.payload is not None:
@@ -74,7 +72,7 @@ def _load(signals: Signals, free: Rows, frame: ContactFrame) -> Load:
     return load_of(force, rotations, weighs=not frame.gravity_compensated)
 
 
-def _fit_load(signals: Signals, there: Rows, frame: ContactFrame) -> tuple[Load, Rows, Rows]:
+def _fit_load(signals: Signals, there: Mask, frame: ContactFrame) -> tuple[Load, Mask, Mask]:
     """Weight and bias by the free rows; which rows these are, depends on the weight where the tool turns."""
     turned = signals.turned and turns(signals.rotations[there])
     none = there & False
@@ -100,5 +98,5 @@ def _fit_load(signals: Signals, there: Rows, frame: ContactFrame) -> tuple[Load,
     return load, inside, free
 
 
-def _contact(signals: Signals, load: Load) -> tuple[Rows, Rows]:
+def _contact(signals: Signals, load: Load) -> tuple[Mask, Mask]:
     return contact_rows(signals.time, load.taken_off(signals.force, signals.rotations), signals.place)

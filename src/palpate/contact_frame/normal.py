@@ -15,10 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array
 from palpate.contact_frame.free_motion.inertia import BLOCKS
-
-Rows = Mask
 
 MATTERS = 0.02
 """Relative standard deviation that the normal may add to K, B and M unsaid: 4 % at 95 %, which in quadrature takes a

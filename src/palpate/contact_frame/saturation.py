@@ -7,11 +7,9 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.identification.saturation import at_limit
 
-Rows = Mask
 
-
-def saturated_rows(force: Array, place: Array, inside: Rows) -> Rows:
-    """Rows in contact in which an axis rests at exactly its extreme value while the tool moves on, shape (n,).
+def saturated_rows(force: Array, place: Array, inside: Mask) -> Mask:
+    """Mask in contact in which an axis rests at exactly its extreme value while the tool moves on, shape (n,).
 
     Args:
         force: in the axes that it was recorded in [N], shape (n, 3); NaN where there is no reading.

@@ -14,8 +14,6 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 
-Rows = Mask
-
 _WINDOWS = np.geomspace(0.04, 2.0, 9)
 """Lengths that are tried [s]."""
 _ROWS = 12
@@ -27,7 +25,7 @@ CHANCE = 1e-3
 """How probable a doubt may be by chance alone."""
 
 
-def free_inertia(time: Array, force: Array, place: Array, free: Rows) -> tuple[float, float] | None:
+def free_inertia(time: Array, force: Array, place: Array, free: Mask) -> tuple[float, float] | None:
     """The mass m of f = -m a, and its standard deviation [kg]; None if the log does not determine it.
 
     Args:
@@ -65,7 +63,7 @@ def wrong_sign_of(inertia: tuple[float, float]) -> str:
     )
 
 
-def _by_window(force: Array, place: Array, there: Rows, dt: float, n: int) -> tuple[float, float] | None:
+def _by_window(force: Array, place: Array, there: Mask, dt: float, n: int) -> tuple[float, float] | None:
     """Windows of n rows that overlap by half, all of whose rows are there."""
     if n < _ROWS or len(force) < n:
         return None

@@ -12,14 +12,12 @@ from palpate.identification.contacts import contacts_of
 from palpate.identification.sampling import channels_of
 from palpate.records import Record
 
-Rows = Mask
-
 _GUARD = 2.0
 """Times the filters' settling: once before the touch is seen, once after it has left the filters."""
 
 
-def contact_rows(time: Array, force: Array, place: Array) -> tuple[Rows, Rows]:
-    """Rows in contact and free rows, with a guard between them that is neither.
+def contact_rows(time: Array, force: Array, place: Array) -> tuple[Mask, Mask]:
+    """Mask in contact and free rows, with a guard between them that is neither.
 
     A probe that never leaves has no free row.
 
@@ -46,8 +44,8 @@ def contact_rows(time: Array, force: Array, place: Array) -> tuple[Rows, Rows]:
     return inside, free if free.sum() >= FEWEST else np.zeros(len(time), bool)
 
 
-def rows_between(time: Array, span: tuple[float, float]) -> Rows:
-    """Rows in a stretch that is said to be free.
+def rows_between(time: Array, span: tuple[float, float]) -> Mask:
+    """Mask in a stretch that is said to be free.
 
     Raises:
         InputError: there are too few.

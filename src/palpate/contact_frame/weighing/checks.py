@@ -24,8 +24,6 @@ from palpate.contact_frame.weighing.estimate import (
 from palpate.identification.saturation import at_limit
 from palpate.records import Record
 
-Rows = Mask
-
 _REFINED = 4
 """Of the cube's 24 turns as many are equally near to a turn at worst, where corners of their cells meet."""
 _FINE = np.radians(2.0)
@@ -33,7 +31,7 @@ _FINE = np.radians(2.0)
 
 
 def notes_against(
-    record: Record, frame: ContactFrame, signals: Signals, there: Rows, fit: PoseFit
+    record: Record, frame: ContactFrame, signals: Signals, there: Mask, fit: PoseFit
 ) -> list[dict[str, Any]]:
     """Notes, as a record's meta has them.
 
@@ -57,7 +55,7 @@ def notes_against(
     return notes
 
 
-def _saturation_notes(signals: Signals, there: Rows, fitted: Fitted) -> list[dict[str, Any]]:
+def _saturation_notes(signals: Signals, there: Mask, fitted: Fitted) -> list[dict[str, Any]]:
     """Axes that rest at their extreme value while the weight turns in the sensor."""
     weight = np.einsum("nji,j->ni", signals.rotations[there], fitted.whole[:3])
     stuck = 0
@@ -71,7 +69,7 @@ def _saturation_notes(signals: Signals, there: Rows, fitted: Fitted) -> list[dic
 
 
 def _another_frame(
-    record: Record, frame: ContactFrame, signals: Signals, there: Rows, poses: Poses, fitted: Fitted
+    record: Record, frame: ContactFrame, signals: Signals, there: Mask, poses: Poses, fitted: Fitted
 ) -> list[dict[str, Any]]:
     """Whether the forces fit another reading of the poses, or of the axes, so much better that chance is out."""
     if _misfit(poses, fitted.whole) < _by_noise(signals.force[there], poses):
