@@ -8,7 +8,7 @@ from palpate.bench import build, changed
 from palpate.checks import controllers as laws
 from palpate.checks.controllers import TICK, WALL
 from palpate.controllers import ControllerTable
-from palpate.signals.tables import example, kinds
+from palpate.signals.types import example, kinds
 
 each = pytest.mark.parametrize(
     "table", [example(kind) for kind in kinds(ControllerTable)], ids=lambda t: t.__struct_config__.tag

@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.excitation import Budget, HybridLoop, KnownBandwidth, Problem, Sensors, SurfaceRange, design
 from palpate.excitation.multisine import PERIOD
 from palpate.excitation.spectra import ForceChain
-from palpate.references.waves import Chirp, Multisine
+from palpate.references import Chirp, Multisine
 
 RANGE = SurfaceRange((3000.0, 8000.0), (50.0, 300.0), (0.1, 0.3))
 KNOWN = SurfaceRange((5200.0, 5200.0), (200.0, 200.0), (0.1, 0.1))

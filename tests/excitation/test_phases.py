@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.excitation.multisine import low_peak, schroeder, summed
-from palpate.references.waves import Multisine
+from palpate.references import Multisine
 
 
 def crest(amplitudes, harmonics, phases):

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from palpate import instruments
 from palpate._jit import kernel
-from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
+from palpate.instruments import Converter, Encoder, analog_filter_190
 from palpate.signals.filters import butterworth2
 
 PHYSICS, LOOP = 20000, 1000.0
@@ -29,7 +30,7 @@ def chain_plain(sensor, analog, converter, digital, forces, out):
 
 
 chain = kernel(chain_plain)
-PARTS = (force_sensor(bits=30), analog_filter_190(), Converter(30, 200.0), butterworth2(120.0, LOOP))
+PARTS = (instruments(bits=30), analog_filter_190(), Converter(30, 200.0), butterworth2(120.0, LOOP))
 
 
 def lag_by_ramp(run):

@@ -27,11 +27,10 @@ from palpate.errors import InputError
 from palpate.friction import Coulomb, LuGre
 from palpate.identifiers.kernels.least_squares import LeastSquares
 from palpate.instruments import Converter, Encoder
-from palpate.references import Approach, Chirp, ForceSchedule, Multisine
-from palpate.references.force_schedule import NO_WAVE
+from palpate.references import NO_WAVE, Approach, Chirp, ForceSchedule, Multisine
 from palpate.robots.arm3 import MOTOR_TORQUE, Arm3
 from palpate.signals.filters import butterworth2, butterworth3, delay, state_variable
-from palpate.signals.parameters import alike, triple
+from palpate.signals.types import alike, triple
 
 
 def build(experiment: Experiment) -> Bench:

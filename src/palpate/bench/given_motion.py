@@ -19,7 +19,7 @@ from palpate.environments.surface import members
 from palpate.environments.surface_state import follow
 from palpate.errors import InputError
 from palpate.records import Record
-from palpate.signals.quantise import quantise
+from palpate.signals.samples import quantise
 
 COLUMNS = {
     "t": "s",

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from palpate._jit import part
-from palpate.references.approach import Approach
+from palpate.references import Approach
 
 APPROACH, CONTACT, LOST = 0.0, 1.0, 2.0
 PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact"}

@@ -13,7 +13,7 @@ from palpate.bench.sequence import CONTACT, Sequence, SequenceState
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 from palpate.friction import Coulomb
 from palpate.instruments import Converter, Encoder
-from palpate.references.force_schedule import ForceSchedule
+from palpate.references import ForceSchedule
 from palpate.signals.types import Task
 
 ALONG_X = Vec3(1.0, 0.0, 0.0)

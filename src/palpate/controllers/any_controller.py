@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.errors import InputError
-from palpate.signals.tables import example, kinds
+from palpate.signals.types import example, kinds
 
 
 @cache

@@ -8,8 +8,7 @@ from palpate.controllers.controller import ControllerTable, controller
 from palpate.force.arm import Arm, Limits, TorqueLoop, load_arm
 from palpate.force.gains import gains_for
 from palpate.force.law import Cautious, CautiousState
-from palpate.signals.parameters import triple
-from palpate.signals.tables import NotNegativeTriple, Positive, PositiveTriple
+from palpate.signals.types import NotNegativeTriple, Positive, PositiveTriple, triple
 
 
 @part

@@ -4,7 +4,7 @@ from typing import Any, ClassVar, TypeVar
 
 from palpate._jit import part
 from palpate._vector import ZERO3
-from palpate.signals.tables import Table
+from palpate.signals.types import Table
 
 C = TypeVar("C", bound=type)
 

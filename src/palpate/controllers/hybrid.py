@@ -6,8 +6,7 @@ from palpate._jit import law
 from palpate._vector import ZERO3, Vec3
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.resolved_acceleration import position_command, resolved_acceleration
-from palpate.signals.parameters import alike
-from palpate.signals.tables import NotNegative
+from palpate.signals.types import NotNegative, alike
 
 
 @law

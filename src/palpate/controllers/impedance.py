@@ -6,8 +6,7 @@ from palpate._jit import law
 from palpate._vector import Vec3
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.resolved_acceleration import resolved_acceleration
-from palpate.signals.parameters import triple
-from palpate.signals.tables import NotNegativeTriple, PositiveTriple
+from palpate.signals.types import NotNegativeTriple, PositiveTriple, triple
 
 
 @law

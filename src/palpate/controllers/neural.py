@@ -13,8 +13,15 @@ from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.errors import InputError
 from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, random_layers, thesis_layers
-from palpate.signals.parameters import alike, coerced, triple
-from palpate.signals.tables import NotNegative, PositiveTriple, Size, Triple
+from palpate.signals.types import (
+    NotNegative,
+    PositiveTriple,
+    Size,
+    Triple,
+    alike,
+    coerced,
+    triple,
+)
 
 INPUTS, OUTPUTS = 9, 3
 STUCK = 1e-3

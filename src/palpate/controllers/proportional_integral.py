@@ -7,8 +7,7 @@ from palpate._vector import ZERO3, Vec3
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.hybrid import Hybrid
 from palpate.errors import InputError
-from palpate.signals.parameters import alike, require
-from palpate.signals.tables import NotNegative, Positive
+from palpate.signals.types import NotNegative, Positive, alike, require
 
 
 @controller

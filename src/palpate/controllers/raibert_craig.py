@@ -7,8 +7,7 @@ import numpy as np
 from palpate._jit import law, part
 from palpate._vector import Vec3, resolve
 from palpate.controllers.controller import ControllerTable, controller
-from palpate.signals.parameters import triple
-from palpate.signals.tables import NotNegative, NotNegativeTriple
+from palpate.signals.types import NotNegative, NotNegativeTriple, triple
 
 
 @law

@@ -5,8 +5,7 @@ from typing import ClassVar, NamedTuple
 from palpate._jit import law, part
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
 from palpate.environments.surface_table import SurfaceTable
-from palpate.signals.parameters import coerced, require
-from palpate.signals.tables import NotNegative, Positive
+from palpate.signals.types import NotNegative, Positive, coerced, require
 
 
 def _check(self):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import clip
-from palpate.signals.parameters import coerced, require
+from palpate.signals.types import coerced, require
 
 
 def _check(self):

@@ -7,7 +7,7 @@ from palpate._jit import part
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.environments.surface_table import SurfaceTable
 from palpate.errors import InputError
-from palpate.signals.tables import example, kinds
+from palpate.signals.types import example, kinds
 
 
 @cache

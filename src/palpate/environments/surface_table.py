@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 from msgspec.structs import asdict
 
-from palpate.signals.tables import Table
+from palpate.signals.types import Table
 
 
 class SurfaceTable(Table, tag_field="kind"):

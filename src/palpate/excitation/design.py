@@ -17,7 +17,7 @@ from palpate.excitation import multisine
 from palpate.excitation.force_loops import Made, Prediction, Wave
 from palpate.excitation.multisine import error_of_sweep
 from palpate.excitation.problem import LONGEST, Problem, used_up
-from palpate.references.waves import Chirp, Multisine
+from palpate.references import Chirp, Multisine
 
 _ENDS = 6  # places for each end of the sweep
 _FINE = 64  # frequencies of a sweep that are looked at

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Complex
 from palpate.errors import InputError
 from palpate.excitation.spectra import covariance
-from palpate.references.waves import Chirp, Multisine
+from palpate.references import Chirp, Multisine
 from palpate.signals.low_pass import LowPass
 
 Range = tuple[float, float]

@@ -18,7 +18,7 @@ from palpate.errors import InputError
 from palpate.excitation.force_loops import Made, Prediction
 from palpate.excitation.problem import Problem, used_up
 from palpate.excitation.spectra import optimal
-from palpate.references.waves import Multisine
+from palpate.references import Multisine
 
 _POINTS_A_CYCLE = 8  # of the period a cycle of the highest harmonic
 _STARTS = 5

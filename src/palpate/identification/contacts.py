@@ -15,8 +15,7 @@ from palpate.identification.options import NOTHING_SAID, Options
 from palpate.identification.payload import Payload, payload_of
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.warning_codes import Code, Warn
-from palpate.signals.runs import runs
-from palpate.signals.spectral import detrend
+from palpate.signals.samples import detrend, runs
 
 ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""

@@ -22,8 +22,7 @@ from palpate.identifiers.line_noise import LineNoise
 from palpate.identifiers.octave_fit import octave_fit
 from palpate.identifiers.octave_system import OctaveData
 from palpate.results import Readable
-from palpate.signals.low_pass import LowPass
-from palpate.signals.taps import FRACTIONS, taps
+from palpate.signals.low_pass import FRACTIONS, LowPass, taps
 from palpate.signals.types import Estimate
 
 NAMES = ("M", "B", "K", "offset")

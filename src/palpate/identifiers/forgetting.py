@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 from palpate._jit import part
 from palpate._vector import solve
 from palpate.identifiers.kernels.square_root import stretch_of, stretched
-from palpate.signals.parameters import coerced, require
+from palpate.signals.types import coerced, require
 
 
 @runtime_checkable

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from palpate.signals.tables import Table
+from palpate.signals.types import Table
 
 
 class IdentifierTable(Table, tag_field="kind"):

@@ -25,8 +25,7 @@ from palpate.identifiers.kernels.state_layout import (
     put,
     statistics_at,
 )
-from palpate.signals.tables import NotNegativeTriple
-from palpate.signals.types import Estimate
+from palpate.signals.types import Estimate, NotNegativeTriple
 
 MEMORY = 10_000.0
 """Samples that the noise is estimated from, at most; at the start, the newer half of those there are."""

@@ -16,7 +16,7 @@ from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
 from palpate.identifiers.kernels.change_detection import COUNTERS, EXTRA, counters, looked_back, noticed
 from palpate.identifiers.kernels.state_layout import known_first, length, statistics_at
 from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorbed
-from palpate.signals.tables import Positive
+from palpate.signals.types import Positive
 
 
 @part

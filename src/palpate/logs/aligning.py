@@ -11,7 +11,7 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.logs.stamps import Timed
-from palpate.signals.held import fresh_rows
+from palpate.signals.samples import fresh_rows
 
 _FEWEST = 20
 """Readings of a stream: with fewer, a spline's ends are most of it, and identification refuses the log as well."""

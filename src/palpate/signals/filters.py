@@ -8,7 +8,7 @@ import math
 from typing import Any, NamedTuple
 
 from palpate._jit import law, part
-from palpate.signals.parameters import coerced, require
+from palpate.signals.types import coerced, require
 
 
 class BiquadState(NamedTuple):

@@ -15,8 +15,7 @@ from palpate._vector import Vec3
 from palpate.controllers.controller import controller as registered_controller
 from palpate.errors import InputError
 from palpate.plugins import Plugin, plugin, reason
-from palpate.signals.parameters import alike, triple
-from palpate.signals.tables import Table, Triple
+from palpate.signals.types import Table, Triple, alike, triple
 
 GIVEN = {"tick": "time between ticks [s]", "wall": "x of the surface [m]"}
 """Fields of a part that the bench fills in; they are no keys of its table."""

@@ -18,7 +18,7 @@ from palpate.errors import InputError, PluginError
 from palpate.files import read_toml
 from palpate.identifiers import IdentifierTable
 from palpate.plugins import is_plugin, look_in
-from palpate.signals.tables import (
+from palpate.signals.types import (
     NotNegative,
     NotNegativeTriple,
     Positive,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from palpate.signals.tables import NotNegative, Positive, Table
+from palpate.signals.types import NotNegative, Positive, Table
 
 
 class TouchedSurface(Table):

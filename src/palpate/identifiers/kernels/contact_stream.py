@@ -32,7 +32,7 @@ from palpate.identifiers.kernels.positions import (
     placed,
 )
 from palpate.identifiers.kernels.sample_clock import sampled_at
-from palpate.signals.taps import FRACTIONS
+from palpate.signals.low_pass import FRACTIONS
 
 ROOM, GAP, QUEUE, PERIOD, LATE, BEFORE, AFTER, SETTLING, HOLD, TOUCH, AVERAGED, DT = range(12)
 """Rows kept of the position; ticks of a gap that is filled; samples on their way at most; rows between two samples, 0

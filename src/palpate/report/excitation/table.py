@@ -11,7 +11,7 @@ from rich.text import Text
 from palpate.excitation import Design, Remedy
 from palpate.excitation.force_loops import Prediction
 from palpate.excitation.problem import LONGEST
-from palpate.references.waves import Multisine
+from palpate.references import Multisine
 from palpate.report.terminal import bare_table
 
 

@@ -1,14 +1,99 @@
-"""A force sensor with its own processor: filter, sample, compute, hold."""
+"""Instruments: each states its lag [s], the group delay at zero frequency.
+
+Converters between volts and numbers quantise and saturate. Their codes are -(2^(bits-1) - 1) ... 2^(bits-1) - 1:
+mid-tread and symmetric; the one code more below is left out.
+"""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate._jit import part
-from palpate.instruments.converter import Converter
-from palpate.signals.filters import Cascade, CascadeState, butterworth3
-from palpate.signals.parameters import coerced, require
+from palpate._vector import clip, sign
+from palpate.signals.filters import Biquad, Cascade, CascadeState, butterworth3, lowpass2
+from palpate.signals.samples import quantise, whole
+from palpate.signals.types import coerced, components, require
+
+
+def _check_converter(self):
+    require(2 <= self.bits <= 32, "bits", "between 2 and 32", self.bits)
+    require(min(components(self.full_scale)) > 0, "full scale", "above 0", self.full_scale)
+
+
+@part
+@coerced(_check_converter)
+class Converter(NamedTuple):
+    """An analog input or output: the quantity that a code stands for, in that quantity's unit.
+
+    What an output holds until the next tick, and so half a tick of lag, is the loop's.
+
+    Args:
+        bits: of the code.
+        full_scale: of the quantity; a number, or a `Vec3` of three channels.
+    """
+
+    bits: int
+    full_scale: Any
+
+    def convert(self, u):
+        """The quantity of the code nearest to u."""
+        return clip(quantise(u, self.resolution), self.full_scale - self.resolution)
+
+    def convert_within(self, u, limit):
+        """The quantity of the code nearest to u of those that do not exceed the limit."""
+        return self.convert(clip(u, self.below(limit)))
+
+    def below(self, limit):
+        """The quantity of the largest code that is no more than the limit."""
+        nearest = quantise(limit, self.resolution)
+        beyond = sign(nearest - limit)
+        return nearest - 0.5 * (beyond + abs(beyond)) * self.resolution
+
+    @property
+    def resolution(self):
+        """One code."""
+        return self.full_scale / 2.0 ** (self.bits - 1)
+
+    @property
+    def lag(self):
+        """Seconds: 5 us of conversion are nothing to a 1 kHz loop."""
+        return 0.0
+
+
+_TURN = 2.0 * math.pi
+
+
+def _check_encoder(self):
+    require(min(components(self.counts)) > 0, "encoder counts", "above 0 a turn", self.counts)
+
+
+@part
+@coerced(_check_encoder)
+class Encoder(NamedTuple):
+    """The angle to the nearest count; mid-tread.
+
+    Args:
+        counts: counts a turn; a number, or a `Vec3` for three joints.
+        offset: angle of the zero count [rad], likewise.
+    """
+
+    counts: Any
+    offset: Any = 0.0
+
+    def read(self, angle):
+        """The angle [rad] as the encoder has it."""
+        return whole((angle - self.offset) * self.counts / _TURN) * _TURN / self.counts + self.offset
+
+    @property
+    def resolution(self):
+        """One count [rad]."""
+        return (0.0 * self.counts + _TURN) / self.counts
+
+    @property
+    def lag(self):
+        """Seconds: an encoder answers at once."""
+        return 0.0
 
 
 class ForceSensorState(NamedTuple):
@@ -19,14 +104,14 @@ class ForceSensorState(NamedTuple):
     held: float  # on the output now [N]
 
 
-def _check(self):
+def _check_sensor(self):
     require(0 < self.sampling <= self.rate, "sampling", f"between 1 and {self.rate} Hz", self.sampling)
     require(self.noise >= 0, "noise", "at least 0 N", self.noise)
     require(0 <= self.shift < self.rate, "shift", f"at least 0 and below {self.rate}", self.shift)
 
 
 @part
-@coerced(_check)
+@coerced(_check_sensor)
 class ForceSensor(NamedTuple):
     """Analog low-pass, noisy sampling, one cycle of computing, and holding; stepped with the physics.
 
@@ -117,3 +202,22 @@ def force_sensor(
     require(0.0 <= phase * sampling < 1.0, "phase", f"at least 0 and below {1.0 / sampling:g} s", phase)
     shift = round(phase * sampling * rate) % rate
     return ForceSensor(butterworth3(cutoff, rate), Converter(bits, full_scale), noise, sampling, rate, shift)
+
+
+def sallen_key(r1: float, r2: float, c1: float, c2: float, rate: float) -> Biquad:
+    """A unity-gain Sallen-Key low-pass, stepped at a physics rate [Hz] far above its corner.
+
+    w0^2 = 1/(R1 R2 C1 C2) and w0/Q = (R1 + R2)/(R1 R2 C1), thesis fig. 3.6; resistances [Ohm], capacities
+    [F].
+    """
+    require(min(r1, r2, c1, c2) > 0, "component values", "above 0", (r1, r2, c1, c2))
+    w0 = 1.0 / math.sqrt(r1 * r2 * c1 * c2)
+    return lowpass2(w0 / (2.0 * math.pi), w0 * r1 * r2 * c1 / (r1 + r2), rate)
+
+
+def analog_filter_190(rate: float = 20000.0) -> Biquad:
+    """The thesis' filter: 189.6 Hz, Q 0.83, and so -3 dB at 217 Hz.
+
+    The values are printed in Ohm and uF, which give the same corner; an amplifier can only drive kOhm and nF.
+    """
+    return sallen_key(r1=100e3, r2=1.5e3, c1=470e-9, c2=10e-9, rate=rate)
