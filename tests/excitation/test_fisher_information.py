@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.excitation.spectra import (
-    NAMES,
-    ForceChain,
-    bound,
-    filtered,
-    instants,
-    phase_std,
-    sensitivities,
-)
+from palpate.excitation.spectra import NAMES, ForceChain, bound, filtered, instants, phase_std, sensitivities
 from palpate.signals.low_pass import LowPass
 
 FOAM = {"K": 5200.0, "B": 200.0, "M": 0.1}

@@ -13,8 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from live.conftest import PATIENCE, playing
 from live.test_server import Clock
 from palpate.errors import InputError
-from palpate.live.feed import Feed
-from palpate.live.player import Player
+from palpate.live.player import Feed, Player
 
 foxglove = pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
 PROTOCOL = "foxglove.sdk.v1"

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.live.of_log import restarted
-from palpate.live.replay import Replay, Signals
-from palpate.live.view import AT, STRIDE, View
+from palpate.live.recorded_run import clear_at_restarts
+from palpate.live.view import AT, STRIDE, Replay, Signals, View
 
 VIEW = View(title="log", about="", kind="replay", rate=0.0)
 
@@ -72,7 +71,7 @@ def test_a_slow_log_keeps_all_its_rows():
 
 def test_rows_whose_time_does_not_grow_are_left_out_and_counted():
     t = np.array([0.0, 1.0, 1.0, np.nan, 0.5, 2.0])
-    kept, notes = restarted({"t": t, "measured": np.arange(6.0)})
+    kept, notes = clear_at_restarts({"t": t, "measured": np.arange(6.0)})
     assert kept["t"].tolist() == [0.0, 1.0, 2.0]
     assert kept["measured"].tolist() == [0.0, 1.0, 5.0]
     assert notes == ("3 rows are left out: their time does not grow.",)

@@ -158,8 +158,7 @@ def _pressing(name: str, seed: int) -> Source:
 
 
 def _replay(path: Path, asked: Any, whole: bool) -> Source:
-    from palpate.live.of_log import of_log
-    from palpate.live.of_run import of_run
+    from palpate.live.recorded_run import of_log, of_run
     from palpate.logs.own_runs import is_run
 
     found, along, source = asked.identified_along(path)
@@ -169,10 +168,8 @@ def _replay(path: Path, asked: Any, whole: bool) -> Source:
 
 
 def _serve(shown: Source, at: ServedOptions) -> int:
-    from palpate.live.feed import Feed
-    from palpate.live.player import Player, made_ready
-    from palpate.live.server import HOST, served
-    from palpate.live.sharing import WARNING, network_address, qr_code
+    from palpate.live.player import Feed, Player, made_ready
+    from palpate.live.server import HOST, WARNING, network_address, qr_code, serve
 
     host = network_address() if at.share else HOST
     if at.share:
@@ -182,7 +179,7 @@ def _serve(shown: Source, at: ServedOptions) -> int:
     with _stability(shown) as (changed, latest, tell):
         player = Player(shown, Feed(), changed, latest)
         tell.append(player.news)
-        with player, served(player, at.port, host) as address, _viewers(player, at) as more:
+        with player, serve(player, at.port, host) as address, _viewers(player, at) as more:
             print_lines(str(address), *more, *(qr_code(str(address)).splitlines() if at.share else ()))
             if at.open_:
                 import webbrowser

@@ -13,15 +13,7 @@ from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.errors import InputError
 from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, random_layers, thesis_layers
-from palpate.signals.types import (
-    NotNegative,
-    PositiveTriple,
-    Size,
-    Triple,
-    alike,
-    coerced,
-    triple,
-)
+from palpate.signals.types import NotNegative, PositiveTriple, Size, Triple, alike, coerced, triple
 
 INPUTS, OUTPUTS = 9, 3
 STUCK = 1e-3

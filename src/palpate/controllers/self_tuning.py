@@ -10,14 +10,7 @@ from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.networks import Network, NetworkState, network, random_layers
-from palpate.signals.types import (
-    NotNegative,
-    Positive,
-    PositiveTriple,
-    Size,
-    alike,
-    triple,
-)
+from palpate.signals.types import NotNegative, Positive, PositiveTriple, Size, alike, triple
 
 INPUTS, OUTPUTS = 3, 3
 

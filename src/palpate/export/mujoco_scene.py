@@ -21,11 +21,9 @@ import numpy as np
 
 from palpate.errors import InputError, unknown
 from palpate.export.contact import Contact
-from palpate.export.mujoco_rig import MuJoCoRig
-from palpate.export.rig import touch
+from palpate.export.rig import MuJoCoRig, touch
 from palpate.files import open_file
-from palpate.robots.serial._extra import mujoco, refusals
-from palpate.robots.serial._loading import load_mjcf
+from palpate.robots.serial.loading import load_mjcf, mujoco, refusals
 
 IMPEDANCE = 1e-4
 """d, the least that MuJoCo takes (mjMINIMP)."""

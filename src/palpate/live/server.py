@@ -7,19 +7,20 @@ import errno
 import logging
 import re
 import secrets
+import socket
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AsyncExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from http import HTTPStatus
+from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from palpate.errors import InputError
-from palpate.live.page import PAGE_HEADERS, page
-from palpate.live.player import Player, Request
+from palpate.live.player import PAGE_HEADERS, Player, Request, page
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -58,7 +59,7 @@ class Address:
 
 
 @contextmanager
-def served(player: Player, port: int = 0, host: str = HOST) -> Iterator[Address]:
+def serve(player: Player, port: int = 0, host: str = HOST) -> Iterator[Address]:
     """Serves a player's page within the block, by a thread of its own.
 
     Args:
@@ -302,3 +303,43 @@ class _PageServer(GuardedServer):
 
 def _text(kind: str, **more: Any) -> str:
     return msgspec.json.encode({"kind": kind, **more}).decode()
+
+
+_ANYWHERE = ("192.0.2.1", 9)
+"""An address of documentation (RFC 5737): asking for the way there sends nothing."""
+WARNING = (
+    "shared: everybody on this network who has the address can watch, and nothing is encrypted; the first page that "
+    "opens it steers, all others only watch"
+)
+
+
+def network_address() -> str:
+    """This machine's own address on its network.
+
+    Raises:
+        InputError: it is on none.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(_ANYWHERE)
+            found = str(probe.getsockname()[0])
+        except OSError:
+            found = ""
+    if not found or found.startswith("127.") or found == "0.0.0.0":  # noqa: S104 - compared, not listened on
+        raise InputError("--share: this machine is on no network; connect it, or leave --share out")
+    return found
+
+
+def qr_code(text: str) -> str:
+    """A text as a QR code of half-height blocks, for a terminal.
+
+    Raises:
+        InputError: segno is not installed.
+    """
+    try:
+        import segno
+    except ImportError:
+        raise InputError('--share draws a QR code, which needs segno: pip install "palpate[live]"') from None
+    drawn = StringIO()
+    segno.make(text, error="l").terminal(drawn, compact=True)
+    return drawn.getvalue()

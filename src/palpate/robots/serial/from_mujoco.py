@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.robots.serial._extra import mujoco, refusals
-from palpate.robots.serial._loading import load_mjcf
 from palpate.robots.serial.chain import Chain, spread_of
+from palpate.robots.serial.loading import load_mjcf, mujoco, refusals
 from palpate.robots.serial.serial_arm import Scene, SerialArm
 
 

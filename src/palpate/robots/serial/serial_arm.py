@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +14,8 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.results import Readable
 from palpate.robots.serial.chain import Chain, chain_model, room_for
-from palpate.robots.serial.described import Found, compiled_description, found_for
+from palpate.robots.serial.loading import compile_model, mujoco, refusals
+from palpate.robots.serial.task import ArmState, arm_state_for, compiled_description
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ class SerialArm(Readable):
         Raises:
             InputError: what MuJoCo refuses, in its words; no such link.
         """
-        from palpate.robots.serial.from_urdf import from_urdf
+        from palpate.robots.serial.from_toml import from_urdf
 
         return from_urdf(Path(path), link)
 
@@ -234,9 +236,9 @@ class SerialArm(Readable):
             )
         return array
 
-    def _found(self, q: ArrayLike, qd: ArrayLike | None = None) -> Found:
+    def _found(self, q: ArrayLike, qd: ArrayLike | None = None) -> ArmState:
         rates = np.zeros(self.joints) if qd is None else self._checked(qd, "qd")
-        found = found_for(self.joints)
+        found = arm_state_for(self.joints)
         compiled_description(self.chain, self._checked(q, "q"), rates, found)
         return found
 
@@ -276,3 +278,63 @@ def _check_moves(arm: SerialArm) -> None:
             f"{arm.title}: the mass matrix at home is not positive definite (smallest eigenvalue {least:.3g}); a joint "
             "moves nothing: give its link a mass and an inertia, or the joint a rotor inertia"
         )
+
+
+def scene_of(arm: SerialArm) -> Scene:
+    """The model in which the arm stands; needs the extra `arms`.
+
+    Raises:
+        InputError: MuJoCo is not installed, or refuses the arm's numbers.
+    """
+    return arm.scene or _make_scene(arm)
+
+
+def _make_scene(arm: SerialArm) -> Scene:
+    with refusals(arm.title):
+        model, _ = compile_model(mujoco().MjSpec.from_string(mjcf(arm)))
+    n = np.arange(arm.joints)
+    return Scene(model, 0, int(model.site_bodyid[0]), n, n)
+
+
+def mjcf(arm: SerialArm) -> str:
+    """The arm as MJCF: no shapes, no motors, a site `tip`."""
+    root = ElementTree.Element("mujoco", model=arm.title)
+    ElementTree.SubElement(root, "compiler", angle="radian", autolimits="false")
+    ElementTree.SubElement(root, "option", gravity=_text(arm.chain.gravity))
+    body = ElementTree.SubElement(root, "worldbody")
+    for i, name in enumerate(arm.names):
+        body = _link(arm, i, name, body)
+    ElementTree.SubElement(
+        body, "site", name="tip", pos=_text(arm.chain.tip), quat=_text(_quaternion(arm.chain.tip_turn))
+    )
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _link(arm: SerialArm, i: int, name: str, parent: ElementTree.Element) -> ElementTree.Element:
+    c = arm.chain
+    body = ElementTree.SubElement(
+        parent, "body", name=f"link{i + 1}", pos=_text(c.at[i]), quat=_text(_quaternion(c.turn[i]))
+    )
+    kind = "slide" if c.slide[i] else "hinge"
+    ElementTree.SubElement(
+        body, "joint", name=name, type=kind, axis="0 0 1", armature=repr(float(c.rotor[i]))
+    )
+    moment = c.inertia[i]
+    ElementTree.SubElement(
+        body,
+        "inertial",
+        pos=_text(c.com[i]),
+        mass=repr(float(c.mass[i])),
+        fullinertia=_text(moment[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]),
+    )
+    return body
+
+
+def _quaternion(turn: Array) -> Array:
+    quat = np.zeros(4)
+    mujoco().mju_mat2Quat(quat, np.ascontiguousarray(turn).ravel())
+    return quat
+
+
+def _text(numbers: Any) -> str:
+    return " ".join(repr(float(v)) for v in numbers)

@@ -1,7 +1,9 @@
-"""A MuJoCo model from its source, with the inertias as they are published."""
+"""A MuJoCo model from its source, with the inertias as they are published, and refusals in one line."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +11,78 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
+from palpate.errors import InputError
 from palpate.files import open_file
 from palpate.files.confined import read_confined
 from palpate.files.limits import GB, Budget, Limits
-from palpate.robots.serial._extra import mujoco, refusals
-from palpate.robots.serial.inertias import check_inertia
+
+
+def mujoco() -> Any:
+    """The package.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        import mujoco as found
+    except ImportError:
+        raise InputError(
+            "reading MJCF and URDF, and MuJoCo's physics, need MuJoCo; install it with: pip install 'palpate[arms]'"
+        ) from None
+    return found
+
+
+@contextmanager
+def refusals(where: str) -> Iterator[None]:
+    """Turns what MuJoCo raises into one line that names the file; its warnings are dropped, not filed."""
+    package = mujoco()
+    package.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    except InputError:
+        raise
+    except (ValueError, TypeError, package.FatalError) as error:
+        raise InputError(f"{where}: MuJoCo refuses it: {' '.join(str(error).split())}") from None
+    finally:
+        package.set_mju_user_warning(None)
+
+
+_ROUNDING = 1e-12
+"""Of an inertia tensor's eigenvalues, as a share of the largest: some thousand last places of a float."""
+
+
+def check_inertia(name: str, mass: float, moment: Array) -> str:
+    """Defect of a link's inertia, in a sentence; "" if there is none.
+
+    A body of positive density has principal moments of which none exceeds the sum of the others. Makers publish links
+    that break this (Franka's link 4): an arm with such a link still moves by the same laws, so it is taken as it is.
+
+    Args:
+        name: of the link.
+        mass: [kg].
+        moment: about its centre of mass [kg m^2], shape (3, 3).
+
+    Raises:
+        InputError: a negative mass, or a moment of inertia that is negative about some axis.
+    """
+    if not (np.isfinite(mass) and mass >= 0.0):
+        raise InputError(f"link {name}: a mass must be 0 kg or more, got {mass:g}")
+    if not np.isfinite(moment).all() or not np.allclose(moment, moment.T, rtol=1e-9, atol=1e-15):
+        raise InputError(f"link {name}: an inertia is six finite numbers of a symmetric matrix")
+    least, middle, most = np.linalg.eigvalsh(moment)
+    if least < -_ROUNDING * max(abs(most), abs(least)):
+        raise InputError(
+            f"link {name}: its inertia is none, the moment about one axis is {least:.4g} kg m^2; it must be 0 or more "
+            "about every axis: check signs and order (xx yy zz xy xz yz, about the centre of mass)"
+        )
+    excess = most - (least + middle)
+    if excess <= _ROUNDING * most:
+        return ""
+    return (
+        f"link {name}: its principal moments break the triangle inequality, {most:.4g} > {least:.4g} + {middle:.4g} "
+        "kg m^2, so no body has them; taken as published"
+    )
+
 
 _LIMITS = Limits(
     size=GB / 4,
@@ -54,7 +123,7 @@ def unpack(
     try:
         with refusals(str(path)):
             spec = specs.from_file(str(path)) if text is None else specs.from_string(text)
-            model, notes = compiled(spec) if published else (spec.compile(), [])
+            model, notes = compile_model(spec) if published else (spec.compile(), [])
     except RuntimeError:  # a foreign exception without a name: there is no memory for what it asks
         raise MemoryError from None
     if model.narena + model.nbuffer > size:
@@ -64,7 +133,7 @@ def unpack(
     return {"model": stored}, notes
 
 
-def compiled(spec: Any) -> tuple[Any, list[str]]:
+def compile_model(spec: Any) -> tuple[Any, list[str]]:
     """The model, and notes on links that no body can be, which MuJoCo would refuse or change."""
     odd = {} if spec.compiler.balanceinertia else _odd(spec)
     if not odd:
