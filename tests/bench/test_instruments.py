@@ -8,7 +8,6 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, lsim
 
 from bench.quick import quick
-from palpate import instruments
 from palpate._jit import kernel
 from palpate._vector import Vec3
 from palpate.bench import build
@@ -16,7 +15,7 @@ from palpate.bench.force_input import ForceInput
 from palpate.bench.plant import Plant
 from palpate.environments import KelvinVoigt, StickSlip, SurfaceState, join
 from palpate.friction import LuGre
-from palpate.instruments import Converter, analog_filter_190
+from palpate.instruments import Converter, analog_filter_190, force_sensor
 from palpate.logs.store import read_record, write_record
 from palpate.robots.arm3 import Arm3
 
@@ -51,7 +50,7 @@ def test_a_fresh_reading_is_the_filtered_force_of_its_instant(phase):
     state = plant.start_at(plant.arm.inverse(Vec3(0.465 + DEPTH, 0.0, 0.0), 1.0))
     state = state._replace(surface=SurfaceState(DEPTH, 0.0, 0.0, 1.0))
     push = plant.arm.jac(state.q).T
-    sensor = instruments(noise=0.0, bits=32, phase=phase)
+    sensor = force_sensor(noise=0.0, bits=32, phase=phase)
     line = ForceInput(sensor, analog_filter_190(float(RATE)), 0.0, Converter(32, 200.0))
     force, readings = np.empty(2 * RATE), np.empty(2 * RATE // STEPS)
     shake(plant, line, state, push @ Vec3(20.0, 0.0, 0.0), push @ Vec3(7.0, 0.0, 0.0), force, readings)

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate import instruments
 from palpate._vector import Mat3, Vec3
 from palpate.bench.matched_channels import Centring, Matched, centred
 from palpate.identifiers.kernels.least_squares import LeastSquares
+from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth3, delay, state_variable
 
 TICK, PHYSICS = 1000.0, 20000
@@ -111,7 +111,7 @@ def identified(front, position, force):
 
 def test_channels_that_share_the_sensors_lag_give_the_truth():
     """Without noise the chain's model is the only error; a naive fit has the lag in B and M."""
-    sensor = instruments(bits=30, noise=0.0)
+    sensor = force_sensor(bits=30, noise=0.0)
     position, force = sampled_contact(sensor)
     M, B, K = identified(matched(sensor), position, force)
     assert pytest.approx(TRUTH[2], rel=2e-3) == K
@@ -123,7 +123,7 @@ def test_channels_that_share_the_sensors_lag_give_the_truth():
 
 
 def test_at_rest_the_front_end_is_at_rest_from_the_first_tick():
-    front = matched(instruments())
+    front = matched(force_sensor())
     (phi, y), _ = front.step(front.start_at(0.46), 0.46, 0.0)
     np.testing.assert_allclose(np.array(phi), [0.0, 0.0, 0.46], atol=1e-9)
     assert y == 0.0
@@ -131,7 +131,7 @@ def test_at_rest_the_front_end_is_at_rest_from_the_first_tick():
 
 def test_position_and_force_leave_with_the_same_filter():
     """A step on either channel that has passed the sensor's model comes out alike."""
-    sensor = instruments()
+    sensor = force_sensor()
     front, model = matched(sensor), butterworth3(120.0, TICK)
     through_position, through_force = front.start_at(0.0), front.start_at(0.0)
     chain, late = model.start(), front.delay.start()

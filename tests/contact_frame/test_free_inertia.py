@@ -8,7 +8,7 @@ import pytest
 from contact_frame.synthetic_arm import any_world
 from contact_frame.synthetic_arm import log_of as press_of
 from palpate.contact_frame import ContactFrame, identify_contact
-from palpate.contact_frame.free_motion.inertia import free_inertia
+from palpate.contact_frame.free_motion import free_inertia
 from palpate.records import Record
 
 

@@ -17,11 +17,10 @@ from errata.loops import (
     tip_acceleration,
 )
 from errata.page import fails, holds
-from palpate import instruments
 from palpate._vector import Vec3, solve
 from palpate.controllers.hybrid import hybrid
 from palpate.friction import Coulomb
-from palpate.instruments import Encoder
+from palpate.instruments import Encoder, force_sensor
 from palpate.signals.filters import butterworth2
 
 Q, QD, _ = states(20, seed=2)
@@ -234,7 +233,7 @@ def noise_through_the_filter(seconds, runs):
     """What the controller sees of a force sensor at rest in the air [N], shape (runs, ticks)."""
     from scipy.signal import lfilter
 
-    sensor, smooth, ticks = instruments(), butterworth2(120.0, 1000.0), round(1000 * seconds)
+    sensor, smooth, ticks = force_sensor(), butterworth2(120.0, 1000.0), round(1000 * seconds)
     sampled = np.random.default_rng(3).normal(0.0, sensor.noise, (runs, ticks))
     held = sampled[:, np.arange(ticks) * sensor.sampling // 1000]
     return lfilter((smooth.b0, smooth.b1, smooth.b2), (1.0, smooth.a1, smooth.a2), held)

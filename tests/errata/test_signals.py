@@ -5,7 +5,7 @@ from scipy import signal
 
 from errata.derivation import LENGTH, START, derivative, pose
 from errata.page import fails, holds
-from palpate import instruments
+from palpate.instruments import sallen_key
 from palpate.references import ForceSchedule
 from palpate.signals.filters import butterworth2
 
@@ -139,7 +139,7 @@ def test_E56_190_hertz_is_not_where_3_db_are_lost():
     natural = f[np.argmax(np.angle(low_pass(f)) < -np.pi / 2)]
     holds(natural - 189.6, 0.1)
     holds(np.abs(low_pass(189.55)) - 0.827, 0.001)  # the gain at the natural frequency is Q
-    used = instruments(100.0, 1.5, 470e-6, 10e-6, rate=200e3)
+    used = sallen_key(100.0, 1.5, 470e-6, 10e-6, rate=200e3)
     z = np.exp(-2j * np.pi * f / used.rate)
     digital = (used.b0 + used.b1 * z + used.b2 * z * z) / (1.0 + used.a1 * z + used.a2 * z * z)
     holds(np.abs(digital) - np.abs(low_pass(f)), 1e-3)

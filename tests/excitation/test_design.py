@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.excitation import Budget, HybridLoop, KnownBandwidth, Problem, Sensors, SurfaceRange, design
+from palpate.excitation import (
+    Budget,
+    HybridLoop,
+    KnownBandwidth,
+    Problem,
+    Sensors,
+    SurfaceRange,
+    design,
+    remedies,
+)
 from palpate.excitation.multisine import PERIOD
 from palpate.excitation.spectra import ForceChain
 from palpate.references import Chirp, Multisine
@@ -164,7 +173,7 @@ def infeasible():
 @pytest.mark.long
 def test_what_would_help_is_said_and_true(infeasible):
     assert not infeasible.feasible
-    found = design(infeasible)
+    found = remedies(infeasible)
     assert len(found) >= 3
     for remedy in found:
         assert remedy.reached["M"] < infeasible.made.worst(4.0)["M"]
@@ -177,7 +186,7 @@ def test_what_would_help_is_said_and_true(infeasible):
 @pytest.mark.long
 def test_time_is_a_remedy_where_it_is_one():
     found = design(replace(PROBLEM, sensors=Sensors(ForceChain()), duration=4.0))
-    longer = design(found)[0]
+    longer = remedies(found)[0]
     assert longer.enough
     assert longer.change == f"{np.ceil(found.needed):.0f} s instead of 4 s"
     assert design(replace(found.problem, duration=2 * np.ceil(longer.needed / 2))).feasible
@@ -186,7 +195,7 @@ def test_time_is_a_remedy_where_it_is_one():
 @pytest.mark.long
 def test_a_budget_of_change_that_binds_is_named():
     slow = replace(PROBLEM, surfaces=KNOWN, budget=replace(LIMITS, rate=100.0), duration=4.0)
-    changes = [remedy.change for remedy in design(design(slow))]
+    changes = [remedy.change for remedy in remedies(design(slow))]
     assert any("instead of 100 N/s" in change for change in changes)
 
 

@@ -6,10 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from palpate import instruments
 from palpate._jit import kernel
 from palpate.errors import InputError
-from palpate.instruments import Converter, ForceSensor
+from palpate.instruments import Converter, ForceSensor, force_sensor
 from palpate.signals.filters import butterworth3, lowpass2
 
 
@@ -31,7 +30,7 @@ def instants(sensor, stop, start=0):
 
 
 def test_sampling_does_not_drift():
-    sensor = instruments()
+    sensor = force_sensor()
     exact = [-(-j * 20000 // 480) for j in range(4800)]  # the first step at or after j/480 s
     assert instants(sensor, 200000) == exact
     after_a_day = 24 * 3600 * 20000
@@ -39,13 +38,13 @@ def test_sampling_does_not_drift():
 
 
 def test_intervals_are_41_or_42_steps():
-    steps = instants(instruments(), 20000)
+    steps = instants(force_sensor(), 20000)
     assert {b - a for a, b in itertools.pairwise(steps)} == {41, 42}
 
 
 @pytest.mark.parametrize("phase", [0.0, 1e-4, 7.3e-4, 1.0 / 960.0, 2.0e-3])
 def test_a_phase_moves_every_sampling_instant(phase):
-    sensor = instruments(phase=phase)
+    sensor = force_sensor(phase=phase)
     steps = np.array(instants(sensor, 200000))
     exact = np.ceil((sensor.shift + np.arange(4800) * 20000) / 480)
     assert sensor.shift / (480 * 20000) == pytest.approx(phase, abs=0.06e-6)
@@ -56,7 +55,7 @@ def test_a_phase_moves_every_sampling_instant(phase):
 @pytest.mark.parametrize("sampling", [480, 500, 1000, 333])
 def test_the_delay_of_a_sample_is_its_mean(phase, sampling):
     """From the sampled step to the clock's tick after which the value is read, over all positions of the two clocks."""
-    sensor = instruments(sampling=sampling, phase=phase % (1.0 / sampling))
+    sensor = force_sensor(sampling=sampling, phase=phase % (1.0 / sampling))
     steps = np.array(instants(sensor, 60000 + 60000 // sampling))[: 3 * sampling + 1]
     clock = (sensor.shift / (sampling * 20000.0)) + np.arange(1, 3 * sampling + 1) / sampling
     readable = clock + 1.0 / 20000.0  # the step after the one that puts it out, as far as that can be told
@@ -64,15 +63,15 @@ def test_the_delay_of_a_sample_is_its_mean(phase, sampling):
 
 
 def test_the_filters_name_is_that_of_its_corner():
-    assert instruments().filter == "butterworth3:120"
-    assert instruments(cutoff=100.0 / 3.0).filter == "butterworth3:33.3333333"
-    sensor = instruments()
+    assert force_sensor().filter == "butterworth3:120"
+    assert force_sensor(cutoff=100.0 / 3.0).filter == "butterworth3:33.3333333"
+    sensor = force_sensor()
     other = sensor._replace(analog=sensor.analog._replace(second=lowpass2(120.0, 0.8, 20000.0)))
     assert other.filter == "unknown"
 
 
 def test_a_sample_comes_out_one_cycle_later_and_is_held():
-    sensor = instruments(bits=30)
+    sensor = force_sensor(bits=30)
     forces = np.sin(np.arange(3000) * 0.01) * 50.0
     filtered, state = np.empty(3000), sensor.analog.start()
     for k, force in enumerate(forces):
@@ -83,7 +82,7 @@ def test_a_sample_comes_out_one_cycle_later_and_is_held():
 
 
 def test_noise_is_that_of_a_sample():
-    sensor = instruments(noise=0.6)
+    sensor = force_sensor(noise=0.6)
     noise = np.random.default_rng(0).normal(size=400000)
     out = run(sensor, np.full(400000, 20.0), noise)[4000:]
     fresh = out[np.flatnonzero(np.diff(out)) + 1]
@@ -92,22 +91,22 @@ def test_noise_is_that_of_a_sample():
 
 
 def test_no_noise_is_drawn_inside():
-    sensor, forces = instruments(), np.full(5000, 20.0)
+    sensor, forces = force_sensor(), np.full(5000, 20.0)
     np.testing.assert_array_equal(run(sensor, forces), run(sensor, forces))
     assert len(set(run(sensor, forces)[2000:])) == 1
 
 
 @pytest.mark.parametrize("force", [1000.0, -1000.0])
 def test_it_saturates_at_full_scale(force):
-    sensor = instruments()
+    sensor = force_sensor()
     out = run(sensor, np.full(4000, force))
     assert out[-1] == math.copysign(200.0 - sensor.converter.resolution, force)
     assert np.abs(out).max() < 200.0
 
 
 def test_twelve_bits_of_400_newton():
-    assert instruments().converter.resolution == pytest.approx(400.0 / 4096)
-    levels = run(instruments(), np.full(4000, 20.03))[-1] / (400.0 / 4096)
+    assert force_sensor().converter.resolution == pytest.approx(400.0 / 4096)
+    levels = run(force_sensor(), np.full(4000, 20.03))[-1] / (400.0 / 4096)
     assert levels == round(levels)
 
 
@@ -127,4 +126,4 @@ def test_bad_parameters_are_refused(sampling, noise, words):
 @pytest.mark.parametrize("phase", [-1e-4, 1.0 / 480.0, 1.0])
 def test_a_phase_of_more_than_a_period_is_refused(phase):
     with pytest.raises(InputError, match=r"phase must be at least 0 and below 0\.00208333 s"):
-        instruments(phase=phase)
+        force_sensor(phase=phase)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from palpate import instruments
 from palpate._jit import kernel
-from palpate.instruments import Converter, Encoder, analog_filter_190
+from palpate.instruments import Converter, Encoder, analog_filter_190, force_sensor
 from palpate.signals.filters import butterworth2
 
 PHYSICS, LOOP = 20000, 1000.0
@@ -30,7 +29,7 @@ def chain_plain(sensor, analog, converter, digital, forces, out):
 
 
 chain = kernel(chain_plain)
-PARTS = (instruments(bits=30), analog_filter_190(), Converter(30, 200.0), butterworth2(120.0, LOOP))
+PARTS = (force_sensor(bits=30), analog_filter_190(), Converter(30, 200.0), butterworth2(120.0, LOOP))
 
 
 def lag_by_ramp(run):

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from palpate import instruments
 from palpate.errors import InputError
-from palpate.instruments import analog_filter_190
+from palpate.instruments import analog_filter_190, sallen_key
 
 RATE = 20000.0
 
@@ -37,10 +36,10 @@ def test_its_corner_is_at_190_hz_but_3_db_at_217_hz():
 
 def test_the_values_as_printed_have_the_same_corner_but_absurd_impedances():
     # kOhm nF = Ohm uF: the corner cannot tell them apart. A 1.5 Ohm resistor on an amplifier's output can.
-    printed = instruments(100.0, 1.5, 470e-6, 10e-6, RATE)
+    printed = sallen_key(100.0, 1.5, 470e-6, 10e-6, RATE)
     np.testing.assert_allclose(printed, analog_filter_190(), rtol=1e-12)
 
 
 def test_component_values_must_be_positive():
     with pytest.raises(InputError, match="component values must be above 0"):
-        instruments(100e3, 0.0, 1e-9, 1e-9, RATE)
+        sallen_key(100e3, 0.0, 1e-9, 1e-9, RATE)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from palpate import instruments
 from palpate._vector import Vec3
 from palpate.bench import build, changed, load
 from palpate.environments import KelvinVoigt
+from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
 from palpate_thesis.conditions import SHORT, rougher
 from palpate_thesis.explanations import e6_friction_compensation as compensation
@@ -80,7 +80,7 @@ def test_a_jump_of_the_desired_pose_moves_the_error_and_not_the_rate():
 
 def swings(loop, stiffness, seconds=3.0, physics=20000):
     """How much a small knock has grown, stepping tip, sensor and filter one by one."""
-    sensor, smooth = instruments(noise=0.0, bits=32, rate=physics), butterworth2(loop.smoothing, 1000.0)
+    sensor, smooth = force_sensor(noise=0.0, bits=32, rate=physics), butterworth2(loop.smoothing, 1000.0)
     chain, past, total, command = sensor.start(), smooth.start_at(0.0), 0.0, 0.0
     x, v, f, dt, early, late = 1e-5, 0.0, 0.0, 1.0 / physics, 0.0, 0.0
     for k in range(round(seconds * physics)):

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate import instruments
 from palpate.bench import build
 from palpate.identifiers import RecursiveLeastSquares
-from palpate.instruments import analog_filter_190
+from palpate.instruments import analog_filter_190, force_sensor
 from palpate.records import Record
 from palpate_thesis.explanations import e1_why_negative_mass as bias
 from palpate_thesis.figures import fig_3_05, fig_3_07, fig_4_02
@@ -178,7 +177,7 @@ def test_the_sensor_off_line_is_the_sensor_of_the_bench():
     rate, seconds = 20000, 0.6
     t = np.arange(round(rate * seconds)) / rate
     force = 10.0 * (1.0 - np.cos(2.0 * np.pi * 3.0 * t))
-    sensor = instruments(noise=0.0, rate=rate, bits=24)
+    sensor = force_sensor(noise=0.0, rate=rate, bits=24)
     state, out = sensor.start(), []
     for k, f in enumerate(force):
         held, state = sensor.sample(state, float(f), k, 0.0)

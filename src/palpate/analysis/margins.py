@@ -6,12 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from palpate.analysis.linear_loop import LinearLoop, moving
-from palpate.arrays import Array, Complex, Mask
+from palpate.arrays import Complex, Mask
 from palpate.errors import InputError
 
+Array = NDArray[np.floating]
 CUT = "force.line"
 """The loop is opened at the force on the controller's converter."""
 POINTS = 1200

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from palpate import instruments
 from palpate.bench.experiments.tables import ForceSensor
 from palpate.bench.force_input import ForceInput
-from palpate.instruments import Converter, analog_filter_190
+from palpate.instruments import Converter, analog_filter_190, force_sensor
 
 
 def force_input(of: ForceSensor, physics: int, full_scale: float = 200.0) -> ForceInput:
@@ -16,7 +15,7 @@ def force_input(of: ForceSensor, physics: int, full_scale: float = 200.0) -> For
         physics: steps of the physics a second [Hz].
         full_scale: of the controller's own converter [N].
     """
-    sensor = instruments(of.cutoff, of.sampling, of.bits, of.full_scale, of.noise, physics, of.phase)
+    sensor = force_sensor(of.cutoff, of.sampling, of.bits, of.full_scale, of.noise, physics, of.phase)
     filtered = 1.0 if of.analog_filter else 0.0
     analog = analog_filter_190(float(physics))
     return ForceInput(sensor, analog, filtered, Converter(16, full_scale), float(of.roughness))

@@ -300,10 +300,10 @@ def excite(
 
 
 def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | None) -> int:
-    from palpate.excitation import design
+    from palpate.excitation import design, remedies
 
     found = design(problem)
-    helps = [] if found.feasible else design(found)
+    helps = [] if found.feasible else remedies(found)
     if found.feasible:
         _write(found, rate, output.out, output.experiment)
     if picture is not None:

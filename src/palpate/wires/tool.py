@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from palpate.contact_frame import Payload
-from palpate.contact_frame.free_motion.inertia import wrong_sign, wrong_sign_of
+from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
 from palpate.wires.at_rest import AtRest
 from palpate.wires.turns import turned
 

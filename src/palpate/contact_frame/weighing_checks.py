@@ -9,18 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.free_motion.inertia import CHANCE, wrong_sign
-from palpate.contact_frame.signals_in_base import Signals, signals_of
-from palpate.contact_frame.weighing.estimate import (
-    Estimated,
-    Fitted,
-    PoseFit,
-    Poses,
-    groups_of,
-    poses_of,
-    solve_force,
-)
+from palpate.contact_frame.free_motion import CHANCE, wrong_sign
+from palpate.contact_frame.signals_in_base import ContactFrame, Signals, signals_of
+from palpate.contact_frame.weighing import Estimated, Fitted, PoseFit, Poses, groups_of, poses_of, solve_force
 from palpate.identification.saturation import at_limit
 from palpate.records import Record
 

@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.free_motion.inertia import BLOCKS, free_inertia
-from palpate.contact_frame.payload import Payload
-from palpate.contact_frame.signals_in_base import Signals, signals_of
+from palpate.contact_frame.free_motion import BLOCKS, free_inertia
+from palpate.contact_frame.load import Payload
+from palpate.contact_frame.signals_in_base import ContactFrame, Signals, signals_of
 from palpate.contact_frame.vectors import FEWEST, Vector, read_rows
-from palpate.contact_frame.weighing.checks import noise_of, notes_against
-from palpate.contact_frame.weighing.estimate import (
+from palpate.contact_frame.weighing import (
     Estimated,
     Fitted,
     PoseFit,
@@ -25,6 +23,7 @@ from palpate.contact_frame.weighing.estimate import (
     groups_of,
     poses_of,
 )
+from palpate.contact_frame.weighing_checks import noise_of, notes_against
 from palpate.errors import InputError
 from palpate.records import Record
 from palpate.results import Result
