@@ -133,7 +133,7 @@ def _read(kind: str, path: Path) -> str:
     try:
         if kind == "experiment":
             from palpate.bench import build
-            from palpate.bench.experiments.tables import load
+            from palpate.bench.tables import load
 
             build(load(str(path)))
         elif kind == "study":

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.bench import build, load
-from palpate.bench.experiments.tables import changed
+from palpate.bench.tables import changed
 from palpate.excitation.spectra import ForceChain, bound, phase_std
 from palpate.identification import Identification, identify
 from palpate.records import Record

@@ -7,7 +7,7 @@ from analysis.worlds import surface
 from palpate.analysis import linearise, stable_intervals, stable_stiffness
 from palpate.analysis.boundaries import growth, stable_pieces
 from palpate.bench import build
-from palpate.bench.experiments.tables import changed
+from palpate.bench.tables import changed
 from palpate.errors import InputError
 from palpate.force.boundary import stable_between
 

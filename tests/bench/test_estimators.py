@@ -5,7 +5,7 @@ import numpy as np
 from bench.quick import quick
 from palpate._vector import ZERO3, Vec3
 from palpate.bench import build
-from palpate.bench.conditioning import Signals
+from palpate.bench.force_input import Signals
 from palpate.signals.types import Sense
 
 ESTIMATORS = build(quick("foam-hybrid")).loop.estimators

@@ -7,8 +7,7 @@ import pytest
 
 from palpate._vector import Vec3
 from palpate.bench import build, changed, load
-from palpate.bench.elastic_mode import RIGID, elastic_mode
-from palpate.bench.plant import Plant
+from palpate.bench.plant import RIGID, Plant, elastic_mode
 from palpate.bench.sequence import CONTACT
 from palpate.environments import KelvinVoigt, StickSlip, join
 from palpate.errors import InputError

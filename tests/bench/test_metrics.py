@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from palpate.bench.metrics import METRICS, Look
-from palpate.bench.row import COLUMNS
-from palpate.bench.sequence import APPROACH, CONTACT, LOST
+from palpate.bench.sequence import APPROACH, COLUMNS, CONTACT, LOST
 from palpate.records import Record
 
 TICK = 1e-3

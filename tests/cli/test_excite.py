@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cli import asked
-from palpate.bench.experiments.tables import parse
+from palpate.bench.tables import parse
 from palpate.cli import main
 from palpate.logs.store import read_record
 from palpate.report.excitation.table import percent

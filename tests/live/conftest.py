@@ -8,7 +8,7 @@ import headless
 import numpy as np
 import pytest
 
-from palpate.bench.experiments.tables import changed, load
+from palpate.bench.tables import changed, load
 from palpate.live.player import Feed, Player
 from palpate.live.server import serve
 from palpate.live.simulation import Simulation

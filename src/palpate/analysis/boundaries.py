@@ -22,7 +22,7 @@ from palpate.analysis.linear_loop import change, effective_states
 from palpate.analysis.linear_model import linearise
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
-from palpate.bench.experiments.tables import Experiment, changed
+from palpate.bench.tables import Experiment, changed
 from palpate.environments.surface import alone
 from palpate.errors import InputError, unknown
 from palpate.force.lyapunov import single

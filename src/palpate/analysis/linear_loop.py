@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Complex
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS
 from palpate.bench.tick import Loop, LoopState, compiled_march
 from palpate.controllers.any_controller import AnyController
 

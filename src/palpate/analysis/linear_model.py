@@ -12,9 +12,8 @@ from palpate.analysis.linear_loop import LinearLoop, Motion, change
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.experiments.tables import Experiment
-from palpate.bench.row import COLUMNS
-from palpate.bench.sequence import CONTACT, SequenceState
+from palpate.bench.sequence import COLUMNS, CONTACT, SequenceState
+from palpate.bench.tables import Experiment
 from palpate.bench.tick import Loop, LoopState, start_at
 from palpate.errors import InputError
 

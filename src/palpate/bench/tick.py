@@ -4,12 +4,10 @@ from typing import Any, NamedTuple
 
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Vec3
-from palpate.bench.conditioning import Conditioning, ConditioningState
 from palpate.bench.estimators import Estimators, EstimatorsState
-from palpate.bench.force_input import ForceInput, ForceInputState
+from palpate.bench.force_input import Conditioning, ConditioningState, ForceInput, ForceInputState
 from palpate.bench.plant import Plant, PlantState, Touch
-from palpate.bench.row import put
-from palpate.bench.sequence import CONTACT, Sequence, SequenceState
+from palpate.bench.sequence import CONTACT, Sequence, SequenceState, put
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 from palpate.friction import Coulomb
 from palpate.instruments import Converter, Encoder

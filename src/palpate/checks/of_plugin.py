@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from palpate.bench.experiments.own_parts import CONTROLLER, IDENTIFIER, SURFACE, Role, role_of, table_of
-from palpate.bench.experiments.tables import Experiment, load
+from palpate.bench.tables import Experiment, load
+from palpate.bench.toml_parts import CONTROLLER, IDENTIFIER, SURFACE, Role, role_of, table_of
 from palpate.checks.check import Check
 from palpate.checks.controllers import TICK, WALL, controller_checks
 from palpate.checks.identifiers import identifier_checks

@@ -141,7 +141,7 @@ def live(
 
 
 def _simulation(name: str, seed: int, whole: bool) -> Source:
-    from palpate.bench.experiments.tables import load
+    from palpate.bench.tables import load
     from palpate.live.simulation import Simulation
 
     experiment = load(name)

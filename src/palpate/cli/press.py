@@ -76,7 +76,7 @@ def press(
 
 
 def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
-    from palpate.bench.ending import DONE, INTERRUPTED
+    from palpate.bench.sequence import DONE, INTERRUPTED
     from palpate.press.prepare import prepared
 
     question, folder = simulated.question(asked), simulated.folder

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.row import COLUMNS as ROW
+from palpate.bench.sequence import COLUMNS as ROW
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.errors import InputError
 from palpate.identification import Identification, Parameter

@@ -18,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from palpate.bench.experiments.tables import Experiment
+from palpate.bench.tables import Experiment
 from palpate.controllers import CautiousController
 from palpate.errors import InputError, PalpateError
 from palpate.force.claims import Claim

@@ -9,9 +9,8 @@ import numpy as np
 
 from palpate._jit import kernel, law, part
 from palpate._vector import clip
-from palpate.bench.experiments.tables import ForceSensor
-from palpate.bench.force_input import ForceInput, ForceInputState
-from palpate.bench.force_reading import force_input
+from palpate.bench.force_input import ForceInput, ForceInputState, force_input
+from palpate.bench.tables import ForceSensor
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
 from palpate.environments.surface import Surface
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing

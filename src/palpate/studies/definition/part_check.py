@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 
 from palpate.bench import Experiment, build
+from palpate.bench.any_experiment import check_parts
 from palpate.bench.metrics import Look, metric_of
-from palpate.bench.metrics.own import tried
-from palpate.bench.part_check import check_parts
+from palpate.bench.metrics.verdicts import try_metric
 from palpate.errors import InputError, PluginError
 from palpate.plugins import is_plugin
 from palpate.studies.definition.plan import TRIED, Plan, samples
@@ -38,7 +38,7 @@ def check_parts_of(plan: Plan, waiting: Callable[[], None] | None = None) -> Non
             run = experiment.run
             record = bench.run(run.duration, press=min(PRESS, run.press), waiting=waiting)
             for metric in metrics:
-                tried(metric, Look(record))
+                try_metric(metric, Look(record))
         first = False
 
 

@@ -8,9 +8,8 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from palpate.bench.experiments.error_messages import explained, not_finite
-from palpate.bench.experiments.toml_files import TomlFiles
 from palpate.bench.metrics import metric_of
+from palpate.bench.toml_parts import TomlFiles, explain, not_finite
 from palpate.errors import InputError, unknown
 from palpate.files import read_toml
 from palpate.plugins import look_in
@@ -83,7 +82,7 @@ def _as(kind: type[T], tables: Any, where: str = "") -> T:
     except msgspec.ValidationError as error:
         if not isinstance(tables, dict):
             raise InputError(f"{where} must be a table, got {tables!r}") from error
-        raise InputError(f"{where + ': ' if where else ''}{explained(str(error), tables, kind)}") from error
+        raise InputError(f"{where + ': ' if where else ''}{explain(str(error), tables, kind)}") from error
 
 
 def _tables(value: Any) -> list[tuple[str, dict[str, Any]]]:

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.ending import DONE
 from palpate.bench.metrics import metric_of
+from palpate.bench.sequence import DONE
 from palpate.studies.definition.parameters import Label
 from palpate.studies.definition.plan import MAIN, Part, Plan
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from palpate.bench.ending import NO_CONTACT
+from palpate.bench.sequence import NO_CONTACT
 from palpate.errors import InputError
 from palpate.studies.definition.plan import MAIN, Plan, Setting
 from palpate.studies.running.run_one import FAILED, REFUSED, Job, run_one

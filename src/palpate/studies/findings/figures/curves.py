@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.bench.ending import DONE
 from palpate.bench.metrics import metric_of
+from palpate.bench.sequence import DONE
 from palpate.report.study.axes import Scale, decades
 from palpate.report.study.lines import Curve, Line, curves_figure
 from palpate.studies.definition.tables import Curves

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Mask
-from palpate.bench.ending import DONE
 from palpate.bench.metrics import Metric, metric_of
+from palpate.bench.sequence import DONE
 from palpate.report.study.axes import Scale
 from palpate.report.study.maps import Heat, heat_figure
 from palpate.studies.definition.tables import Map

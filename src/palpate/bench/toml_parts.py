@@ -1,21 +1,182 @@
-"""The table of a part that the user brings, ``kind = "module:Class"``: its keys are the part's own fields."""
+"""TOML files of experiments: shipped ones by name and the user's, tables of the user's parts, errors in its words.
+
+The table of a part that the user brings is ``kind = "module:Class"``: its keys are the part's own fields.
+"""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, ClassVar, get_type_hints
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from types import NoneType
+from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
 import msgspec
 
 from palpate._jit import part as registered
 from palpate._vector import Vec3
 from palpate.controllers.controller import controller as registered_controller
-from palpate.errors import InputError
+from palpate.errors import InputError, unknown
+from palpate.files import read_text
 from palpate.plugins import Plugin, plugin, reason
 from palpate.signals.types import Table, Triple, alike, triple
+
+_KINDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "a text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a table",
+    "null": "left out",
+}
+_LIMITS = {">": "above", ">=": "at least", "<": "below", "<=": "at most"}
+_EXPECTED = re.compile(r"Expected `([^`]+)`(?: (>=|<=|>|<) (\S+)| of length (\d+))?(?:, got .*)?$")
+_MISSING = re.compile(r"Object missing required field `(.+)`")
+_UNKNOWN_KEY = re.compile(r"Object contains unknown field `(.+)`")
+
+
+def explain(message: str, tables: Mapping[str, Any], kind: Any) -> str:
+    """msgspec's message about a file in its user's words.
+
+    Args:
+        message: as msgspec has it.
+        tables: what was given, without types.
+        kind: the type that it should have had.
+    """
+    what, _, path = message.partition(" - at `$")
+    steps = re.findall(r"[^.\[\]`]+", path)
+    if found := _UNKNOWN_KEY.match(what):
+        return _unknown("key", found[1], _keys(kind, tables, steps), _place(steps))
+    if found := _MISSING.match(what):
+        choices = _choices(kind, tables, [*steps, found[1]])
+        those = f"; it is one of: {', '.join(choices)}" if choices else ""
+        return f"the key {found[1]!r} is missing{_place(steps)}{those}"
+    given = _given_value(tables, steps)
+    if what.startswith("Invalid"):
+        return _unknown(steps[-1], str(given), _choices(kind, tables, steps), _place(steps[:-1]))
+    if found := _EXPECTED.match(what):
+        return f"{_name(steps)} must be {_allowed_value(*found.groups())}, got {given!r}"
+    return f"{what}{_place(steps)}"
+
+
+def not_finite(tables: Any, steps: tuple[str, ...] = ()) -> str | None:
+    """Message about the first number that is not finite; None if all are."""
+    if isinstance(tables, float) and not math.isfinite(tables):
+        return f"{_name(list(steps))} must be finite, got {tables}"
+    pairs = (
+        tables.items() if isinstance(tables, dict) else enumerate(tables) if isinstance(tables, list) else ()
+    )
+    return next(filter(None, (not_finite(value, (*steps, str(key))) for key, value in pairs)), None)
+
+
+def _unknown(kind: str, name: str, known: list[str], place: str) -> str:
+    return str(unknown(kind, name, known)).replace(";", f"{place};", 1)
+
+
+def _allowed_value(kind: str, sign: str | None, limit: str | None, length: str | None) -> str:
+    words = " or ".join(_KINDS.get(name, name) for name in kind.split(" | ") if name != "null")
+    if length is not None:
+        return f"{words} of {length}"
+    return words if sign is None or limit is None else f"{words} {_LIMITS[sign]} {float(limit):g}"
+
+
+def _name(steps: list[str]) -> str:
+    """``coulomb[1] in [friction]`` of the steps friction, coulomb, 1."""
+    keys = [step for step in steps if not step.isdigit()]
+    index = "".join(f"[{step}]" for step in steps if step.isdigit())
+    return f"{keys[-1] if keys else 'the file'}{index}{_place(keys[:-1])}"
+
+
+def _place(steps: list[str]) -> str:
+    return f" in [{'.'.join(steps)}]" if steps else ""
+
+
+def _given_value(tables: Any, steps: list[str]) -> Any:
+    for step in steps:
+        tables = tables[int(step)] if isinstance(tables, list) else tables.get(step)
+    return tables
+
+
+def _keys(kind: Any, tables: Mapping[str, Any], steps: list[str]) -> list[str]:
+    """The keys of a table, of the kind that it says it is."""
+    structs = list(_structs(kind, tables, steps))
+    tags = [s.__struct_config__.tag_field for s in structs if s.__struct_config__.tag_field]
+    return sorted({f.encode_name for s in structs for f in msgspec.structs.fields(s)} | set(tags))
+
+
+def _choices(kind: Any, tables: Mapping[str, Any], steps: list[str]) -> list[str]:
+    """Allowed words of a key."""
+    *table, key = steps
+    structs = list(_structs(kind, tables, table, of_any_kind=True))
+    tags = [s.__struct_config__.tag for s in structs if s.__struct_config__.tag_field == key]
+    fields = [f.type for s in structs for f in msgspec.structs.fields(s) if f.encode_name == key]
+    words = [choice for f in fields if get_origin(f) is Literal for choice in get_args(f)]
+    return [str(choice) for choice in tags or words]
+
+
+def _structs(
+    kind: Any, tables: Mapping[str, Any], steps: list[str], *, of_any_kind: bool = False
+) -> Iterator[Any]:
+    """The types that the table at these steps may have, or the one that its tag names."""
+    for step in steps:
+        kind = next(f.type for f in msgspec.structs.fields(kind) if f.encode_name == step)
+    given = _given_value(tables, steps)
+    for one in get_args(kind) or (kind,):
+        if one is NoneType:  # a table that may be left out
+            continue
+        config = one.__struct_config__
+        if of_any_kind or config.tag_field is None or given.get(config.tag_field) in {config.tag, None}:
+            yield one
+
+
+@dataclass(frozen=True)
+class TomlFiles:
+    """Where they are.
+
+    Args:
+        kind: what one of them is, as `experiment`.
+        article: of that word.
+        package: that holds those of palpate.
+        folders: of it.
+    """
+
+    kind: str
+    article: str
+    package: str
+    folders: tuple[str, ...]
+
+    def names(self) -> list[str]:
+        """Those that come with palpate."""
+        return sorted(self._shipped())
+
+    def _shipped(self) -> dict[str, Traversable]:
+        """File of each name."""
+        files = [p for f in self.folders for p in (resources.files(self.package) / f).iterdir()]
+        return {p.name.removesuffix(".toml"): p for p in files if p.name.endswith(".toml")}
+
+    def source(self, name: str) -> str:
+        """The text of one that comes with palpate, or of a TOML file of the user's.
+
+        Raises:
+            InputError: no such name, no such file, or not a text.
+        """
+        shipped = self._shipped()
+        if name in shipped:
+            return shipped[name].read_text("utf-8")
+        path = Path(name)
+        if path.suffix != ".toml" and not path.exists():
+            raise unknown(self.kind, name, self.names())
+        if not path.exists():
+            raise InputError(f"{name}: no such file; give {self.article} {self.kind}'s name or a TOML file")
+        return read_text(path, f"{self.article} {self.kind}")
+
 
 GIVEN = {"tick": "time between ticks [s]", "wall": "x of the surface [m]"}
 """Fields of a part that the bench fills in; they are no keys of its table."""
@@ -92,10 +253,10 @@ class OwnTable(Table, frozen=True):
 
     def __reduce__(self) -> Any:
         values = {f.name: getattr(self, f.name) for f in msgspec.structs.fields(self)}
-        return _restored, (self.role.key, self.plugin, values)
+        return _restore, (self.role.key, self.plugin, values)
 
 
-def _restored(role: str, known: Plugin, values: dict[str, Any]) -> OwnTable:
+def _restore(role: str, known: Plugin, values: dict[str, Any]) -> OwnTable:
     """As it was pickled, in another process."""
     known.value()
     return table_of(ROLES[role], known.name)(**values)

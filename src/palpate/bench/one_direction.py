@@ -1,20 +1,22 @@
-"""From a press along one direction to its record; every time counts from the first touch."""
+"""A press along one direction: one TOML file with every number of a run, and the bench that makes its record.
+
+Every time counts from the first touch.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, pi, sqrt
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
 from palpate._jit import kernel, law
 from palpate.arrays import Array
-from palpate.bench.ending import DONE, NO_CONTACT
-from palpate.bench.one_direction.tables import OneDirection, TouchedSurface
-from palpate.bench.sequence import APPROACH, CONTACT, LOST
+from palpate.bench.sequence import APPROACH, CONTACT, DONE, LOST, NO_CONTACT
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop, load_arm
 from palpate.force.gains import Gains, gains_for, known_lag
@@ -22,6 +24,69 @@ from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.touching import Surface
 from palpate.records import Record
 from palpate.references import ForceSchedule
+from palpate.signals.types import NotNegative, Positive, Table
+
+
+class TouchedSurface(Table):
+    """A spring and a damper; they may change under the force, and the surface may sway by itself."""
+
+    stiffness: Positive
+    """K [N/m]."""
+    damping_ratio: NotNegative = 0.1
+    """B/(2 sqrt(K m)), m the mass of a torque arm's tip, or 1 kg."""
+    later: Positive | None = None
+    """K from `changes` on [N/m], the force kept; as before when left out."""
+    changes: NotNegative = 2.0
+    """Seconds after the touch."""
+    sway: NotNegative = 0.0
+    """Amplitude of the surface's own motion [m]."""
+    sway_frequency: NotNegative = 0.5
+    """Of that [Hz]."""
+
+
+class StepsAndSine(Table):
+    """Desired force from the touch on: steps between two forces [N] each period [s], and a sine [N], [Hz]."""
+
+    first: Positive = 20.0
+    second: Positive | None = None
+    """Of every other interval; as the first when left out."""
+    period: Positive = 2.0
+    amplitude: NotNegative = 0.0
+    frequency: NotNegative = 0.5
+
+
+class Priors(Table):
+    """Factors of the law's prior over the truth; 1 is the truth."""
+
+    cap: Positive = 1.0
+    """Of the stiffest surface that there may be."""
+    lag: Positive = 1.0
+    """Of the loop's whole lag."""
+
+
+class Duration(Table):
+    """Duration."""
+
+    press: Positive = 4.0
+    """Seconds from the touch on."""
+    duration: Annotated[float, Meta(gt=0, le=3600)] = 60.0
+    """Seconds after which it ends in any case."""
+
+
+class OneDirection(Table, kw_only=True):
+    """Every number of a press along one direction."""
+
+    title: str
+    about: str = ""
+    arm: str
+    """ur5e, fr3, ... or a TOML file, as `palpate tune --arm` takes it."""
+    surface: TouchedSurface
+    force: StepsAndSine = StepsAndSine()
+    priors: Priors = Priors()
+    noise: NotNegative | None = None
+    """Of the force sensor [N], standard deviation of a reading; as the arm's file has it when left out."""
+    run: Duration = Duration()
+
 
 COLUMNS = {
     "t": "s",
@@ -40,13 +105,13 @@ FIRM = 0.5
 
 
 @law
-def wanted(schedule, tick, touch, out):
+def desired_forces(schedule, tick, touch, out):
     """Desired force at each tick, its clock starting at the touch; before, its first value."""
     for k in range(len(out)):
         out[k] = schedule.force(max(k - touch, 0) * tick)
 
 
-_compiled_wanted = kernel(wanted)
+_compiled_desired_forces = kernel(desired_forces)
 
 
 @dataclass(frozen=True)
@@ -95,7 +160,7 @@ class OneDirectionBench:
         if progress is not None:
             progress(touch * tick, "approach")
         desired = np.empty(n)
-        _compiled_wanted(self.schedule, self.arm.tick, touch, desired)
+        _compiled_desired_forces(self.schedule, self.arm.tick, touch, desired)
         rows = self._rows(desired, seed, touch * tick + self.change)
         if progress is not None:
             progress(n * tick, "contact")

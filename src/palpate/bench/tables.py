@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 import msgspec
 from msgspec import Meta
 
-from palpate.bench.experiments.error_messages import explained, not_finite
-from palpate.bench.experiments.own_parts import ROLES, table_of
-from palpate.bench.experiments.toml_files import TomlFiles
+from palpate.bench.toml_parts import ROLES, TomlFiles, explain, not_finite, table_of
 from palpate.controllers import ControllerTable, HybridController
 from palpate.environments import SurfaceTable
 from palpate.errors import InputError, PluginError
@@ -240,7 +238,7 @@ def parse(text: str, where: str) -> Experiment:
     """An experiment from TOML; `where` names the text in errors, and parts of the user's lie beside it."""
     if where.endswith(".toml"):
         look_in(Path(where).parent)
-    return converted(read_toml(text, where), where, Experiment)
+    return convert(read_toml(text, where), where, Experiment)
 
 
 def changed(experiment: T, changes: Mapping[str, Any]) -> T:
@@ -258,10 +256,10 @@ def changed(experiment: T, changes: Mapping[str, Any]) -> T:
                 table[name] = {}
             table = table[name]
         table[key] = msgspec.to_builtins(value)
-    return converted(tables, ", ".join(changes), type(experiment))
+    return convert(tables, ", ".join(changes), type(experiment))
 
 
-def converted(tables: dict[str, Any], where: str, kind: type[T]) -> T:
+def convert(tables: dict[str, Any], where: str, kind: type[T]) -> T:
     """The tables as an experiment of this kind; `where` names them in errors.
 
     Raises:
@@ -308,4 +306,4 @@ def _as(kind: Any, tables: dict[str, Any]) -> Any:
     try:
         return msgspec.convert(tables, kind)
     except msgspec.ValidationError as error:
-        raise InputError(explained(str(error), tables, kind)) from error
+        raise InputError(explain(str(error), tables, kind)) from error
