@@ -137,14 +137,14 @@ def _read(kind: str, path: Path) -> str:
 
             build(load(str(path)))
         elif kind == "study":
-            from palpate.studies.definition.plan import plan
-            from palpate.studies.definition.study import load as load_study
+            from palpate.studies.plan import plan
+            from palpate.studies.study import load as load_study
 
             plan(load_study(str(path)), str(path))
         elif kind == "journal":
-            from palpate.studies.running import journal
+            from palpate.studies import run_study
 
-            with journal.opened(path, HEAD()) as book:
+            with run_study.open_journal(path, HEAD()) as book:
                 list(book.rows())
         elif kind == "gains":
             _press(path)

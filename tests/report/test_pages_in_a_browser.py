@@ -6,8 +6,8 @@ import pytest
 
 from opened_pages import open_page
 from palpate.cli import main
-from palpate.studies.findings.summary import present
-from palpate.studies.running.run_study import Work
+from palpate.studies.run_study import Work
+from palpate.studies.summary import present
 from studies.small import Formula, planned, text
 
 EXCITE = (

@@ -16,12 +16,10 @@ from distributed import KilledWorker
 
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.studies.running import cluster as clusters
-from palpate.studies.running.cluster import Certificates, Cluster, run_batch
-from palpate.studies.running.local import Local
-from palpate.studies.running.run_one import Job
-from palpate.studies.running.run_study import Work
-from palpate.studies.running.sources import sources
+from palpate.studies import cluster as clusters
+from palpate.studies.cluster import Certificates, Cluster, run_batch
+from palpate.studies.run_one import Job, Local, sources
+from palpate.studies.run_study import Work
 from studies.cluster import local_cluster
 from studies.small import SMALL, Formula, planned, text
 

@@ -3,9 +3,8 @@
 import time
 
 from palpate.bench.speed import cores
-from palpate.studies.running.cost import in_words, seconds_a_run, too_much
-from palpate.studies.running.local import Local
-from palpate.studies.running.run_one import Job
+from palpate.studies.preview import in_words, seconds_a_run, too_much
+from palpate.studies.run_one import Job, Local
 from studies.small import SMALL, planned, text
 
 

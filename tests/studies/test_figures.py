@@ -9,18 +9,14 @@ from palpate.bench import load
 from palpate.bench.metrics import METRICS
 from palpate.errors import InputError
 from palpate.report.study.axes import Scale
-from palpate.studies.definition.plan import MAIN
-from palpate.studies.definition.tables import Map
-from palpate.studies.findings.figures import draw
-from palpate.studies.findings.figures.curves import lines, references
-from palpate.studies.findings.figures.maps import cells
-from palpate.studies.findings.figures.rows import Rows
-from palpate.studies.findings.figures.scatter import points
-from palpate.studies.findings.figures.stability_boundary import bounds, equivalent
-from palpate.studies.findings.ranking import Mean, rankings
-from palpate.studies.findings.summary import interval, present, tables
-from palpate.studies.running.results import table
-from palpate.studies.running.run_one import Row
+from palpate.studies import figures
+from palpate.studies.figures import bounds, cells, equivalent, lines, points, references
+from palpate.studies.pairing import Rows
+from palpate.studies.plan import MAIN
+from palpate.studies.ranking import Mean, rankings
+from palpate.studies.run_one import Row, table
+from palpate.studies.study import Map
+from palpate.studies.summary import interval, present, tables
 from studies.small import planned, text
 
 GRID = text(
@@ -81,7 +77,7 @@ def lost(at):
 
 
 def test_every_figure_that_is_asked_for_is_drawn_and_none_is_left_open(plan, tmp_path):
-    files = draw.draw(list(draw.figures(results(plan, lost), plan)), tmp_path)
+    files = figures.draw(list(figures.figures(results(plan, lost), plan)), tmp_path)
     assert [path.name for path in files] == ["map1.png", "map2.png", "curves1.png"]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in files)
     assert all(caption.endswith(".") for caption in files.values())
@@ -135,7 +131,7 @@ def test_points_that_were_drawn_make_clouds(tmp_path):
     )
     drawn = planned(source)
     frame = results(drawn)
-    assert [f.name for f in draw.draw(list(draw.figures(frame, drawn)), tmp_path)] == [
+    assert [f.name for f in figures.draw(list(figures.figures(frame, drawn)), tmp_path)] == [
         "clouds-force_rms.png",
         "clouds-outcome.png",
     ]
@@ -148,7 +144,7 @@ def test_points_that_were_drawn_make_clouds(tmp_path):
 
 def test_figures_are_suggested_where_none_are_asked_for(plan, tmp_path):
     plain = planned(GRID[: GRID.index("[[maps]]")] + GRID[GRID.index("[parameters]") :])
-    names = [one.name for one in draw.figures(results(plain), plain)]
+    names = [one.name for one in figures.figures(results(plain), plain)]
     assert names == ["map1", "map2", "curves1"]  # a map of each metric; curves of quantities only
 
 

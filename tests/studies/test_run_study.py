@@ -12,10 +12,9 @@ import pytest
 from palpate.bench import Bench
 from palpate.errors import InputError
 from palpate.logs import read_record
-from palpate.studies.running import run_one as one_run
-from palpate.studies.running.local import Local, unordered
-from palpate.studies.running.run_one import Job
-from palpate.studies.running.run_study import Work
+from palpate.studies import run_one as one_run
+from palpate.studies.run_one import Job, Local, map_unordered
+from palpate.studies.run_study import Work
 from studies.small import NEAR, SMALL, Formula, planned, text
 
 GRID = text(
@@ -210,7 +209,7 @@ def test_items_are_taken_as_they_are_needed():
             taken.append(i)
             yield i
 
-    results = unordered(lambda i: i, items(), threads=2)
+    results = map_unordered(lambda i: i, items(), threads=2)
     next(results)
     assert len(taken) <= 4
     results.close()

@@ -11,8 +11,8 @@ import numpy as np
 
 from palpate.bench.metrics import metric_of
 from palpate.bench.sequence import DONE
-from palpate.studies.definition.parameters import Label
-from palpate.studies.definition.plan import MAIN, Plan
+from palpate.studies.parameters import Label
+from palpate.studies.plan import MAIN, Plan
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -93,7 +93,7 @@ def _ranking(
 ) -> Ranking:
     done = [(at, seeds) for at, seeds in settings if seeds]
     done.sort(key=lambda one: sign * sum(one[1].values()) / len(one[1]))
-    ranked = tuple(_ranked(at, seeds, done[0][1], sign) for at, seeds in done)
+    ranked = tuple(_rank(at, seeds, done[0][1], sign) for at, seeds in done)
     return Ranking(given, ranked, len(settings) - len(done))
 
 
@@ -127,9 +127,7 @@ def _by_seed(row: Mapping[str, Any], *, signed: bool) -> dict[int, float] | None
     return dict(zip(row["seed"], values, strict=True))
 
 
-def _ranked(
-    at: dict[str, Label], seeds: Mapping[int, float], top: Mapping[int, float], sign: float
-) -> Ranked:
+def _rank(at: dict[str, Label], seeds: Mapping[int, float], top: Mapping[int, float], sign: float) -> Ranked:
     shared = [sign * (value - top[seed]) for seed, value in seeds.items() if seed in top]
     return Ranked(at, len(seeds), mean(list(seeds.values())), mean(shared))
 

@@ -15,13 +15,12 @@ from palpate.bench.sequence import DONE
 from palpate.files import signed, write_json, write_text
 from palpate.report.page import Table
 from palpate.report.study.page import StudyPage, study_page
-from palpate.studies.definition.plan import MAIN, Plan
-from palpate.studies.findings import comparison_table, effects
-from palpate.studies.findings.charts import charts
-from palpate.studies.findings.figures.draw import draw, figures
-from palpate.studies.findings.figures.rows import short, with_unit
-from palpate.studies.findings.pairing import Comparison, comparisons
-from palpate.studies.findings.ranking import Mean, Ranked, Ranking, rankings
+from palpate.studies import effects
+from palpate.studies.effects import charts
+from palpate.studies.figures import draw, figures
+from palpate.studies.pairing import Comparison, comparisons, short, with_unit
+from palpate.studies.plan import MAIN, Plan
+from palpate.studies.ranking import Mean, Ranked, Ranking, rankings
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -70,7 +69,7 @@ def present(
             "command": command,
             "answer": answer,
             **summary(frame, plan, ranked, compared),
-            "factors": comparison_table.as_json(apart),
+            "factors": effects.as_json(apart),
         }
     )
     own = tables(frame, plan, ranked, compared)
@@ -113,9 +112,9 @@ def headline(
     """The answer, a sentence each: failures first where they are many, the effect of each factor, the best setting."""
     best, what = plan.study.best, "surfaces" if compared and len(apart) == 1 else "pairs of runs"
     parts = [_failures(frame)] if _failed(frame) else []
-    parts += [effects.sentence(one, what) for one in apart[: effects.SHOWN]]
+    parts += [effects.effect_sentence(one, what) for one in apart[: effects.EFFECTS_SHOWN]]
     if compared and len(apart) != 1:
-        parts.append(comparison_table.sentence(compared[0]))
+        parts.append(effects.comparison_sentence(compared[0]))
     elif not compared and best is not None and len(ranked) == 1 and ranked[0].settings:
         one = ranked[0].settings[0]
         at = ", ".join(f"{name} {short(value)}" for name, value in one.at.items())
@@ -167,7 +166,7 @@ def summary(
             }
             for one in ranked
         ],
-        "compared": comparison_table.as_json(compared),
+        "compared": effects.as_json(compared),
     }
 
 
@@ -183,7 +182,7 @@ def tables(
     best = plan.study.best
     found = []
     if compared:
-        found += [comparison_table.comparison_table(one) for one in compared]
+        found += [effects.comparison_table(one) for one in compared]
     elif best is not None and best.each:
         found += [each_table(plan, MAIN, ranked)]
         found += [each_table(plan, p.name, rankings(frame, plan, p.name)) for p in plan.parts[1:]]

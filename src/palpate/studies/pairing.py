@@ -10,19 +10,23 @@ distribution (Conover, Practical Nonparametric Statistics, 1999, sec. 3.2); a sh
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.metrics import metric_of
+from palpate.bench.metrics import Metric, metric_of
 from palpate.bench.sequence import DONE
-from palpate.studies.definition.parameters import Label
-from palpate.studies.definition.plan import MAIN, Part, Plan
+from palpate.errors import unknown
+from palpate.report.study.axes import Scale
+from palpate.studies.parameters import Axis, Label, label
+from palpate.studies.plan import MAIN, Part, Plan
+from palpate.studies.study import Curves, Map, flat
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from polars import DataFrame
 
 LEVEL = 0.95
@@ -97,7 +101,7 @@ class Comparison:
 
     def pair(self, one: int, other: int) -> Pair:
         """One entrant against another."""
-        return compared(self.entrants[one], self.entrants[other], self.most)
+        return compare(self.entrants[one], self.entrants[other], self.most)
 
 
 def conditions_of(plan: Plan) -> list[str]:
@@ -125,14 +129,16 @@ def comparisons(frame: DataFrame, plan: Plan) -> list[Comparison]:
     return found
 
 
-Rows = dict[str, tuple[dict[str, Label], "DataFrame"]]
+GroupedRows = dict[str, tuple[dict[str, Label], "DataFrame"]]
 
 
-def _groups(frame: DataFrame, plan: Plan, conditions: Sequence[str]) -> list[tuple[dict[str, Label], Rows]]:
+def _groups(
+    frame: DataFrame, plan: Plan, conditions: Sequence[str]
+) -> list[tuple[dict[str, Label], GroupedRows]]:
     """The rows of each setting, by the given values."""
     import polars
 
-    found: dict[tuple[tuple[str, Label], ...], Rows] = {}
+    found: dict[tuple[tuple[str, Label], ...], GroupedRows] = {}
     each = plan.study.best.each if plan.study.best else []
     for part in plan.parts:
         own = frame.filter(polars.col("part") == part.name) if "part" in frame.columns else frame
@@ -161,7 +167,7 @@ def _name(plan: Plan, part: Part, at: Mapping[str, Any]) -> str:
 
 
 def comparison_of(
-    of: dict[str, Label], rows: Rows, metric: str, most: bool, conditions: Sequence[str]
+    of: dict[str, Label], rows: GroupedRows, metric: str, most: bool, conditions: Sequence[str]
 ) -> Comparison:
     """Settings compared by a metric, one difference for each combination of the conditions.
 
@@ -185,7 +191,7 @@ def comparison_of(
         most,
         first,
         tuple(ranks[i] for i in order),
-        tuple(compared(one, first[0], most) for one in first),
+        tuple(compare(one, first[0], most) for one in first),
         {name: [place[i] for place in places] for i, name in enumerate(conditions)},
     )
 
@@ -207,7 +213,7 @@ def _values(
     return values, np.array([bool(bad) for _, bad in found])
 
 
-def compared(one: Entrant, other: Entrant, most: bool) -> Pair:
+def compare(one: Entrant, other: Entrant, most: bool) -> Pair:
     """One setting against another: differences of the metric, one a surface.
 
     A run that failed is worse than any that was done; where both failed nothing is known.
@@ -256,3 +262,119 @@ def mean_ranks(entrants: Sequence[Entrant], most: bool) -> list[float]:
     worst = math.inf
     values = np.array([np.where(e.failed, worst, -e.values if most else e.values) for e in entrants])
     return [float(r) for r in rankdata(values, axis=0).mean(axis=1)]
+
+
+FEW = 12
+"""More panels than this are not drawn, nor more lines than this in a panel."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure before it is drawn.
+
+    Args:
+        name: of its file.
+        caption: of the figure.
+        metric: drawn.
+        panels: makes its panels, all of one kind.
+        figure: draws them, with what stands at their axis.
+    """
+
+    name: str
+    caption: str
+    metric: Metric
+    panels: Callable[[], Sequence[Any]]
+    figure: Callable[[Sequence[Any], str], Figure]
+
+    def draw(self) -> Figure:
+        """The figure."""
+        return self.figure(self.panels(), with_unit(self.metric))
+
+
+class Rows:
+    """A study's rows, as figures ask for them."""
+
+    def __init__(self, frame: DataFrame, plan: Plan):
+        self.frame, self.plan = frame, plan
+
+    def part(self, name: str = MAIN) -> DataFrame:
+        """The rows of the study's own part, or of one that it is compared with."""
+        import polars
+
+        return self.frame.filter(polars.col("part") == name) if "part" in self.frame.columns else self.frame
+
+    def axis(self, name: str, part: str = MAIN) -> Axis:
+        """A parameter."""
+        return next(a for p in self.plan.parts if p.name == part for a in p.axes if a.name == name)
+
+    def scale(self, name: str) -> Scale:
+        """The axis of a figure that a parameter makes."""
+        axis = self.axis(name)
+        return Scale(axis.title, axis.labels(), logarithmic(axis))
+
+    def where(self, rows: DataFrame, asked: Map | Curves) -> DataFrame:
+        """Those of the rows that a figure is about; a part without such a parameter is left whole.
+
+        Raises:
+            InputError: no row has such a value.
+        """
+        import polars
+
+        for name, value in flat(asked.where).items():
+            if name not in rows.columns:
+                continue
+            known = rows[name].unique().drop_nulls().to_list()
+            if known and label(value) not in known:
+                raise unknown(f"value of {name}", str(value), map(str, known))
+            if known:
+                rows = rows.filter(polars.col(name) == label(value))
+        return rows
+
+    def panels(self, asked: Map | Curves) -> list[tuple[str, Any, DataFrame]]:
+        """Title, value and rows of each panel of a figure; without a parameter for them, one with all its rows."""
+        import polars
+
+        name, rows = asked.panels, self.where(self.part(), asked)
+        if not name:
+            return [("", None, rows)]
+        told = self.axis(name).title
+        return [
+            (f"{told}: {short(v)}", v, rows.filter(polars.col(name) == v))
+            for v in self.axis(name).labels()[:FEW]
+        ]
+
+
+def logarithmic(axis: Axis) -> bool:
+    """Whether its values go by factors rather than by differences."""
+    if axis.parameter.log:
+        return True
+    scale = Scale("", axis.labels())
+    if axis.parameter.range or not scale.numeric or len(scale.values) < 3 or scale.places.min() <= 0.0:
+        return False
+    return _unevenness(np.log(np.sort(scale.places))) < _unevenness(np.sort(scale.places))
+
+
+def _unevenness(values: Array) -> float:
+    """How much the steps differ, as a share of their mean."""
+    steps = np.diff(values)
+    return float(np.std(steps) / np.mean(steps))
+
+
+def restricted_to(asked: Map | Curves) -> str:
+    """Common values of a figure's runs, for its caption."""
+    return "".join(f", {name} {short(value)}" for name, value in flat(asked.where).items())
+
+
+def short(value: Any) -> str:
+    """A value in few digits."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def with_unit(metric: Metric) -> str:
+    """A metric's name with its unit, for an axis."""
+    return f"{metric.name} [{metric.unit}]" if metric.unit != "1" else metric.name
+
+
+def sentence(metric: Metric) -> str:
+    """A metric's text as the beginning of a sentence."""
+    return metric.text[0].upper() + metric.text[1:]

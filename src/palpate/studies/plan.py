@@ -1,4 +1,7 @@
-"""All runs of a study by their number: the grid of its parameters times the points drawn, times the seeds."""
+"""All runs of a study by their number: the grid of its parameters times the points drawn, times the seeds.
+
+The points are those of Sobol's sequence, one by one.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +19,34 @@ from palpate.bench.any_experiment import AnyExperiment, build_any, load_any
 from palpate.bench.toml_parts import ROLES
 from palpate.errors import InputError, PluginError, unknown
 from palpate.plugins import Plugin, is_plugin, plugin
-from palpate.studies.definition.applying import Tables, experiment_of, put, tables_of
-from palpate.studies.definition.parameters import Axis, Label, axis, label
-from palpate.studies.definition.sobol import Sobol
-from palpate.studies.definition.study import flat
-from palpate.studies.definition.tables import Against, Parameter, Study
+from palpate.studies.parameters import Axis, Label, Tables, axis, experiment_of, label, put, tables_of
+from palpate.studies.study import Against, Parameter, Study, flat
+
+
+class Sobol:
+    """Points of Sobol's sequence by their number; cheap when asked for one after the other."""
+
+    def __init__(self, dimensions: int, seed: int):
+        self._dimensions, self._seed = dimensions, seed
+        self._engine: Any = None
+        self._last: tuple[int, list[float]] = (-1, [])
+
+    def point(self, number: int) -> list[float]:
+        """The coordinates of a point, each in [0, 1)."""
+        if self._last[0] != number:
+            self._last = (number, self._drawn(number))
+        return self._last[1]
+
+    def _drawn(self, number: int) -> list[float]:
+        from scipy.stats import qmc
+
+        if self._engine is None or self._engine.num_generated > number:
+            self._engine = qmc.Sobol(self._dimensions, scramble=True, rng=self._seed)
+        if self._engine.num_generated < number:
+            self._engine.fast_forward(number - self._engine.num_generated)
+        point: list[float] = self._engine.random(1)[0].tolist()
+        return point
+
 
 TRIED = 2000
 """How many combinations of values are tried before a study is refused whose every value is refused."""
@@ -237,8 +263,8 @@ def _whole(study: Study, other: Against) -> Against:
 def _part(study: Study, name: str, of: Against, seeds: tuple[int, ...], folder: Path) -> Part:
     cases = [p for p in of.parameters.values() if p.cases is not None]
     others = {c["experiment"] for p in cases for c in (p.cases or {}).values() if "experiment" in c}
-    named = {one: _loaded(one, folder) for one in others} | {"": _loaded(of.experiment, folder)}
-    bases = {one: _fixed(base, flat(of.fixed), one or of.experiment) for one, base in named.items()}
+    named = {one: _load(one, folder) for one in others} | {"": _load(of.experiment, folder)}
+    bases = {one: _fix(base, flat(of.fixed), one or of.experiment) for one, base in named.items()}
     some = _some(bases, cases)
     ordered = sorted(of.parameters.items(), key=lambda item: item[1].cases is None)
     axes = tuple(axis(key, parameter, some) for key, parameter in ordered)
@@ -250,11 +276,11 @@ def _part(study: Study, name: str, of: Against, seeds: tuple[int, ...], folder: 
     return found
 
 
-def _loaded(name: str, folder: Path) -> AnyExperiment:
+def _load(name: str, folder: Path) -> AnyExperiment:
     return load_any(str(folder / name) if name.endswith(".toml") else name)
 
 
-def _fixed(base: AnyExperiment, fixed: Mapping[str, Any], name: str) -> AnyExperiment:
+def _fix(base: AnyExperiment, fixed: Mapping[str, Any], name: str) -> AnyExperiment:
     """An experiment with its constants."""
     tables = tables_of(base)
     try:
@@ -273,7 +299,7 @@ def _some(bases: Mapping[str, AnyExperiment], cases: Sequence[Parameter]) -> lis
             base = bases[changes.get("experiment", "")]
             try:
                 found.append(
-                    tables_of(_fixed(base, flat({k: v for k, v in changes.items() if k != "experiment"}), ""))
+                    tables_of(_fix(base, flat({k: v for k, v in changes.items() if k != "experiment"}), ""))
                 )
             except InputError:  # is said when the case is used
                 continue
@@ -307,7 +333,7 @@ def samples(part: Part) -> Iterator[dict[str, Any]]:
         yield from ({**end, name: value} for value in values for end in ends)
 
 
-def resolved(plan: Plan) -> bytes:
+def resolve(plan: Plan) -> bytes:
     """Everything that decides the rows of a study, as bytes: what is only shown is left out."""
     study = plan.study
     shown = (

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, check_place
-from palpate.studies.definition.parameters import Axis
-from palpate.studies.definition.plan import Plan
+from palpate.studies.parameters import Axis
+from palpate.studies.plan import Plan
 
 if TYPE_CHECKING:
     from optuna import Study as OptunaStudy
@@ -78,7 +78,9 @@ class Searching:
         )
         fresh.add_trials(self._kept.get_trials(deepcopy=False)[:first])
         asked = [fresh.ask(self._space).params for _ in range(count)]
-        return [(first + i, {a.name: _heard(a, p[a.name]) for a in self._axes}) for i, p in enumerate(asked)]
+        return [
+            (first + i, {a.name: _value_of(a, p[a.name]) for a in self._axes}) for i, p in enumerate(asked)
+        ]
 
     def _stored(self, path: Path, name: str) -> OptunaStudy:
         check_place(path)
@@ -94,7 +96,7 @@ class Searching:
 
     def _opened(self, path: Path, name: str) -> OptunaStudy:
         storages = self._optuna.storages
-        backend = storages.journal.JournalFileBackend(str(path), lock_obj=_unlocked(storages))
+        backend = storages.journal.JournalFileBackend(str(path), lock_obj=_no_lock(storages))
         study = self._optuna.create_study(
             storage=storages.JournalStorage(backend),
             study_name=f"{SIGNATURE} {name}",
@@ -121,7 +123,7 @@ def _optuna() -> Any:
     return optuna
 
 
-def _unlocked(storages: Any) -> Any:
+def _no_lock(storages: Any) -> Any:
     """No lock: the study's folder is its process's alone, and a lock of Optuna's outlives a process that is killed."""
 
     class Unlocked(storages.journal.JournalFileOpenLock):
@@ -146,7 +148,7 @@ def _distribution(axis: Axis) -> BaseDistribution:
     return distributions.FloatDistribution(low, high, log=p.log is not None)
 
 
-def _heard(axis: Axis, told: Any) -> Any:
+def _value_of(axis: Axis, told: Any) -> Any:
     """A value as it is set, from Optuna's."""
     if axis.drawn:
         return told

@@ -17,8 +17,7 @@ from urllib.parse import urlsplit
 
 from palpate.errors import InputError
 from palpate.plugins import Plugin
-from palpate.studies.running.run_one import FAILED, Done, Job, Row, run_one
-from palpate.studies.running.sources import sources
+from palpate.studies.run_one import FAILED, Done, Job, Row, run_one, sources
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -98,7 +97,7 @@ class Cluster:
     """
 
     def __init__(self, address: str, patience: float = PATIENCE, certificates: Certificates | None = None):
-        host, port = _parsed(address, certificates)
+        host, port = _parse(address, certificates)
         try:
             import distributed
         except ImportError as error:
@@ -161,7 +160,7 @@ class Cluster:
             hand.drop()
 
 
-def _parsed(address: str, certificates: Certificates | None) -> tuple[str, int]:
+def _parse(address: str, certificates: Certificates | None) -> tuple[str, int]:
     """Host and port of an address."""
     wrong = InputError(f"{address!r} is no address of a scheduler; give tcp://HOST:PORT or tls://HOST:PORT")
     try:
