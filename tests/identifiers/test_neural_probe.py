@@ -5,7 +5,7 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.identifiers import NeuralProbe, watch
-from palpate.identifiers.neural_settings import SETTINGS
+from palpate.identifiers.neural_probe import SETTINGS
 from palpate.records import Record
 
 K, B, M = 5000.0, 300.0, 3.0
