@@ -30,7 +30,7 @@ MORE = SMALL.replace("points = 3", "points = 20")
 def here(tmp_path_factory):
     """The table of `MORE` from the threads of this process."""
     folder = tmp_path_factory.mktemp("here") / "out"
-    Work(planned(MORE), MORE, folder, Local()).done()
+    Work(planned(MORE), MORE, folder, Local()).run()
     return (folder / "results.parquet").read_bytes()
 
 
@@ -45,7 +45,7 @@ def on(address, folder, **options):
     """The table of `MORE` from a cluster."""
     runner = Cluster(address, **options)
     try:
-        Work(planned(MORE), MORE, folder, runner).done()
+        Work(planned(MORE), MORE, folder, runner).run()
     finally:
         runner.close()
     return (folder / "results.parquet").read_bytes()
@@ -78,10 +78,10 @@ def test_a_cluster_that_goes_away_loses_nothing(cluster, tmp_path, here, monkeyp
 
     runner = Cluster(cluster.address)
     with pytest.raises(InputError, match="disappeared") as gone:
-        Work(planned(source), source, folder, runner, leave).done()
+        Work(planned(source), source, folder, runner, leave).run()
     runner.close()
     assert "the same command resumes" in str(gone.value)
-    Work(planned(source), source, folder, Local()).done()
+    Work(planned(source), source, folder, Local()).run()
     assert (folder / "results.parquet").read_bytes() == here
 
 
@@ -195,8 +195,8 @@ class Deadly:
 
 def test_of_runs_that_kill_workers_each_is_tried_alone_and_becomes_a_row():
     hand = clusters.Hand(None, "tcp://somewhere", 1.0)
-    assert hand.taken(Deadly(), jobs(2)) is None
-    ((row, record),) = hand.taken(Deadly(), jobs(1))
+    assert hand.take(Deadly(), jobs(2)) is None
+    ((row, record),) = hand.take(Deadly(), jobs(1))
     assert (row.run, row.result, row.metrics, record) == (0, "failed", (None, None, None), None)
     assert "tcp://10.0.0.7:1" in row.why
 

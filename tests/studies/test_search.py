@@ -30,7 +30,7 @@ def bowl(at):
 
 
 def searched(folder, runner, source=SEARCH):
-    return Work(planned(source), source, folder, runner).done()
+    return Work(planned(source), source, folder, runner).run()
 
 
 @pytest.fixture(scope="module")

@@ -57,7 +57,7 @@ class Cell:
         """Of the coordinate."""
         return self.high - self.low
 
-    def missed(self) -> list[Array]:
+    def error_at_quarters(self) -> list[Array]:
         """Error at the quarters of the quadratic through ends and middle."""
         a, p, m, q, b = self.nodes
         return [p - (0.375 * a + 0.75 * m - 0.125 * b), q - (0.375 * b + 0.75 * m - 0.125 * a)]
@@ -117,7 +117,7 @@ def _stable(cell: Cell, period: Period | None) -> Iterator[Cell]:
         if all(growth(M) < 0.0 for M in cell.nodes):  # a boundary is touched, not crossed
             yield cell
         return
-    smooth = max(map(_size, cell.missed())) < SMOOTH * max(map(_size, cell.nodes))
+    smooth = max(map(_size, cell.error_at_quarters())) < SMOOTH * max(map(_size, cell.nodes))
     for half in cell.halves(None if smooth else period):
         yield from _stable(half, None if smooth else period)
 
@@ -153,7 +153,7 @@ def contracts(cell: Cell) -> bool:
     back = np.linalg.inv(L.T)
     a, p, m, q, b = (L.T @ M @ back for M in inside)
     hull = max(float(np.linalg.norm(M, 2)) for M in (a, 2.0 * m - 0.5 * (a + b), b))
-    missed = Cell(cell.low, cell.high, (a, p, m, q, b)).missed()
+    missed = Cell(cell.low, cell.high, (a, p, m, q, b)).error_at_quarters()
     return hull + MISSED * max(float(np.linalg.norm(M, 2)) for M in missed) < 1.0
 
 

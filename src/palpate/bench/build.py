@@ -153,7 +153,7 @@ def build(experiment: Experiment) -> Bench:
     )
     meta = {"experiment": msgspec.to_builtins(e), "truth": _truth(loop)}
     return Bench(
-        loop, q, meta, e.run.losses, None if e.identifier is None else partial(e.identifier.made, tick)
+        loop, q, meta, e.run.losses, None if e.identifier is None else partial(e.identifier.build, tick)
     )
 
 

@@ -122,7 +122,7 @@ class ForceInput(NamedTuple):
         smooth, analog = self.analog.step(state.analog, line)
         return ForceInputState(sensor, analog, smooth if self.filtered == 1.0 else line)
 
-    def sampled(self, state):
+    def reading(self, state):
         """Present reading of the converter [N]."""
         return self.converter.convert(state.line)
 

@@ -123,7 +123,7 @@ def march_path(surface, line, state, way, x, rest, k, steps, noise, out):
                 force = surface.force(state, now, (after - before) / (2.0 * dt))
                 force += surface.mass * (after - 2.0 * now + before) / (dt * dt)
             if j == 0:
-                out[i, 0], out[i, 1] = max(force, 0.0), line.sampled(way)
+                out[i, 0], out[i, 1] = max(force, 0.0), line.reading(way)
             state, impulse = follow(surface, state, force, after, (after - now) / dt, RIGID, dt)
             way = line.advance(way, max(force, 0.0) + impulse / dt, k * steps + n, noise[i])
     return state, way
@@ -197,7 +197,7 @@ class GivenMotion:
         for i, (first, last) in enumerate(self._spans(len(rows))):
             surface = self.surfaces[i][1]
             if i > 0 and state.contact == 1.0:
-                rest, state = self._changed(i, state, x[first * self.steps :], rest)
+                rest, state = self._next_surface(i, state, x[first * self.steps :], rest)
             rests.append(rest)
             piece = x[first * self.steps : last * self.steps + 2]
             numbers = noise[first:last], rows[first:last]
@@ -218,7 +218,7 @@ class GivenMotion:
             force = max(surface.force(state, now, rate) + surface.mass * second, 0.0)
         return state, self.line.settled_at(force, noise[-1], noise[-2])
 
-    def _changed(self, i: int, state: SurfaceState, x: Array, rest: float) -> tuple[float, SurfaceState]:
+    def _next_surface(self, i: int, state: SurfaceState, x: Array, rest: float) -> tuple[float, SurfaceState]:
         """Rest position [m] and state of the i-th surface, relaxed, under the force that there is already."""
         old, new = self.surfaces[i - 1][1], self.surfaces[i][1]
         now, rate, second = self._motion(x, rest)

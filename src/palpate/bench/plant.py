@@ -50,7 +50,7 @@ class ElasticMode(NamedTuple):
         rate = state.rate + dt * acceleration
         return ElasticState(state.bend + dt * rate, rate)
 
-    def struck(self, state, impulse):
+    def after_impulse(self, state, impulse):
         """The state after an impulse [N s] of the surface."""
         return ElasticState(state.bend, state.rate - self.mobility * impulse)
 
@@ -159,7 +159,7 @@ class Plant(NamedTuple):
             side = self.side.start()
         surface, impulse = follow(self.surface, surface, force, p, v, tip_mass, dt)
         qd -= per_normal * impulse
-        bent = self.mode.struck(bent, impulse)
+        bent = self.mode.after_impulse(bent, impulse)
         after = normal @ qd + bent.rate
         inertial = self.beyond * ((after - normal @ state.qd - state.bent.rate) / dt + model.Jdqd.x)
         felt = Touch(max(force, 0.0) + impulse / dt, -slide, p, friction, inertial, after)

@@ -126,7 +126,7 @@ def move(loop, plant, force, torque, k, noise):
 def tick(loop, state, k, noise, out):
     """One tick, the k-th: the new state; its row is written into `out`. `noise`: one standard normal number."""
     q = loop.encoder.read(state.plant.q)
-    sampled = loop.force.sampled(state.force)
+    sampled = loop.force.reading(state.force)
     signals, conditioning = loop.conditioning.step(state.conditioning, q, sampled)
     sequence = loop.sequence.step(state.sequence, signals.sense.x.x, signals.sense.f.x)
     estimators = loop.estimators.step(state.estimators, signals, sequence.phase == CONTACT, sequence.x0)

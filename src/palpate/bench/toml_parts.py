@@ -154,9 +154,9 @@ class TomlFiles:
 
     def names(self) -> list[str]:
         """Those that come with palpate."""
-        return sorted(self._shipped())
+        return sorted(self._files())
 
-    def _shipped(self) -> dict[str, Traversable]:
+    def _files(self) -> dict[str, Traversable]:
         """File of each name."""
         files = [p for f in self.folders for p in (resources.files(self.package) / f).iterdir()]
         return {p.name.removesuffix(".toml"): p for p in files if p.name.endswith(".toml")}
@@ -167,7 +167,7 @@ class TomlFiles:
         Raises:
             InputError: no such name, no such file, or not a text.
         """
-        shipped = self._shipped()
+        shipped = self._files()
         if name in shipped:
             return shipped[name].read_text("utf-8")
         path = Path(name)
@@ -233,7 +233,7 @@ class OwnTable(Table, frozen=True):
 
     shares_loop: ClassVar[bool] = False
 
-    def made(self, tick: float = 0.0, wall: float = 0.0) -> Any:
+    def build(self, tick: float = 0.0, wall: float = 0.0) -> Any:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m].
 
         Raises:

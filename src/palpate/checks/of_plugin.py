@@ -58,6 +58,6 @@ def _of_experiment(name: str) -> dict[str, list[Check]]:
 
 def _checks(role: Role, table: Any, tick: float, wall: float) -> list[Check]:
     if role is IDENTIFIER:
-        return identifier_checks(partial(table.made, tick))
-    part = table.made(tick, wall)
+        return identifier_checks(partial(table.build, tick))
+    part = table.build(tick, wall)
     return controller_checks(part) if role is CONTROLLER else surface_checks(part)

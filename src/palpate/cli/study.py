@@ -156,7 +156,7 @@ def _done(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Finding
         _ask(planned, screen, here=where.scheduler is None)
     with _runner(where, screen) as runner, counted(screen) as show:
         work = Work(planned, asked.source, folder, runner, lambda done: show("runs", done, len(planned)))
-        frame = work.done(replace=asked.replace)
+        frame = work.run(replace=asked.replace)
     told = printable(f"palpate study {shlex.quote(name)}")
     return present(frame, planned, folder, asked.source, told, drawn.endings, drawn.dpi)
 

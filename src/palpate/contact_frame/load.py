@@ -244,18 +244,18 @@ class Payload(Table):
         The one that follows the acceleration, where it was shaken; else the one that hangs, unless that is nothing: a
         driver that takes off the weight may leave the inertia in.
         """
-        if self.followed is not None:
-            return max(self.followed[0], 0.0), self.followed[1]
+        if self.inertia_followed is not None:
+            return max(self.inertia_followed[0], 0.0), self.inertia_followed[1]
         return (self.mass, self.mass_std) if self.mass > 2.0 * self.mass_std else None
 
     @property
     def meta(self) -> dict[str, list[float]]:
         """Metadata of this tool in the record of a press, for `identify_contact` [kg]."""
-        known = {"tool_mass_kg": self.beyond, "tool_inertia_kg": self.followed}
+        known = {"tool_mass_kg": self.beyond, "tool_inertia_kg": self.inertia_followed}
         return {name: list(value) for name, value in known.items() if value is not None}
 
     @property
-    def followed(self) -> tuple[float, float] | None:
+    def inertia_followed(self) -> tuple[float, float] | None:
         """The mass by which the force follows the acceleration, and its std [kg]; None if it is not told."""
         if self.inertia is None or self.inertia_std is None:
             return None

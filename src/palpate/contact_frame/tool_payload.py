@@ -232,14 +232,14 @@ def _centre(signals: Signals, there: Mask, time: Array, poses: Poses, fitted: Fi
         return {}
     own = poses_of(time, signals.rotations[there], signals.torque[there], poses.first)
     found = fit_centre(own, fitted.whole[:3], drift=fitted.drift is not None)
-    centre = found.jackknifed(found.left_out[:, :3], found.whole[:3], "m")
+    centre = found.jackknife(found.left_out[:, :3], found.whole[:3], "m")
     if not np.isfinite(centre.half).all():
         return {}
     # The centre is c = torque over weight, so the weight's own share of error is the centre's too.
     scale = float(fitted.mass.std / fitted.mass.value)
     std = np.hypot(centre.std, scale * np.abs(centre.value))
     half = np.hypot(centre.half, float(fitted.mass.half / fitted.mass.value) * np.abs(centre.value))
-    bias = found.jackknifed(found.left_out[:, 3:6], found.whole[3:6], "N m")
+    bias = found.jackknife(found.left_out[:, 3:6], found.whole[3:6], "N m")
     return {"centre": Estimated(centre.value, std, half, "m"), "torque_bias": bias}
 
 

@@ -125,7 +125,7 @@ class Fitted:
     axes: Array
     dof: float
 
-    def jackknifed(self, replicas: Array, value: Array, unit: str) -> Estimated:
+    def jackknife(self, replicas: Array, value: Array, unit: str) -> Estimated:
         """A number with its interval, from its replicas, shape (g,) or (g, 3)."""
         from scipy.special import stdtrit
 
@@ -140,23 +140,23 @@ class Fitted:
     @property
     def weight(self) -> Estimated:
         """w [N]."""
-        return self.jackknifed(self.left_out[:, :3], self.whole[:3], "N")
+        return self.jackknife(self.left_out[:, :3], self.whole[:3], "N")
 
     @property
     def bias(self) -> Estimated:
         """b in the middle of the log [N]."""
-        return self.jackknifed(self.left_out[:, 3:6], self.whole[3:6], "N")
+        return self.jackknife(self.left_out[:, 3:6], self.whole[3:6], "N")
 
     @property
     def drift(self) -> Estimated | None:
         """d [N/s]."""
-        return self.jackknifed(self.left_out[:, 6:], self.whole[6:], "N/s") if len(self.whole) > 6 else None
+        return self.jackknife(self.left_out[:, 6:], self.whole[6:], "N/s") if len(self.whole) > 6 else None
 
     @property
     def mass(self) -> Estimated:
         """|w|/g [kg]."""
         sizes = np.linalg.norm(self.left_out[:, :3], axis=1) / GRAVITY
-        return self.jackknifed(sizes, np.asarray(np.linalg.norm(self.whole[:3]) / GRAVITY), "kg")
+        return self.jackknife(sizes, np.asarray(np.linalg.norm(self.whole[:3]) / GRAVITY), "kg")
 
 
 @dataclass(frozen=True)

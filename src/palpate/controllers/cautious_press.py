@@ -85,7 +85,7 @@ class CautiousController(ControllerTable, tag="cautious"):
     room: Positive = 80.0
     """Farthest that the spring is drawn beyond what is felt [N]."""
 
-    def made(self, tick: float, wall: float) -> CautiousPress:
+    def build(self, tick: float, wall: float) -> CautiousPress:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         return cautious_on_bench(tick, self.spring, self.damping, self.force, self.cap, self.room)
 

@@ -44,6 +44,6 @@ class ControllerTable(Table, tag_field="kind"):
 
     shares_loop: ClassVar[bool] = False
 
-    def made(self, tick: float, wall: float) -> Any:
+    def build(self, tick: float, wall: float) -> Any:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         raise NotImplementedError

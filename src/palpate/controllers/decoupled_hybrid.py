@@ -83,7 +83,7 @@ class DecoupledHybridController(ControllerTable, tag="decoupled-hybrid"):
     kfv: NotNegative = 110.0
     """Of the force's rate [1/s]; not used as printed."""
 
-    def made(self, tick: float, wall: float) -> DecoupledHybrid:
+    def build(self, tick: float, wall: float) -> DecoupledHybrid:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         kp, kv, kf = alike(self.kp), alike(self.kv), alike(self.kf)
         if self.form == "printed":

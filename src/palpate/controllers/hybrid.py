@@ -56,6 +56,6 @@ class HybridController(ControllerTable, tag="hybrid"):
     ki: NotNegative = 0.003
     """Per sample."""
 
-    def made(self, tick: float, wall: float) -> Hybrid:
+    def build(self, tick: float, wall: float) -> Hybrid:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         return Hybrid(alike(self.kp), alike(self.kv), alike(self.kf), alike(self.ki))

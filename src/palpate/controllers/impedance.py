@@ -58,7 +58,7 @@ class ImpedanceController(ControllerTable, tag="impedance"):
     beyond: float = 0.0138
     """How far beyond the wall the desired x lies [m]."""
 
-    def made(self, tick: float, wall: float) -> Impedance:
+    def build(self, tick: float, wall: float) -> Impedance:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         target = Vec3(float(wall + self.beyond), 0.0, 0.0)
         return Impedance(triple(self.mass), triple(self.damping), triple(self.stiffness), target)

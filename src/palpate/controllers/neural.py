@@ -140,7 +140,7 @@ class NeuralController(ControllerTable, tag="neural"):
     offset: Triple = (0.0, 0.01, 0.01)
     """Added to the poses that the network sees [m, m, rad]."""
 
-    def made(self, tick: float, wall: float) -> Neural:
+    def build(self, tick: float, wall: float) -> Neural:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         return Neural(alike(self.kp), alike(self.kv), alike(self.kf), triple(self.offset), self._network())
 

@@ -63,7 +63,7 @@ class ProportionalIntegralController(ControllerTable, tag="proportional-integral
     bandwidth: Positive | None = None
     """Of the force loop [Hz], instead of ki."""
 
-    def made(self, tick: float, wall: float) -> ProportionalIntegral:
+    def build(self, tick: float, wall: float) -> ProportionalIntegral:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         if self.ki is not None and self.bandwidth is not None:
             raise InputError("ki and bandwidth in [controller] set the same gain; leave one out")

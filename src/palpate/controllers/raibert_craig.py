@@ -105,7 +105,7 @@ class RaibertCraigController(ControllerTable, tag="raibert-craig"):
     feed_forward: NotNegative = 1.0
     """Share of the desired force that is fed forward."""
 
-    def made(self, tick: float, wall: float) -> RaibertCraig:
+    def build(self, tick: float, wall: float) -> RaibertCraig:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         stiffness, damping, integral = triple(self.stiffness), triple(self.damping), triple(self.integral)
         return RaibertCraig(

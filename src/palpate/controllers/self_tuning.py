@@ -139,7 +139,7 @@ class SelfTuningController(ControllerTable, tag="self-tuning"):
     smoothing: Positive = 0.01
     """Time constant of the force rate [s]."""
 
-    def made(self, tick: float, wall: float) -> SelfTuning:
+    def build(self, tick: float, wall: float) -> SelfTuning:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         middle = (self.kf, self.ki, self.kd)
         layers = random_layers((INPUTS, *self.layers, OUTPUTS), self.weights_seed, self.scale)

@@ -15,6 +15,6 @@ class SurfaceTable(Table, tag_field="kind"):
 
     part: ClassVar[type]
 
-    def made(self) -> Any:
+    def build(self) -> Any:
         """The surface."""
         return self.part(**{name: float(value) for name, value in asdict(self).items()})

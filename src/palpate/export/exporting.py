@@ -93,7 +93,7 @@ class Checked:
     reached: bool = True
 
     @property
-    def passed(self) -> bool | None:
+    def within_tolerance(self) -> bool | None:
         """Whether both errors are within `TOLERANCE`; None if it could not be pressed for want of reach."""
         if not self.reached:
             return None
@@ -105,7 +105,7 @@ class Checked:
         measured = self.pressed.to_json() if self.pressed else None
         return {
             "probe": self.probe, "measured": measured, "error_K": self.error_K, "error_B": self.error_B,
-            "tolerance": TOLERANCE, "passed": self.passed, "note": self.note,
+            "tolerance": TOLERANCE, "passed": self.within_tolerance, "note": self.note,
         }  # fmt: skip
 
 
@@ -131,7 +131,7 @@ class Exported:
     validate: Callable[[Path], object] = field(default=lambda _path: None, repr=False)
     check: Callable[[Path], list[Checked]] = field(default=lambda _path: [], repr=False)
 
-    def commented(self, mark: str) -> str:
+    def with_comment(self, mark: str) -> str:
         """The text with a comment about its origin.
 
         Args:

@@ -291,7 +291,7 @@ def policy_of(forgetting: float | Forgetting) -> Forgetting:
 class IdentifierTable(Table, tag_field="kind"):
     """The [identifier] table of an experiment. Derive from it beside the estimator, with its `kind` as tag."""
 
-    def made(self, tick: float) -> Any:
+    def build(self, tick: float) -> Any:
         """The estimator of (M, B, K) at its start, for a time between samples [s]."""
         raise NotImplementedError
 

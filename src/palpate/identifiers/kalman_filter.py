@@ -156,6 +156,6 @@ class KalmanIdentifier(IdentifierTable, tag="kalman-filter"):
     drift: NotNegativeTriple = (0.0, 0.0, 0.0)
     """Of M [kg], B [N s/m] and K [N/m] per root second."""
 
-    def made(self, tick: float) -> KalmanFilter:
+    def build(self, tick: float) -> KalmanFilter:
         """The estimator at its start."""
         return KalmanFilter(np.zeros(3), np.diag(np.square(VAGUE)), self.drift, tick, names=NAMES)

@@ -186,7 +186,7 @@ class NeuralProbe(Readable):
         return layers_of(self._net.sizes, self._memory.weights.copy())
 
     @property
-    def learned(self) -> Array:
+    def range_learned(self) -> Array:
         """Smallest and largest displacement, velocity and acceleration seen, shape (2, 3)."""
         return np.stack([self._low, self._high])
 

@@ -122,7 +122,7 @@ def _change(data: OctaveData, first: int, end: int, found: OctaveFit) -> int:
 
 def _apart(system: System, noise: Array) -> System:
     """The same with relaxation as far as it is no mass, damping and stiffness: these are those of the motion."""
-    whole = system.weighted(noise)
+    whole = system.weighted_products(noise)
     turn = np.eye(SIZE + 1)
     for place in OTHERS[0]:
         turn[place, :OWN] = -solve(whole[:OWN, :OWN], whole[:OWN, place])
@@ -153,7 +153,7 @@ def _mean(system: System, noise: Array, sensor: Array, deviations: Array) -> _Me
     weight = np.exp(evidence - evidence.max())
     kept = weight > _WINDOW
     weight, priors = weight[kept] / weight[kept].sum(), priors[kept]
-    whole = system.weighted(noise)
+    whole = system.weighted_products(noise)
     noisy = np.tensordot(1 / noise, system.noisy, axes=1)
     thetas, noises, opens = compensate(whole[:-1, :-1], whole[:-1, -1], noisy, priors)
     theta = weight @ thetas
@@ -218,7 +218,7 @@ def _beside_relaxation(system: System, noise: Array, deviations: Array, mean: _M
 
     A stiffness that grows with the frequency is no mass below zero.
     """
-    whole = system.weighted(noise)
+    whole = system.weighted_products(noise)
     normal = whole[:-1, :-1] + np.diag(prior_of(system, deviations)[0])
     apart = abs(float(solve(normal, whole[:-1, -1])[0]) - mean.theta[0])
     grown = max(float(inverse(normal)[0, 0]) - mean.noise[0, 0], 0.0)
@@ -229,7 +229,7 @@ def _by_lag(system: System, noise: Array, theta: Array) -> Array:
     """How theta moves with the lag, shape (8,): the force's rate is B a + K v and M times the rate of a, -w^2 v."""
     rate = np.zeros((len(noise), SIZE))
     rate[:, 0], rate[:, 1] = theta[1], theta[2] - theta[0] * (2 * np.pi * system.frequency) ** 2
-    whole = system.weighted(noise)[:-1, :-1]
+    whole = system.weighted_products(noise)[:-1, :-1]
     right = np.einsum("o,oij,oj->i", 1 / noise, system.total[:, :-1, :-1], rate)
     return solve(whole, right)
 
@@ -265,7 +265,7 @@ def _repetition(system: System, noise: Array, mean: _Mean) -> Array:
 
     Of so many degrees of freedom f, Student's interval of 95 % is about f / (f - 2.4) times Gauss', squared.
     """
-    whole, own = system.weighted(noise), np.tensordot(system.products, 1 / noise, axes=((1,), (0,)))
+    whole, own = system.weighted_products(noise), np.tensordot(system.products, 1 / noise, axes=((1,), (0,)))
     normal = whole[:-1, :-1] + np.diag(mean.prior)
     theta = solve(normal, whole[:-1, -1])
     rest = normal - own[:, :-1, :-1]
@@ -285,7 +285,7 @@ def _refusal(system: System, noise: Array, sensor: Array, theta: Array) -> str:
     if beyond > UNEXPLAINED * power:
         return f"{100 * beyond / power:.0f} % of the force is not explained"
     # The dynamic stiffness at the ends of a sine of this size: that of no contact changes by as much as itself.
-    whole = system.weighted(noise)[:-1, :-1]
+    whole = system.weighted_products(noise)[:-1, :-1]
     tangent = float(whole[_K, :OWN] @ theta[:OWN]) / float(whole[_K, _K])
     spread = float(system.plain[2, 2] / system.samples - system.means[2] ** 2)
     bend = np.hypot(2 * theta[5], theta[6] * np.sqrt(whole[1, 1] / whole[_K, _K]))

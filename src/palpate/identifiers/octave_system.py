@@ -124,7 +124,7 @@ class System:
             frequency=self.frequency[use],
         )
 
-    def weighted(self, noise: Array) -> Array:
+    def weighted_products(self, noise: Array) -> Array:
         """Products over all octaves, each over its noise, shape (9, 9)."""
         return np.asarray(np.tensordot(1 / noise, self.total, axes=1))
 

@@ -131,7 +131,7 @@ class LeastSquaresIdentifier(IdentifierTable, tag="least-squares"):
     """Forgetting factor; 1 forgets nothing."""
     forgetting: Literal["exponential", "directional", "sift"] = "exponential"
 
-    def made(self, tick: float) -> RecursiveLeastSquares:
+    def build(self, tick: float) -> RecursiveLeastSquares:
         """The estimator at its start."""
         policy = {"exponential": Exponential, "directional": Directional, "sift": SIFt}[self.forgetting]
         forgetting: Any = policy(self.keep) if self.keep < 1.0 else 1.0

@@ -108,7 +108,7 @@ class RestartingIdentifier(IdentifierTable, tag="restarting-least-squares"):
     evidence: Positive = 20.0
     """Log-likelihood ratio from which the surface has changed."""
 
-    def made(self, tick: float) -> RestartingLeastSquares:
+    def build(self, tick: float) -> RestartingLeastSquares:
         """The estimator at its start."""
         P = np.diag(np.square(VAGUE))
         return RestartingLeastSquares(np.zeros(3), P, 1.0, self.memory, self.evidence, NAMES)

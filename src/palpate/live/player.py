@@ -190,7 +190,7 @@ class Player:
         self._watched = threading.Event()
         self._stop = threading.Event()
         self._requests: queue.Queue[Request] = queue.Queue(WAITING)
-        self._thread = threading.Thread(target=self._guarded, name="live", daemon=True)
+        self._thread = threading.Thread(target=self._run_guarded, name="live", daemon=True)
 
     def __enter__(self) -> Player:
         self._thread.start()
@@ -228,7 +228,7 @@ class Player:
         self.version += 1
         self.feed.tell()
 
-    def described(self) -> dict[str, Any]:
+    def description(self) -> dict[str, Any]:
         """How it stands, as the page takes it."""
         state = self.source.state
         return {
@@ -244,7 +244,7 @@ class Player:
             "stability": self._stability(),
         }
 
-    def _guarded(self) -> None:
+    def _run_guarded(self) -> None:
         try:
             self._run()
         except BaseException as error:  # noqa: BLE001 - raised again by whoever started it

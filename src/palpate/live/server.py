@@ -143,7 +143,7 @@ class GuardedServer(ABC):
 
         self._loop, self._ending = asyncio.get_running_loop(), asyncio.Event()
         options: dict[str, Any] = {
-            "process_request": self._asked,
+            "process_request": self._refuse_or_answer,
             "subprotocols": self.subprotocols,
             "compression": None,
             "max_size": _LARGEST,
@@ -176,7 +176,7 @@ class GuardedServer(ABC):
         for reader in self._readers:
             reader.set()
 
-    def _asked(self, connection: ServerConnection, asked: Asked) -> Response | None:
+    def _refuse_or_answer(self, connection: ServerConnection, asked: Asked) -> Response | None:
         """Refuses requests without the token, by another host name, or of another page; answers what is no stream."""
         hosts = asked.headers.get_all("Host")
         if len(hosts) != 1 or not (_OWN_HOST.match(hosts[0]) or hosts[0] == f"{self.host}:{self._port}"):
@@ -292,7 +292,7 @@ class _PageServer(GuardedServer):
                 await connection.send(_text("clear"))
             if lost:
                 await connection.send(_text("lost", rows=lost))
-            told = self._player.described()
+            told = self._player.description()
             if told["version"] != version:
                 version = told["version"]
                 await connection.send(_text("state", **told))

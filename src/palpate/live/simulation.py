@@ -116,7 +116,7 @@ class Simulation:
             self.state.note(Happened(float(out[-1, 0]) if len(out) else 0.0, ending.end, "fail"))
         elif self._run.ticks >= LONGEST * self._rate:
             self.state.ended = OVER
-        return self._shown(out)
+        return self._rows_shown(out)
 
     def set(self, key: str, value: float) -> None:
         """Moves a slider; a surface that is pressed gets the rest length that leaves the force as it is.
@@ -214,7 +214,7 @@ class Simulation:
                 self.state.note(Happened(float(out[i, 0]), "contact lost", "fail"))
         self._phase = float(phases[-1])
 
-    def _shown(self, out: Array) -> Array:
+    def _rows_shown(self, out: Array) -> Array:
         """Each stride's last row; of the measured force its least and its largest value by turns."""
         whole = len(out) // self._stride * self._stride
         if not whole:

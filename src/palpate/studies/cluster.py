@@ -227,7 +227,7 @@ class Batches:
         if self._again:
             return self._again.pop()
         first = next(self._jobs)
-        seconds = self.seconds if self.seconds is not None else _guessed(first)
+        seconds = self.seconds if self.seconds is not None else _guess(first)
         count = min(math.ceil(UNIT / max(seconds, 1e-9)), LARGEST_KEPT if first.keep else LARGEST)
         return list(chain([first], islice(self._jobs, count - 1)))
 
@@ -241,7 +241,7 @@ class Batches:
         self._again += [[job] for job in jobs]
 
 
-def _guessed(job: Job) -> float:
+def _guess(job: Job) -> float:
     if job.setting.experiment is None:
         return 1e-5
     run = job.setting.experiment.run
@@ -269,9 +269,9 @@ class Hand:
         while more or self._pending:
             self._look()
             more = more and self._send(batches)
-            for future in self._done():
+            for future in self._completed_batches():
                 jobs = self._pending.pop(future)
-                done = self.taken(future, jobs)
+                done = self.take(future, jobs)
                 if done is None:
                     batches.again(jobs)
                     more = True
@@ -293,15 +293,15 @@ class Hand:
             except StopIteration:
                 return False
             try:
-                self._pending[self._submitted(jobs)] = jobs
+                self._pending[self._submit(jobs)] = jobs
             except Exception as error:
-                raise self._gone(error) from error
+                raise self._lost_error(error) from error
         return True
 
-    def _submitted(self, jobs: list[Job]) -> Any:
+    def _submit(self, jobs: list[Job]) -> Any:
         return self.client.submit(run_batch, pickle.dumps(jobs), sources(), jobs[0].plugins, pure=False)
 
-    def _done(self) -> list[Any]:
+    def _completed_batches(self) -> list[Any]:
         """The batches that are done, after a while of waiting."""
         import distributed
 
@@ -317,7 +317,7 @@ class Hand:
         except TimeoutError:
             return []
         except Exception as error:
-            raise self._gone(error) from error
+            raise self._lost_error(error) from error
 
     def _look(self) -> None:
         """Now and then, how many workers there are: some come, some go; none for too long is an error."""
@@ -325,12 +325,12 @@ class Hand:
             return
         self._looked = time.monotonic()
         if self.client.status != "running":
-            raise self._gone(None)
+            raise self._lost_error(None)
         try:
             asked = self.client.sync(self.client.scheduler.ncores, callback_timeout=CONNECT)
             threads = sum(asked.values())
         except Exception as error:
-            raise self._gone(error) from error
+            raise self._lost_error(error) from error
         self._room = AHEAD * threads
         if threads:
             self._alone = time.monotonic()
@@ -340,7 +340,7 @@ class Hand:
                 "runs are saved, and the same command resumes"
             )
 
-    def taken(self, future: Any, jobs: list[Job]) -> list[Done] | None:
+    def take(self, future: Any, jobs: list[Job]) -> list[Done] | None:
         """Result of a batch; None if a worker died of one of several runs."""
         from distributed import KilledWorker
 
@@ -357,13 +357,13 @@ class Hand:
             return [(Row(setting.run, setting.at, FAILED, why, none, 0.0), None)]
         except Exception as error:
             if self.client.status != "running":
-                raise self._gone(error) from error
+                raise self._lost_error(error) from error
             raise InputError(
                 f"the workers of {self.address} cannot run palpate: {_line(error)}; install the same version on all "
                 "machines"
             ) from error
 
-    def _gone(self, error: Exception | None) -> InputError:
+    def _lost_error(self, error: Exception | None) -> InputError:
         what = f" ({_line(error)})" if isinstance(error, OSError) else ""
         return InputError(
             f"the cluster at {self.address} disappeared{what}; the finished runs are saved, and the same "

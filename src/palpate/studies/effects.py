@@ -99,12 +99,12 @@ def comparison_sentence(comparison: Comparison) -> str:
     count = f"{round(pair.won * n)} of {n} surfaces"
     if not pair.decided:
         return (
-            f"{first.name} and {next_one} do not differ significantly in {metric.called}{place}: {first.name} is "
+            f"{first.name} and {next_one} do not differ significantly in {metric.phrase}{place}: {first.name} is "
             f"better on {count}, worse on {round(pair.lost * n)}."
         )
     more = "larger" if comparison.most else "smaller"
     which = "" if len(comparison.entrants) == 2 else f" than {next_one}, the next,"
-    lead = f"{first.name} has the {more} {metric.called}{place}{which} on {count}"
+    lead = f"{first.name} has the {more} {metric.phrase}{place}{which} on {count}"
     ends = (pair.median, pair.low, pair.high)
     if not all(end is not None and math.isfinite(end) for end in ends):
         return f"{lead}; on the others {first.name} or {next_one} fails." if pair.lost else f"{lead}."
@@ -272,15 +272,15 @@ def effect_sentence(one: Comparison, what: str) -> str:
     if not pair.decided:
         better, behind = round(pair.won * pair.surfaces), round(pair.lost * pair.surfaces)
         return (
-            f"{factor} does not change {metric.called} significantly: {best} is better on {better}, worse on {behind} "
+            f"{factor} does not change {metric.phrase} significantly: {best} is better on {better}, worse on {behind} "
             f"of {pair.surfaces} {what}."
         )
     count = f"{round(pair.won * pair.surfaces)} of {pair.surfaces} {what}"
     if pair.median is None or math.isinf(pair.median):
         return f"{best} is better{against} on {count}: with {worst} most runs fail."
     if last == 1:
-        return f"{best} has the {more} {metric.called} on {count}, by {by(pair, metric.unit)}."
-    return f"{best} has the {more} {metric.called}: {by(pair, metric.unit)} better{against} and better on {count}."
+        return f"{best} has the {more} {metric.phrase} on {count}, by {by(pair, metric.unit)}."
+    return f"{best} has the {more} {metric.phrase}: {by(pair, metric.unit)} better{against} and better on {count}."
 
 
 def by(pair: Pair, unit: str) -> str:

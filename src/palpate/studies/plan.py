@@ -34,10 +34,10 @@ class Sobol:
     def point(self, number: int) -> list[float]:
         """The coordinates of a point, each in [0, 1)."""
         if self._last[0] != number:
-            self._last = (number, self._drawn(number))
+            self._last = (number, self._draw(number))
         return self._last[1]
 
-    def _drawn(self, number: int) -> list[float]:
+    def _draw(self, number: int) -> list[float]:
         from scipy.stats import qmc
 
         if self._engine is None or self._engine.num_generated > number:

@@ -108,7 +108,7 @@ def run_one(
     try:
         record = _record(setting.experiment, setting.seed, stopped, waiting)
         look = Look(record, job.window)
-        metrics = tuple(metric_of(name).measured(look) for name in job.metrics)
+        metrics = tuple(metric_of(name).value_in(look) for name in job.metrics)
     except Stopped:
         raise
     except InputError as error:

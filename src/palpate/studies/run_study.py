@@ -173,7 +173,7 @@ class Work:
     runner: Runner
     progress: Progress = lambda _: None
 
-    def done(self, *, replace: bool = False) -> DataFrame:
+    def run(self, *, replace: bool = False) -> DataFrame:
         """Does the missing runs, and writes and returns the table.
 
         Raises:
@@ -243,7 +243,7 @@ def run(text: str, out: str | Path, *, where: str = "study", runner: Runner | No
     """
     planned = plan(parse(text, where), where)
     check_parts_of(planned)
-    return Work(planned, text, Path(out), runner or Local()).done()
+    return Work(planned, text, Path(out), runner or Local()).run()
 
 
 def begun(folder: Path) -> bool:

@@ -48,12 +48,12 @@ class Searching:
         self._search, self._axes = study.search, plan.parts[0].axes
         self._direction = "minimize" if study.best.least else "maximize"
         self._space = {a.name: _distribution(a) for a in self._axes}
-        self._kept = self._stored(path, name)
+        self._kept = self._open_or_renew(path, name)
 
     def batches(self) -> Iterator[list[Trial]]:
         """The trials of each batch; the results of all before have to be told first."""
         for first in range(0, self._search.trials, self._search.batch):
-            yield self._proposed(first, min(self._search.batch, self._search.trials - first))
+            yield self._propose(first, min(self._search.batch, self._search.trials - first))
 
     def tell(self, number: int, values: Mapping[str, Any], objective: float | None) -> None:
         """Value of a trial; None if it failed, which the search ranks last."""
@@ -70,7 +70,7 @@ class Searching:
             )
         )
 
-    def _proposed(self, first: int, count: int) -> list[Trial]:
+    def _propose(self, first: int, count: int) -> list[Trial]:
         """The trials from the first on, from those before it alone."""
         seed = int.from_bytes(hashlib.sha256(f"{self._search.seed} {first}".encode()).digest()[:4], "big")
         fresh = self._optuna.create_study(
@@ -82,19 +82,19 @@ class Searching:
             (first + i, {a.name: _value_of(a, p[a.name]) for a in self._axes}) for i, p in enumerate(asked)
         ]
 
-    def _stored(self, path: Path, name: str) -> OptunaStudy:
+    def _open_or_renew(self, path: Path, name: str) -> OptunaStudy:
         check_place(path)
         if path.exists() and not path.read_bytes().endswith(
             b"\n"
         ):  # torn: what is added would be spoiled too
             path.unlink()
         try:
-            return self._opened(path, name)
+            return self._open(path, name)
         except (ValueError, KeyError, TypeError):  # spoiled, or of another search
             path.unlink()
-            return self._opened(path, name)
+            return self._open(path, name)
 
-    def _opened(self, path: Path, name: str) -> OptunaStudy:
+    def _open(self, path: Path, name: str) -> OptunaStudy:
         storages = self._optuna.storages
         backend = storages.journal.JournalFileBackend(str(path), lock_obj=_no_lock(storages))
         study = self._optuna.create_study(

@@ -137,7 +137,7 @@ def start_loop(loop):
 @law
 def tick(loop, state, k, noise, out):
     """The k-th tick: the new state; its row is written into `out`. `noise`: one standard normal number."""
-    sampled = loop.force.sampled(state.force)
+    sampled = loop.force.reading(state.force)
     measured, filtered = loop.filter.step(state.filter, sampled)
     desired = loop.schedule.force(k * loop.tick)
     wanted, controller = loop.controller.step(state.controller, desired, measured)

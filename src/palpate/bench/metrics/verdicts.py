@@ -177,7 +177,7 @@ def try_metric(metric: Metric, look: Look) -> None:
         InputError: it raises, or does not return a number.
     """
     try:
-        metric.measured(look)
+        metric.value_in(look)
     except Exception as error:
         raise InputError(
             f"the metric {metric.name} fails: {reason(error)}; it returns a number, or None"

@@ -217,11 +217,11 @@ class Metric:
         return "least" if self.signed else self.better
 
     @property
-    def called(self) -> str:
+    def phrase(self) -> str:
         """Its name in a sentence."""
         return f"{self.name} by magnitude" if self.signed else self.name
 
-    def measured(self, look: Look) -> Value:
+    def value_in(self, look: Look) -> Value:
         """The number, or None where there is none or it is not finite."""
         with np.errstate(all="ignore"):
             value = self.of(look)

@@ -151,12 +151,12 @@ class SerialArm(Readable):
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
         """Pose of the tip, shape (4, 4)."""
-        return self._found(q).pose
+        return self._state_at(q).pose
 
     def joint_places(self, q: ArrayLike) -> Array:
         """Origin of the base, of each joint's frame, and of the tip [m], shape (n + 2, 3)."""
         c, p, R, places = self.chain, np.zeros(3), np.eye(3), [np.zeros(3)]
-        for i, value in enumerate(self._checked(q, "q")):
+        for i, value in enumerate(self._check(q, "q")):
             p, R = p + R @ c.at[i], R @ c.turn[i]
             if c.slide[i]:
                 p = p + value * R[:, 2]
@@ -178,46 +178,46 @@ class SerialArm(Readable):
         """
         from palpate.robots.serial.inverse import inverse_kinematics
 
-        return inverse_kinematics(self, pose, self.home if near is None else self._checked(near, "near"))
+        return inverse_kinematics(self, pose, self.home if near is None else self._check(near, "near"))
 
     def jacobian(self, q: ArrayLike) -> Array:
         """J, velocity of the tip [m/s] above its turning [rad/s] by joint rates, shape (6, n)."""
-        return self._found(q).room.J
+        return self._state_at(q).room.J
 
     def jacobian_dot(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """dJ/dt, shape (6, n)."""
-        return self._found(q, qd).Jdot
+        return self._state_at(q, qd).Jdot
 
     def jacobian_dot_qd(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """dJ/dt qd: acceleration of the tip at rest of the joints' accelerations, shape (6,)."""
-        return self._found(q, qd).Jdqd
+        return self._state_at(q, qd).Jdqd
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q) [kg m^2], rotors included, shape (n, n)."""
-        return self._found(q).room.M
+        return self._state_at(q).room.M
 
     def bias_torque(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """h(q, qd): centrifugal, Coriolis and gravity torque [N m], shape (n,)."""
-        return self._found(q, qd).room.h
+        return self._state_at(q, qd).room.h
 
     def gravity_torque(self, q: ArrayLike) -> Array:
         """Torque that holds the arm at rest [N m], shape (n,)."""
-        return self._found(q).room.h
+        return self._state_at(q).room.h
 
     def inverse_dynamics(
         self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, tip_wrench: ArrayLike | None = None
     ) -> Array:
         """Joint torques M qdd + h + J^T w [N m], shape (n,)."""
-        found = self._found(q, qd)
-        torque = found.room.M @ self._checked(qdd, "qdd") + found.room.h
+        found = self._state_at(q, qd)
+        torque = found.room.M @ self._check(qdd, "qdd") + found.room.h
         return torque if tip_wrench is None else torque + found.room.J.T @ _wrench(tip_wrench)
 
     def forward_dynamics(
         self, q: ArrayLike, qd: ArrayLike, torque: ArrayLike, tip_wrench: ArrayLike | None = None
     ) -> Array:
         """Joint accelerations, the qdd of torque = M qdd + h + J^T w, shape (n,)."""
-        found = self._found(q, qd)
-        push = self._checked(torque, "torque") - found.room.h
+        found = self._state_at(q, qd)
+        push = self._check(torque, "torque") - found.room.h
         if tip_wrench is not None:
             push = push - found.room.J.T @ _wrench(tip_wrench)
         return np.asarray(np.linalg.solve(found.room.M, push))
@@ -226,7 +226,7 @@ class SerialArm(Readable):
         """Of J, largest first, shape (min(6, n),): the last is 0 in a singular pose."""
         return np.asarray(np.linalg.svd(self.jacobian(q), compute_uv=False))
 
-    def _checked(self, values: ArrayLike, name: str) -> Array:
+    def _check(self, values: ArrayLike, name: str) -> Array:
         array = np.array(values, dtype=np.float64)
         if array.shape != (self.joints,) or not np.isfinite(array).all():
             raise InputError(
@@ -236,10 +236,10 @@ class SerialArm(Readable):
             )
         return array
 
-    def _found(self, q: ArrayLike, qd: ArrayLike | None = None) -> ArmState:
-        rates = np.zeros(self.joints) if qd is None else self._checked(qd, "qd")
+    def _state_at(self, q: ArrayLike, qd: ArrayLike | None = None) -> ArmState:
+        rates = np.zeros(self.joints) if qd is None else self._check(qd, "qd")
         found = arm_state_for(self.joints)
-        compiled_description(self.chain, self._checked(q, "q"), rates, found)
+        compiled_description(self.chain, self._check(q, "q"), rates, found)
         return found
 
 
