@@ -13,7 +13,7 @@ from palpate._jit import part
 from palpate._vector import clip, sign
 from palpate.signals.filters import Biquad, Cascade, CascadeState, butterworth3, lowpass2
 from palpate.signals.samples import quantise, whole
-from palpate.signals.types import coerced, components, require
+from palpate.signals.types import coerce_fields, components, require
 
 
 def _check_converter(self):
@@ -22,7 +22,7 @@ def _check_converter(self):
 
 
 @part
-@coerced(_check_converter)
+@coerce_fields(_check_converter)
 class Converter(NamedTuple):
     """An analog input or output: the quantity that a code stands for, in that quantity's unit.
 
@@ -69,7 +69,7 @@ def _check_encoder(self):
 
 
 @part
-@coerced(_check_encoder)
+@coerce_fields(_check_encoder)
 class Encoder(NamedTuple):
     """The angle to the nearest count; mid-tread.
 
@@ -111,7 +111,7 @@ def _check_sensor(self):
 
 
 @part
-@coerced(_check_sensor)
+@coerce_fields(_check_sensor)
 class ForceSensor(NamedTuple):
     """Analog low-pass, noisy sampling, one cycle of computing, and holding; stepped with the physics.
 

@@ -13,7 +13,7 @@ from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.errors import InputError
 from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, random_layers, thesis_layers
-from palpate.signals.types import NotNegative, PositiveTriple, Size, Triple, alike, coerced, triple
+from palpate.signals.types import NotNegative, PositiveTriple, Size, Triple, alike, coerce_fields, triple
 
 INPUTS, OUTPUTS = 9, 3
 STUCK = 1e-3
@@ -37,7 +37,7 @@ def _check(self):
 
 
 @controller
-@coerced(_check)
+@coerce_fields(_check)
 class Neural(NamedTuple):
     """The hybrid controller without its integral, and a network whose force command is added through J^T.
 

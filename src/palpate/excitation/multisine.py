@@ -51,7 +51,7 @@ def low_peak(amplitudes: Array, harmonics: NDArray[np.intp], rounds: int = 500) 
     phases = np.vstack([schroeder(amplitudes**2), rng.uniform(0, 2 * np.pi, (_STARTS, len(amplitudes)))])
     lowest, best = np.full(len(phases), np.inf), phases.copy()
     for k in range(rounds):
-        signal = summed(amplitudes * np.exp(1j * phases), harmonics)
+        signal = sum_of_sines(amplitudes * np.exp(1j * phases), harmonics)
         top = np.abs(signal).max(axis=1)
         better = top < lowest
         lowest[better], best[better] = top[better], phases[better]
@@ -60,7 +60,7 @@ def low_peak(amplitudes: Array, harmonics: NDArray[np.intp], rounds: int = 500) 
     return best[np.argmin(lowest)]
 
 
-def summed(phasors: Complex, harmonics: NDArray[np.intp], points: int = _POINTS_A_CYCLE) -> Array:
+def sum_of_sines(phasors: Complex, harmonics: NDArray[np.intp], points: int = _POINTS_A_CYCLE) -> Array:
     """Sums over a period of sines of given phasors, Im sum p exp(2 pi j h t/T).
 
     Args:
@@ -92,7 +92,7 @@ def error_of_period(motion: Complex, harmonics: NDArray[np.intp], readings: int,
     """
     spectrum = np.zeros(readings // 2 + 1, complex)
     spectrum[harmonics] = -0.5j * readings * motion
-    error = _rounded(np.fft.irfft(spectrum, readings), step)
+    error = _rounding_errors(np.fft.irfft(spectrum, readings), step)
     return np.asarray(2j / readings * np.fft.rfft(error, axis=-1))
 
 
@@ -112,11 +112,11 @@ def error_of_sweep(motion: Complex, omega: Array, seconds: float, rate: float, s
     size = np.interp(place, np.arange(len(omega)), motion.real) + 1j * np.interp(
         place, np.arange(len(omega)), motion.imag
     )
-    error = _rounded(np.imag(size * phase), step) * np.conj(phase)
+    error = _rounding_errors(np.imag(size * phase), step) * np.conj(phase)
     return np.asarray(2j / each * error.reshape(PLACES, len(omega), each).sum(axis=-1))
 
 
-def _rounded(path: Array, step: float) -> Array:
+def _rounding_errors(path: Array, step: float) -> Array:
     """Error that rounding adds to a path from each place of the encoder, shape (places, *path.shape)."""
     if not step > 0:
         return np.zeros((PLACES, *path.shape))
@@ -199,17 +199,19 @@ def _within_budget(
 
     def share(strength: float) -> float:
         asked = strength * amplitudes * start
-        peak, slope = np.abs(summed(np.stack([asked, 1j * omega * asked]), harmonics, _POINTS)).max(axis=1)
+        peak, slope = np.abs(sum_of_sines(np.stack([asked, 1j * omega * asked]), harmonics, _POINTS)).max(
+            axis=1
+        )
         phasors = problem.forces(omega, strength * amplitudes) * start
-        felt = np.abs(summed(phasors, harmonics, _POINTS)).max()
+        felt = np.abs(sum_of_sines(phasors, harmonics, _POINTS)).max()
         return min(problem.budget.share(float(peak), float(slope)), problem.budget.swing / float(felt))
 
     amplitudes = amplitudes * used_up(share, problem.budget.desired_swing)
     forces = problem.forces(omega, amplitudes)
     predictions = []
     for surface, force in zip(problem.surfaces.surfaces(), forces, strict=True):
-        felt_there = problem.budget.mean + summed(force * start, harmonics, _POINTS)
-        moved = summed(force / surface.impedance(omega) * start, harmonics, _POINTS)
+        felt_there = problem.budget.mean + sum_of_sines(force * start, harmonics, _POINTS)
+        moved = sum_of_sines(force / surface.impedance(omega) * start, harmonics, _POINTS)
         between = float(felt_there.min()), float(felt_there.max())
         motion = force / surface.impedance(omega) * start
         readings = max(round(period * sensors.rate), 2 * int(harmonics[-1]) + 2)

@@ -72,7 +72,7 @@ def phase_std(sampling: int, rate: int) -> float:
     return gcd(sampling, rate) / (sampling * rate) / sqrt(12)
 
 
-def bound(
+def cramer_rao_bound(
     time: Array,
     penetration: Array,
     truth: Mapping[str, float],
@@ -131,12 +131,12 @@ def sensitivities(
 
     Those of K, B and M times their values, summed, are the filtered force itself.
     """
-    x, v, a, jerk = filtered(time, penetration, low_pass, at)
+    x, v, a, jerk = filter_at(time, penetration, low_pass, at)
     K, B, M = (float(truth.get(name, 0.0)) for name in ("K", "B", "M"))
     return np.column_stack([x, v, a, np.ones_like(at), -(K * v + B * a + M * jerk)])
 
 
-def filtered(time: Array, signal: Array, low_pass: LowPass, at: Array, derivatives: int = 4) -> Array:
+def filter_at(time: Array, signal: Array, low_pass: LowPass, at: Array, derivatives: int = 4) -> Array:
     """A smooth signal through a continuous filter, and its derivatives, at any instants; shape (derivatives, len(at)).
 
     Exact for signals without content above half the grid's rate: the line between its ends is filtered by hand, what

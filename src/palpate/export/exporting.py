@@ -236,11 +236,11 @@ def _mujoco(contact: Contact, request: Request, out: Path) -> Exported:
     numbers = {pair.probe: _pair_numbers(pair, contact) for pair in found}
 
     def pressed(path: Path) -> list[Checked]:
-        return [_pressed_pair(scenes.compiled(path), scene, pair, contact) for pair in found]
+        return [_pressed_pair(scenes.compile_scene(path), scene, pair, contact) for pair in found]
 
     return Exported(
         contact, request.target, scenes.xml(scene, found, contact, out.parent),
-        (*notes, *scenes.NOTES), {"pairs": numbers}, validate=scenes.compiled, check=pressed,
+        (*notes, *scenes.NOTES), {"pairs": numbers}, validate=scenes.compile_scene, check=pressed,
     )  # fmt: skip
 
 
@@ -255,11 +255,11 @@ def _pair_numbers(pair: Any, contact: Contact) -> dict[str, Any]:
 
 
 def _pressed_pair(model: Any, scene: Any, pair: Any, contact: Contact) -> Checked:
-    from palpate.export.mujoco_scene import touched
+    from palpate.export.mujoco_scene import bring_to_touch
     from palpate.export.rig import MuJoCoRig
 
     rig = MuJoCoRig(model, scene.geom(scene.surface), scene.geom(pair.probe))
-    if touched(rig) is None:
+    if bring_to_touch(rig) is None:
         return _out_of_reach(pair.probe)
     return _judge(pair.probe, press(rig, contact.stiffness.value, _force(contact)), contact)
 

@@ -226,7 +226,7 @@ def _reach(scene: Scene, probe: str | None) -> tuple[dict[str, tuple[int, tuple[
 def _measure_pair(rough: Any, scene: Scene, probe: str, own: tuple[int, tuple[float, ...]]) -> Pair:
     """A pair with its R, read off the engine with the contact made: at the touch, or else from afar."""
     rig = MuJoCoRig(rough, scene.geom(scene.surface), scene.geom(probe))
-    mass = touched(rig)
+    mass = bring_to_touch(rig)
     near = copy.copy(rig.model)
     margin = _CLOSE if mass is not None else _WIDE * (1.0 + float(near.stat.extent))
     near.pair_margin[near.pair_margin >= 0.0] = margin
@@ -243,7 +243,7 @@ def _measure_pair(rough: Any, scene: Scene, probe: str, own: tuple[int, tuple[fl
     return Pair(probe, 1.0 / inverse, *own, len(held), mass)
 
 
-def touched(rig: MuJoCoRig) -> float | None:
+def bring_to_touch(rig: MuJoCoRig) -> float | None:
     """Bring a rig to the touch from the model's own pose, or else from one of its keyframes; the mass that is felt."""
     rig.start()
     mass = touch(rig)
@@ -316,7 +316,7 @@ def _pair(surface: str, pair: Pair, contact: Contact, ratio: float | None) -> st
     return "    <pair " + " ".join(f"{name}={quoteattr(str(value))}" for name, value in own.items()) + "/>"
 
 
-def compiled(path: Path) -> Any:
+def compile_scene(path: Path) -> Any:
     """The model of a file that includes the scene.
 
     Raises:

@@ -19,7 +19,7 @@ from palpate.errors import InputError
 from palpate.identifiers.kernels.dimension import size_of
 from palpate.identifiers.kernels.least_squares import length, stretch, stretch_of
 from palpate.results import Readable
-from palpate.signals.types import Estimate, Table, coerced, require
+from palpate.signals.types import Estimate, Table, coerce_fields, require
 
 LARGEST = 1e30
 """No measurement in SI units is larger: the range of a log's columns."""
@@ -212,7 +212,7 @@ def _factor(policy: Any) -> None:
 
 
 @part
-@coerced(_factor)
+@coerce_fields(_factor)
 class Exponential(NamedTuple):
     """Everything is forgotten alike, whether the sample speaks of it or not.
 
@@ -231,7 +231,7 @@ class Exponential(NamedTuple):
 
 
 @part
-@coerced(_factor)
+@coerce_fields(_factor)
 class Directional(NamedTuple):
     """Only what the sample speaks of is forgotten: the force that is predicted for it (Kulhavy and Karny, 1984).
 
@@ -256,7 +256,7 @@ def _subspace(policy: "SIFt") -> None:
 
 
 @part
-@coerced(_subspace)
+@coerce_fields(_subspace)
 class SIFt(NamedTuple):
     """Information is forgotten only in the subspace that new information arrives in, and only where some does.
 

@@ -91,7 +91,7 @@ def passive_verdict(value: float, std: float, tolerance: float = 0.25) -> str:
 C = TypeVar("C", bound=type)
 
 
-def coerced(check: Callable[[Any], None] | None = None) -> Callable[[C], C]:
+def coerce_fields(check: Callable[[Any], None] | None = None) -> Callable[[C], C]:
     """Decorates a NamedTuple of parameters: numbers become what their fields say, then `check` judges them.
 
     A field marked `Any` takes a number or a `Vec3`. Put it under `@part`. `_make` and `_replace` build the

@@ -137,11 +137,11 @@ def task_model(axes, room, tip, own):
     factorise(own.mobility, own.factor)
     inertia = ApparentInertia(own.factor, own.six)
     Jdqd = into(axes, tip.a, tip.dw)
-    return TaskModel(Identity(1.0), Jdqd, inertia, inertia @ passed(own))
+    return TaskModel(Identity(1.0), Jdqd, inertia, inertia @ acceleration_of_last(own))
 
 
 @law
-def passed(own):
+def acceleration_of_last(own):
     """Task acceleration that the torque of the last row gives, J M^-1 tau."""
     y = own.six
     for i in range(6):
@@ -170,7 +170,7 @@ def joint_torque(axes, room, model, own, F, damping, qd, torque):
             torque[i] -= damping * (room.M[i, k] * qd[k])
         last[i] = torque[i]
     forward(own.L, last)
-    wrench = F - model.M @ passed(own)
+    wrench = F - model.M @ acceleration_of_last(own)
     for i in range(n):
         torque[i] += wrench @ column_in(axes, room.J, i)
 
