@@ -52,7 +52,7 @@ class Converter(NamedTuple):
 
     @property
     def resolution(self):
-        """One code."""
+        """The size of one step of the instrument."""
         return self.full_scale / 2.0 ** (self.bits - 1)
 
     @property
@@ -87,7 +87,7 @@ class Encoder(NamedTuple):
 
     @property
     def resolution(self):
-        """One count [rad]."""
+        """The size of one step of the instrument."""
         return (0.0 * self.counts + _TURN) / self.counts
 
     @property

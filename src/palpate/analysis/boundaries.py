@@ -54,7 +54,7 @@ class Cell:
 
     @property
     def width(self) -> float:
-        """Of the coordinate."""
+        """Width of the cell in its coordinate."""
         return self.high - self.low
 
     def error_at_quarters(self) -> list[Array]:

@@ -140,7 +140,7 @@ class ForceInput(NamedTuple):
 
     @property
     def lag(self):
-        """Seconds."""
+        """Lag of the force's whole way [s]."""
         return self.sensor.lag + self.filtered * self.analog.lag + self.converter.lag
 
 

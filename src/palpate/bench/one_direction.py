@@ -65,7 +65,7 @@ class Priors(Table):
 
 
 class Duration(Table):
-    """Duration."""
+    """Duration of a press and of its run."""
 
     press: Positive = 4.0
     """Seconds from the touch on."""

@@ -262,7 +262,7 @@ class Payload(Table):
         return self.inertia, self.inertia_std
 
     def to_toml(self) -> str:
-        """The file's text."""
+        """The text of the payload's file."""
         plain = {name: value for name, value in msgspec.to_builtins(self).items() if value is not None}
         lines = [f"{name} = {_toml_value(value)}" for name, value in plain.items()]
         head = "# Made by palpate payload; palpate identify and palpate tune take it by --payload. SI units."

@@ -139,7 +139,7 @@ class Fitted:
 
     @property
     def weight(self) -> Estimated:
-        """w [N]."""
+        """The weight w of the tool [N]."""
         return self.jackknife(self.left_out[:, :3], self.whole[:3], "N")
 
     @property
@@ -149,12 +149,12 @@ class Fitted:
 
     @property
     def drift(self) -> Estimated | None:
-        """d [N/s]."""
+        """The drift d of the bias [N/s]."""
         return self.jackknife(self.left_out[:, 6:], self.whole[6:], "N/s") if len(self.whole) > 6 else None
 
     @property
     def mass(self) -> Estimated:
-        """|w|/g [kg]."""
+        """The mass |w|/g of the tool [kg]."""
         sizes = np.linalg.norm(self.left_out[:, :3], axis=1) / GRAVITY
         return self.jackknife(sizes, np.asarray(np.linalg.norm(self.whole[:3]) / GRAVITY), "kg")
 

@@ -13,7 +13,7 @@ from palpate.signals.types import NotNegativeTriple, Positive, PositiveTriple, t
 
 @part
 class CautiousPressState(NamedTuple):
-    """Of `CautiousPress`."""
+    """State of `CautiousPress` between two ticks."""
 
     inner: CautiousState
     x_c: float  # far end of the spring [m]

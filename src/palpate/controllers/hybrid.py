@@ -43,7 +43,7 @@ class Hybrid(NamedTuple):
         return hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f), integral
 
     def report(self, state):
-        """The force integral."""
+        """The force integral, for the record."""
         return state, ZERO3
 
 

@@ -39,7 +39,7 @@ class ProportionalIntegral(NamedTuple):
         return Hybrid(self.kp, self.kv, self.kf, self.tick * self.ki).step(state, sense, task, model)
 
     def report(self, state):
-        """The force integral."""
+        """The force integral, for the record."""
         return state, ZERO3
 
 

@@ -53,7 +53,7 @@ class RaibertCraig(NamedTuple):
     tick: float
 
     def start(self):
-        """No error yet."""
+        """The state before the first error."""
         return RaibertCraigState(0.0 * self.stiffness, 0.0 * self.stiffness)
 
     def step(self, state, sense, task, model):

@@ -16,5 +16,5 @@ class SurfaceTable(Table, tag_field="kind"):
     part: ClassVar[type]
 
     def build(self) -> Any:
-        """The surface."""
+        """The surface that the table describes."""
         return self.part(**{name: float(value) for name, value in asdict(self).items()})

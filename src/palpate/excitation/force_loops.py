@@ -40,7 +40,7 @@ class Surface:
 
     @property
     def values(self) -> tuple[float, float, float]:
-        """K, B, M."""
+        """The parameters K, B, M."""
         return self.stiffness, self.damping, self.mass
 
 
@@ -199,7 +199,7 @@ class KnownBandwidth:
         return np.broadcast_to(gain, impedance.shape)
 
     def stable(self, surface: Surface) -> bool:
-        """Taken for granted."""
+        """Stability, which is taken for granted."""
         return True
 
 

@@ -61,7 +61,7 @@ class Request:
 
     @property
     def name(self) -> str:
-        """Of the surface."""
+        """Name of the surface's geometry."""
         return self.surface or "surface"
 
     def default_place(self) -> Path:
@@ -101,7 +101,7 @@ class Checked:
         return all(error is not None and error <= TOLERANCE for error in errors)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The result as plain values."""
         measured = self.pressed.to_json() if self.pressed else None
         return {
             "probe": self.probe, "measured": measured, "error_K": self.error_K, "error_B": self.error_B,
@@ -160,7 +160,7 @@ class Exported:
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The result as plain values."""
         own = self.contact
         quantities = {"K": own.stiffness, "B": own.damping, "M": own.mass}
         return {

@@ -100,7 +100,7 @@ class Scene:
     surface: str
 
     def geom(self, name: str) -> int:
-        """A geom's number."""
+        """The number of a geom by its name."""
         return int(mujoco().mj_name2id(self.model, mujoco().mjtObj.mjOBJ_GEOM, name))
 
 

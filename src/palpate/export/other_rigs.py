@@ -124,7 +124,7 @@ class DrakeRig:
         return self.plant.get_geometry_query_input_port().Eval(self.context)
 
     def gap(self) -> tuple[float, Array]:
-        """See `Rig.gap`."""
+        """Gap between the geometries, see `Rig.gap`."""
         pair = self._query().ComputeSignedDistancePairClosestPoints(self._surface, self._probe)
         distance = float(pair.distance)
         outward = np.array(pair.nhat_BA_W) * (-1.0 if pair.id_A == self._surface else 1.0)
@@ -148,15 +148,15 @@ class DrakeRig:
         )
 
     def mass(self) -> Array:
-        """See `Rig.mass`."""
+        """Mass that is felt, see `Rig.mass`."""
         return np.array(self.plant.CalcMassMatrix(self.context))
 
     def velocity(self) -> Array:
-        """See `Rig.velocity`."""
+        """Velocity of the probe, see `Rig.velocity`."""
         return np.array(self.plant.GetVelocities(self.context))
 
     def move(self, change: Array) -> None:
-        """See `Rig.move`."""
+        """Moves the probe, see `Rig.move`."""
         rate = self.plant.MapVelocityToQDot(self.context, change)
         positions = self.plant.GetPositions(self.context) + rate
         low, high = self.plant.GetPositionLowerLimits(), self.plant.GetPositionUpperLimits()
@@ -221,22 +221,22 @@ class NewtonRig:
         self._contacts = self._pipeline.contacts()
 
     def gap(self) -> tuple[float, Array]:
-        """See `Rig.gap`."""
+        """Gap between the geometries, see `Rig.gap`."""
         return self._height() - _RADIUS, np.array([[1.0], [0.0], [0.0]])
 
     def _height(self) -> float:
         return float(self._now.body_q.numpy()[0, 2])
 
     def mass(self) -> Array:
-        """See `Rig.mass`."""
+        """Mass that is felt, see `Rig.mass`."""
         return np.array([[_MASS]])
 
     def velocity(self) -> Array:
-        """See `Rig.velocity`."""
+        """Velocity of the probe, see `Rig.velocity`."""
         return np.array([float(self._now.body_qd.numpy()[0, 2])])
 
     def move(self, change: Array) -> None:
-        """See `Rig.move`."""
+        """Moves the probe, see `Rig.move`."""
         poses = self._now.body_q.numpy()
         poses[0, 2] += change[0]
         self._now.body_q.assign(poses)

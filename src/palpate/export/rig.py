@@ -98,7 +98,7 @@ class Pressed:
         return abs(self.stiffness / stiffness - 1.0), of_damping
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The press as plain values."""
         return {
             "K": self.stiffness,
             "B": self.damping,
@@ -286,18 +286,18 @@ class MuJoCoRig:
         return across(self._normal) @ past
 
     def mass(self) -> Array:
-        """See `Rig.mass`."""
+        """Mass that is felt, see `Rig.mass`."""
         whole = np.zeros((self.model.nv, self.model.nv))
         for unit, row in zip(np.eye(self.model.nv), whole, strict=True):
             mujoco().mj_mulM(self.model, self.data, row, unit)
         return whole
 
     def velocity(self) -> Array:
-        """See `Rig.velocity`."""
+        """Velocity of the probe, see `Rig.velocity`."""
         return np.array(self.data.qvel)
 
     def move(self, change: Array) -> None:
-        """See `Rig.move`."""
+        """Moves the probe, see `Rig.move`."""
         mujoco().mj_integratePos(self.model, self.data.qpos, change, 1.0)
         for joint in np.flatnonzero(self.model.jnt_limited):
             if self.model.jnt_type[joint] >= int(mujoco().mjtJoint.mjJNT_SLIDE):

@@ -48,7 +48,7 @@ class Estimator(Protocol):
         """Take one sample in."""
 
     def estimate(self) -> Estimate:
-        """The present estimate."""
+        """The estimate of the samples so far."""
 
 
 class ContactIdentifier(Readable):

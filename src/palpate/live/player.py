@@ -94,7 +94,7 @@ class Feed:
         return end
 
     def tell(self) -> None:
-        """Calls the listeners."""
+        """Calls the listeners of the feed."""
         with self._lock:
             listeners = list(self._listeners)
         for listener in listeners:
@@ -130,7 +130,7 @@ class Reset(msgspec.Struct, tag="reset", tag_field="do", forbid_unknown_fields=T
 
 
 class Set(msgspec.Struct, tag="set", tag_field="do", forbid_unknown_fields=True):
-    """Move a slider."""
+    """Command that moves a slider."""
 
     key: str
     value: float

@@ -127,7 +127,7 @@ class GuardedServer(ABC):
         self._thread.join()
 
     def _address(self) -> Address:
-        """Once it listens."""
+        """Address of the server once it listens."""
         self._ready.wait(_STARTING)
         if self._refused is not None:
             remedy = f"name another with {self._option}; 0 takes a free one"

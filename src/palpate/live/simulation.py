@@ -159,7 +159,7 @@ class Simulation:
         return OfBench(self._experiment)
 
     def bones(self, row: Array) -> Array:
-        """See `Source`."""
+        """Positions of the joints, see `Source`."""
         return planar_bones(self.view.links, row)
 
     def _begin(self) -> None:

@@ -330,7 +330,7 @@ class Replay:
         return
 
     def bones(self, row: Array) -> Array:
-        """See `Source`."""
+        """Positions of the joints, see `Source`."""
         return planar_bones(self.view.links, row)
 
     def reset(self, seed: int | None = None) -> None:

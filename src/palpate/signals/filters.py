@@ -223,7 +223,7 @@ class Delay(NamedTuple):
 
     @property
     def lag(self):
-        """Seconds."""
+        """Lag of the filter at zero frequency [s]."""
         return self.samples / self.rate
 
 

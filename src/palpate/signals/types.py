@@ -133,7 +133,7 @@ def alike(value: float) -> Vec3:
 
 
 def triple(values: Iterable[float]) -> Vec3:
-    """Three numbers."""
+    """Three numbers as a `Vec3`."""
     return Vec3(*map(float, values))
 
 

@@ -173,7 +173,7 @@ def number(value: float) -> str:
 
 
 def as_json(comparisons: Sequence[Comparison]) -> list[dict[str, Any]]:
-    """Plain values."""
+    """The comparison as plain values."""
     return [
         {
             "of": one.of,

@@ -287,7 +287,7 @@ class Drawn:
     figure: Callable[[Sequence[Any], str], Figure]
 
     def draw(self) -> Figure:
-        """The figure."""
+        """The figure, drawn from its panels."""
         return self.figure(self.panels(), with_unit(self.metric))
 
 
@@ -304,7 +304,7 @@ class Rows:
         return self.frame.filter(polars.col("part") == name) if "part" in self.frame.columns else self.frame
 
     def axis(self, name: str, part: str = MAIN) -> Axis:
-        """A parameter."""
+        """A parameter of a part, by its name."""
         return next(a for p in self.plan.parts if p.name == part for a in p.axes if a.name == name)
 
     def scale(self, name: str) -> Scale:

@@ -113,7 +113,7 @@ class Part:
 
     @cached_property
     def sobol(self) -> Sobol:
-        """The points drawn."""
+        """The sequence of the points drawn."""
         return Sobol(len(self.drawn), self.samples_seed)
 
     def values(self, number: int) -> dict[str, Any]:

@@ -64,7 +64,7 @@ class Finished:
         return self.below + len(self.above or ())
 
     def add(self, run: int) -> None:
-        """One more."""
+        """Takes one more run as finished."""
         above = self.above = self.above if self.above is not None else set()
         if run >= self.below:
             above.add(run)

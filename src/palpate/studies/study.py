@@ -64,7 +64,7 @@ class Best(Table, frozen=True):
 
     @property
     def metric(self) -> str:
-        """The metric's name."""
+        """The name of the figure's metric."""
         return self.least or self.most
 
 
@@ -117,7 +117,7 @@ class Against(Table, frozen=True):
 
 
 class Study(Table, frozen=True, kw_only=True):
-    """A whole study."""
+    """A whole study, from its file."""
 
     title: str
     about: str = ""

@@ -76,7 +76,7 @@ class Positions(NamedTuple):
     reach: float
 
     def put(self, row, x):
-        """Writes a row."""
+        """Writes a row into the ring."""
         slot = int(row) % self.room
         self.ring[slot] = self.ring[slot + self.room] = x
 

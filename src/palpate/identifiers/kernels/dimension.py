@@ -74,7 +74,7 @@ class Vector(NamedTuple):
         return total
 
     def map_left(b, A):
-        """A b."""
+        """The matrix product from the left."""
         out = np.zeros(len(b.of))
         for i in range(len(out)):
             for j in range(len(out)):
@@ -82,7 +82,7 @@ class Vector(NamedTuple):
         return Vector(out)
 
     def map_outer(a, b):
-        """a b^T."""
+        """The outer product a b^T."""
         out = np.empty((len(a.of), len(a.of)))
         for i in range(len(out)):
             for j in range(len(out)):
@@ -121,7 +121,7 @@ class Matrix(NamedTuple):
         return b.map_left(A)
 
     def map_left(B, A):
-        """A B."""
+        """The matrix product from the left."""
         out = np.zeros(A.of.shape)
         for i in range(len(out)):
             for j in range(len(out)):
@@ -162,11 +162,11 @@ class Vec4(NamedTuple):
         return a.v @ b.v + a.w * b.w
 
     def map_left(b, A):
-        """A b."""
+        """The matrix product from the left."""
         return Vec4(A.inner @ b.v + b.w * A.column, A.row @ b.v + A.corner * b.w)
 
     def map_outer(a, b):
-        """a b^T."""
+        """The outer product a b^T."""
         return Mat4(outer(a.v, b.v), b.w * a.v, a.w * b.v, a.w * b.w)
 
 
@@ -192,7 +192,7 @@ class Mat4(NamedTuple):
         return b.map_left(A)
 
     def map_left(B, A):
-        """A B."""
+        """The matrix product from the left."""
         return Mat4(
             A.inner @ B.inner + outer(A.column, B.row),
             A.inner @ B.column + B.corner * A.column,
@@ -202,7 +202,7 @@ class Mat4(NamedTuple):
 
     @property
     def T(A):
-        """The transpose."""
+        """The transpose of the matrix."""
         return Mat4(A.inner.T, A.row, A.column, A.corner)
 
     def map_solve(A, b):
@@ -258,7 +258,7 @@ class Three(NamedTuple):
         return _AXES[i]
 
     def identity(self):
-        """The unit matrix."""
+        """The unit matrix of this size."""
         return _AXES
 
     def variances(self, S):
@@ -303,7 +303,7 @@ class Four(NamedTuple):
         return Vec4(_AXES[i], 0.0) if i < 3 else Vec4(_NONE, 1.0)
 
     def identity(self):
-        """The unit matrix."""
+        """The unit matrix of this size."""
         return Mat4(_AXES, _NONE, _NONE, 1.0)
 
     def variances(self, S):
@@ -345,7 +345,7 @@ class AnyNumber(NamedTuple):
         return Vector(out)
 
     def identity(self):
-        """The unit matrix."""
+        """The unit matrix of this size."""
         return Matrix(np.eye(self.n))
 
     def variances(self, S):

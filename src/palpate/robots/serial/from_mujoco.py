@@ -18,7 +18,7 @@ from palpate.robots.serial.serial_arm import Scene, SerialArm
 
 
 def from_mujoco(model: Any, site: str | None = None) -> SerialArm:
-    """See `SerialArm.from_mujoco`."""
+    """The arm of a MuJoCo model, see `SerialArm.from_mujoco`."""
     if isinstance(model, str | PathLike):
         path = Path(model)
         loaded, notes = load_mjcf(path)

@@ -55,7 +55,7 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class ArmFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An arm's file."""
+    """Content of an arm's TOML file."""
 
     title: str
     home: list[float]
@@ -189,7 +189,7 @@ _SEEN = ("visual", "collision")
 
 
 def from_urdf(path: Path, link: str) -> SerialArm:
-    """See `SerialArm.from_urdf`."""
+    """The arm of a URDF file, see `SerialArm.from_urdf`."""
     root = _robot(path)
     links = [one.get("name", "") for one in root.iter("link")]
     if link not in links:

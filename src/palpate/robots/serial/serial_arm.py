@@ -146,7 +146,7 @@ class SerialArm(Readable):
 
     @property
     def joints(self) -> int:
-        """n."""
+        """Number of the joints, n."""
         return len(self.names)
 
     def forward_kinematics(self, q: ArrayLike) -> Array:

@@ -26,7 +26,7 @@ class Identity(NamedTuple):
     one: float = 1.0
 
     def on(A, b):
-        """b itself."""
+        """The vector b itself, unchanged."""
         return b
 
     def __matmul__(A, b):
@@ -34,11 +34,11 @@ class Identity(NamedTuple):
 
     @property
     def T(A):
-        """Itself."""
+        """The identity, its own transpose."""
         return A
 
     def map_resolve(J, a, M):
-        """a itself."""
+        """The vector a itself, unchanged."""
         return a
 
 
