@@ -20,12 +20,12 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=572, lines=68740, tokens=454514),
-    "packages/palpate-thesis/src/palpate_thesis": Weight(files=67, lines=10585, tokens=80850),
+    "src/palpate": Weight(files=466, lines=68520, tokens=453760),
+    "packages/palpate-thesis/src/palpate_thesis": Weight(files=67, lines=10575, tokens=80801),
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 414, 148
+PARTICIPLES, SHORT_DOCSTRINGS = 248, 75
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 TWICE = frozenset(
     {
