@@ -123,9 +123,9 @@ def _wrote(path: Path, *words: str) -> None:
 
 def HEAD() -> object:
     """Of the journal."""
-    from palpate.studies.run_study import Head
+    from palpate.studies.run_study import JournalHead
 
-    return Head("T", "study", "0.1.0", "sources", 10)
+    return JournalHead("T", "study", "0.1.0", "sources", 10)
 
 
 SAMPLES: dict[str, tuple[str, Callable[[Path], None]]] = {

@@ -69,5 +69,5 @@ def test_a_wrong_sign_is_named_and_damping_refused(left, named):
     assert bool(said) is (left != 0.0)  # a tool's own mass is told too, and taken out
     assert ("wrong sign" in found.parameters["B"].reason) is named
     assert found.parameters["K"].value == pytest.approx(5000, rel=0.05)
-    value, std = along.meta["contact_frame"]["air_inertia_kg"]
+    value, std = along.meta["contact_frame"]["free_inertia_kg"]
     assert abs(value - left) < 4 * std

@@ -13,7 +13,7 @@ from live.test_server import Clock
 from palpate.live.pressing import PressingArm
 from palpate.live.recorded_run import clear_at_restarts
 from palpate.live.simulation import Simulation
-from palpate.live.view import Replay, Signals, View
+from palpate.live.view import Replay, ReplayedSignals, View
 
 MS = 1000 * PATIENCE
 by_the_clock = pytest.mark.flaky(reruns=2, reruns_delay=2)
@@ -219,7 +219,10 @@ def test_a_log_shows_what_it_has_and_nothing_else(browser):
     view = View(
         title="log", about="", kind="replay", rate=0.0, notes=notes, units={"depth": "mm", "measured": "N"}
     )
-    with playing(Replay(view, Signals(columns))) as (_, address, _client), opened(browser, address) as page:
+    with (
+        playing(Replay(view, ReplayedSignals(columns))) as (_, address, _client),
+        opened(browser, address) as page,
+    ):
         until(page, "palpate.live.rows > 100")
         assert page.locator("#charts h3").all_text_contents() == ["Force", "Position"]
         assert not page.locator("#stiffness").is_visible()

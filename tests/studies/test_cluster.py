@@ -18,7 +18,7 @@ from palpate.cli import main
 from palpate.errors import InputError
 from palpate.studies import cluster as clusters
 from palpate.studies.cluster import Certificates, Cluster, run_batch
-from palpate.studies.run_one import Job, Local, sources
+from palpate.studies.run_one import Local, RunJob, sources
 from palpate.studies.run_study import Work
 from studies.cluster import local_cluster
 from studies.small import SMALL, Formula, planned, text
@@ -177,7 +177,7 @@ def test_a_cluster_is_reached_through_tls(tmp_path):
 
 def jobs(count):
     plan = planned(SMALL)
-    return [Job(plan.setting(i), tuple(plan.study.metrics), None, False) for i in range(count)]
+    return [RunJob(plan.setting(i), tuple(plan.study.metrics), None, False) for i in range(count)]
 
 
 def test_a_worker_with_other_sources_refuses():

@@ -7,13 +7,13 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.studies.run_one import Row
-from palpate.studies.run_study import Finished, Head, open_journal, rows
+from palpate.studies.run_study import Finished, JournalHead, open_journal, rows
 
 YESTERDAY = (
     b'60054b54 {"title":"T","study":"study","palpate":"0.1.0","sources":"sources","runs":10,"format":1}\n'
     b'42b338d8 [4,{"a":0.4,"seed":0},"done","as asked for",[0.2,null],0.01]\n'
 )
-HEAD = Head("T", "study", "0.1.0", "sources", 10)
+HEAD = JournalHead("T", "study", "0.1.0", "sources", 10)
 
 
 def row(run):
@@ -77,9 +77,9 @@ def test_whatever_one_byte_is_changed_to_at_most_one_run_is_lost(path):
 
 def test_another_study_and_another_version_are_refused(path):
     for other, told in (
-        (Head("T", "another", "0.1.0", "sources", 10), "another study"),
-        (Head("T", "study", "0.2.0", "sources", 10), "another version"),
-        (Head("T", "study", "0.1.0", "other", 10), "another version"),
+        (JournalHead("T", "another", "0.1.0", "sources", 10), "another study"),
+        (JournalHead("T", "study", "0.2.0", "sources", 10), "another version"),
+        (JournalHead("T", "study", "0.1.0", "other", 10), "another version"),
     ):
         before = path.read_bytes()
         with pytest.raises(InputError, match=told), open_journal(path, other):

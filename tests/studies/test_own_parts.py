@@ -11,7 +11,7 @@ from palpate.studies import run
 from palpate.studies.cluster import run_batch
 from palpate.studies.plan import plan, resolve
 from palpate.studies.preview import check_parts_of
-from palpate.studies.run_one import Job, run_one, sources
+from palpate.studies.run_one import RunJob, run_one, sources
 from palpate.studies.study import parse
 from studies.small import NEAR, text
 
@@ -71,7 +71,7 @@ def test_a_worker_imports_them_and_refuses_other_sources():
     from dataclasses import replace
 
     planned = plan(parse(IDENTIFIED, "T"), "T")
-    job = Job(planned.setting(0), tuple(planned.study.metrics), None, False, planned.plugins)
+    job = RunJob(planned.setting(0), tuple(planned.study.metrics), None, False, planned.plugins)
     ((row, _),) = run_batch(pickle.dumps([job]), sources(), job.plugins)
     assert row.metrics == run_one(job)[0].metrics
     other = replace(planned.plugins[0], stamp="0123456789abcdef")

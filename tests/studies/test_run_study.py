@@ -13,7 +13,7 @@ from palpate.bench import Bench
 from palpate.errors import InputError
 from palpate.logs import read_record
 from palpate.studies import run_one as one_run
-from palpate.studies.run_one import Job, Local, map_unordered
+from palpate.studies.run_one import Local, RunJob, map_unordered
 from palpate.studies.run_study import Work
 from studies.small import NEAR, SMALL, Formula, planned, text
 
@@ -223,7 +223,7 @@ def test_stopping_stops_the_runs_under_way():
 
     def jobs():
         for run in range(2):
-            yield Job(plan.setting(run), ("force_rms",), None, False)
+            yield RunJob(plan.setting(run), ("force_rms",), None, False)
         raise KeyboardInterrupt
 
     before = set(threading.enumerate())

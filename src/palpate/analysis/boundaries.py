@@ -40,7 +40,7 @@ SMOOTH = 1e-3
 
 
 @dataclass(frozen=True)
-class Cell:
+class StabilityCell:
     """A piece of the number's coordinate and the period's matrices in it.
 
     Args:
@@ -70,7 +70,7 @@ class Cell:
             found += np.prod((share - others) / (places[i] - others)) * matrix
         return found
 
-    def halves(self, period: Period | None) -> list[Cell]:
+    def halves(self, period: Period | None) -> list[StabilityCell]:
         """Both halves: of periods where they are given, else of the quartic."""
         middle = 0.5 * (self.low + self.high)
         found = []
@@ -81,7 +81,7 @@ class Cell:
                 p, q = map(self.at, shares)
             else:
                 p, q = (period(self.low + share * self.width) for share in shares)
-            found.append(Cell(low, high, (a, p, m, q, b)))
+            found.append(StabilityCell(low, high, (a, p, m, q, b)))
         return found
 
 
@@ -98,7 +98,7 @@ def stable_pieces(period: Period, low: float, high: float) -> list[tuple[float, 
     found: list[tuple[float, float]] = []
     for i in range(0, 4 * FIRST, 4):
         a, p, m, q, b = known[i : i + 5]
-        for cell in _stable(Cell(places[i], places[i + 4], (a, p, m, q, b)), period):
+        for cell in _stable(StabilityCell(places[i], places[i + 4], (a, p, m, q, b)), period):
             if found and found[-1][1] == cell.low:
                 found[-1] = (found[-1][0], cell.high)
             else:
@@ -106,7 +106,7 @@ def stable_pieces(period: Period, low: float, high: float) -> list[tuple[float, 
     return found
 
 
-def _stable(cell: Cell, period: Period | None) -> Iterator[Cell]:
+def _stable(cell: StabilityCell, period: Period | None) -> Iterator[StabilityCell]:
     """The stable cells of a cell, from below."""
     if unstable(cell):
         return
@@ -132,7 +132,7 @@ def growth(matrix: Array) -> float:
     return float(np.log(np.abs(np.linalg.eigvals(into.T @ matrix @ into)).max() + 1e-300))
 
 
-def unstable(cell: Cell) -> bool:
+def unstable(cell: StabilityCell) -> bool:
     """Whether the fastest mode grows everywhere in the cell."""
     if not all(growth(M) > 0.0 for M in cell.nodes[::-2]):
         return False
@@ -143,7 +143,7 @@ def unstable(cell: Cell) -> bool:
     return MISSED * max(missed) < min(*rates, 2.0 * m - 0.5 * (a + b))
 
 
-def contracts(cell: Cell) -> bool:
+def contracts(cell: StabilityCell) -> bool:
     """Whether one norm contracts in all of the cell, what never changes left out."""
     into, _, _ = change(cell.nodes[2])
     inside = [into.T @ M @ into for M in cell.nodes]
@@ -153,7 +153,7 @@ def contracts(cell: Cell) -> bool:
     back = np.linalg.inv(L.T)
     a, p, m, q, b = (L.T @ M @ back for M in inside)
     hull = max(float(np.linalg.norm(M, 2)) for M in (a, 2.0 * m - 0.5 * (a + b), b))
-    missed = Cell(cell.low, cell.high, (a, p, m, q, b)).error_at_quarters()
+    missed = StabilityCell(cell.low, cell.high, (a, p, m, q, b)).error_at_quarters()
     return hull + MISSED * max(float(np.linalg.norm(M, 2)) for M in missed) < 1.0
 
 

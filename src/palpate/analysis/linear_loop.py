@@ -99,7 +99,7 @@ class Moving(NamedTuple):
     controller: Any
 
 
-class Motion:
+class LoopMotion:
     """The motion of a loop around a state.
 
     Args:
@@ -267,7 +267,7 @@ class LinearLoop:
         torque: of the motors at rest [N m], shape (3,).
     """
 
-    motion: Motion
+    motion: LoopMotion
     x: Array
     period: int
     transition: Array

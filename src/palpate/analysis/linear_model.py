@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate._vector import ZERO3, Vec3
-from palpate.analysis.linear_loop import LinearLoop, Motion, change
+from palpate.analysis.linear_loop import LinearLoop, LoopMotion, change
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
@@ -147,7 +147,7 @@ def linearise(
     if not wanted > 0.0:
         raise InputError(f"force must be above 0 N, got {wanted:g}: without contact there is no force loop")
     loop = at_equilibrium(bench.loop, wanted, friction=friction)
-    motion = Motion(*pressing(loop, wanted, math.copysign(1.0, bench.q.y), x))
+    motion = LoopMotion(*pressing(loop, wanted, math.copysign(1.0, bench.q.y), x))
     period = period_of(loop)
     at = at_rest(motion, period)
     if at is None:
@@ -175,7 +175,7 @@ def period_of(loop: Loop) -> int:
     return math.lcm(pattern, loop.steps) // loop.steps
 
 
-def at_rest(motion: Motion, period: int) -> Array | None:
+def at_rest(motion: LoopMotion, period: int) -> Array | None:
     """The state that no tick moves by more than `REST`, by Newton's iteration, shape (n,); None if it finds none.
 
     Of many such states the one nearest to the start.
@@ -193,11 +193,11 @@ def at_rest(motion: Motion, period: int) -> Array | None:
     return None
 
 
-def _unrest(motion: Motion, x: Array, first: int, ticks: int) -> Array:
+def _unrest(motion: LoopMotion, x: Array, first: int, ticks: int) -> Array:
     """How far some ticks carry the state, in steps."""
     return (motion.after(x, first, ticks)[0] - x) / motion.steps
 
 
-def _row(motion: Motion, x: Array) -> dict[str, float]:
+def _row(motion: LoopMotion, x: Array) -> dict[str, float]:
     """Recorded values of a state, by column; of its second tick, which includes the force."""
     return dict(zip(COLUMNS, motion.after(x, 0, 2)[1][-1].tolist(), strict=True))

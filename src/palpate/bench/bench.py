@@ -95,7 +95,7 @@ class Bench(Readable):
         progress: Progress | None = None,
         waiting: Callable[[], None] | None = None,
     ) -> Record:
-        """Runs from rest in the air.
+        """Runs from rest in free motion.
 
         Args:
             duration: at most so long [s].

@@ -16,7 +16,7 @@ from palpate.signals.types import Sense
 
 
 @part
-class Signals(NamedTuple):
+class ConditionedSignals(NamedTuple):
     """Conditioned sensor signals of a tick, for controllers and estimators."""
 
     sense: Sense  # what controllers see
@@ -79,7 +79,7 @@ class Conditioning(NamedTuple):
         smooth_a, acceleration = self.motion.step(state.acceleration, a)
         smooth_force, force_state = self.force.step(state.force, force)
         sense = Sense(Vec3(q.x, q.y, q3), Vec3(qd.x, qd.y, qd3), x, smooth_xd, Vec3(smooth_force, 0.0, 0.0))
-        signals = Signals(sense, xd.x, a, smooth_a, force)
+        signals = ConditionedSignals(sense, xd.x, a, smooth_a, force)
         return signals, ConditioningState(q, x, xd.x, angle, rate, twist, acceleration, force_state)
 
 

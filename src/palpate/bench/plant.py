@@ -75,12 +75,12 @@ class PlantState(NamedTuple):
 
 
 @part
-class Touch(NamedTuple):
+class SurfaceTouch(NamedTuple):
     """Force of the tip on the surface during a step."""
 
     normal: float  # into the surface [N], never negative
     tangential: float  # along y [N]
-    penetration: float  # of the tip [m], negative in the air
+    penetration: float  # of the tip [m], negative in free motion
     friction: Vec3  # torque lost in the joints [N m]
     inertial: float = 0.0  # force that what lies beyond the force sensor takes to be moved [N]
     rate: float = 0.0  # of the tip along x [m/s]
@@ -109,7 +109,7 @@ class Plant(NamedTuple):
     beyond: float = 0.0
 
     def start_at(self, q):
-        """At rest in the air, at the joint angles q."""
+        """At rest in free motion, at the joint angles q."""
         return PlantState(
             q,
             0.0 * q,
@@ -162,5 +162,5 @@ class Plant(NamedTuple):
         bent = self.mode.after_impulse(bent, impulse)
         after = normal @ qd + bent.rate
         inertial = self.beyond * ((after - normal @ state.qd - state.bent.rate) / dt + model.Jdqd.x)
-        felt = Touch(max(force, 0.0) + impulse / dt, -slide, p, friction, inertial, after)
+        felt = SurfaceTouch(max(force, 0.0) + impulse / dt, -slide, p, friction, inertial, after)
         return PlantState(q, qd, bristles, surface, side, bent), felt

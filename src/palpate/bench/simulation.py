@@ -26,7 +26,7 @@ DEPTH, RATE = 1e-3, 1e-3
 """Of the tip in the surface, at which it is asked for its force [m], [m/s]."""
 
 
-class Call(NamedTuple):
+class PartCall(NamedTuple):
     """One method of a part with the arguments that the loop gives it.
 
     Args:
@@ -112,7 +112,7 @@ def not_finite(loop: Loop, state: LoopState) -> str:
     return ""
 
 
-def _wrong(call: Call, value: Any) -> str:
+def _wrong(call: PartCall, value: Any) -> str:
     """Fault of a method's return value."""
     if call.method == "step":
         if not isinstance(value, tuple) or isinstance(value, Vec3) or len(value) != 2:
@@ -130,23 +130,23 @@ def _wrong(call: Call, value: Any) -> str:
     return ""
 
 
-def calls(loop: Loop, state: LoopState) -> Iterator[Call]:
+def calls(loop: Loop, state: LoopState) -> Iterator[PartCall]:
     """Every method of the user's parts, as the loop calls it in contact."""
     controller, surface = loop.controller, loop.plant.surface
     if is_own(controller):
         sense, task, model = _moment(loop, state)
         own = controller.start()
-        yield Call("controller", controller, "start", (), None)
-        yield Call("controller", controller, "step", (own, sense, task, model), 1)
-        yield Call("controller", controller, "rest", (own, sense), -1)
-        yield Call("controller", controller, "report", (own,), None)
+        yield PartCall("controller", controller, "start", (), None)
+        yield PartCall("controller", controller, "step", (own, sense, task, model), 1)
+        yield PartCall("controller", controller, "rest", (own, sense), -1)
+        yield PartCall("controller", controller, "report", (own,), None)
     if is_own(surface):
         untouched = surface.start()
         pressed, dt = touch(untouched, RATE), loop.tick / loop.steps
-        yield Call("surface", surface, "start", (), None)
-        yield Call("surface", surface, "force", (pressed, DEPTH, RATE), None)
-        yield Call("surface", surface, "relax", (pressed, DEPTH, RATE, dt), -1)
-        yield Call("surface", surface, "free", (untouched, dt), -1)
+        yield PartCall("surface", surface, "start", (), None)
+        yield PartCall("surface", surface, "force", (pressed, DEPTH, RATE), None)
+        yield PartCall("surface", surface, "relax", (pressed, DEPTH, RATE, dt), -1)
+        yield PartCall("surface", surface, "free", (untouched, dt), -1)
 
 
 def _moment(loop: Loop, state: LoopState) -> tuple[Sense, Task, Any]:

@@ -6,7 +6,7 @@ from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Vec3
 from palpate.bench.estimators import Estimators, EstimatorsState
 from palpate.bench.force_input import Conditioning, ConditioningState, ForceInput, ForceInputState
-from palpate.bench.plant import Plant, PlantState, Touch
+from palpate.bench.plant import Plant, PlantState, SurfaceTouch
 from palpate.bench.sequence import CONTACT, Sequence, SequenceState, put
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 from palpate.friction import Coulomb
@@ -55,7 +55,7 @@ class Loop(NamedTuple):
 @part
 class LoopState(NamedTuple):
     plant: PlantState
-    felt: Touch  # during the step before this tick
+    felt: SurfaceTouch  # during the step before this tick
     force: ForceInputState
     conditioning: ConditioningState
     sequence: SequenceState
@@ -74,12 +74,12 @@ class Command(NamedTuple):
 
 @law
 def start_at(loop, q):
-    """The loop at rest in the air, at joint angles q [rad]."""
+    """The loop at rest in free motion, at joint angles q [rad]."""
     seen = loop.encoder.read(q)
     conditioning = loop.conditioning.start_at(seen)
     return LoopState(
         loop.plant.start_at(q),
-        Touch(0.0, 0.0, loop.plant.arm.pose(q).x - loop.plant.wall, ZERO3, 0.0, 0.0),
+        SurfaceTouch(0.0, 0.0, loop.plant.arm.pose(q).x - loop.plant.wall, ZERO3, 0.0, 0.0),
         loop.force.start(),
         conditioning,
         loop.sequence.start(),
@@ -114,7 +114,7 @@ def think(loop, state, signals, sequence):
 def move(loop, plant, force, torque, k, noise):
     """Plant and force sensor through the steps up to the next tick."""
     dt = loop.tick / loop.steps
-    felt = Touch(0.0, 0.0, 0.0, ZERO3, 0.0, 0.0)
+    felt = SurfaceTouch(0.0, 0.0, 0.0, ZERO3, 0.0, 0.0)
     for j in range(loop.steps):
         plant, felt = loop.plant.advance(plant, torque, dt)
         rough = noise * (1.0 + loop.force.roughness * abs(felt.rate))

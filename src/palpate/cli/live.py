@@ -22,7 +22,7 @@ from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.live.player import Player
-    from palpate.live.view import Source
+    from palpate.live.view import RowSource
 
 _DEFAULT = "foam-hybrid"
 
@@ -140,7 +140,7 @@ def live(
     return _serve(_replay(path, asked, shown.whole_approach), at)
 
 
-def _simulation(name: str, seed: int, whole: bool) -> Source:
+def _simulation(name: str, seed: int, whole: bool) -> RowSource:
     from palpate.bench.tables import load
     from palpate.live.simulation import Simulation
 
@@ -151,13 +151,13 @@ def _simulation(name: str, seed: int, whole: bool) -> Source:
         raise InputError(f"{name}: {error}") from error
 
 
-def _pressing(name: str, seed: int) -> Source:
+def _pressing(name: str, seed: int) -> RowSource:
     from palpate.live.pressing import PressingArm
 
     return PressingArm(name, seed, waiting=lambda: say(COMPILING))
 
 
-def _replay(path: Path, asked: Any, whole: bool) -> Source:
+def _replay(path: Path, asked: Any, whole: bool) -> RowSource:
     from palpate.live.recorded_run import of_log, of_run
     from palpate.logs.own_runs import is_run
 
@@ -167,7 +167,7 @@ def _replay(path: Path, asked: Any, whole: bool) -> Source:
     return of_log(source.title, found, along)
 
 
-def _serve(shown: Source, at: ServedOptions) -> int:
+def _serve(shown: RowSource, at: ServedOptions) -> int:
     from palpate.live.player import Feed, Player, made_ready
     from palpate.live.server import HOST, WARNING, network_address, qr_code, serve
 
@@ -191,7 +191,7 @@ def _serve(shown: Source, at: ServedOptions) -> int:
 
 
 @contextmanager
-def _stability(shown: Source) -> Iterator[tuple[Any, Any, list[Any]]]:
+def _stability(shown: RowSource) -> Iterator[tuple[Any, Any, list[Any]]]:
     """Stability of the loop of a simulation; a log has no loop."""
     from palpate.live.stability import Stability
 

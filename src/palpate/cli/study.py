@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from palpate.studies.cluster import Cluster
     from palpate.studies.plan import Plan
-    from palpate.studies.run_study import Runner
+    from palpate.studies.run_study import StudyRunner
     from palpate.studies.summary import Findings
 
 
@@ -177,7 +177,7 @@ def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
 
 
 @contextmanager
-def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
+def _runner(where: ClusterOptions, screen: Console) -> Iterator[StudyRunner]:
     cluster = where.cluster()
     if cluster is None:
         from palpate.studies.run_one import Local

@@ -12,6 +12,7 @@ from palpate.contact_frame.signals_in_base import Arm
 from palpate.errors import InputError
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn
 from palpate.identification.options import LEAST_SQUARES
+from palpate.signals.types import NORMAL
 from palpate.units import GRAVITY
 
 LOWER_BOUND = "a lower bound of the surface's stiffness"
@@ -79,8 +80,8 @@ def _without_tool(mass: Parameter, arm: Arm, tolerance: float) -> Parameter:
             mass, ci95=None, reason=f"{mass.reason}; the tool's {tool:.3g} kg are not taken off yet"
         )
     value = (mass.ci95[0] + mass.ci95[1]) / 2 - tool
-    half = float(np.hypot((mass.ci95[1] - mass.ci95[0]) / 2, 1.96 * tool_std))
-    std, low, high = half / 1.96, value - half, value + half
+    half = float(np.hypot((mass.ci95[1] - mass.ci95[0]) / 2, NORMAL * tool_std))
+    std, low, high = half / NORMAL, value - half, value + half
     taken = f"the tool's {tool:.3g} kg taken off"
     if low <= 0 <= high:
         bounds = f"95 %: {low:.3g} to {high:.3g} {mass.unit}"

@@ -229,7 +229,7 @@ class Payload(Table):
     """Of mass, in the tool's axes from the point that the torque is about [m]; None without a torque."""
     centre_std: NotNegative | None = None
     inertia: float | None = None
-    """Mass by which the force follows the acceleration in the air, against gravity's sense [kg]: the tool's own where
+    """Mass by which the force follows the acceleration when free, against gravity's sense [kg]: the tool's own where
     nothing takes it off, 0 where a driver does, below 0 where one does so with the wrong sign; None if not told."""
     inertia_std: NotNegative | None = None
 

@@ -18,8 +18,8 @@ from palpate.contact_frame.load import MATTERS, Normal, direction_of, load_of, s
 from palpate.contact_frame.signals_in_base import (
     FORCE,
     Arm,
+    BaseSignals,
     ContactFrame,
-    Signals,
     Unloaded,
     in_range,
     signals_of,
@@ -34,7 +34,7 @@ _LEAST = 0.3
 """Of the largest force: the line of a weaker one is three times as uncertain, for the same noise of the torque."""
 
 
-def line_misses_tcp(signals: Signals, free: Mask, inside: Mask, frame: ContactFrame) -> float | None:
+def line_misses_tcp(signals: BaseSignals, free: Mask, inside: Mask, frame: ContactFrame) -> float | None:
     """How far the contact force's line of action passes from the tool centre point [m]; the median over the contact.
 
     A force f at r gives the torque r x f about the point that the torque is about, so the line is at
@@ -92,13 +92,13 @@ def project(record: Record, frame: ContactFrame) -> Record:
     spread = scale_std(normal, *_in_contact(signals, freed))
     inertia = _inertia_in_air(signals, freed, sign, frame)
     notes += turned + _warnings(signals, freed, normal, spread) + _doubts(freed, signals, frame, inertia)
-    about = _about(signals, freed, normal, sign, frame) | {"scale_std": spread, "air_inertia_kg": inertia}
+    about = _about(signals, freed, normal, sign, frame) | {"scale_std": spread, "free_inertia_kg": inertia}
     meta = {**record.meta, "contact_frame": about, "notes": [*record.meta.get("notes", ()), *notes]}
     columns = {"time": signals.time, "position": position, "force": sign * freed.force @ normal.direction}
     return Record(columns, {"time": "s", "position": "m", "force": "N"}, meta)
 
 
-def _normal(signals: Signals, freed: Unloaded, frame: ContactFrame) -> Normal:
+def _normal(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> Normal:
     if frame.normal is None:
         direction, std = direction_of(freed.force[freed.there])
         return Normal(direction, std, found=True)
@@ -110,7 +110,7 @@ def _normal(signals: Signals, freed: Unloaded, frame: ContactFrame) -> Normal:
     return Normal(direction, 0.0, found=False)
 
 
-def _in_contact(signals: Signals, freed: Unloaded) -> tuple[Array, Array]:
+def _in_contact(signals: BaseSignals, freed: Unloaded) -> tuple[Array, Array]:
     """Forces and places in contact; of the whole log where there is none."""
     rows = freed.inside if (freed.inside & freed.there).sum() > 1 else np.ones(len(freed.inside), bool)
     placed = read_rows(signals.place)
@@ -118,7 +118,7 @@ def _in_contact(signals: Signals, freed: Unloaded) -> tuple[Array, Array]:
 
 
 def _orient(
-    signals: Signals, freed: Unloaded, normal: Normal, frame: ContactFrame
+    signals: BaseSignals, freed: Unloaded, normal: Normal, frame: ContactFrame
 ) -> tuple[float, Normal, list[dict[str, Any]]]:
     """The sign that makes the force act from the tool on the surface, and the normal into the surface."""
     together = _correlation(signals, freed, normal.direction)
@@ -139,7 +139,7 @@ def _orient(
     return sign, turned, [{"code": "position-sign-reversed", "text": text}]
 
 
-def _correlation(signals: Signals, freed: Unloaded, direction: Array) -> float:
+def _correlation(signals: BaseSignals, freed: Unloaded, direction: Array) -> float:
     """Of the force with the position along a direction, in contact; the same for the direction turned round."""
     rows = (freed.inside if freed.inside.any() else freed.there) & freed.there
     placed = read_rows(signals.place)
@@ -150,7 +150,7 @@ def _correlation(signals: Signals, freed: Unloaded, direction: Array) -> float:
     return float(np.corrcoef(position, force)[0, 1])
 
 
-def _mean_press(signals: Signals, freed: Unloaded, direction: Array) -> float:
+def _mean_press(signals: BaseSignals, freed: Unloaded, direction: Array) -> float:
     """How much larger the force along a direction is in contact than out of it [N]; 0 if the tool never leaves."""
     inside = freed.inside & freed.there
     if not (freed.free.any() and inside.any()):
@@ -158,7 +158,7 @@ def _mean_press(signals: Signals, freed: Unloaded, direction: Array) -> float:
     return float((freed.force[inside].mean(axis=0) - freed.force[freed.free].mean(axis=0)) @ direction)
 
 
-def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) -> list[dict[str, Any]]:
+def _warnings(signals: BaseSignals, freed: Unloaded, normal: Normal, spread: float) -> list[dict[str, Any]]:
     notes = []
     if signals.guess:
         notes.append({"code": "frame-guess", "text": f"{signals.guess}; say --wrench-frame if it is not so"})
@@ -181,7 +181,7 @@ def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) 
 
 
 def _inertia_in_air(
-    signals: Signals, freed: Unloaded, sign: float, frame: ContactFrame
+    signals: BaseSignals, freed: Unloaded, sign: float, frame: ContactFrame
 ) -> tuple[float, float] | None:
     """The mass by which the force follows the acceleration before the touch, and its std [kg].
 
@@ -196,7 +196,7 @@ def _inertia_in_air(
 
 
 def _doubts(
-    freed: Unloaded, signals: Signals, frame: ContactFrame, inertia: tuple[float, float] | None
+    freed: Unloaded, signals: BaseSignals, frame: ContactFrame, inertia: tuple[float, float] | None
 ) -> list[dict[str, Any]]:
     """Contradictions between the free rows and the compensated or weighed tool."""
     from scipy.special import chdtri
@@ -222,7 +222,7 @@ def _doubts(
 
 
 def _about(
-    signals: Signals, freed: Unloaded, normal: Normal, sign: float, frame: ContactFrame
+    signals: BaseSignals, freed: Unloaded, normal: Normal, sign: float, frame: ContactFrame
 ) -> dict[str, Any]:
     """Declared and estimated properties, as plain values."""
     load = freed.load
@@ -287,7 +287,7 @@ def identify_contact(
     in_space = FORCE[0] in record.columns
     if in_space:
         record = project(record, frame or ContactFrame())
-        spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "air_inertia_kg"))
+        spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "free_inertia_kg"))
     elif inertia is not None and wrong_sign(inertia):
         record = _note_inertia_sign(record, inertia)
     if arm.stiffness is not None:

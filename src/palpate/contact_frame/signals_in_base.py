@@ -114,7 +114,7 @@ QUATERNION = ("quaternion_x", "quaternion_y", "quaternion_z", "quaternion_w")
 
 
 @dataclass(frozen=True)
-class Signals:
+class BaseSignals:
     """Wrench and pose over time; NaN where there is no reading.
 
     Args:
@@ -140,7 +140,7 @@ class Signals:
     turned: bool
 
 
-def signals_of(record: Record, frame: ContactFrame) -> Signals:
+def signals_of(record: Record, frame: ContactFrame) -> BaseSignals:
     """Wrench and pose of a record in three dimensions.
 
     Raises:
@@ -156,7 +156,7 @@ def signals_of(record: Record, frame: ContactFrame) -> Signals:
     wrench_frame, guess = _wrench_frame(record, frame, turned)
     torque = _vectors(record, TORQUE) if TORQUE[0] in record.columns else None
     into_tool = _into_tool(wrench_frame, frame, rotations)
-    return Signals(
+    return BaseSignals(
         time=time,
         recorded=_vectors(record, FORCE),
         force=np.einsum("nij,nj->ni", into_tool, _vectors(record, FORCE)),
@@ -256,7 +256,7 @@ class Unloaded:
     load: Load
 
 
-def in_range(signals: Signals, frame: ContactFrame) -> tuple[Signals, Unloaded, list[dict[str, Any]]]:
+def in_range(signals: BaseSignals, frame: ContactFrame) -> tuple[BaseSignals, Unloaded, list[dict[str, Any]]]:
     """Take off weight and bias, and leave out the readings of a force at the end of its range.
 
     Returns:
@@ -271,7 +271,7 @@ def in_range(signals: Signals, frame: ContactFrame) -> tuple[Signals, Unloaded, 
     return signals, _remove_load(signals, frame), [{"code": "saturated", "text": text}]
 
 
-def _remove_load(signals: Signals, frame: ContactFrame) -> Unloaded:
+def _remove_load(signals: BaseSignals, frame: ContactFrame) -> Unloaded:
     there = read_rows(signals.force)
     if frame.free is None:
         load, inside, free = _fit_load(signals, there, frame)
@@ -282,7 +282,7 @@ def _remove_load(signals: Signals, frame: ContactFrame) -> Unloaded:
     return Unloaded(load.taken_off(signals.force, signals.rotations), there, inside, free, load)
 
 
-def _load(signals: Signals, free: Mask, frame: ContactFrame) -> Load:
+def _load(signals: BaseSignals, free: Mask, frame: ContactFrame) -> Load:
     """Weight and bias by the free rows; the weight is the payload's where there is one."""
     force, rotations = signals.force[free], signals.rotations[free]
     if frame.payload is not None:
@@ -290,7 +290,7 @@ def _load(signals: Signals, free: Mask, frame: ContactFrame) -> Load:
     return load_of(force, rotations, weighs=not frame.gravity_compensated)
 
 
-def _fit_load(signals: Signals, there: Mask, frame: ContactFrame) -> tuple[Load, Mask, Mask]:
+def _fit_load(signals: BaseSignals, there: Mask, frame: ContactFrame) -> tuple[Load, Mask, Mask]:
     """Weight and bias by the free rows; which rows these are, depends on the weight where the tool turns."""
     turned = signals.turned and turns(signals.rotations[there])
     none = there & False
@@ -316,5 +316,5 @@ def _fit_load(signals: Signals, there: Mask, frame: ContactFrame) -> tuple[Load,
     return load, inside, free
 
 
-def _contact(signals: Signals, load: Load) -> tuple[Mask, Mask]:
+def _contact(signals: BaseSignals, load: Load) -> tuple[Mask, Mask]:
     return contact_rows(signals.time, load.taken_off(signals.force, signals.rotations), signals.place)

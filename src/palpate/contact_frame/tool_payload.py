@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.contact_frame.free_motion import BLOCKS, free_inertia
 from palpate.contact_frame.load import Payload
-from palpate.contact_frame.signals_in_base import ContactFrame, Signals, signals_of
+from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, signals_of
 from palpate.contact_frame.vectors import FEWEST, Vector, read_rows
 from palpate.contact_frame.weighing import (
     Estimated,
-    Fitted,
     PoseFit,
     Poses,
+    WeighingFit,
     fit_centre,
     fit_force,
     groups_of,
@@ -127,7 +127,7 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
     )
 
 
-def _fit(signals: Signals, there: Mask, tolerance: float) -> PoseFit:
+def _fit(signals: BaseSignals, there: Mask, tolerance: float) -> PoseFit:
     time = signals.time[there] - signals.time[there].mean()
     turns, force = signals.rotations[there], signals.force[there]
     poses = poses_of(time, turns, force, groups_of(turns))
@@ -143,8 +143,8 @@ def _fit(signals: Signals, there: Mask, tolerance: float) -> PoseFit:
 
 
 def _at_rest(
-    signals: Signals, fitted: Fitted, parameters: dict[str, Estimated], frame: ContactFrame
-) -> Signals:
+    signals: BaseSignals, fitted: WeighingFit, parameters: dict[str, Estimated], frame: ContactFrame
+) -> BaseSignals:
     """Force and torque without the tool's inertia; unchanged if it is not determined."""
     from scipy.signal import savgol_filter
 
@@ -164,14 +164,14 @@ def _at_rest(
     return replace(signals, force=signals.force + added, torque=torque)
 
 
-def _centre_of(signals: Signals, parameters: dict[str, Estimated], frame: ContactFrame) -> Array:
+def _centre_of(signals: BaseSignals, parameters: dict[str, Estimated], frame: ContactFrame) -> Array:
     """Where the centre of mass is, in the base [m], shape (n, 3); the sensor if it is not determined."""
     at = np.array(frame.wrench_at) + (parameters["centre"].value if "centre" in parameters else 0.0)
     place: Array = signals.place + signals.rotations @ at
     return place
 
 
-def _fit_with_drift(poses: Poses, tolerance: float) -> Fitted:
+def _fit_with_drift(poses: Poses, tolerance: float) -> WeighingFit:
     """With a drift if the poses determine it beside the weight, without one otherwise."""
     if len(poses.count) < _FEWEST:
         return fit_force(poses, drift=False)
@@ -181,18 +181,18 @@ def _fit_with_drift(poses: Poses, tolerance: float) -> Fitted:
     )
 
 
-def _determines(fitted: Fitted, tolerance: float) -> bool:
+def _determines(fitted: WeighingFit, tolerance: float) -> bool:
     mass = fitted.mass
     return bool(np.isfinite(mass.half) and float(mass.half) <= max(tolerance * float(mass.value), 1e-3))
 
 
-def _model_force(time: Array, turns: Array, fitted: Fitted) -> Array:
+def _model_force(time: Array, turns: Array, fitted: WeighingFit) -> Array:
     whole = np.where(np.isfinite(fitted.whole), fitted.whole, 0.0)
     force: Array = np.einsum("nji,j->ni", turns, whole[:3]) + whole[3:6]
     return force + time[:, None] * whole[6:] if len(whole) > 6 else force
 
 
-def _lacking(poses: Poses, fitted: Fitted, tolerance: float) -> list[str]:
+def _lacking(poses: Poses, fitted: WeighingFit, tolerance: float) -> list[str]:
     """The undetermined direction, and the motion to add."""
     if _determines(fitted, tolerance) and poses.effective > 2.0:
         return []
@@ -222,7 +222,9 @@ def _lacking(poses: Poses, fitted: Fitted, tolerance: float) -> list[str]:
     return [text]
 
 
-def _centre(signals: Signals, there: Mask, time: Array, poses: Poses, fitted: Fitted) -> dict[str, Estimated]:
+def _centre(
+    signals: BaseSignals, there: Mask, time: Array, poses: Poses, fitted: WeighingFit
+) -> dict[str, Estimated]:
     """Centre of mass and bias of the torque, if there is one."""
     if (
         signals.torque is None
@@ -243,7 +245,7 @@ def _centre(signals: Signals, there: Mask, time: Array, poses: Poses, fitted: Fi
     return {"centre": Estimated(centre.value, std, half, "m"), "torque_bias": bias}
 
 
-def _inertia(signals: Signals, fit: PoseFit, frame: ContactFrame) -> dict[str, Estimated]:
+def _inertia(signals: BaseSignals, fit: PoseFit, frame: ContactFrame) -> dict[str, Estimated]:
     """The mass by which the force follows the acceleration, if the tool is shaken."""
     from scipy.special import stdtrit
 
@@ -278,7 +280,7 @@ def side_of(weight: Array) -> float | None:
 
 def _payload(
     parameters: dict[str, Estimated],
-    signals: Signals,
+    signals: BaseSignals,
     frame: ContactFrame,
     force: Array,
     first: NDArray[np.intp],

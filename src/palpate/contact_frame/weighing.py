@@ -107,7 +107,7 @@ def poses_of(time: Array, rotations: Array, signal: Array, first: NDArray[np.int
 
 
 @dataclass(frozen=True)
-class Fitted:
+class WeighingFit:
     """Weight, bias and drift, from all rows and with each stretch left out.
 
     Args:
@@ -171,7 +171,7 @@ class PoseFit:
     """
 
     poses: Poses
-    fitted: Fitted
+    fitted: WeighingFit
     parameters: dict[str, Estimated]
     means: Array
 
@@ -183,7 +183,7 @@ def solve_force(poses: Poses, drift: bool) -> Array:
     return _solve(A[:, :n, :n].sum(axis=0), r[:, :n].sum(axis=0))
 
 
-def fit_force(poses: Poses, drift: bool) -> Fitted:
+def fit_force(poses: Poses, drift: bool) -> WeighingFit:
     """Weight, bias and drift of a force, with each orientation left out once."""
     A, r = _normal_equations(poses)
     n = 9 if drift else 6
@@ -194,10 +194,10 @@ def fit_force(poses: Poses, drift: bool) -> Fitted:
     schur = whole[:3, :3] - whole[:3, 3:] @ np.linalg.pinv(rest, hermitian=True) @ whole[3:, :3]
     information, axes = np.linalg.eigh(schur / poses.count.sum())
     dof = poses.effective - 1.0
-    return Fitted(_solve(whole, total), left_out, np.maximum(information, 0.0), axes, dof)
+    return WeighingFit(_solve(whole, total), left_out, np.maximum(information, 0.0), axes, dof)
 
 
-def fit_centre(poses: Poses, weight: Array, drift: bool) -> Fitted:
+def fit_centre(poses: Poses, weight: Array, drift: bool) -> WeighingFit:
     """Centre of mass, bias and drift of a torque, with the weight known; `whole` begins with the centre [m]."""
     shown = np.einsum("gji,j->gi", poses.turns, weight)
     shown_t = np.einsum("gji,j->gi", poses.turns_t, weight)
@@ -215,7 +215,7 @@ def fit_centre(poses: Poses, weight: Array, drift: bool) -> Fitted:
     A, r = (A * count[:, None, None])[:, :n, :n], (r * count[:, None])[:, :n]
     whole, total = A.sum(axis=0), r.sum(axis=0)
     left_out = np.array([_solve(whole - a, total - b) for a, b in zip(A, r, strict=True)])
-    return Fitted(_solve(whole, total), left_out, np.ones(3), eye, poses.effective - 1.0)
+    return WeighingFit(_solve(whole, total), left_out, np.ones(3), eye, poses.effective - 1.0)
 
 
 def _normal_equations(poses: Poses) -> tuple[Array, Array]:

@@ -10,8 +10,16 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
 from palpate.contact_frame.free_motion import CHANCE, wrong_sign
-from palpate.contact_frame.signals_in_base import ContactFrame, Signals, signals_of
-from palpate.contact_frame.weighing import Estimated, Fitted, PoseFit, Poses, groups_of, poses_of, solve_force
+from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, signals_of
+from palpate.contact_frame.weighing import (
+    Estimated,
+    PoseFit,
+    Poses,
+    WeighingFit,
+    groups_of,
+    poses_of,
+    solve_force,
+)
 from palpate.identification.saturation import at_limit
 from palpate.records import Record
 
@@ -22,7 +30,7 @@ _FINE = np.radians(2.0)
 
 
 def notes_against(
-    record: Record, frame: ContactFrame, signals: Signals, there: Mask, fit: PoseFit
+    record: Record, frame: ContactFrame, signals: BaseSignals, there: Mask, fit: PoseFit
 ) -> list[dict[str, Any]]:
     """Notes, as a record's meta has them.
 
@@ -46,7 +54,7 @@ def notes_against(
     return notes
 
 
-def _saturation_notes(signals: Signals, there: Mask, fitted: Fitted) -> list[dict[str, Any]]:
+def _saturation_notes(signals: BaseSignals, there: Mask, fitted: WeighingFit) -> list[dict[str, Any]]:
     """Axes that rest at their extreme value while the weight turns in the sensor."""
     weight = np.einsum("nji,j->ni", signals.rotations[there], fitted.whole[:3])
     stuck = 0
@@ -60,7 +68,7 @@ def _saturation_notes(signals: Signals, there: Mask, fitted: Fitted) -> list[dic
 
 
 def _another_frame(
-    record: Record, frame: ContactFrame, signals: Signals, there: Mask, poses: Poses, fitted: Fitted
+    record: Record, frame: ContactFrame, signals: BaseSignals, there: Mask, poses: Poses, fitted: WeighingFit
 ) -> list[dict[str, Any]]:
     """Whether the forces fit another reading of the poses, or of the axes, so much better that chance is out."""
     if _misfit(poses, fitted.whole) < _by_noise(signals.force[there], poses):
@@ -192,7 +200,7 @@ def _touch_notes(time: Array, poses: Poses, means: Array) -> list[dict[str, Any]
     ends = np.r_[poses.first, len(time)]
     begin, end = time[ends[worst]], time[ends[worst + 1] - 1]
     text = (
-        f"from {begin:.4g} to {end:.4g} s the force is {np.sqrt(size[worst]):.2g} N off that of a tool in the air: was"
+        f"from {begin:.4g} to {end:.4g} s the force is {np.sqrt(size[worst]):.2g} N off a tool's in free motion: was"
         " something touched, or a cable drawn? leave that stretch out (--start, --end)"
     )
     return [{"code": "not-free", "text": text}]
@@ -204,8 +212,9 @@ def _inertia(parameters: dict[str, Estimated]) -> list[dict[str, Any]]:
     found, mass = parameters["inertia"], parameters["mass"]
     if wrong_sign((float(found.value), float(found.std))):
         text = (
-            f"in the air the force follows the acceleration as a mass of {found.value:.3g} kg would: the tool's inertia"
-            " is compensated with the wrong sign, or twice; correct that, or damping and lag of the surface are wrong"
+            f"in free motion the force follows the acceleration as of a mass of {found.value:.3g} kg: the tool's"
+            " inertia is compensated with the wrong sign, or twice; correct that, or the surface's damping and lag are"
+            " wrong"
         )
         return [{"code": "tool-inertia", "text": text}]
     if found.value - found.half > mass.value + mass.half:

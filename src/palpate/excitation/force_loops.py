@@ -16,6 +16,7 @@ from palpate.errors import InputError
 from palpate.excitation.spectra import covariance
 from palpate.references import Chirp, Multisine
 from palpate.signals.low_pass import LowPass
+from palpate.signals.types import NORMAL
 
 Range = tuple[float, float]
 
@@ -266,7 +267,7 @@ class Prediction:
         """
         C = covariance(seconds * self.information, self.prior)
         C = C + self.rounding + np.diag((POWER_KNOWN * self.pull) ** 2)
-        return {name: 1.96 * float(np.sqrt(C[i, i])) for i, name in enumerate(self.names)}
+        return {name: NORMAL * float(np.sqrt(C[i, i])) for i, name in enumerate(self.names)}
 
 
 @dataclass(frozen=True)

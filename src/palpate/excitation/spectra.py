@@ -29,6 +29,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.signals import Estimate
 from palpate.signals.low_pass import LowPass
+from palpate.signals.types import NORMAL
 
 NAMES = ("K", "B", "M", "offset", "lag")
 """Parameters of the bound, in this order."""
@@ -267,7 +268,7 @@ def sensitivity_of(
 ) -> Array:
     """How fast the criterion falls with the power of each frequency, shape (F,)."""
     C = covariance(np.einsum("f,cfij->cij", powers, information), prior)
-    unit = wanted[asked] / 1.96
+    unit = wanted[asked] / NORMAL
     own = C[:, asked[:, None], asked] / np.outer(unit, unit)
     values, slopes = criterion(own)
     slopes = slopes / np.outer(unit, unit)

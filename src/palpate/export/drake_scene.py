@@ -57,7 +57,7 @@ class Collision:
 
 
 @dataclass(frozen=True)
-class Scene:
+class DrakeScene:
     """An SDF or URDF file.
 
     Args:
@@ -97,7 +97,7 @@ class Scene:
         return found[0]
 
 
-def load_scene(path: Path) -> Scene:
+def load_scene(path: Path) -> DrakeScene:
     """Read a file.
 
     Raises:
@@ -116,7 +116,7 @@ def load_scene(path: Path) -> Scene:
         raise InputError(f"{path}: no XML: {error}; give an SDF or URDF file") from None
     if reader.root not in {"sdf", "robot"}:
         raise InputError(f"{path}: begins with <{reader.root}>; Drake's contact goes into SDF or URDF")
-    return Scene(path, text, reader.root == "robot", tuple(reader.found))
+    return DrakeScene(path, text, reader.root == "robot", tuple(reader.found))
 
 
 class _Reader:
@@ -175,7 +175,7 @@ def _no_entities(*_: Any) -> None:
     raise expat.ExpatError("it declares entities, which are not read")
 
 
-def probe_of(scene: Scene, surface: Collision, name: str | None) -> Collision | None:
+def probe_of(scene: DrakeScene, surface: Collision, name: str | None) -> Collision | None:
     """The probe: of that name, or the only other collision; None if there is no other.
 
     Raises:
@@ -208,7 +208,7 @@ def notes(probe: bool) -> tuple[str, ...]:
     return (_PLANT, other)
 
 
-def edit(scene: Scene, surface: Collision, probe: Collision | None, contact: Contact) -> bytes:
+def edit(scene: DrakeScene, surface: Collision, probe: Collision | None, contact: Contact) -> bytes:
     """The file with the contact in it."""
     numbers = {surface.path: (contact.stiffness.value, contact.relaxation_time)}
     if probe is not None:

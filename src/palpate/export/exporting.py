@@ -15,7 +15,7 @@ from xml.sax.saxutils import quoteattr
 
 from palpate.errors import InputError, unknown
 from palpate.export.contact import Contact
-from palpate.export.rig import MuJoCoRig, Pressed, press, touch
+from palpate.export.rig import MuJoCoRig, RigPress, press, touch
 from palpate.robots.serial.loading import mujoco, refusals
 from palpate.text import printable
 
@@ -86,7 +86,7 @@ class Checked:
     """
 
     probe: str
-    pressed: Pressed | None
+    pressed: RigPress | None
     error_K: float | None
     error_B: float | None
     note: str = ""
@@ -198,7 +198,7 @@ def check(exported: Exported, path: Path) -> list[Checked]:
     return exported.check(path)
 
 
-def _judge(probe: str, pressed: Pressed | None, contact: Contact, note: str = "") -> Checked:
+def _judge(probe: str, pressed: RigPress | None, contact: Contact, note: str = "") -> Checked:
     if pressed is None:
         return Checked(
             probe,
@@ -372,7 +372,7 @@ def xml(contact: Contact, name: str) -> str:
 """
 
 
-def press_plate(text: str, contact: Contact, name: str, force: float) -> Pressed | None:
+def press_plate(text: str, contact: Contact, name: str, force: float) -> RigPress | None:
     """Press the plate with a sphere, and read K and B of the plate's displacement."""
     probe = (
         '<body name="palpate-probe" pos="0 0 0.1"><joint type="slide" axis="0 0 1"/>'

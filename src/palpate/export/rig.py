@@ -67,7 +67,7 @@ class Rig(Protocol):
 
 
 @dataclass(frozen=True)
-class Pressed:
+class RigPress:
     """Result of a press in a simulator.
 
     Args:
@@ -130,7 +130,7 @@ def touch(rig: Rig) -> float | None:
     return None
 
 
-def press(rig: Rig, stiffness: float, force: float, *, inward: bool = False) -> Pressed | None:
+def press(rig: Rig, stiffness: float, force: float, *, inward: bool = False) -> RigPress | None:
     """Press from the touch on with a force that oscillates about `force`, and fit K x + B v to the contact's force.
 
     The probe is led along the normal, as far as its joints can: where a probe slides, friction is pressed too.
@@ -194,14 +194,14 @@ def _path(rig: Rig) -> tuple[Array, float, Array] | None:
     return way, float(way @ inertia @ way), rates[0]
 
 
-def _fit(rows: Array, mass: float, time_step: float) -> Pressed | None:
+def _fit(rows: Array, mass: float, time_step: float) -> RigPress | None:
     held = rows[(rows[:, 2] > 0.0) & (rows[:, 0] > 0.0)]
     if len(held) < _FINEST:
         return None
     (K, B), *_ = np.linalg.lstsq(held[:, :2], held[:, 2], rcond=None)
     off = np.abs(held[:, :2] @ (K, B) - held[:, 2]).max()
     largest = float(held[:, 2].max())
-    return Pressed(
+    return RigPress(
         float(K), float(B), float(held[:, 0].max()), largest, float(off) / largest, mass, time_step, len(held)
     )
 

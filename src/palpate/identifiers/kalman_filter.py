@@ -43,7 +43,7 @@ _GUESS = 30.0
 
 
 @part
-class Noise(NamedTuple):
+class KalmanUpdate(NamedTuple):
     """Noise of the force: its variance [N^2], or 0 where it is to be estimated."""
 
     variance: float
@@ -110,7 +110,7 @@ class KalmanFilter(Streaming):
         if noise is not None and not (noise > 0.0 and np.isfinite(noise)):
             raise InputError(f"noise must be above 0 N, or None to have it estimated, got {noise}")
         self.drift, self.period = pace, float(period)
-        known = Noise(0.0 if noise is None else float(noise) ** 2)
+        known = KalmanUpdate(0.0 if noise is None else float(noise) ** 2)
         state = _first(start, P, pace * np.sqrt(period), 1.0 if noise is None else float(noise))
         super().__init__(state, len(start), known, names)
 

@@ -25,7 +25,7 @@ from palpate.identifiers.octave_system import (
     OWN,
     SIZE,
     OctaveData,
-    System,
+    OctaveSystem,
     compensate,
     inverse,
     noise_levels,
@@ -68,7 +68,7 @@ class OctaveFit:
     theta: Array
     covariance: Array
     open: Array
-    system: System
+    system: OctaveSystem
     rejected: str
 
     def without_position_noise(self, theta: Array, deviations: Array) -> tuple[Array, Array]:
@@ -120,7 +120,7 @@ def _change(data: OctaveData, first: int, end: int, found: OctaveFit) -> int:
     return first + split + 1 if apart > NormalDist().inv_cdf(1 - 0.5 * FALSE_ALARM / _LOOKS) else 0
 
 
-def _apart(system: System, noise: Array) -> System:
+def _apart(system: OctaveSystem, noise: Array) -> OctaveSystem:
     """The same with relaxation as far as it is no mass, damping and stiffness: these are those of the motion."""
     whole = system.weighted_products(noise)
     turn = np.eye(SIZE + 1)
@@ -141,7 +141,7 @@ class _Mean:
     prior: Array
 
 
-def _mean(system: System, noise: Array, sensor: Array, deviations: Array) -> _Mean:
+def _mean(system: OctaveSystem, noise: Array, sensor: Array, deviations: Array) -> _Mean:
     """Over the sizes of the mass and of other forces, by evidence.
 
     A residual beyond the sensor's noise is not chance, so it counts as that much less evidence (a likelihood raised to
@@ -202,7 +202,7 @@ def _fit_stretches(data: OctaveData, first: int, end: int) -> OctaveFit | None:
 
 
 def _with_offset(
-    system: System, theta: Array, covariance: Array, opened: Array, level: float
+    system: OctaveSystem, theta: Array, covariance: Array, opened: Array, level: float
 ) -> tuple[Array, Array, Array]:
     """M, B, K and the offset, their covariance, and the part of it that is not noise of the force."""
     own, means = np.eye(4, SIZE), system.means
@@ -213,7 +213,7 @@ def _with_offset(
     return values, own @ covariance @ own.T + of_mean, own @ opened @ own.T
 
 
-def _beside_relaxation(system: System, noise: Array, deviations: Array, mean: _Mean) -> float:
+def _beside_relaxation(system: OctaveSystem, noise: Array, deviations: Array, mean: _Mean) -> float:
     """Variance of the mass by how far relaxation of any size moves it, beyond its noise (Hausman, 1978).
 
     A stiffness that grows with the frequency is no mass below zero.
@@ -225,7 +225,7 @@ def _beside_relaxation(system: System, noise: Array, deviations: Array, mean: _M
     return float(max(apart - NORMAL * np.sqrt(grown), 0.0) ** 2)
 
 
-def _by_lag(system: System, noise: Array, theta: Array) -> Array:
+def _by_lag(system: OctaveSystem, noise: Array, theta: Array) -> Array:
     """How theta moves with the lag, shape (8,): the force's rate is B a + K v and M times the rate of a, -w^2 v."""
     rate = np.zeros((len(noise), SIZE))
     rate[:, 0], rate[:, 1] = theta[1], theta[2] - theta[0] * (2 * np.pi * system.frequency) ** 2
@@ -234,7 +234,7 @@ def _by_lag(system: System, noise: Array, theta: Array) -> Array:
     return solve(whole, right)
 
 
-def _hidden_force(system: System, noise: Array, sensor: Array, covariance: Array) -> Array:
+def _hidden_force(system: OctaveSystem, noise: Array, sensor: Array, covariance: Array) -> Array:
     """Variances by a force that lies along the parameters' columns, as large as the residual beyond the sensors' noise.
 
     Seen is what chance would show in one of twenty presses at most, in any octave.
@@ -246,7 +246,7 @@ def _hidden_force(system: System, noise: Array, sensor: Array, covariance: Array
     return np.asarray(_HIDDEN**2 * np.maximum((system.count * beyond / noise**2) @ gain, 0.0))
 
 
-def _by_octave(system: System, noise: Array, sensor: Array, deviations: Array, mean: _Mean) -> Array:
+def _by_octave(system: OctaveSystem, noise: Array, sensor: Array, deviations: Array, mean: _Mean) -> Array:
     """Variances by how far the answer moves without one octave, beyond the growth of its covariance."""
     excess = np.zeros(SIZE)
     if len(noise) < 2:
@@ -260,7 +260,7 @@ def _by_octave(system: System, noise: Array, sensor: Array, deviations: Array, m
     return excess
 
 
-def _repetition(system: System, noise: Array, mean: _Mean) -> Array:
+def _repetition(system: OctaveSystem, noise: Array, mean: _Mean) -> Array:
     """Variances by what leaving each stretch of time out moves, shape (8,), for Student's degrees of freedom.
 
     Of so many degrees of freedom f, Student's interval of 95 % is about f / (f - 2.4) times Gauss', squared.
@@ -278,7 +278,7 @@ def _repetition(system: System, noise: Array, mean: _Mean) -> Array:
     return np.asarray(student * (free / (free + 1)) * np.sum(moves**2, axis=0))
 
 
-def _refusal(system: System, noise: Array, sensor: Array, theta: Array) -> str:
+def _refusal(system: OctaveSystem, noise: Array, sensor: Array, theta: Array) -> str:
     """Why nothing is identified, or nothing."""
     beyond = float(np.maximum(noise - sensor, 0.0) @ system.count)
     power = float(system.total[:, -1, -1].sum())
@@ -294,7 +294,7 @@ def _refusal(system: System, noise: Array, sensor: Array, theta: Array) -> str:
     return ""
 
 
-def _likeliest(system: System, noise: Array, theta: Array, deviations: Array) -> int:
+def _likeliest(system: OctaveSystem, noise: Array, theta: Array, deviations: Array) -> int:
     """How many stretches are before the likeliest change of the stiffness; 0 if nothing speaks for one.
 
     Each stretch has a stiffness of its own, as far as its scores go; those before an instant are compared with those

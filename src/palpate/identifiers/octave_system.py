@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.identifiers.kernels import octave_sums as sums
-from palpate.identifiers.kernels.octave_sums import LineNoise, PositionNoise
+from palpate.identifiers.kernels.octave_sums import LineNoise, OctavePositionNoise
 
 SEEN = 10.0
 """Power of a column over that of the position's noise in it, below which an octave is left out: its parameter would be
@@ -75,7 +75,7 @@ class OctaveData:
 
 
 @dataclass(frozen=True)
-class System:
+class OctaveSystem:
     """Normal equations by stretch and octave.
 
     Args:
@@ -113,7 +113,7 @@ class System:
         """Samples that it rests on."""
         return float(self.plain[3, 3])
 
-    def only(self, use: NDArray[np.bool_]) -> System:
+    def only(self, use: NDArray[np.bool_]) -> OctaveSystem:
         """The same with some octaves, shape (octaves,)."""
         return replace(
             self,
@@ -129,7 +129,7 @@ class System:
         return np.asarray(np.tensordot(1 / noise, self.total, axes=1))
 
 
-def system_of(data: OctaveData, first: int, end: int) -> System | None:
+def system_of(data: OctaveData, first: int, end: int) -> OctaveSystem | None:
     """The normal equations of the stretches from first to before end; None where they are too few, or drowned."""
     kept = data.groups[first:end]
     kept = kept[kept[:, sums.WEIGHT] > 0]
@@ -151,7 +151,7 @@ def system_of(data: OctaveData, first: int, end: int) -> System | None:
     turn = _turn(float(means[2]))
     noisy = np.zeros((len(frequency), SIZE, SIZE))
     noisy[:, :OWN, :OWN] = position * count.sum(axis=0)[:, None, None]
-    found = System(
+    found = OctaveSystem(
         np.einsum("pi,goij,qj->gopq", turn, products, turn),
         noisy,
         count,
@@ -165,7 +165,7 @@ def system_of(data: OctaveData, first: int, end: int) -> System | None:
     return found.only(use) if use.any() else None
 
 
-def _usable_octaves(system: System, data: OctaveData) -> NDArray[np.bool_]:
+def _usable_octaves(system: OctaveSystem, data: OctaveData) -> NDArray[np.bool_]:
     """Octaves that count, shape (octaves,): with more motion than noise, and no slower than a contact lasts.
 
     A line slower than its contacts would be made of their edges.
@@ -197,11 +197,11 @@ def _products(groups: Array, size: float) -> tuple[Array, Array]:
     return products * share[:, None, None], sums.LINES * share * blocks
 
 
-def _position_noise(groups: Array, step: float) -> PositionNoise:
+def _position_noise(groups: Array, step: float) -> OctavePositionNoise:
     power, product, number = groups[:, [sums.NOISE_POWER, sums.NOISE_PRODUCT, sums.NOISE_COUNT]].sum(axis=0)
     if not number > 0:
-        return PositionNoise(0.0, 0.0, 0.0)
-    return PositionNoise.of(float(power / number), float(product / number), step)
+        return OctavePositionNoise(0.0, 0.0, 0.0)
+    return OctavePositionNoise.of(float(power / number), float(product / number), step)
 
 
 def _whole(state: Array) -> tuple[Array, float, int, float] | None:
@@ -257,7 +257,7 @@ def _prior_weights() -> Array:
 _WEIGHTS = _prior_weights()
 
 
-def prior_of(system: System, deviations: Array) -> Array:
+def prior_of(system: OctaveSystem, deviations: Array) -> Array:
     """Weights of the priors, each supposing a size of the mass and of every other force, shape (members, 8).
 
     The first supposes the largest of all.
@@ -285,7 +285,7 @@ def inverse(normal: Array) -> Array:
     return np.asarray(np.linalg.inv(scaled) / (size[..., :, None] * size[..., None, :]))
 
 
-def noise_levels(system: System, deviations: Array) -> tuple[Array, Array]:
+def noise_levels(system: OctaveSystem, deviations: Array) -> tuple[Array, Array]:
     """Variance of a line in each octave by the residual there, shape (octaves,), and the fit with it.
 
     Degrees of freedom are taken off. Stretches count by the power of their force: the residual of a tip at rest says

@@ -18,7 +18,7 @@ from palpate.signals.types import Positive
 
 
 @part
-class Watch(NamedTuple):
+class RestartingUpdate(NamedTuple):
     """The update of `RestartingLeastSquares`.
 
     Args:
@@ -84,7 +84,7 @@ class RestartingLeastSquares(LeastSquaresEstimator):
         self.forgetting = policy_of(forgetting)
         initial = [start, np.linalg.cholesky(P).ravel(), np.zeros(COUNTERS + int(memory) * (n + EXTRA))]
         state = np.concatenate([known_first(start, P), *initial])
-        super().__init__(state, n, Watch(self.forgetting, float(memory), float(evidence)), names)
+        super().__init__(state, n, RestartingUpdate(self.forgetting, float(memory), float(evidence)), names)
 
     def _worth(self, weight: float) -> float:
         return min(weight, float(self.since))

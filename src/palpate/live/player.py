@@ -21,7 +21,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.live.view import COLUMNS, STRIDE, Source, View
+from palpate.live.view import COLUMNS, STRIDE, RowSource, View
 from palpate.report.look.assets import ARM, ARM_IN_SPACE, CHARTS, data, policy, scripts
 from palpate.report.page import render
 from palpate.text import printable
@@ -177,7 +177,7 @@ class Player:
 
     def __init__(
         self,
-        source: Source,
+        source: RowSource,
         feed: Feed,
         changed: Callable[[], None] = lambda: None,
         stability: Callable[[], dict[str, Any] | None] = lambda: None,

@@ -14,12 +14,13 @@ from palpate.bench.sequence import COLUMNS as ROW
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.errors import InputError
 from palpate.identification import Identification, Parameter
-from palpate.live.view import LEAD, Happened, Replay, Signals, View
+from palpate.live.view import LEAD, Happened, Replay, ReplayedSignals, View
 from palpate.logs.read import read_log
 from palpate.records import Record
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED, formatted
 from palpate.robots.arm3 import Arm3
+from palpate.signals.types import NORMAL
 from palpate.text import printable
 
 _MOST_MARKS = 200
@@ -60,7 +61,7 @@ def of_log(title: str, found: Identification, along: Record) -> Replay:
         units={"depth": "mm" if metre else units["position"], "measured": units["force"]},
     )
     marks = [Happened(start, "contact") for start, _ in found.contacts[:_MOST_MARKS]]
-    return Replay(view, Signals(kept, tuple(marks)))
+    return Replay(view, ReplayedSignals(kept, tuple(marks)))
 
 
 def identification_rows(found: Identification) -> tuple[dict[str, str], ...]:
@@ -135,7 +136,7 @@ def of_run(path: Path, found: Identification, *, whole: bool = False) -> Replay:
     columns["wall"] = record["x"] - record["penetration"]
     contact = np.maximum.accumulate(record["phase"]) > 0.0
     for name in ("K", "B"):
-        value, half = record[f"{name}_matched"], 1.96 * record[f"{name}_matched_std"]
+        value, half = record[f"{name}_matched"], NORMAL * record[f"{name}_matched_std"]
         known = contact & (half < np.abs(value))
         columns[name] = np.where(known, value, np.nan)
         columns[f"{name}_half"] = np.where(known, half, np.nan)
@@ -154,7 +155,7 @@ def of_run(path: Path, found: Identification, *, whole: bool = False) -> Replay:
     kept, notes = clear_at_restarts(columns)
     moments = tuple(_moments(record["t"], record["phase"]))
     first = float(record["t"][np.argmax(contact)]) - LEAD if contact.any() and not whole else None
-    return Replay(replace(view, notes=notes), Signals(kept, moments), first)
+    return Replay(replace(view, notes=notes), ReplayedSignals(kept, moments), first)
 
 
 def _moments(t: Array, phase: Array) -> list[Happened]:

@@ -30,6 +30,7 @@ from palpate.live.view import (
     check_ahead,
     planar_bones,
 )
+from palpate.signals.types import NORMAL
 from palpate.text import printable
 
 _FROM = {name: i for i, name in enumerate(ROW)}
@@ -229,7 +230,7 @@ class Simulation:
         rows[:, AT["depth"]] *= 1e3
         rows[:, AT["wall"]] = blocks[:, -1, _FROM["x"]] - blocks[:, -1, _FROM["penetration"]]
         for name, column in (("K", "K_matched_std"), ("B", "B_matched_std")):
-            half = 1.96 * blocks[:, -1, _FROM[column]]
+            half = NORMAL * blocks[:, -1, _FROM[column]]
             value = rows[:, AT[name]]
             # As wide as itself, or before there was force control: nothing is known yet.
             unknown = ~(half < np.abs(value)) | (self._contacts == 0)

@@ -75,7 +75,7 @@ class Slider:
 
 
 @dataclass(frozen=True)
-class Scene:
+class ViewScene:
     """A serial arm and the surface before it, as they are drawn in space; everything in the base's axes [m].
 
     Args:
@@ -125,7 +125,7 @@ class View:
     stride: float = STRIDE
     sliders: tuple[Slider, ...] = ()
     links: tuple[float, ...] = ()
-    scene: Scene | None = None
+    scene: ViewScene | None = None
     rest: tuple[float, ...] = ()
     span: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
@@ -225,7 +225,7 @@ def planar_bones(links: tuple[float, ...], row: Array) -> Array:
     return np.vstack([np.zeros((1, 3)), ends])
 
 
-class Source(Protocol):
+class RowSource(Protocol):
     """The source of rows: a simulation, or a replayed log."""
 
     view: View
@@ -266,7 +266,7 @@ FEWEST = 3
 
 
 @dataclass(frozen=True)
-class Signals:
+class ReplayedSignals:
     """The replayed columns: any of `COLUMNS`, by name, each of shape (n,), with times that grow.
 
     Args:
@@ -307,7 +307,7 @@ class Replay:
         InputError: too few rows, or times that do not grow.
     """
 
-    def __init__(self, view: View, signals: Signals, first: float | None = None):
+    def __init__(self, view: View, signals: ReplayedSignals, first: float | None = None):
         t = signals.columns["t"]
         if len(t) < FEWEST:
             raise InputError(f"there is nothing to show: {len(t)} rows")

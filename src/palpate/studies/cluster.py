@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from palpate.errors import InputError
 from palpate.plugins import Plugin
-from palpate.studies.run_one import FAILED, Done, Job, Row, run_one, sources
+from palpate.studies.run_one import FAILED, Done, Row, RunJob, run_one, sources
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -147,7 +147,7 @@ class Cluster:
             if self._client.status == "running":
                 self._client.cancel(futures, force=True)
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[Done]:
+    def run(self, jobs: Iterable[RunJob]) -> Iterator[Done]:
         """Results of the jobs, in the order of completion.
 
         Raises:
@@ -218,12 +218,12 @@ def _security(certificates: Certificates | None) -> Any:
 class Batches:
     """Jobs in batches that take long enough, by what the runs so far took."""
 
-    def __init__(self, jobs: Iterable[Job]):
+    def __init__(self, jobs: Iterable[RunJob]):
         self._jobs = iter(jobs)
-        self._again: list[list[Job]] = []
+        self._again: list[list[RunJob]] = []
         self.seconds: float | None = None
 
-    def __next__(self) -> list[Job]:
+    def __next__(self) -> list[RunJob]:
         if self._again:
             return self._again.pop()
         first = next(self._jobs)
@@ -236,12 +236,12 @@ class Batches:
         mean = sum(row.seconds for row, _ in done) / len(done)
         self.seconds = mean if self.seconds is None else 0.8 * self.seconds + 0.2 * mean
 
-    def again(self, jobs: list[Job]) -> None:
+    def again(self, jobs: list[RunJob]) -> None:
         """Runs that a worker died of are tried one by one."""
         self._again += [[job] for job in jobs]
 
 
-def _guess(job: Job) -> float:
+def _guess(job: RunJob) -> float:
     if job.setting.experiment is None:
         return 1e-5
     run = job.setting.experiment.run
@@ -260,7 +260,7 @@ class Hand:
     patience: float
 
     def __post_init__(self) -> None:
-        self._pending: dict[Any, list[Job]] = {}
+        self._pending: dict[Any, list[RunJob]] = {}
         self._room, self._looked, self._alone = 0, -math.inf, time.monotonic()
 
     def all(self, batches: Batches) -> Iterator[Done]:
@@ -298,7 +298,7 @@ class Hand:
                 raise self._lost_error(error) from error
         return True
 
-    def _submit(self, jobs: list[Job]) -> Any:
+    def _submit(self, jobs: list[RunJob]) -> Any:
         return self.client.submit(run_batch, pickle.dumps(jobs), sources(), jobs[0].plugins, pure=False)
 
     def _completed_batches(self) -> list[Any]:
@@ -340,7 +340,7 @@ class Hand:
                 "runs are saved, and the same command resumes"
             )
 
-    def take(self, future: Any, jobs: list[Job]) -> list[Done] | None:
+    def take(self, future: Any, jobs: list[RunJob]) -> list[Done] | None:
         """Result of a batch; None if a worker died of one of several runs."""
         from distributed import KilledWorker
 

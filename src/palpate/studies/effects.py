@@ -16,10 +16,10 @@ from palpate.bench.metrics import metric_of
 from palpate.report.page import Table
 from palpate.report.study.plain import MOST, numbers, plain_panels
 from palpate.studies.pairing import (
-    Comparison,
     Drawn,
     Entrant,
-    Pair,
+    PairedComparison,
+    PairedDifference,
     comparison_of,
     conditions_of,
     sentence,
@@ -35,7 +35,7 @@ ENTRANTS = 12
 """Settings that are drawn against each other at most, the best ones."""
 
 
-def charts(plan: Plan, comparisons: Sequence[Comparison], figures: Sequence[Drawn]) -> dict[str, Any]:
+def charts(plan: Plan, comparisons: Sequence[PairedComparison], figures: Sequence[Drawn]) -> dict[str, Any]:
     """Comparisons and figures, by metric."""
     shown = [
         {
@@ -56,7 +56,7 @@ def charts(plan: Plan, comparisons: Sequence[Comparison], figures: Sequence[Draw
     }
 
 
-def _comparison(one: Comparison) -> dict[str, Any]:
+def _comparison(one: PairedComparison) -> dict[str, Any]:
     n = len(one.entrants[0].values)
     rows = np.unique(np.linspace(0, n - 1, min(MOST, n)).astype(int))
     few = range(min(len(one.entrants), ENTRANTS))
@@ -90,7 +90,7 @@ SHOWN = 12
 """Settings in a table."""
 
 
-def comparison_sentence(comparison: Comparison) -> str:
+def comparison_sentence(comparison: PairedComparison) -> str:
     """Which setting is the best, on how many surfaces, by how much."""
     first, metric = comparison.entrants[0], metric_of(comparison.metric)
     pair, next_one = comparison.pair(0, 1), comparison.entrants[1].name
@@ -112,12 +112,12 @@ def comparison_sentence(comparison: Comparison) -> str:
     return f"{lead}, by {number(middle)}{unit} (95 %: {number(min(low, high))} to {number(max(low, high))})."
 
 
-def fraction_won(pair: Pair) -> str:
+def fraction_won(pair: PairedDifference) -> str:
     """The share won, with its interval."""
     return f"{100 * pair.won:.0f} % ({100 * pair.won_low:.0f} to {100 * pair.won_high:.0f})"
 
 
-def comparison_table(comparison: Comparison) -> Table:
+def comparison_table(comparison: PairedComparison) -> Table:
     """Each setting against the best one, on the same surfaces."""
     rows = [
         (
@@ -146,7 +146,7 @@ def comparison_table(comparison: Comparison) -> Table:
     return Table(title, head, rows)
 
 
-def difference(pair: Pair) -> str:
+def difference(pair: PairedDifference) -> str:
     """The median difference with its interval."""
     if pair.median is None:
         return NONE
@@ -172,7 +172,7 @@ def number(value: float) -> str:
     return f"{value:.{digits}f}"
 
 
-def as_json(comparisons: Sequence[Comparison]) -> list[dict[str, Any]]:
+def as_json(comparisons: Sequence[PairedComparison]) -> list[dict[str, Any]]:
     """The comparison as plain values."""
     return [
         {
@@ -209,7 +209,7 @@ EFFECTS_SHOWN = 3
 """Factors in the headline, those that change most first."""
 
 
-def effects(frame: DataFrame, plan: Plan) -> list[Comparison]:
+def effects(frame: DataFrame, plan: Plan) -> list[PairedComparison]:
     """Of each factor its values compared by the study's metric, on the same surfaces, seeds and other factors.
 
     The factor that changes the metric most comes first. Parameters drawn at random are surfaces, not factors.
@@ -250,13 +250,13 @@ def _metric(plan: Plan) -> tuple[str, bool] | None:
     return next(((name, side == "most") for name, side in sided if side), None)
 
 
-def _change(one: Comparison) -> float:
+def _change(one: PairedComparison) -> float:
     """How much the metric changes from the best value to the worst; a failure more than any number."""
     median = one.pair(0, len(one.entrants) - 1).median
     return 0.0 if median is None else abs(median)
 
 
-def effect_sentence(one: Comparison, what: str) -> str:
+def effect_sentence(one: PairedComparison, what: str) -> str:
     """Effect of a factor: `PI has the smaller error on 50 of 50 surfaces, by 1.40 N (95 %: 0.17 to 2.40)`.
 
     Args:
@@ -283,7 +283,7 @@ def effect_sentence(one: Comparison, what: str) -> str:
     return f"{best} has the {more} {metric.phrase}: {by(pair, metric.unit)} better{against} and better on {count}."
 
 
-def by(pair: Pair, unit: str) -> str:
+def by(pair: PairedDifference, unit: str) -> str:
     """The median difference with its interval, without a sign."""
     if pair.median is None or math.isinf(pair.median):
         return "failures"
@@ -292,7 +292,7 @@ def by(pair: Pair, unit: str) -> str:
     return f"{number(abs(pair.median or 0.0))}{'' if unit == '1' else f' {unit}'}{known}"
 
 
-def effects_table(found: Sequence[Comparison]) -> Table:
+def effects_table(found: Sequence[PairedComparison]) -> Table:
     """A row a factor: its best value, and by how much the next and the worst are behind, all else the same."""
     rows = []
     for one in found:
@@ -313,7 +313,7 @@ def effects_table(found: Sequence[Comparison]) -> Table:
     return Table(f"Effect of each factor on {label}, all else the same, 95 % intervals", head, rows)
 
 
-def _median(one: Comparison, i: int) -> str:
+def _median(one: PairedComparison, i: int) -> str:
     values = one.entrants[i].values
     known = values[np.isfinite(values)]
     return number(float(np.median(known))) if len(known) else NONE

@@ -28,7 +28,7 @@ from palpate.report.study.axes import Scale, decades
 from palpate.report.study.clouds import Cloud, Points, clouds_figure
 from palpate.report.study.lines import Curve, Line, curves_figure
 from palpate.report.study.maps import Bound, Heat, heat_figure
-from palpate.studies.pairing import FEW, Drawn, Rows, logarithmic, restricted_to, sentence, short
+from palpate.studies.pairing import FEW, Drawn, StudyRows, logarithmic, restricted_to, sentence, short
 from palpate.studies.parameters import Axis
 from palpate.studies.plan import Part, Plan
 from palpate.studies.study import Curves, Map, flat
@@ -40,7 +40,7 @@ ALWAYS = frozenset({"time_in_contact", "time_to_loss", "contacts_lost"})
 """Metrics of runs that did not come to their end, too."""
 
 
-def curves_of(table: Rows, asked: Curves, number: int) -> Drawn:
+def curves_of(table: StudyRows, asked: Curves, number: int) -> Drawn:
     """Curves that a study asks for."""
     metric, x = metric_of(asked.metric), table.scale(asked.x)
 
@@ -59,7 +59,7 @@ def curves_of(table: Rows, asked: Curves, number: int) -> Drawn:
     return Drawn(f"curves{number}", caption, metric, made, curves_figure)
 
 
-def lines(table: Rows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[Line]:
+def lines(table: StudyRows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[Line]:
     """The study's own lines in a panel."""
     import polars
 
@@ -74,7 +74,7 @@ def lines(table: Rows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[Lin
         yield _line(rows.filter(polars.col(asked.lines) == value), asked, x, label, False)
 
 
-def references(table: Rows, asked: Curves, x: Scale, panel: Any) -> Iterator[Line]:
+def references(table: StudyRows, asked: Curves, x: Scale, panel: Any) -> Iterator[Line]:
     """The reference runs: a curve if they have the same parameter, else a level."""
     import polars
 
@@ -113,7 +113,7 @@ def _spread(numbers: Sequence[float]) -> tuple[float, float, float]:
     return float(np.median(numbers)), min(numbers), max(numbers)
 
 
-def map_of(table: Rows, asked: Map, number: int) -> Drawn:
+def map_of(table: StudyRows, asked: Map, number: int) -> Drawn:
     """A map that a study asks for."""
     metric, x, y = metric_of(asked.metric), table.scale(asked.x), table.scale(asked.y)
 
@@ -170,7 +170,7 @@ CLOUDS = 9
 """Parameters that are drawn as clouds at most."""
 
 
-def clouds_of(table: Rows, metric: Metric) -> Drawn:
+def clouds_of(table: StudyRows, metric: Metric) -> Drawn:
     """A metric over every parameter that was drawn."""
     axes = [a for a in table.plan.parts[0].axes if "seed" not in a.targets]
     drawn, others = [a for a in axes if a.drawn], [a for a in axes if not a.drawn and len(a.settings) <= FEW]
@@ -191,7 +191,7 @@ def clouds_of(table: Rows, metric: Metric) -> Drawn:
     return Drawn(f"clouds-{metric.name.replace(':', '-')}", caption, metric, made, clouds_figure)
 
 
-def points(table: Rows, metric: Metric, name: str, kinds: Axis | None) -> Iterator[Points]:
+def points(table: StudyRows, metric: Metric, name: str, kinds: Axis | None) -> Iterator[Points]:
     """The runs of each case over a drawn parameter."""
     import polars
 
@@ -225,7 +225,7 @@ def draw(
 
 def figures(frame: DataFrame, plan: Plan) -> Iterator[Drawn]:
     """The figures that a study asks for; of each metric that it asks none of, those that its parameters suit."""
-    own = Rows(frame, plan)
+    own = StudyRows(frame, plan)
     maps, curves = list(plan.study.maps), list(plan.study.curves)
     asked = {one.metric for one in maps} | {one.metric for one in curves}
     left = [name for name in plan.study.metrics if name not in asked]

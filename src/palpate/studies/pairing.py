@@ -50,7 +50,7 @@ class Entrant:
 
 
 @dataclass(frozen=True)
-class Pair:
+class PairedDifference:
     """One setting against another, on the same surfaces.
 
     Args:
@@ -78,7 +78,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PairedComparison:
     """The settings of a study by one metric, the best first.
 
     Args:
@@ -96,10 +96,10 @@ class Comparison:
     most: bool
     entrants: tuple[Entrant, ...]
     ranks: tuple[float, ...]
-    behind: tuple[Pair, ...]
+    behind: tuple[PairedDifference, ...]
     conditions: dict[str, list[Label]]
 
-    def pair(self, one: int, other: int) -> Pair:
+    def pair(self, one: int, other: int) -> PairedDifference:
         """One entrant against another."""
         return compare(self.entrants[one], self.entrants[other], self.most)
 
@@ -112,7 +112,7 @@ def conditions_of(plan: Plan) -> list[str]:
     return [a.name for a in plan.parts[0].axes if a.drawn or a.name in over]
 
 
-def comparisons(frame: DataFrame, plan: Plan) -> list[Comparison]:
+def comparisons(frame: DataFrame, plan: Plan) -> list[PairedComparison]:
     """For each metric that has a better side, the one of [best] first, and each value of what is given."""
     conditions, best = conditions_of(plan), plan.study.best
     if not conditions or best is None:
@@ -168,7 +168,7 @@ def _name(plan: Plan, part: Part, at: Mapping[str, Any]) -> str:
 
 def comparison_of(
     of: dict[str, Label], rows: GroupedRows, metric: str, most: bool, conditions: Sequence[str]
-) -> Comparison:
+) -> PairedComparison:
     """Settings compared by a metric, one difference for each combination of the conditions.
 
     Args:
@@ -185,7 +185,7 @@ def comparison_of(
     ranks = mean_ranks(entrants, most)
     order = sorted(range(len(entrants)), key=lambda i: ranks[i])
     first = tuple(entrants[i] for i in order)
-    return Comparison(
+    return PairedComparison(
         of,
         metric,
         most,
@@ -213,7 +213,7 @@ def _values(
     return values, np.array([bool(bad) for _, bad in found])
 
 
-def compare(one: Entrant, other: Entrant, most: bool) -> Pair:
+def compare(one: Entrant, other: Entrant, most: bool) -> PairedDifference:
     """One setting against another: differences of the metric, one a surface.
 
     A run that failed is worse than any that was done; where both failed nothing is known.
@@ -227,12 +227,14 @@ def compare(one: Entrant, other: Entrant, most: bool) -> Pair:
     ]
     n = len(difference)
     if one is other or n == 0:
-        return Pair(None, None, None, 0.0, 0.0, 0.0, 1.0, n)
+        return PairedDifference(None, None, None, 0.0, 0.0, 0.0, 1.0, n)
     better = difference > 0.0 if most else difference < 0.0
     won, lost = int(better.sum()), int((~better & (difference != 0.0)).sum())
     share = binomtest(won, n).proportion_ci(LEVEL)
     low, high = median_interval(difference)
-    return Pair(_median(difference), low, high, won / n, lost / n, float(share.low), float(share.high), n)
+    return PairedDifference(
+        _median(difference), low, high, won / n, lost / n, float(share.low), float(share.high), n
+    )
 
 
 def _median(values: Array) -> float | None:
@@ -291,7 +293,7 @@ class Drawn:
         return self.figure(self.panels(), with_unit(self.metric))
 
 
-class Rows:
+class StudyRows:
     """A study's rows, as figures ask for them."""
 
     def __init__(self, frame: DataFrame, plan: Plan):

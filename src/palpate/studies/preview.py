@@ -15,7 +15,7 @@ from palpate.bench.speed import cores
 from palpate.errors import InputError, PluginError
 from palpate.plugins import is_plugin
 from palpate.studies.plan import MAIN, TRIED, Plan, Setting, samples
-from palpate.studies.run_one import FAILED, REFUSED, Job, Stopped, run_one
+from palpate.studies.run_one import FAILED, REFUSED, RunJob, Stopped, run_one
 
 PRESS = 0.1
 """Contact after which a run is long enough to ask a metric of it [s]."""
@@ -153,7 +153,8 @@ def check_cases(plan: Plan, waiting: Callable[[], None] | None = None) -> None:
         return
     for name, setting in _cases(plan):
         row, _ = run_one(
-            Job(setting, tuple(plan.study.metrics), plan.study.window, False, plan.plugins), waiting=waiting
+            RunJob(setting, tuple(plan.study.metrics), plan.study.window, False, plan.plugins),
+            waiting=waiting,
         )
         if row.result in USELESS:
             raise InputError(

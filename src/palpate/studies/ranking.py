@@ -21,7 +21,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True)
-class Mean:
+class MetricMean:
     """A mean over seeds, with its 95 % interval by Student's t; without one for a single seed."""
 
     value: float
@@ -46,8 +46,8 @@ class Ranked:
 
     at: dict[str, Label]
     runs: int
-    metric: Mean
-    behind: Mean
+    metric: MetricMean
+    behind: MetricMean
 
 
 @dataclass(frozen=True)
@@ -132,15 +132,15 @@ def _rank(at: dict[str, Label], seeds: Mapping[int, float], top: Mapping[int, fl
     return Ranked(at, len(seeds), mean(list(seeds.values())), mean(shared))
 
 
-def mean(values: Sequence[float]) -> Mean:
+def mean(values: Sequence[float]) -> MetricMean:
     """The mean of some values with its interval."""
     from scipy.special import stdtrit
 
     n = len(values)
     if n == 0:
-        return Mean(math.nan, None)
+        return MetricMean(math.nan, None)
     half = float(stdtrit(n - 1, 0.5 + LEVEL / 2) * np.std(values, ddof=1) / math.sqrt(n)) if n > 1 else None
-    return Mean(float(np.mean(values)), half)
+    return MetricMean(float(np.mean(values)), half)
 
 
 def _order(value: Label) -> tuple[int, float, str]:

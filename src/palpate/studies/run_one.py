@@ -63,7 +63,7 @@ class Row(msgspec.Struct, frozen=True, array_like=True):
 
 
 @dataclass(frozen=True)
-class Job:
+class RunJob:
     """A run to be done, with all that it takes.
 
     Args:
@@ -85,7 +85,7 @@ Done = tuple[Row, Record | None]
 
 
 def run_one(
-    job: Job, stopped: Callable[[], bool] = lambda: False, waiting: Callable[[], None] | None = None
+    job: RunJob, stopped: Callable[[], bool] = lambda: False, waiting: Callable[[], None] | None = None
 ) -> Done:
     """Runs a job to a row, for any outcome; with the record if it is to be kept.
 
@@ -147,7 +147,7 @@ class Local:
     def __init__(self, threads: int | None = None, waiting: Callable[[], None] | None = None):
         self.threads, self._waiting = threads or cores(), waiting
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[Done]:
+    def run(self, jobs: Iterable[RunJob]) -> Iterator[Done]:
         """Results of the jobs, in the order of completion.
 
         Who stops asking stops the runs that are under way.

@@ -21,7 +21,7 @@ from palpate.logs import write_record
 from palpate.studies import run_one, search
 from palpate.studies.plan import Plan, Setting, plan, resolve
 from palpate.studies.preview import check_parts_of
-from palpate.studies.run_one import Done, Job, Local, Row, sources
+from palpate.studies.run_one import Done, Local, Row, RunJob, sources
 from palpate.studies.study import parse
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 NAME = "runs.jsonl"
 
 
-class Head(msgspec.Struct, frozen=True):
+class JournalHead(msgspec.Struct, frozen=True):
     """The first line: which study this is, and whose numbers.
 
     Args:
@@ -73,7 +73,7 @@ class Finished:
             self.below += 1
 
 
-class Journal(journal.Journal):
+class RunJournal(journal.Journal):
     """A journal of runs, of `opened`."""
 
     def __init__(self, path: Path, file: FileIO, finished: Finished):
@@ -96,7 +96,7 @@ class Journal(journal.Journal):
 
 
 @contextmanager
-def open_journal(path: Path, head: Head) -> Iterator[Journal]:
+def open_journal(path: Path, head: JournalHead) -> Iterator[RunJournal]:
     """The journal of a study at `path`: begun, or gone on with if it is the same study's.
 
     The folder has to be this process's alone (`kept_folder`).
@@ -115,7 +115,7 @@ def open_journal(path: Path, head: Head) -> Iterator[Journal]:
         if 0 <= row.run < head.runs:
             finished.add(row.run)
     with journal.opened(path, end) as file:
-        yield Journal(path, file, finished)
+        yield RunJournal(path, file, finished)
 
 
 def rows(path: Path) -> Iterator[Row]:
@@ -123,9 +123,9 @@ def rows(path: Path) -> Iterator[Row]:
     return (row for row, _ in journal.entries(path, Row))
 
 
-def _check(path: Path, head: Head) -> None:
+def _check(path: Path, head: JournalHead) -> None:
     """Refuse a journal that is not of this study and version."""
-    there = journal.head_of(path, Head)
+    there = journal.head_of(path, JournalHead)
     if there is None:
         raise InputError(f"{path} is no journal of a study; choose another --out")
     if there == head:
@@ -147,10 +147,10 @@ SOURCE, RECORDS = "study.toml", "records"
 Progress = Callable[[int], None]
 
 
-class Runner(Protocol):
+class StudyRunner(Protocol):
     """Runs jobs: here, or on a cluster."""
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[Done]:
+    def run(self, jobs: Iterable[RunJob]) -> Iterator[Done]:
         """Results of the jobs, in any order."""
         ...
 
@@ -170,7 +170,7 @@ class Work:
     plan: Plan
     source: str
     folder: Path
-    runner: Runner
+    runner: StudyRunner
     progress: Progress = lambda _: None
 
     def run(self, *, replace: bool = False) -> DataFrame:
@@ -195,12 +195,12 @@ class Work:
             run_one.write(frame, self.plan, self.folder / run_one.NAME)
         return frame
 
-    def _run(self, book: Journal, settings: Iterable[Setting]) -> None:
+    def _run(self, book: RunJournal, settings: Iterable[Setting]) -> None:
         """Runs these; each row is in the journal as soon as it is done, its record before it."""
         study = self.plan.study
         metrics = tuple(study.metrics)
         for row, record in self.runner.run(
-            Job(s, metrics, study.window, study.keep_records, self.plan.plugins) for s in settings
+            RunJob(s, metrics, study.window, study.keep_records, self.plan.plugins) for s in settings
         ):
             if record is not None:
                 write_record(record, self.record(row.run))
@@ -213,7 +213,7 @@ class Work:
         folder.mkdir(exist_ok=True)
         return folder / f"{run:0{len(str(len(self.plan) - 1))}d}.parquet"
 
-    def _search(self, book: Journal) -> None:
+    def _search(self, book: RunJournal) -> None:
         study = self.plan.study
         assert study.best is not None
         sought = study.metrics.index(study.best.metric)
@@ -229,7 +229,7 @@ class Work:
                 searching.tell(number, values, search.objective([found[s.run] for s in trial]))
 
 
-def run(text: str, out: str | Path, *, where: str = "study", runner: Runner | None = None) -> DataFrame:
+def run(text: str, out: str | Path, *, where: str = "study", runner: StudyRunner | None = None) -> DataFrame:
     """The table of a study: run, parameters, seed, result, why, metrics; what is finished is not run again.
 
     Args:
@@ -263,9 +263,9 @@ def check_folder(folder: Path, plan: Plan, *, replace: bool) -> None:
             pass
 
 
-def head(plan: Plan) -> Head:
+def head(plan: Plan) -> JournalHead:
     """Identity of a study's journal."""
     from palpate import __version__
 
     study = hashlib.sha256(resolve(plan)).hexdigest()[:16]
-    return Head(plan.study.title, study, str(__version__), sources(), len(plan))
+    return JournalHead(plan.study.title, study, str(__version__), sources(), len(plan))

@@ -18,9 +18,9 @@ from palpate.report.study.page import StudyPage, study_page
 from palpate.studies import effects
 from palpate.studies.effects import charts
 from palpate.studies.figures import draw, figures
-from palpate.studies.pairing import Comparison, comparisons, short, with_unit
+from palpate.studies.pairing import PairedComparison, comparisons, short, with_unit
 from palpate.studies.plan import MAIN, Plan
-from palpate.studies.ranking import Mean, Ranked, Ranking, rankings
+from palpate.studies.ranking import MetricMean, Ranked, Ranking, rankings
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -106,8 +106,8 @@ def headline(
     frame: DataFrame,
     plan: Plan,
     ranked: Sequence[Ranking],
-    compared: Sequence[Comparison],
-    apart: Sequence[Comparison] = (),
+    compared: Sequence[PairedComparison],
+    apart: Sequence[PairedComparison] = (),
 ) -> list[str]:
     """The answer, a sentence each: failures first where they are many, the effect of each factor, the best setting."""
     best, what = plan.study.best, "surfaces" if compared and len(apart) == 1 else "pairs of runs"
@@ -148,7 +148,7 @@ def _seeds(plan: Plan) -> str:
 
 
 def summary(
-    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison] = ()
+    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
 ) -> dict[str, Any]:
     """JSON summary: runs, results, and the best settings of each ranking, or those on the same surfaces."""
     best = plan.study.best
@@ -176,7 +176,7 @@ def _span(values: Sequence[Any]) -> list[Any]:
 
 
 def tables(
-    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison] = ()
+    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
 ) -> list[Table]:
     """The best settings, the best of what the study is compared with, and results."""
     best = plan.study.best
@@ -261,7 +261,7 @@ def _overall(values: Sequence[float], name: str) -> str:
 
 
 def notes(
-    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[Comparison] = ()
+    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
 ) -> list[str]:
     """Warnings of the summary."""
     found = []
@@ -287,7 +287,7 @@ def notes(
     return found
 
 
-def _of_pairs(one: Comparison, plan: Plan) -> list[str]:
+def _of_pairs(one: PairedComparison, plan: Plan) -> list[str]:
     """Notes on the counts of a comparison."""
     failed = {e.name: int(e.failed.sum()) for e in one.entrants if e.failed.any()}
     found = []
@@ -346,7 +346,7 @@ def _behind(one: Ranked, place: int) -> str:
     )
 
 
-def interval(one: Mean) -> str:
+def interval(one: MetricMean) -> str:
     """A mean with its half-width, to two digits of the latter."""
     if one.half is None or one.half <= 0.0:
         return f"{one.value:.4g}"

@@ -246,11 +246,11 @@ class LineNoise:
         middle = 4.0 / (ROWS * 2.0 ** np.arange(LEVELS) * period)
         return cls(np.asarray(middle, np.float64), position, force, weights, tick, 1 / period)
 
-    def positions(self, noise: PositionNoise) -> Array:
+    def positions(self, noise: OctavePositionNoise) -> Array:
         """Products of what noise of the position makes of a, v and x in a line of each octave, (levels, 3, 3)."""
         return noise.power(self.frequency * self.tick)[:, None, None] * self.position
 
-    def in_samples(self, noise: PositionNoise) -> Array:
+    def in_samples(self, noise: OctavePositionNoise) -> Array:
         """Products of what noise of the position makes of a, v, x and 1 in one sample, shape (4, 4).
 
         Jumps have no power of their own in the position, but a position that wanders has its acceleration against it:
@@ -288,7 +288,7 @@ def _response(turns: Array, level: int) -> Array:
 
 
 @dataclass(frozen=True)
-class PositionNoise:
+class OctavePositionNoise:
     """Noise of the position: white, and jumps, which are white increments, as slow motion through an encoder has them.
 
     Args:
@@ -302,7 +302,7 @@ class PositionNoise:
     count: float
 
     @classmethod
-    def of(cls, power: float, product: float, count: float) -> PositionNoise:
+    def of(cls, power: float, product: float, count: float) -> OctavePositionNoise:
         """From the mean square of the position's sixth differences, the mean product of neighbours, and the count."""
         # Sums of products of the binomial weights of sixth differences of both kinds, at no distance and at one.
         white, jump = np.linalg.solve([[924.0, 252.0], [-792.0, -210.0]], [power, product])

@@ -30,7 +30,7 @@ Positive = Annotated[float, Meta(gt=0)]
 GRAVITY = 9.81
 
 
-class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class JointTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A joint and the link that it moves."""
 
     name: str
@@ -66,7 +66,7 @@ class ArmFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Roll, pitch, yaw [deg]."""
     gravity: Triple = (0.0, 0.0, -GRAVITY)
     """In the base's axes [m/s^2]."""
-    joint: list[Joint]
+    joint: list[JointTable]
 
 
 def names() -> list[str]:
