@@ -83,14 +83,15 @@ class World:
         table = {"time": self.time, "position": columns[0], "force": columns[1]}
         return Record(table, {"time": "s", "position": "m", "force": "N"})
 
-    def tangent(self, force: float, sign: float) -> float | None:
+    def tangent(self, force: float, sign: float, from_rest: bool) -> float | None:
         """Slope at a force that an answer names [N/m], the mean over the strokes; None where the log never has it.
 
         Args:
-            force: as named: from its rest where the log shows one, else as logged [N].
+            force: as named [N].
             sign: by which the answer counts the log's force.
+            from_rest: whether it counts from the force in free motion, and not as the log has it.
         """
-        level = sign * force + (self.rest if self.free else 0.0)
+        level = sign * force + (self.rest if from_rest else 0.0)
         found = []
         for first, last in self.strokes:
             x, f = self.position[first:last], self.force[first:last]
@@ -251,7 +252,7 @@ def judged(world: World, found: Identification) -> Judged:
     assert own.ci95 is not None
     assert own.value is not None
     sign = -1.0 if "force-sign-reversed" in found.codes else 1.0
-    truth = world.tangent(point.force_N, sign)
+    truth = world.tangent(point.force_N, sign, "contact-at-start" not in found.codes)
     half = (own.ci95[1] - own.ci95[0]) / 2
     if truth is None:
         return Judged("names a force that the log never has", own.value, half, point.force_N)

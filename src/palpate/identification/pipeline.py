@@ -89,7 +89,7 @@ def identify(
     choice = choose(problem, options)
     holds = estimated_by(method, choice.answer, choice.problem, channels)
     follows = max(choice.answer.fit.r2, holds.r2) > _FOLLOWS
-    if not (contacts.clear or bonded or follows):
+    if not (contacts.clear or bonded or follows or contacts.press):
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
         return nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))

@@ -53,8 +53,13 @@ class Choice:
 
     @property
     def explains(self) -> bool:
-        """Whether less than a third of the force's amplitude is left, in the octaves and in time."""
-        return 1 - min(self.answer.explained, self._followed) < THIRD**2
+        """Whether less than a third of the force's amplitude is left."""
+        return self.left < THIRD
+
+    @property
+    def left(self) -> float:
+        """Share of the force's amplitude that is left, in the octaves or in time, whichever is more."""
+        return float(np.sqrt(max(1 - min(self.answer.explained, self._followed), 0.0)))
 
     @property
     def _followed(self) -> float:

@@ -17,6 +17,7 @@ from palpate.identification.evidence.work import unloading_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import Press, Tangent
+from palpate.identification.tangents import SteadyPress
 
 _LEVELS = (0.3, 0.5, 0.7, 0.9)
 
@@ -44,6 +45,20 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
         relaxation(problem, lag, segments, slope_between(loadings, later)),
         back.late,
     )
+
+
+def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) -> Press:
+    """A press at constant speed, with the lost work and the relaxation that its log shows.
+
+    Args:
+        steady: its strokes' tangents and curves.
+        seen: the press by the filtered contact, if that shows one.
+        origin: position of the surface [m].
+    """
+    tangents = [Tangent(own.force, own.stiffness, own.half) for own in (*steady.others, steady.headline)]
+    from_surface = [own - np.array([[origin], [0.0]]) for own in (steady.loading, steady.unloading)]
+    loss, relaxed = (seen.hysteresis_loss, seen.relaxation) if seen else (None, None)
+    return Press(tuple(sorted(tangents, key=lambda own: own.force)), *from_surface, loss, relaxed)
 
 
 def _tangent(loadings: list[Loading], later: list[Loading], level: float) -> Tangent | None:
