@@ -72,7 +72,7 @@ def overlap(own, other):
 
 
 def follows_strokes(record):
-    """Whether a press at constant speed has a force that goes with it: less than half of it is no line of the position."""
+    """Whether the force of a press at constant speed goes with the position in every stroke."""
     channels = channels_of(record)
     strokes = strokes_of(channels)
     x, f = channels.position, channels.force

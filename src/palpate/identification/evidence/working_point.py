@@ -108,7 +108,9 @@ def steady_point(own: Slopes, problem: Problem, options: Options, unit: str) -> 
     stiffness = replace(_judged(value, half, options.tolerance, unit), budget=_largest(budget, half))
     interval = None if again is None else (value - again, value + again)
     depth = own.depth - problem.origin
-    return WorkingPoint(stiffness, own.force, depth, 0.25 / own.rise, "press", interval, not problem.contacts.bonded)
+    return WorkingPoint(
+        stiffness, own.force, depth, 0.25 / own.rise, "press", interval, not problem.contacts.bonded
+    )
 
 
 def _scaled(budget: dict[str, float], gain: float) -> dict[str, float]:
