@@ -67,7 +67,7 @@ def outcome(
         parameters=parameters,
         contacts=tuple(_clock(channels, chain, problem.contacts, span) for span in problem.contacts.spans),
         lag=_lag(choice),
-        r2=found.fit.r2 if found.fit.r2 >= 0 else max(holds.r2, 0.0),
+        r2=max(found.fit.r2, 0.0),
         rmse=found.fit.rmse,
         n=len(problem.force),
         warnings=(*warnings, *_late(press, problem, warnings), *_doubts(parameters, problem, options, terms)),

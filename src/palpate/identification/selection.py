@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,6 +82,20 @@ class Choice:
 
 
 def choose(problem: Problem, options: Options) -> Choice:
+    """The model; of a press at constant speed the force by a plain one is that of least squares in time."""
+    choice = _chosen(problem, options)
+    found = choice.answer
+    if problem.contacts.press is None or found.fit.model.nonlinear:
+        return choice
+    fitted = found.fit.in_time(found.problem.motion, found.problem.force)
+    tried = [
+        replace(own, r2=fitted.r2, rmse=fitted.rmse) if own.model == fitted.model.name else own
+        for own in choice.tried
+    ]
+    return replace(choice, answer=replace(found, fit=fitted), tried=tuple(tried))
+
+
+def _chosen(problem: Problem, options: Options) -> Choice:
     """Answer the plain model, and a richer one if it is asked for or earns its place.
 
     A richer model earns it by explaining at least half of what any plainer one leaves, with everything that it has more
