@@ -46,7 +46,7 @@ with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PI
         )
         keep = f"--gains cautious.toml --normal 0,0,-1 {LIMITS} --save-options ur.toml"
         palpate(f"press --wire {wire} --force 20:N {keep} --dry-run")
-        moved = f"press --wire {wire} --force 20:N --options ur.toml --yes --ordinary-priority --seconds 3 --probe 0.2"
+        moved = f"press --wire {wire} --force 20:N --options ur.toml --yes --seconds 3 --probe 0.2"
         if palpate(f"{moved} --record first"):
             # A machine that is busy is late, and then the arm is stopped: that is as it should be.
             sys.exit(

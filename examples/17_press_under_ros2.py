@@ -59,7 +59,7 @@ with subprocess.Popen(node, stdout=subprocess.PIPE, text=True) as arm:  # noqa: 
         palpate("tune --arm cell.toml --stiffness 1e3:1e4 --force 15 --out gains.toml")
         words = f"press --wire {wire} --force 15:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 6 --probe 0.2"
         palpate(f"{words} --dry-run")
-        if palpate(f"{words} --yes --ordinary-priority --record first"):
+        if palpate(f"{words} --yes --record first"):
             sys.exit(
                 "the press ended before it was done, as said above: a busy machine is late; run this again"
             )

@@ -47,8 +47,8 @@ static int inside_of(int file) {
     return inside(where);
 }
 
-/* Whether this change fails: 0 no, 1 yes, 2 after half of it. */
-static int fails(void) {
+/* Whether this change fails: 0 no, 1 yes, 2 after half of it. A full disk takes what makes room. */
+static int fails_if(int takes_room) {
     const char *at = getenv("ATTACK_FAIL"), *how = getenv("ATTACK_HOW"), *count = getenv("ATTACK_COUNT");
     long now = ++changes, wanted = at ? atol(at) : 0;
     if (count) {
@@ -62,6 +62,7 @@ static int fails(void) {
     }
     if (!wanted || !how) return 0;
     if (now == wanted && strcmp(how, "kill") == 0) raise(SIGKILL);
+    if (!takes_room && strcmp(how, "error") != 0) return 0;
     if (now == wanted && strcmp(how, "short") == 0) return 2;
     if (now == wanted || (now > wanted && (strcmp(how, "full") == 0 || strcmp(how, "short") == 0))) {
         errno = strcmp(how, "error") == 0 ? EIO : ENOSPC;
@@ -69,6 +70,8 @@ static int fails(void) {
     }
     return 0;
 }
+
+static int fails(void) { return fails_if(1); }
 
 #define NEXT(type, name, ...) type (*next)(__VA_ARGS__) = dlsym(RTLD_NEXT, name)
 
@@ -127,9 +130,25 @@ int link(const char *from, const char *to) {
 
 int unlink(const char *path) {
     NEXT(int, "unlink", const char *);
-    const char *how = getenv("ATTACK_HOW"); /* a full disk takes what makes room */
-    return how && strcmp(how, "kill") == 0 && inside_at(AT_FDCWD, path) && fails() ? -1 : next(path);
+    return inside_at(AT_FDCWD, path) && fails_if(0) ? -1 : next(path);
 }
+
+int unlinkat(int at, const char *path, int how) {
+    NEXT(int, "unlinkat", int, const char *, int);
+    return inside_at(at, path) && fails_if(0) ? -1 : next(at, path, how);
+}
+
+int rmdir(const char *path) {
+    NEXT(int, "rmdir", const char *);
+    return inside_at(AT_FDCWD, path) && fails_if(0) ? -1 : next(path);
+}
+
+int posix_fallocate64(int file, off_t at, off_t size) {
+    NEXT(int, "posix_fallocate64", int, off_t, off_t);
+    return inside_of(file) && fails() ? errno : next(file, at, size);
+}
+
+int posix_fallocate(int file, off_t at, off_t size) { return posix_fallocate64(file, at, size); }
 
 int mkdir(const char *path, mode_t mode) {
     NEXT(int, "mkdir", const char *, mode_t);

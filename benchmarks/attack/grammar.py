@@ -293,9 +293,9 @@ def names(chance: random.Random, folder: Path) -> Words:
     more = chance.choice(
         (
             (),
-            ("--report=r.html", "--replace"),
-            ("--figure=f.png", "--replace"),
-            ("--save-options=o.toml", "--replace"),
+            ("--report=r.html",),
+            ("--figure=f.png",),
+            ("--save-options=o.toml",),
         )
     )
     return [["topics", said], ["identify", said, *COLUMNS, *more]]

@@ -1,4 +1,8 @@
-"""Kills, Ctrl-C and full disks at any moment of a run and of a study: what is on the disk afterwards is whole."""
+"""Kills, Ctrl-C and full disks at any moment of a command: what is on the disk afterwards is whole.
+
+A run and a study are processes of their own, imports included; the other commands begin with everything imported
+(`warm`), so that a moment lies within their work.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +15,12 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from faults import COMMANDS, killed
 from reading import processor_time
 from samples import SAMPLES
 
@@ -215,6 +220,8 @@ KINDS = {
     "run, Ctrl-C": run_interrupted,
     "study killed": study_killed,
     "disk full": disks_full,
+    **{kind: partial(killed, kind) for kind in COMMANDS if kind not in {"run", "study"}},
 }
+"""What is done to a command, by its name: (count, folder, seed) -> outcomes, counted."""
 
 os.environ.setdefault("MPLBACKEND", "Agg")

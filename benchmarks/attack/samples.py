@@ -25,7 +25,8 @@ NAMES = ("time_s", "position_mm", "force_N")
 def sources() -> str:
     """Hash of what is attacked and of what attacks it."""
     hashed = hashlib.sha256()
-    for file in sorted([*(ROOT / "src").rglob("*.py"), *Path(__file__).parent.glob("*.[cp]*")]):
+    attacked = [file for room in ("src", "packages") for file in (ROOT / room).rglob("*.py")]
+    for file in sorted([*attacked, *Path(__file__).parent.glob("*.[cp]*")]):
         if file.is_file() and file.suffix != ".pyc":
             hashed.update(file.relative_to(ROOT).as_posix().encode() + file.read_bytes())
     return hashed.hexdigest()[:16]

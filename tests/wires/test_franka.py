@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import socket
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from palpate.wires import LostError, open_wire
-from palpate.wires.franka_driver import nearer
+from palpate.wires import LostError, link, open_wire
+from palpate.wires.franka_driver import Driver, nearer
 from palpate.wires.protocol import Command
 from palpate.wires.turns import from_matrix_by_columns
 from wires.slow_cell import PATIENCE, WORDS, child, slower_cell, wait_for_rows, while_it_presses
@@ -213,3 +216,48 @@ def test_a_matrix_by_columns_is_read_as_a_library_reads_it():
         matrix[:3, :3] = turn.as_matrix()
         found = Rotation.from_quat(from_matrix_by_columns(matrix.T.ravel()))
         assert (found * turn.inv()).magnitude() < 1e-7
+
+
+class RestingRobot:
+    """A robot of pylibfranka that is at rest and gives its states at once, and its motion under way."""
+
+    def __init__(self):
+        self.time, self.O_T_EE = SimpleNamespace(to_sec=lambda: 0.0), np.eye(4).ravel()
+        self.O_F_ext_hat_K, self.commands = (0.0,) * 6, []
+
+    def read_once(self):
+        return self
+
+    def start_cartesian_velocity_control(self, mode):
+        return self
+
+    def readOnce(self):
+        return self, None
+
+    def writeOnce(self, command):
+        self.commands.append(command)
+
+
+@pytest.mark.parametrize(
+    ("request_", "answer"), [(link.text(link.TARE), link.TARED), (link.begin(0.1), link.BEGUN)]
+)
+def test_an_answer_is_kept_while_nobody_reads(request_, answer):
+    """A loop that is busy for a third of a second leaves its socket full of states: what it asks then is answered."""
+    modes = SimpleNamespace(JointImpedance=None)
+    library = SimpleNamespace(ControllerMode=modes, CartesianVelocities=lambda speeds: SimpleNamespace())
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    theirs.setblocking(False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            theirs.send(bytes([link.STATE]))
+    driver = Driver(library, RestingRobot(), theirs, 1.0)
+    ours.send(request_)
+    thread = threading.Thread(target=driver.run)
+    thread.start()
+    time.sleep(0.05)  # the request is heard while there is no room for the answer
+    ours.settimeout(PATIENCE)
+    kinds = [ours.recv(link.LARGEST)[0] for _ in range(2000)]  # more than the socket holds
+    ours.close()
+    thread.join(PATIENCE)
+    theirs.close()
+    assert kinds.count(answer) == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import signal
@@ -19,7 +20,7 @@ from cli.json_keys import documented
 from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
-from palpate.wires import LostError, open_wire
+from palpate.wires import LostError, open_wire, sim_arm, sim_protocol
 from wires.slow_cell import WORDS, arm, cell, relayed, wait_for_rows
 
 
@@ -199,6 +200,29 @@ def test_a_second_master_is_refused(folder, here, capsys):
 
 
 @pytest.mark.long
+def test_nobody_but_its_master_moves_an_arm_even_with_the_number_of_its_session():
+    with contextlib.ExitStack() as stack:
+        arm, master, stranger = (
+            stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(3)
+        )
+        arm.bind(("127.0.0.1", 0))
+        arm.settimeout(5.0)
+        greeting = sim_protocol.packed(sim_protocol.HELLO, 7)
+        down = sim_protocol.packed(sim_protocol.MOVE, 7, sim_protocol.move(1, (0.0, 0.0, -0.01)))
+
+        def hear(sender, datagram, heard):
+            sender.sendto(datagram, arm.getsockname())
+            arm.recvfrom(512, socket.MSG_PEEK)
+            arm.setblocking(False)
+            heard = sim_arm._heard(arm, heard, 100.0)
+            arm.settimeout(5.0)
+            return heard
+
+        heard = hear(master, greeting, None)
+        assert hear(stranger, down, heard).speed == 0.0
+        assert hear(master, down, heard).speed == 0.01
+
+
 def test_an_arm_rests_when_its_master_dies_and_its_record_is_recovered(folder, here, capsys):
     with arm(folder, "--gap", "0.05") as (_, address):
         words = [w for w in words_of(folder, address) if w != "--json"]

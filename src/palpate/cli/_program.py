@@ -68,7 +68,7 @@ def _version() -> str:
     return str(__version__)
 
 
-def _described(place: str) -> str:
+def _describe(place: str) -> str:
     """A command's docstring before its parameters, each paragraph on one line for the terminal to wrap."""
     module, _, function = place.partition(":")
     text = getdoc(getattr(import_module(module), function)) or ""
@@ -127,6 +127,6 @@ def program(asked: str = "") -> App:
         raise InputError(f"{asked} is a command of {package}, which is not installed: pip install {package}")
     for order, (name, place) in enumerate((own | added).items()):
         group = next((group for group, names in GROUPS.items() if name in names), _PROGRAM)
-        text = _described(place) if name == asked else COMMANDS.get(name) or _first_line(place)
+        text = _describe(place) if name == asked else COMMANDS.get(name) or _first_line(place)
         app.command(place, name=name, help=text, sort_key=order, group=group)
     return app

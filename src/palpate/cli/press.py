@@ -65,7 +65,7 @@ def press(
     if wire.wire is None:
         for part in (wire, limits):
             only(part, "a real arm, and --wire is missing; add --wire")
-        code = _simulated(asked, simulated, json)
+        code = _simulate(asked, simulated, json)
     else:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
         from palpate.cli._press_wire import press_over
@@ -75,7 +75,7 @@ def press(
     return code
 
 
-def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
+def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
     from palpate.bench.ending import DONE, INTERRUPTED
     from palpate.press.prepare import prepared
 
@@ -85,14 +85,14 @@ def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> in
         start = "starting (the first run compiles, which takes some seconds)"
         with _progress.simulated(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)
-        summary = _written(record, pressing, fresh)
+        summary = _write(record, pressing, fresh)
     _show(pressing, summary, folder, json)
     if interrupted() or summary["end"] == INTERRUPTED:
         return interrupted.code
     return 0 if summary["end"] == DONE else 1
 
 
-def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
+def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
     from dataclasses import replace as changed
 
     from palpate.logs import write_record
@@ -109,11 +109,12 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
 
 
 def _show(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    from palpate.report.press.page import notes, tables
+    from palpate.report.press.page import notes, sentence, tables
 
     if as_json:
         print_answer(summary)
         return
-    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    found = (summary["identified"] or {}).get("parameters", {})
+    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated\n{sentence(summary, found)}"
     screen = show_answer(pressing.asked.arm.title, rest, tables(summary), notes(summary))
     place(screen, "report:", folder / "report.html")

@@ -18,7 +18,7 @@ from palpate.logs.own_runs import is_run
 from palpate.logs.plausibility import epoch_unit
 from palpate.logs.proposal import Proposal, Seen, clock_of, for_a_run, from_columns, from_topics
 from palpate.logs.tables import Sheet, Stated, equal_sheets, open_table
-from palpate.text import shortened
+from palpate.text import shorten
 from palpate.units import unit, unit_in_name
 
 
@@ -95,7 +95,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     if repeats:
         one = list_log(repeats[0], limits=limits).proposal
         text = f"{len(repeats)} sheets have the same columns and are pooled, as repeats of one test: "
-        named = shortened(", ".join(sheet.name for sheet in repeats), 120)
+        named = shorten(", ".join(sheet.name for sheet in repeats), 120)
         proposal = replace(one, guesses=(*one.guesses, text + named))
     facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
     return Listing(entries, unread + [note["text"] for note in table.notes], proposal, facts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -37,6 +37,12 @@ _FOLLOWS = 0.3
 """Rank correlation of a force with its position above which it follows: 1 - (1 - c)^3 where it follows in a share c of
 the rows and is noise in the others, so that a contact over a ninth of the log is seen."""
 _NO_PAIR = "no two columns are a position that moves and a force that follows it"
+_JOINTS_ONLY = (
+    "the columns are those of libfranka's logToCSV: joints and their torques, without wrench and pose of the tip;"
+    " record O_F_ext_hat_K and O_T_EE of RobotState with its time, which --preset franka reads"
+)
+_STATES = 1000
+"""Fastest rate at which an arm's controller gives its state [Hz]: that of libfranka; UR's is 500."""
 _RATE = 1000
 """Of the example [Hz]; nothing is computed with it."""
 
@@ -161,11 +167,22 @@ def from_columns(table: Sheet, seen: Sequence[Seen], delimiter: str | None = Non
     length = max((len(own.values) for own in seen), default=0)
     own = [column for column in seen if len(column.values) == length]
     options = {} if delimiter is None else {"delimiter": delimiter}
-    name = _preset_of({column.name for column in own})
-    if name is not None:
-        time = {} if "time" in preset(name) else _timing(table, own, guesses)[0]
-        return Proposal({**options, "preset": name, **time}, tuple(guesses), _motion(name, own))
     timing, clock = _timing(table, own, guesses)
+    by_member = {_member(column.name): replace(column, name=_member(column.name)) for column in own}
+    name = _preset_of(by_member)
+    if name is not None:
+        facts = _motion(name, list(by_member.values()))
+        if "time" in preset(name):
+            return Proposal({**options, "preset": name}, (), facts)
+        timing, guesses = _state_time(clock) if clock else (timing, guesses)
+        names = {_member(column.name): column.name for column in own}
+        given = {
+            key: ",".join(names[one] for one in value.split(",")) for key, value in _columns_of(name).items()
+        }
+        changed = {} if given == _columns_of(name) else given
+        return Proposal({**options, "preset": name, **timing, **changed}, tuple(guesses), facts)
+    if all(f"{part}[{i}]" in by_member for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
+        return Proposal(None, (_JOINTS_ONLY,))
     others = [column for column in own if column is not clock and column.changes and not column.counts_rows]
     space = _in_space(table, others, guesses)
     if space:
@@ -176,6 +193,24 @@ def from_columns(table: Sheet, seen: Sequence[Seen], delimiter: str | None = Non
     position, force = pair
     place, load = (_with_unit(table, *one, guesses) for one in ((position, "length"), (force, "force")))
     return Proposal({**options, **timing, "position": place, "force": load}, tuple(guesses))
+
+
+def _member(name: str) -> str:
+    """The member of a driver's state that a column holds: `O_T_EE[3]` of `state.O_T_EE[3]` and `O_T_EE_3`."""
+    return re.sub(
+        r"^(?:state\.)?((?:O_T_EE|O_F_ext_hat_K|q|tau_ext_hat_filtered))[\[_.](\d+)\]?$", r"\1[\2]", name
+    )
+
+
+def _columns_of(name: str) -> dict[str, str]:
+    """Wrench and pose of a preset."""
+    return {key: preset(name)[key] for key in ("wrench", "pose")}
+
+
+def _state_time(clock: Seen) -> tuple[dict[str, str], list[str]]:
+    """The time of a driver's states: no controller gives them faster than `_STATES`, which leaves one unit."""
+    symbol = next((s for s in ("us", "ms") if clock.step * unit(s).factor * _STATES > 0.5), "s")
+    return {"time": clock.name if symbol == "s" else f"{clock.name}:{symbol}"}, []
 
 
 def _preset_of(names: Container[str]) -> str | None:

@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 from palpate.errors import InputError
 from palpate.wires import link
@@ -75,10 +76,11 @@ class ApartWire:
         self._ask(link.text(link.TARE), link.TARED)
 
     def begin(self, silence: float = SILENCE) -> None:
-        """Take the arm over, with this process's own priority."""
+        """Take the arm over; all threads of the library's process get this thread's priority."""
         policy = os.sched_getscheduler(0)
         if policy != os.SCHED_OTHER:
-            os.sched_setscheduler(self._driver.pid, policy, os.sched_getparam(0))
+            for thread in Path(f"/proc/{self._driver.pid}/task").iterdir():
+                os.sched_setscheduler(int(thread.name), policy, os.sched_getparam(0))
         self._begun = True
         self._ask(link.begin(silence), link.BEGUN)
 
@@ -112,7 +114,7 @@ class ApartWire:
             self._send(message)
             self._answered(answer, self.answer)
         except LostError as error:
-            raise InputError(f"{self.title} does not begin to move: {error}") from None
+            raise InputError(f"{self.title} does not answer: {error}") from None
 
     def _send(self, message: bytes) -> None:
         try:

@@ -14,6 +14,7 @@ import select
 import socket
 import sys
 import time
+from collections import deque
 from typing import Any
 
 from palpate.wires import link
@@ -24,6 +25,8 @@ from palpate.wires.turns import from_matrix_by_columns
 _TICK = 1e-3
 _ANSWER = 5e-4
 """Of a tick, for which a loop's answer is waited for [s]."""
+_FAREWELL = 1.0
+"""For which the reason of the end waits for room in the socket [s]: a loop that stands still never makes any."""
 _REST = 10
 """Ticks without a command after which the arm is brought to rest."""
 _ACCELERATION = 2.0
@@ -51,12 +54,13 @@ class Driver:
         self._control: Any = None
         self._wanted, self._speed, self._silent = _ZERO, _ZERO, 0
         self._ending, self._left = False, False
+        self._answers: deque[bytes] = deque()
 
     def run(self) -> None:
         """Until the wire has gone; what libfranka throws ends it."""
         while not self._left or self._control is not None:
             state = self._robot.read_once() if self._control is None else self._control.readOnce()[0]
-            self._tell(link.state(self._sense(state)))
+            self._send(link.state(self._sense(state)))
             self._listen()
             if self._control is not None:
                 self._write()
@@ -67,10 +71,20 @@ class Driver:
         place = (float(m[12]), float(m[13]), float(m[14]))
         return Sense(received, state.time.to_sec(), (a, b, c), (d, e, f), place, from_matrix_by_columns(m))
 
-    def _tell(self, message: bytes) -> None:
+    def _answer(self, kind: int, words: str = "") -> None:
+        """Answer a request. The wire waits for that answer: it is kept until there is room for it."""
+        self._answers.append(link.text(kind, words))
+        self._send()
+
+    def _send(self, *readings: bytes) -> None:
+        """Send the answers that are kept, then readings; a reading for which there is no room is dropped."""
         try:
-            self._wire.send(message)
-        except BlockingIOError:  # nobody reads: the newest is what they will want
+            while self._answers:
+                self._wire.send(self._answers[0])
+                self._answers.popleft()
+            for reading in readings:
+                self._wire.send(reading)
+        except BlockingIOError:  # nobody has read for a while
             return
         except OSError:
             self._gone()
@@ -101,21 +115,21 @@ class Driver:
         elif message[0] == link.REST:
             self._ending = True
             if self._control is None:
-                self._tell(link.text(link.RESTED))
+                self._answer(link.RESTED)
         elif message[0] == link.BEGIN:
             self._begin()
         elif message[0] == link.TARE:  # the estimate has no zero that could be set
-            self._tell(link.text(link.TARED))
+            self._answer(link.TARED)
 
     def _begin(self) -> None:
         mode = self._library.ControllerMode.JointImpedance
         try:
             self._control = self._robot.start_cartesian_velocity_control(mode)
         except Exception as error:  # noqa: BLE001 - libfranka throws kinds of no common base
-            self._tell(link.text(link.REFUSED, f"the Franka may not be moved: {line(error)}"))
+            self._answer(link.REFUSED, f"the Franka may not be moved: {line(error)}")
             return
         self._wanted, self._speed, self._silent, self._ending = _ZERO, _ZERO, 0, False
-        self._tell(link.text(link.BEGUN))
+        self._answer(link.BEGUN)
 
     def _write(self) -> None:
         if self._ending or self._silent > _REST:
@@ -128,7 +142,7 @@ class Driver:
         self._control.writeOnce(command)
         if last:
             self._control = None
-            self._tell(link.text(link.RESTED))
+            self._answer(link.RESTED)
 
 
 def nearer(old: Triple, new: Triple, step: float) -> Triple:
@@ -155,6 +169,7 @@ def main() -> None:
         wire.send(link.text(link.READY, f"{title}\n{_WATCHDOG}\n"))
         Driver(pylibfranka, robot, wire, float(sign)).run()
     except Exception as error:  # noqa: BLE001 - likewise
+        wire.settimeout(_FAREWELL)
         try:
             wire.send(link.text(link.FAILED, f"the controller: {line(error)}"))
         except OSError:

@@ -1,4 +1,4 @@
-"""Priority for a loop, where the system gives one, and a word where it does not."""
+"""Priority for a loop or a simulated controller, where the system gives one, and a word where it does not."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import gc
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 _PRIORITY = 40
 _BOTH = 3  # MCL_CURRENT | MCL_FUTURE
@@ -26,6 +27,8 @@ def hurried(wanted: bool) -> Iterator[str]:
     finally:
         if fifo:
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        if locked:
+            _libc().munlockall()
         gc.enable()
 
 
@@ -50,9 +53,13 @@ def _fifo() -> bool:
 
 
 def _locked() -> bool:
-    import ctypes
-
     try:
-        return ctypes.CDLL(None, use_errno=True).mlockall(_BOTH) == 0
+        return bool(_libc().mlockall(_BOTH) == 0)
     except (OSError, AttributeError):
         return False
+
+
+def _libc() -> Any:
+    import ctypes
+
+    return ctypes.CDLL(None, use_errno=True)

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.files import RECORD, check_place, signed, write_json
+from palpate.files import RECORD, check_place, fresh_folder, signed, write_json
 from palpate.logs import write_record
 from palpate.records import Record
 
@@ -34,7 +34,7 @@ UNITS = {
     **{f"quaternion_{axis}": "1" for axis in "xyzw"},
 }
 """Columns of a row. The first columns are along the direction of the press, the force without its bias in the air."""
-_ROWS, _HEAD, TOLD = "rows.f64", "press.json", "press.json"
+_ROWS, _HEAD = "rows.f64", "press.json"
 
 
 class Rows:
@@ -58,9 +58,9 @@ class Rows:
         if folder.exists() or folder.is_symlink():
             raise InputError(f"{folder} exists; choose another place for --record")
         check_place(folder, "--record")
-        folder.mkdir()
-        write_json(folder / _HEAD, signed({"unfinished": True, **about}))
-        _reserve(folder / _ROWS, 8 * most * len(UNITS))
+        with fresh_folder(folder, replace=False) as draft:
+            write_json(draft / _HEAD, signed({"unfinished": True, **about}))
+            _reserve(draft / _ROWS, 8 * most * len(UNITS))
         self._rows = np.memmap(folder / _ROWS, dtype=np.float64, mode="r+", shape=shape)
 
     @property
@@ -114,10 +114,12 @@ def recover(folder: Path) -> Path:
         about = msgspec.json.decode(head.read_bytes(), type=dict[str, Any])
     except msgspec.DecodeError as error:
         raise InputError(f"{head} is spoiled ({error}); it cannot be recovered") from None
+    if about.pop("unfinished", None) is None:  # the record was made, and its rows were not removed yet
+        rows.unlink()
+        return folder / RECORD
     numbers = np.fromfile(rows, dtype=np.float64)
     numbers = numbers[: len(numbers) // len(UNITS) * len(UNITS)].reshape(-1, len(UNITS))
     written = numbers[numbers[:, 1] != 0.0]  # a time of receipt is never 0
-    about.pop("unfinished", None)
     return _finished(folder, _record(written, about), {**about, "ended": "broken off", "ok": False})
 
 
@@ -125,7 +127,7 @@ def _finished(folder: Path, record: Record, outcome: dict[str, Any]) -> Path:
     if len(record):
         write_record(record, folder / RECORD)
     outcome = {name: value for name, value in outcome.items() if name != "written_by"}
-    write_json(folder / TOLD, signed(outcome))
+    write_json(folder / _HEAD, signed(outcome))
     (folder / _ROWS).unlink()
     return folder / RECORD
 

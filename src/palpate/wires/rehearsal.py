@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from palpate._vector import ZERO3
 from palpate.force.arm import Arm, load_arm
 from palpate.force.simulated_press import surface, world_of
 from palpate.force.touching import BodyState, Surface, World, moved
+from palpate.wires.realtime import hurried
 
 START = 0.3
 """Height of the surface in the base [m]."""
@@ -92,13 +93,21 @@ def ready(line: str) -> None:
     sys.stdout.flush()
 
 
-def paced(arm: OneDirection, seconds: float) -> Iterator[None]:
-    """Each tick when it is due, at real time, until the seconds of the arm are over."""
-    begun = time.monotonic()
-    while arm.time < seconds:
-        wait = begun + arm.time - time.monotonic()
-        if wait > 0.0:
-            time.sleep(wait)
-        elif wait < -_BEHIND:
-            begun -= wait
-        yield
+def paced(arm: OneDirection, seconds: float, wait: Callable[[float], None] = time.sleep) -> Iterator[None]:
+    """Each tick when it is due, at real time, until the seconds of the arm are over.
+
+    With real-time priority, where the system gives it: a controller is not late because the loop's computer is busy.
+
+    Args:
+        arm: whose clock it is.
+        seconds: of the arm's time.
+        wait: called before each tick with the seconds that are left until it is due.
+    """
+    with hurried(True):
+        begun = time.monotonic()
+        while arm.time < seconds:
+            left = begun + arm.time - time.monotonic()
+            wait(max(left, 0.0))
+            if left < -_BEHIND:
+                begun -= left
+            yield

@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from palpate.wires.rehearsal import START, OneDirection, arm_of, loopback, ready, words_of
+from palpate.wires.rehearsal import START, OneDirection, arm_of, loopback, paced, ready, words_of
 
 RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
 _VERSION = (5, 15, 0, 0)
@@ -204,21 +204,20 @@ class Server:
 
     def serve(self, seconds: float) -> None:
         """Run at real time until the seconds of the arm are over."""
-        controller, begun = self.controller, time.monotonic()
-        while controller.arm.time < seconds:
-            due = begun + controller.arm.time
-            while True:
-                left = max(due - time.monotonic(), 0.0)
-                for key, _ in self.selector.select(left):
-                    self._handle(key.fileobj, *key.data)
-                if time.monotonic() >= due:
-                    break
-            if time.monotonic() - due > 1.0:
-                begun += time.monotonic() - due
-            controller.tick()
+        for _ in paced(self.controller.arm, seconds, self._listen):
+            self.controller.tick()
             for client in list(self.clients.values()):
                 if client.started:
                     self._send(client, "U", self._packet(client))
+
+    def _listen(self, seconds: float) -> None:
+        """Handle messages for so long, and once at least."""
+        due = time.monotonic() + seconds
+        while True:
+            for key, _ in self.selector.select(max(due - time.monotonic(), 0.0)):
+                self._handle(key.fileobj, *key.data)
+            if time.monotonic() >= due:
+                return
 
     def _handle(self, one: Any, what: str, port: int) -> None:
         if what == "accept":

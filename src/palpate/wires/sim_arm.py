@@ -81,7 +81,7 @@ def _heard(listening: socket.socket, master: Master | None, rate: float) -> Mast
             if master is None or master.session != session:
                 master = Master(address, session, now)
             _send(listening, protocol.packed(protocol.WELCOME, session, protocol.welcome(rate)), address)
-        elif master is not None and session == master.session:
+        elif master is not None and (address, session) == (master.address, master.session):
             master.heard = now
             _obeyed(master, kind, body)
 
