@@ -246,8 +246,7 @@ def _within(curve: Curve, low: float, high: float) -> _Window | None:
 
 
 def _fit(window: _Window, degree: int) -> Array:
-    theta: Array = chebyshev.chebfit(window.scaled, window.force, degree)
-    return theta
+    return np.asarray(chebyshev.chebfit(window.scaled, window.force, degree), np.float64)
 
 
 def _tangent(window: _Window, level: float) -> tuple[float, ...]:

@@ -56,9 +56,12 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
         origin: position of the surface [m].
     """
     tangents = [Tangent(own.force, own.stiffness, own.half) for own in (*steady.others, steady.headline)]
-    from_surface = [own - np.array([[origin], [0.0]]) for own in (steady.loading, steady.unloading)]
-    loss, relaxed = (seen.hysteresis_loss, seen.relaxation) if seen else (None, None)
-    return Press(tuple(sorted(tangents, key=lambda own: own.force)), *from_surface, loss, relaxed)
+    surface = np.array([[origin], [0.0]])
+    ordered = tuple(sorted(tangents, key=lambda own: own.force))
+    curves = steady.loading - surface, steady.unloading - surface
+    if seen is None:
+        return Press(ordered, *curves)
+    return replace(seen, tangent=ordered, loading=curves[0], unloading=curves[1])
 
 
 def _tangent(loadings: list[Loading], later: list[Loading], level: float) -> Tangent | None:
