@@ -37,6 +37,8 @@ _FEWEST = 20
 _ROUNDS = 3
 _SIGNED = 0.6
 """Correlation of block means of force and position below which nobody can tell which way they count."""
+_BESIDE = 0.05
+"""Share of a stroke before and after it in which the probe is still speeding up or slowing down."""
 _OVERSAMPLED = 16.0
 """Samples in a period of the cut-off that are kept: means of more readings droop by 0.6 % there, on both alike."""
 
@@ -116,7 +118,9 @@ def _crossed(channels: Channels, air: FreeMotion, strokes: tuple[Stroke, ...]) -
     """Whether the strokes pass the air of a press and the force stays: places at rest have no slope to tell."""
     limit, slopes = air.way * air.limit, []
     for stroke in strokes:
-        x, f = air.way * channels.position[stroke.rows(channels)], channels.force[stroke.rows(channels)]
+        more = _BESIDE * (stroke.end - stroke.begin)
+        rows = replace(stroke, begin=stroke.begin - more, end=stroke.end + more).rows(channels)
+        x, f = air.way * channels.position[rows], channels.force[rows]
         inside = x < limit
         if np.count_nonzero(inside) >= _SEVERAL:
             slopes.append((float(np.ptp(x[inside])), _rise(x[inside], f[inside]), _rise(x, f)))
