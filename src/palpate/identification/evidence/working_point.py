@@ -78,15 +78,8 @@ def working_point(
     if against:
         reason = f"{stiffness.reason}; {against}"
         stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
-    return WorkingPoint(
-        stiffness,
-        force - rest,
-        depth,
-        float(frequency),
-        "press" if use_press else "octave",
-        again,
-        not contacts.bonded,
-    )
+    source = "press" if use_press else "octave"
+    return WorkingPoint(stiffness, force - rest, depth, float(frequency), source, again, not contacts.bonded)
 
 
 def steady_point(own: Slopes, problem: Problem, options: Options, unit: str) -> WorkingPoint:
