@@ -11,7 +11,6 @@ import numpy as np
 from palpate.contact_frame.signals_in_base import Arm
 from palpate.errors import InputError
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn
-from palpate.identification.options import LEAST_SQUARES
 from palpate.signals.types import NORMAL
 from palpate.units import GRAVITY
 
@@ -222,8 +221,6 @@ def _arm(arm: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"force filtered by {arm['force_filter']} before it was sampled; the position goes through the same"
         )
-    if arm.get("method", LEAST_SQUARES) != LEAST_SQUARES:
-        lines.append(f"parameters by {arm['method']}; the models were chosen by {LEAST_SQUARES}")
     return lines
 
 
