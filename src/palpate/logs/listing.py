@@ -46,7 +46,7 @@ class Entry:
     fields: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """As plain values."""
+        """The listing as plain JSON values."""
         return asdict(self)
 
 
@@ -86,7 +86,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
             entries = [_of_topic(bag, name, fields[name]) for name in bag.topics]
             return Listing(entries, bag.troubles, from_topics(bag, fields))
     table = open_table(path, kind, delimiter, limits)
-    seen, unread = _seen(table)
+    seen, unread = _read_columns(table)
     clock = clock_of(table, seen)
     entries = [_of_column(own, clock) for own in seen]
     entries += [Entry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
@@ -130,7 +130,7 @@ def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
     return " ".join(uses) + (f" (in {topic.parent})" if topic.parent else "")
 
 
-def _seen(table: Sheet) -> tuple[list[Seen], list[str]]:
+def _read_columns(table: Sheet) -> tuple[list[Seen], list[str]]:
     """Every column's values and unit; and why there are no values, where they cannot be read."""
     places = list(range(len(table.names)))
     unread = []

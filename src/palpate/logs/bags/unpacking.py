@@ -12,7 +12,7 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 """First bytes of whatever zstd packed."""
 
 
-def unpacked(data: bytes, packing: str, size: int, budget: Budget) -> bytes:
+def unpack_chunk(data: bytes, packing: str, size: int, budget: Budget) -> bytes:
     """Unpack a chunk.
 
     Args:

@@ -127,7 +127,7 @@ def first_lines(path: Path) -> tuple[list[Line], bool]:
         begin, newline, _ = begin.rpartition(b"\n")
         if not newline:
             raise InputError(f"the first line of {path} has over {LOOK:,} bytes; a table has a line a row")
-    return lines_of(path, _decoded(begin)), b"\r" in begin and b"\n" not in begin
+    return lines_of(path, _decode(begin)), b"\r" in begin and b"\n" not in begin
 
 
 def lines_of(path: Path, text: str) -> list[Line]:
@@ -154,7 +154,7 @@ def lines_of(path: Path, text: str) -> list[Line]:
     return lines
 
 
-def _decoded(begin: bytes) -> str:
+def _decode(begin: bytes) -> str:
     """Text in UTF-8, or else in the code of an old Windows, where a micro or a degree is one byte."""
     try:
         return begin.decode("utf-8-sig")
