@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.logs.missing import find_sentinel
+from palpate.logs.columns import find_sentinel
 from palpate.logs.plausibility import epoch_unit
 from palpate.logs.roles import Loaded, check_apart, check_quantity, family, quantity, si_unit
 from palpate.logs.tables import Sheet, Stated

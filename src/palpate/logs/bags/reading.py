@@ -15,8 +15,7 @@ from palpate.files.limits import Budget
 from palpate.logs.bags.scan_bag1 import scan_bag1
 from palpate.logs.bags.scan_mcap import scan_mcap
 from palpate.logs.bags.scan_sqlite import scan_sqlite
-from palpate.logs.bags.scanning import Channel, End, Raw
-from palpate.logs.bags.unpacking import ZSTD, unpack_file, unpack_message
+from palpate.logs.bags.scanning import ZSTD, Channel, End, Raw, unpack_file, unpack_message
 from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
 
 _SCANS = {Kind.BAG1: scan_bag1, Kind.MCAP: scan_mcap, Kind.SQLITE: scan_sqlite}

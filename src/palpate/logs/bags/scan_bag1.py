@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from palpate.errors import InputError
 from palpate.files.limits import Budget, LimitError
-from palpate.logs.bags.scanning import Channel, End, Raw
-from palpate.logs.bags.unpacking import unpack_chunk
+from palpate.logs.bags.scanning import Channel, End, Raw, unpack_chunk
 
 if TYPE_CHECKING:
     from rosbags.rosbag1.reader import Header

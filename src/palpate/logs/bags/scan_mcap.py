@@ -10,8 +10,7 @@ from struct import unpack_from
 from typing import BinaryIO
 
 from palpate.files.limits import Budget, LimitError
-from palpate.logs.bags.scanning import Channel, End, Raw
-from palpate.logs.bags.unpacking import unpack_chunk
+from palpate.logs.bags.scanning import Channel, End, Raw, unpack_chunk
 
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 _MAGIC = 8

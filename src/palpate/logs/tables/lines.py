@@ -1,15 +1,21 @@
-"""The lines of a text log: its first lines, their delimiter, and the kinds of cells."""
+"""The lines of a text log: its first lines, their delimiter, the kinds of cells, dates and times as seconds."""
 
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.logs.tables.clock import seconds_of_text
+
+if TYPE_CHECKING:
+    import polars
 
 LOOK = 4_000_000
 """Bytes at the beginning of a file that are looked at."""
@@ -162,3 +168,31 @@ def _decode(begin: bytes) -> str:
         if len(begin) - error.start < 4 and error.reason == "unexpected end of data":
             return begin[: error.start].decode("utf-8-sig")
         return begin.decode("cp1252", errors="replace")
+
+
+def seconds_of_text(text: str | None) -> float | None:
+    """A date and time of ISO 8601 in seconds since 1970, a time of day since midnight; None if it is neither.
+
+    Without a zone it counts as UTC. No text at all is no reading: NaN.
+    """
+    if not text:
+        return math.nan
+    if len(text) < len("12:00:00") or not text[:2].isdigit():
+        return None
+    try:
+        moment = datetime.fromisoformat(text if text[2] != ":" else f"1970-01-01T{text}")
+    except ValueError:
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def seconds_of_cells(cells: polars.Series) -> Array:
+    """A column of dates, times or durations in seconds, NaN where there is none."""
+    import polars
+
+    if cells.dtype == polars.Date:
+        cells = cells.cast(polars.Datetime("ns"))
+    if cells.dtype != polars.Time:  # which counts nanoseconds as it stands
+        cells = cells.dt.cast_time_unit("ns")
+    seconds: Array = cells.to_physical().cast(polars.Float64).to_numpy() / 1e9
+    return seconds

@@ -16,8 +16,7 @@ from palpate.errors import InputError
 from palpate.files import SIGNATURE
 from palpate.files.confined import read_confined
 from palpate.files.limits import Budget, Limits
-from palpate.logs.tables.clock import seconds_of_cells
-from palpate.logs.tables.lines import NO_READING
+from palpate.logs.tables.lines import NO_READING, seconds_of_cells
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, as_counts
 
 if TYPE_CHECKING:

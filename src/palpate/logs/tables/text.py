@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.files.limits import Budget
-from palpate.logs.tables.clock import seconds_of_text
 from palpate.logs.tables.layout import Layout, find_layout
 from palpate.logs.tables.lines import (
     COMMENTS,
@@ -25,6 +24,7 @@ from palpate.logs.tables.lines import (
     Parting,
     first_lines,
     lines_of,
+    seconds_of_text,
 )  # fmt: skip
 from palpate.logs.tables.preamble import read_preamble
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, is_finite
