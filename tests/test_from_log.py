@@ -55,6 +55,56 @@ def test_a_log_of_a_ur_leads_to_its_preset_and_is_read_alone(tmp_path, capsys):
     assert own["parameters"] == json.loads(json.dumps(found.to_json()["parameters"]))
 
 
+def franka_log(path, name="{}[{}]", unit=1e-3, start=5000.0):
+    """The same press by a Franka: members of libfranka's RobotState, each column named as recorders do."""
+    log = np.genfromtxt(ur_log(path), names=True)
+    matrix = np.tile([1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], (len(log), 1))
+    for i in range(3):
+        matrix[:, 12 + i] = log[f"actual_TCP_pose_{i}"]
+    names = ["time", *(name.format("O_T_EE", i) for i in range(16))]
+    names += [name.format("O_F_ext_hat_K", i) for i in range(6)]
+    wrench = [log[f"actual_TCP_force_{i}"] for i in range(6)]
+    time = start + np.round(log["timestamp"] / unit, 6)
+    np.savetxt(
+        path, np.column_stack([time, matrix, *wrench]), header=" ".join(names), comments="", fmt="%.9g"
+    )
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "words"),
+    [
+        ("{}[{}]", 1e-3, "--preset franka --time time:ms"),
+        ("state.{}[{}]", 1.0, "--preset franka --time time --wrench 'state.O_F_ext_hat_K[0],"),
+        ("{}_{}", 1e-3, "--preset franka --time time:ms --wrench O_F_ext_hat_K_0,O_F_ext_hat_K_1"),
+    ],
+)
+def test_a_log_of_a_franka_leads_to_its_preset_and_is_read_alone(tmp_path, name, unit, words):
+    path = franka_log(tmp_path / "press.csv", name, unit)
+    proposal = list_log(path).proposal
+    assert proposal.command(path).startswith(f"palpate identify {path} {words}")
+    assert not proposal.guesses
+    assert palpate.identify_log(path).working_point.stiffness.value == pytest.approx(K, rel=0.02)
+
+
+def test_joints_without_a_pose_are_no_press_and_the_reason_names_the_columns_to_record(tmp_path):
+    names = ["time", *(f"state.{part}[{i}]" for part in ("q", "tau_ext_hat_filtered") for i in range(7))]
+    rows = np.random.default_rng(0).normal(size=(400, len(names)))
+    rows[:, 0] = np.arange(400)
+    np.savetxt(tmp_path / "log.csv", rows, header=",".join(names), comments="", delimiter=",")
+    assert list_log(tmp_path / "log.csv").proposal.options is None
+    with pytest.raises(InputError, match="record O_F_ext_hat_K and O_T_EE of RobotState"):
+        palpate.identify(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(("steps", "proposed"), [(19, False), (20, True)])
+def test_a_position_of_fewer_than_twenty_counts_is_never_proposed(tmp_path, steps, proposed):
+    ramp = np.concatenate([np.arange(steps + 1), np.arange(steps, -1, -1)]).repeat(20)
+    rows = [f"{0.002 * i:.3f},{0.01 * x:.2f},{3.0 * x:.1f}" for i, x in enumerate(ramp)]
+    (tmp_path / "log.csv").write_text("\n".join(["time_s,position_mm,force_N", *rows]) + "\n")
+    assert (list_log(tmp_path / "log.csv").proposal.options is not None) == proposed
+
+
 def test_what_was_measured_can_be_pressed_though_its_damping_has_no_number(tmp_path, capsys, monkeypatch):
     """An unknown damping counts at the upper end of its interval, and the tuning says so."""
     monkeypatch.chdir(tmp_path)

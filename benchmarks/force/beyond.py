@@ -3,9 +3,10 @@
     python benchmarks/force/beyond.py [--touches 50] [--arms ur5e fr3] [--seed 0]
 
 A cap too low by 2 to 50, an arm whose lag is twice or half that of its file, a surface that stiffens tenfold under the
-tip, a quiet sensor (0.01 N) that reads in steps which its file states. A surface of 300 N/m to 100 kN/m (even in its
-logarithm), 20 N desired, noise of 0.1 N. `hammers`: contact is lost more than three times, or later than a second after
-the first touch, and the press does not stop. `faster again`: an approach after a lost contact faster than the first.
+tip, a quiet sensor (0.01 N) that reads in steps which its file states, a surface with a mass. The surface has 300
+N/m to 100 kN/m (even in its logarithm), 20 N are desired, noise is 0.1 N. `hammers`: contact is lost more than three
+times, or later than a second after the first touch, and the press does not stop; a mass swings off the tip by itself.
+`faster again`: an approach after a lost contact faster than the first.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ CASES = {
     "reads in steps of 0.5 N": {"resolution": 0.5},
     "reads in steps of 1 N": {"resolution": 1.0},
     "reads in steps of 2 N": {"resolution": 2.0},
+    **{f"a mass of {mass:g} kg": {"mass": mass} for mass in (0.03, 0.1, 0.3, 1.0, 3.0)},
 }
 
 
@@ -63,7 +65,7 @@ def press(arm, case, rng):
     change = (
         {"later": later, "change": float(rng.uniform(0.5, 2.0)), "depth": FORCE / K} if later != K else {}
     )
-    touched = surface(K, B, **change)
+    touched = surface(K, B, mass=case.get("mass", 0.0), **change)
     rows = pressed(
         world,
         touched,

@@ -33,8 +33,6 @@ FIGURES = {
     "The thesis' arm, friction twice": "on_the_bench.py --friction 2 --seeds 1 --controllers foam-cautious",
     "The thesis' arm, surfaces that sway or change": "moving_on_the_bench.py --seeds 3 --controllers foam-cautious",
     "The thesis' arm, the hardest change": "moving_on_the_bench.py --seeds 24 --told 18 36 54",
-    "Dither": "dither.py --seeds 5 --arms ur5e",
-    "Learning": "learning.py --seeds 5 --arms ur5e",
     "Proofs: UR5e": "falsify.py",
     "Proofs: FR3": "falsify.py --arms fr3",
     "The peak at the touch": "peak.py",

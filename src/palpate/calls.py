@@ -41,9 +41,9 @@ def identify(source: Record | Any, **options: Any) -> Identification:
     """
     with _in_python():
         if isinstance(source, str | Path) and not {*options} - _OPTIONS:
-            return identify_log_file(source, **_sorted(options, columns=True)[1])
-        reading, fitting = _sorted(options, columns=not isinstance(source, Record))
-        return _identified(source if isinstance(source, Record) else read(source, **reading), fitting)
+            return identify_log_file(source, **_split(options, columns=True)[1])
+        reading, fitting = _split(options, columns=not isinstance(source, Record))
+        return _fit(source if isinstance(source, Record) else read(source, **reading), fitting)
 
 
 def identify_log(path: str | Path, **options: Any) -> Identification:
@@ -84,7 +84,7 @@ def pool(logs: Sequence[Any], **options: Any) -> Pooled:
         return pool_found(results)
 
 
-def _identified(record: Record, options: dict[str, Any]) -> Identification:
+def _fit(record: Record, options: dict[str, Any]) -> Identification:
     """Along the contact's normal where the record has a wrench and a pose."""
     from palpate.contact_frame import identify_contact
 
@@ -95,7 +95,7 @@ def _identified(record: Record, options: dict[str, Any]) -> Identification:
     )
 
 
-def _sorted(options: dict[str, Any], *, columns: bool) -> tuple[dict[str, Any], dict[str, Any]]:
+def _split(options: dict[str, Any], *, columns: bool) -> tuple[dict[str, Any], dict[str, Any]]:
     """Options of reading, and of fitting, each of the right kind."""
     reading = {name: value for name, value in options.items() if name not in _OPTIONS}
     for name, value in reading.items():
@@ -103,15 +103,15 @@ def _sorted(options: dict[str, Any], *, columns: bool) -> tuple[dict[str, Any], 
             raise unknown("option", name, {*_OPTIONS, *(_READ if columns else ())})
     fitting = {name: value for name, value in options.items() if name in _OPTIONS}
     if isinstance(fitting.get("lag"), tuple | list):
-        _checked("lag", fitting["lag"], pair=True)
+        _check("lag", fitting["lag"], pair=True)
         fitting["lag"], fitting["lag_std"] = fitting["lag"]
     for name, value in fitting.items():
         if value is not None and name not in _WORDS:
-            _checked(name, value, pair=name in _PAIRS)
+            _check(name, value, pair=name in _PAIRS)
     return reading, fitting
 
 
-def _checked(name: str, value: Any, *, pair: bool) -> None:
+def _check(name: str, value: Any, *, pair: bool) -> None:
     numbers = value if pair and isinstance(value, tuple | list) else (value,)
     if (
         pair != isinstance(value, tuple | list)

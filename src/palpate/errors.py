@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-from palpate.text import shortened
+from palpate.text import shorten
 
 LONGEST = 400
 """Letters of an error: it may quote a stranger's file, of which nobody reads more."""
@@ -19,7 +19,7 @@ class PalpateError(Exception):
     """
 
     def __init__(self, text: object = ""):
-        super().__init__(shortened(str(text), LONGEST))
+        super().__init__(shorten(str(text), LONGEST))
 
 
 class InputError(PalpateError, ValueError):

@@ -55,7 +55,7 @@ class LogIdentifier:
         Raises:
             InputError: the log or an option is wrong, in one line.
         """
-        own, words = self._completed(log)
+        own, words = self._complete(log)
         known: dict[str, Any] = measured_by(log) if own.signals.plain and is_run(log) else {}
         if self.options.get("method", LEAST_SQUARES) != LEAST_SQUARES:
             known.pop("force_filter", None)  # only least squares make use of it
@@ -75,7 +75,7 @@ class LogIdentifier:
             found = with_modulus(found, self.indenter, self.poisson, known.get("tolerance", 0.25))
         return found, along
 
-    def _completed(self, log: Path) -> tuple[LogIdentifier, str]:
+    def _complete(self, log: Path) -> tuple[LogIdentifier, str]:
         """These with what the log's own names leave no doubt of; what is given goes first."""
         signals, others = self.signals.complete(log, known_frame=self.frame.wrench_frame is not None)
         frame, arm = self.frame, self.arm
@@ -141,19 +141,19 @@ def log_identifier(options: Mapping[str, Any]) -> LogIdentifier:
         named = preset(given.pop("preset"))
         given = {name.replace("-", "_"): value for name, value in named.items()} | given
 
-    def taken(*names: str) -> dict[str, Any]:
+    def take(*names: str) -> dict[str, Any]:
         return {name: given.pop(name) for name in names if name in given}
 
-    signals = Signals(**taken(*Signals.__dataclass_fields__))
+    signals = Signals(**take(*Signals.__dataclass_fields__))
     payload = given.pop("payload", None)
     payload = load_payload(Path(payload)) if isinstance(payload, str | Path) else payload
-    frame = ContactFrame(**taken(*ContactFrame.__dataclass_fields__))
+    frame = ContactFrame(**take(*ContactFrame.__dataclass_fields__))
     wall, shape = given.pop("robot_stiffness_from", None), given.pop("indenter", None)
     arm = Arm(
         stiffness=given.pop("robot_stiffness", None),
         mass=given.pop("robot_mass", None),
         tool_mass=given.pop("tool_mass", payload.beyond if payload else None),
-        **taken("position_from"),
+        **take("position_from"),
     )
     if isinstance(given.get("lag"), tuple):
         given["lag"], given["lag_std"] = given["lag"]

@@ -65,7 +65,7 @@ def printable(text: str) -> str:
     return "".join(_visible(letter) for letter in text)
 
 
-def shortened(text: str, most: int) -> str:
+def shorten(text: str, most: int) -> str:
     """The text with its middle left out where it has more letters: its beginning says the fault, its end the remedy."""
     if len(text) <= most:
         return text

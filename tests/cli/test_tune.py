@@ -16,6 +16,7 @@ from force.test_inner_loop import log as loop_log
 from palpate.cli import main
 from palpate.force import Certificate, ForceLoop, known_from, load_arm, tune
 from palpate.force.gains import LAW
+from palpate.report.numbers import quantity
 
 CONTRACT = {
     "arm", "kind", "rate_hz", "theta_s", "gains", "approach_speed_m_s", "peak_N", "settling_s", "overshoot",
@@ -66,7 +67,7 @@ def test_the_contract_of_json(capsys, elsewhere):
 
 @pytest.mark.long
 def test_gains_certificate_and_check(capsys, elsewhere):
-    (elsewhere / "gains.toml").write_text(gains_of().to_toml())
+    (elsewhere / "gains.toml").write_text(gains_of(cap=2e4).to_toml())
     assert main(["certify", "gains.toml", "--held-only", "--out", "proof.json", "--json"]) == 0
     capsys.readouterr()
     assert main(["certify", "--check", "proof.json", "--json"]) == 0
@@ -74,13 +75,22 @@ def test_gains_certificate_and_check(capsys, elsewhere):
     assert told["holds"] is True
     assert told["contraction"] > 1e2 * told["rounding"]
     assert main(["certify", "gains.toml", "--check", "proof.json"]) == 0
-    assert "holds" in capsys.readouterr().out
+    holds, surfaces, constant, *_ = capsys.readouterr().out.splitlines()
+    assert holds.startswith("✓ The certificate holds: ")
+    assert "K + B/theta" in surfaces
+    (held, _) = told["claims"]
+    low, high = held["felt_stiffness"]
+    assert gains_of(cap=2e4).arm.surface(high) > 1e9, "as much as the arm alone has: the surface may be rigid"
+    assert f" {quantity(low, 'N/m')} up; B/K" in constant
+    assert main(["certify", "gains.toml", "--check", "proof.json", "--verbose"]) == 0
+    assert "not covered: " in capsys.readouterr().out
     (elsewhere / "other.toml").write_text(gains_of(cap=1e4).to_toml())
     assert "another cap" in refused(capsys, "certify", "other.toml", "--check", "proof.json")
     spoiled = json.loads((elsewhere / "proof.json").read_text())
     spoiled["claims"][0]["shares"] = [1.0, 3.0]
     (elsewhere / "spoiled.json").write_text(json.dumps(spoiled))
     assert main(["certify", "--check", "spoiled.json"]) == 1
+    assert "✕ The certificate does not hold: " in capsys.readouterr().out
     (elsewhere / "none.json").write_text("{}")
     capsys.readouterr()
     assert "no certificate" in refused(capsys, "certify", "--check", "none.json")

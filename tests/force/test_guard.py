@@ -60,6 +60,30 @@ def test_no_error_of_the_sensor_makes_the_tip_faster_than_its_approach(name, err
 
 
 @pytest.mark.parametrize("name", ["ur5e", "fr3"])
+def test_a_step_is_whole_within_half_of_the_lag(name):
+    control = Guarded(gains_of(name).cautious())
+    for late in range(12):
+        state, rise = control.start(), 0.0
+        before, sensor = 0.0, np.zeros(200)
+        for k in range(150 + late, 200):  # a low-pass of 120 Hz
+            before += (1.0 - np.exp(-2.0 * np.pi * 120.0 * control.law.tick)) * (1.0 - before)
+            sensor[k] = before
+        for k, force in enumerate(sensor):
+            _, state = control.step(state, 20.0, force + 1e-3 * (k % 3), 0.0)
+            rise = max(rise, state.law.watch.steepest.rise)
+        assert 0.9 < rise < 1.01
+
+
+@pytest.mark.parametrize("name", ["ur5e", "fr3", "iiwa14"])
+def test_two_steps_of_a_cable_in_one_direction_are_no_surface(name):
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        times, sizes = rng.uniform(0.5, 0.8, 2), rng.uniform(0.2, 1.0, 2)
+        gains, rows = travel(name, lambda t, a=times, h=sizes: (h[:, None] * (t >= a[:, None])).sum(axis=0))
+        assert rows[:, 3].max() <= gains.approach * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("name", ["ur5e", "fr3"])
 def test_any_signal_below_the_level_leaves_the_approach(name):
     gains = gains_of(name)
     for seed in range(10):

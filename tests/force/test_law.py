@@ -218,3 +218,12 @@ def test_no_information_is_no_certainty():
         even = even.taking(Vec3(0.0, 8.0, 1.0), 0.3, 100.0, 0.999)  # the tip moves evenly in the air
     assert even.std(Vec3(1.0, 0.0, 0.0)) > 0.9
     assert np.isfinite(list(even.solved())).all()
+
+
+@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+def test_a_surface_of_little_mass_is_one_without(name):
+    light, none = (run(name, 2e3, 20.0, noise=0.0, mass=mass)[:, 0] for mass in (0.02, 0.0))
+    assert np.abs(light - none).max() < 0.5
+    heavy = run(name, 2e3, 20.0, noise=0.0, mass=0.3)[:, 0]
+    assert np.abs(heavy - none).max() > 0.5
+    assert abs(heavy[-50:].mean() - 20.0) < 0.2

@@ -14,7 +14,7 @@ from cyclopts import CycloptsError
 
 from palpate.cli import _streams
 from palpate.errors import LONGEST, PalpateError
-from palpate.text import printable, shortened
+from palpate.text import printable, shorten
 
 DONE = 0
 WRONG_INPUT = 2
@@ -47,11 +47,11 @@ def guarded(command: Callable[[], Any]) -> int:
         code = command()
         _streams.flush(sys.stdout)
     except BaseException as error:  # noqa: BLE001 - the last one out: exits and interrupts are codes too
-        return _settled(_code_of(error))
-    return _settled(DONE if code is None else int(code))
+        return _settle(_code_of(error))
+    return _settle(DONE if code is None else int(code))
 
 
-def _settled(code: int) -> int:
+def _settle(code: int) -> int:
     """The code, after the streams are flushed, so that Python's own flush at exit cannot fail."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):
@@ -85,7 +85,7 @@ def _code_of(error: BaseException) -> int:
 
 
 def _say(text: str, code: int) -> int:
-    line = printable(shortened(" ".join(text.split()), LONGEST))
+    line = printable(shorten(" ".join(text.split()), LONGEST))
     with suppress(OSError):  # standard error is full or closed: the code still tells
         print(f"palpate: {line}", file=sys.stderr)  # noqa: T201
     return code

@@ -105,7 +105,7 @@ class PhraseFormatter(DefaultFormatter):
         """Render one panel."""
         from attrs import evolve
 
-        entries = [evolve(entry, **_described(entry)) for entry in panel.entries]
+        entries = [evolve(entry, **_describe(entry)) for entry in panel.entries]
         super().__call__(console, options, panel.copy(entries=entries))
 
     def render_description(self, console: Console, options: ConsoleOptions, description: Any) -> None:
@@ -116,7 +116,7 @@ class PhraseFormatter(DefaultFormatter):
             console.print()
 
 
-def _described(entry: Any) -> dict[str, Any]:
+def _describe(entry: Any) -> dict[str, Any]:
     """An entry's text with what else is known of it, as one."""
     choices = [f"[choices: {', '.join(entry.choices)}]"] if entry.choices else []
     empty: Sequence[object] = (None, "False", "()", "('',)")

@@ -60,7 +60,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
             if not json:
                 print_lines(*notes)
         _ask(options.yes)
-        return _pressed(arm, order, options, _about(arm, order, tool), json)
+        return _press(arm, order, options, _about(arm, order, tool), json)
     finally:
         arm.close()
 
@@ -77,10 +77,10 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
     }
 
 
-def _pressed(arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], json: bool) -> int:
+def _press(arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], json: bool) -> int:
     """Press, keep the record and print the outcome, whatever signal comes; returns the exit code."""
     with _interrupts.noticed() as came:
-        outcome, words, where = _recorded(arm, order, options, about, came)
+        outcome, words, where = _write_record(arm, order, options, about, came)
         try:
             code = _print(outcome, words, where, json)
         except OSError:  # nobody reads any more: a terminal that hung up
@@ -90,7 +90,7 @@ def _pressed(arm: Wire, order: Order, options: WireOptions, about: dict[str, Any
     return came.code if came() else code
 
 
-def _recorded(
+def _write_record(
     arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], came: _interrupts.Noticed
 ) -> tuple[Outcome, str, Path | None]:
     """The outcome, the priority that was given, and where the record is; its rows are kept whatever happens."""

@@ -30,6 +30,7 @@ COMMANDS = {
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
     "excite": "Design a force that identifies a surface, and predict the uncertainty.",
+    "map": "Map the stiffness of a surface from presses, and choose the next ones.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
@@ -44,7 +45,7 @@ COMMANDS = {
 
 
 GROUPS = {
-    Group("From a log", sort_key=1): ("identify", "topics", "payload", "excite"),
+    Group("From a log", sort_key=1): ("identify", "topics", "payload", "excite", "map"),
     Group("Force loop", sort_key=2): ("tune", "certify", "press"),
     Group("Simulate", sort_key=3): ("run", "live", "study", "export", "checks"),
     Group("Thesis", sort_key=4): ("thesis", "laboratory"),
@@ -68,7 +69,7 @@ def _version() -> str:
     return str(__version__)
 
 
-def _described(place: str) -> str:
+def _describe(place: str) -> str:
     """A command's docstring before its parameters, each paragraph on one line for the terminal to wrap."""
     module, _, function = place.partition(":")
     text = getdoc(getattr(import_module(module), function)) or ""
@@ -127,6 +128,6 @@ def program(asked: str = "") -> App:
         raise InputError(f"{asked} is a command of {package}, which is not installed: pip install {package}")
     for order, (name, place) in enumerate((own | added).items()):
         group = next((group for group, names in GROUPS.items() if name in names), _PROGRAM)
-        text = _described(place) if name == asked else COMMANDS.get(name) or _first_line(place)
+        text = _describe(place) if name == asked else COMMANDS.get(name) or _first_line(place)
         app.command(place, name=name, help=text, sort_key=order, group=group)
     return app

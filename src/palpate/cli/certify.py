@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import console, print_lines
 from palpate.cli.options.flags import FLAG, SIGNED
-from palpate.cli.options.force import ColumnOptions, OutputOptions, inner_loop
+from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def certify(
     *,
     proof: ProofOptions | None = None,
     columns: ColumnOptions | None = None,
-    output: OutputOptions | None = None,
+    output: TuningOutputOptions | None = None,
     check: Path | None = None,
 ) -> int:
     """Prove where a tuned force loop is stable, or check such a proof.
@@ -107,17 +107,17 @@ def certify(
     check
         A certificate to check.
     """
-    proof, output = proof or ProofOptions(), output or OutputOptions()
+    proof, output = proof or ProofOptions(), output or TuningOutputOptions()
     if check is not None:
-        return _checked(check, gains, output.json)
+        return _check(check, gains, output)
     if gains is None:
         raise InputError("nothing to certify; give the gains file of palpate tune, or --check CERTIFICATE")
     output.check_new(output.out, ending=".json")
     proof.check()
-    return _made(gains, proof, columns or ColumnOptions(), output)
+    return _prove(gains, proof, columns or ColumnOptions(), output)
 
 
-def _made(path: Path, asked: ProofOptions, columns: ColumnOptions, output: OutputOptions) -> int:
+def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: TuningOutputOptions) -> int:
     from palpate.force import certify as proved
     from palpate.force import load_gains
     from palpate.force.arm import PositionLoop
@@ -141,29 +141,37 @@ def _made(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Outpu
         )
     if output.out is not None and made.claims:
         made.save(output.out)
-    _print(made, made.check(), output.json)
+    _print(made, made.check(), output, output.out)
     kinds = {claim.kind for claim in made.claims}
     wanted = {"one-sided" if measured is not None else "held"} | (set() if asked.held_only else {"adapting"})
     return 0 if wanted <= kinds else 1
 
 
-def _checked(path: Path, gains: Path | None, json: bool) -> int:
+def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     from palpate.force import Certificate, load_gains
 
     certificate = Certificate.load(path)
     if gains is not None:
         certificate.check_of(load_gains(gains))
     verdict = certificate.check()
-    _print(certificate, verdict, json)
+    _print(certificate, verdict, output)
     return 0 if verdict.holds else 1
 
 
-def _print(certificate: Certificate, verdict: Verdict, json: bool) -> None:
-    if json:
+def _print(
+    certificate: Certificate, verdict: Verdict, output: TuningOutputOptions, written: Path | None = None
+) -> None:
+    if output.json:
         from palpate.force.describe import as_json
 
         print_answer(as_json(certificate, verdict))
         return
-    from palpate.force.describe import lines
+    if output.verbose:
+        from palpate.force.describe import lines
 
-    print_lines(*lines(certificate, verdict))
+        print_lines(*lines(certificate, verdict))
+        return
+    from palpate.report.terminal import print_hanging
+    from palpate.report.tuning.table import proof_lines
+
+    print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console())

@@ -121,7 +121,7 @@ def export(
         working_point=given.working_point,
     )
     exported = prepare(contact, request, out)
-    checked = _written(exported, out, output.check)
+    checked = _write(exported, out, output.check)
     told = _as_json(exported, out, checked)
     write_json(beside, signed(told))
     _print(exported, told, checked, (out, beside), json=output.json)
@@ -136,7 +136,7 @@ def _check_places(places: tuple[Path, ...], output: OutputOptions, model: Path |
         output.check_new(path)
 
 
-def _written(exported: Exported, out: Path, wanted: bool) -> list[Checked]:
+def _write(exported: Exported, out: Path, wanted: bool) -> list[Checked]:
     """Write the file and press its contact; a file that the engine refuses is removed."""
     from palpate import __version__
     from palpate.export import check

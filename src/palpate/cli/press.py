@@ -12,7 +12,14 @@ from palpate.cli._program import command
 from palpate.cli._terminal import console, place, print_lines, show_answer
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.kept import CellOptions
-from palpate.cli.options.press import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
+from palpate.cli.options.press import (
+    AskOptions,
+    LimitOptions,
+    PhantomOptions,
+    SimulatedOptions,
+    WireOptions,
+    only,
+)
 from palpate.files import RECORD, fresh_folder, signed, write_json
 from palpate.text import printable
 
@@ -28,6 +35,7 @@ def press(
     wire: WireOptions | None = None,
     limits: LimitOptions | None = None,
     cell: CellOptions | None = None,
+    phantom: PhantomOptions | None = None,
     json: Annotated[bool, FLAG] = False,
 ) -> int:
     """Press on a surface with a desired force: with a simulated arm, or with a real one over its wire.
@@ -36,6 +44,10 @@ def press(
     readings of its encoders and its force sensor:
 
     palpate press --arm fr3 --force 20:N --surface K=5000,B=50 --out runs/press
+
+    It maps a phantom, a surface with lumps, by presses at places that it chooses itself:
+
+    palpate press --arm ur5e --force 5:N --map phantom.toml --presses 40 --stiffer-than 2:kN/m --out runs/map
 
     For a real arm, --dry-run reads the arm, prints the planned motion and moves nothing:
 
@@ -65,7 +77,12 @@ def press(
     if wire.wire is None:
         for part in (wire, limits):
             only(part, "a real arm, and --wire is missing; add --wire")
-        code = _simulated(asked, simulated, json)
+        if phantom is not None and phantom.map is not None:
+            from palpate.cli._press_map import press_map
+
+            code = press_map(asked, simulated, phantom, json=json)
+        else:
+            code = _simulate(asked, simulated, json)
     else:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
         from palpate.cli._press_wire import press_over
@@ -75,7 +92,7 @@ def press(
     return code
 
 
-def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
+def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
     from palpate.bench.ending import DONE, INTERRUPTED
     from palpate.press.prepare import prepared
 
@@ -85,14 +102,14 @@ def _simulated(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> in
         start = "starting (the first run compiles, which takes some seconds)"
         with _progress.simulated(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)
-        summary = _written(record, pressing, fresh)
+        summary = _write(record, pressing, fresh)
     _show(pressing, summary, folder, json)
     if interrupted() or summary["end"] == INTERRUPTED:
         return interrupted.code
     return 0 if summary["end"] == DONE else 1
 
 
-def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
+def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
     from dataclasses import replace as changed
 
     from palpate.logs import write_record
@@ -109,11 +126,12 @@ def _written(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]
 
 
 def _show(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    from palpate.report.press.page import notes, tables
+    from palpate.report.press.page import notes, sentence, tables
 
     if as_json:
         print_answer(summary)
         return
-    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    found = (summary["identified"] or {}).get("parameters", {})
+    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated\n{sentence(summary, found)}"
     screen = show_answer(pressing.asked.arm.title, rest, tables(summary), notes(summary))
     place(screen, "report:", folder / "report.html")

@@ -133,7 +133,7 @@ def _run(
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / RECORD)
         alone = isinstance(asked.experiment, OneDirection)  # nothing excites it, and no estimator watches
-        found, why = (None, "") if alone else _identified(fresh / RECORD)
+        found, why = (None, "") if alone else _identify(fresh / RECORD)
         said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
         about = {"experiment": printable(Path(asked.name).stem), "command": command}
         summary = signed({**about, **summarise(record), **said})
@@ -177,7 +177,7 @@ def _draw(
         write_movie(record, folder / "arm.gif")
 
 
-def _identified(record: Path) -> tuple[Identification | None, str]:
+def _identify(record: Path) -> tuple[Identification | None, str]:
     """The identification of the record by `palpate identify`, or the reason for its absence."""
     from palpate.cli._one_log import OneLog
     from palpate.cli.identify import ModelOptions

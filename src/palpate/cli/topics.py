@@ -57,7 +57,7 @@ def topics(
         files = [{"file": str(log), "sha256": None}]
         print_answer({"files": files, "entries": entries, "troubles": found.troubles, "identify": proposal})
         return 0
-    print_lines(*_table(log, found), *_proposed(found, command))
+    print_lines(*_table(log, found), *_proposal_lines(found, command))
     return 0
 
 
@@ -82,7 +82,7 @@ def _table(log: Path, found: Listing) -> list[str]:
     return [*lines, *found.facts, *found.troubles]
 
 
-def _proposed(found: Listing, command: str | None) -> list[str]:
+def _proposal_lines(found: Listing, command: str | None) -> list[str]:
     """The proposed command, and its guessed parts."""
     guesses = [f"  {guess}" for guess in found.proposal.guesses]
     if command is None:

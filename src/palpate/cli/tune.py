@@ -68,17 +68,17 @@ def tune(
     told = tuned(
         one,
         press.desired,
-        _known(found, surface, columns),
+        _surface_of(found, surface, columns),
         cap=surface.cap,
         peak=press.highest,
         surface_speed=surface.surface_speed,
     )
-    written = _written(told, output.out, report)
+    written = _write(told, output.out, report)
     _print(told, inner, written, output)
     return 0 if told.proved else 1
 
 
-def _known(found: Path | None, surface: SurfaceOptions, columns: ColumnOptions) -> Known | None:
+def _surface_of(found: Path | None, surface: SurfaceOptions, columns: ColumnOptions) -> Known | None:
     from palpate.force import Known, known_from
     from palpate.from_log import log_identifier
 
@@ -97,7 +97,7 @@ def _known(found: Path | None, surface: SurfaceOptions, columns: ColumnOptions) 
     return known_from(identified.to_json(), str(found)).with_damping_up_to(highest)
 
 
-def _written(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
+def _write(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     if out is not None:
         write_text(out, told.gains.to_toml())
     if page is not None:

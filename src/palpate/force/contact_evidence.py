@@ -35,6 +35,16 @@ MEMORY = 1.0
 
 
 @part
+class Steepest(NamedTuple):
+    """Largest rise of the force within half of theta, by the means over quarters of it."""
+
+    total: float  # of the readings in the quarter that runs [N]
+    last: float  # mean over the quarter before [N]
+    former: float  # mean over the one before that [N]
+    rise: float  # largest, while the force is not surely that of a surface [N]
+
+
+@part
 class Watch(NamedTuple):
     """The force's readings and their noise."""
 
@@ -45,13 +55,14 @@ class Watch(NamedTuple):
     slower: float  # over `SLOWER` theta, in free motion [N]
     rest: float  # bias: mean of the readings in free motion [N]
     drift: float  # of the bias [N/s]
-    peak: float  # largest deviation from it in free motion, fading [N]
+    peak: float  # largest deviation of the mean over theta from it in free motion, fading [N]
     variance: float  # of a reading [N^2]
     tide: float  # of the mean over theta [N^2]
     evidence: float  # of a contact
     fresh: float  # readings so far
     age: float  # ticks since the last fresh reading; 0 if this one is
     gap: float  # ticks between the last two
+    steepest: Steepest
 
 
 @law
@@ -89,9 +100,9 @@ def watched(law, state, starts, force):
         period = law.period / law.tick
         return Watch(
             force, force, force, w.rest, force, w.rest, w.drift, w.peak, w.variance, w.tide, 0.0, w.fresh + 1.0, 0.0,
-            period,
+            period, Steepest(0.0, force, force, w.steepest.rise),
         )  # fmt: skip
-    fresh = is_fresh(law, w, force)
+    fresh, steepest = is_fresh(law, w, force), steepest_of(law, state, force)
     mean = w.mean + law.tick / (0.004 + law.tick) * (force - w.mean)
     slow = w.slow + law.tick / (law.theta + law.tick) * (force - w.slow)
     evidence = evident(law, state, starts, mean, slow, force)
@@ -109,21 +120,9 @@ def watched(law, state, starts, force):
     if state.stage.phase != AIR:
         tide = max(w.tide, white(law, variance))
         return Watch(
-            force,
-            former,
-            mean,
-            slow,
-            w.slower,
-            w.rest,
-            w.drift,
-            w.peak,
-            variance,
-            tide,
-            evidence,
-            many,
-            age,
-            gap,
-        )
+            force, former, mean, slow, w.slower, w.rest, w.drift, w.peak, variance, tide, evidence, many, age, gap,
+            steepest,
+        )  # fmt: skip
     slower = w.slower + law.tick / (SLOWER * law.theta + law.tick) * (force - w.slower)
     swing = slow - slower
     tide = w.tide + law.tick / (1.0 + span) * (min(swing * swing, 9.0 * w.tide) - w.tide)
@@ -134,10 +133,28 @@ def watched(law, state, starts, force):
         rest = max(min(rest, law.bias), -law.bias)
     tide = max(tide, white(law, variance))
     drift = w.drift + law.tick / MEMORY * ((rest - w.rest) / law.tick - w.drift)
-    peak = min(max((1.0 - law.tick / FADING) * w.peak, abs(mean - rest)), law.bias)
+    peak = min(max((1.0 - law.tick / FADING) * w.peak, abs(slow - rest)), law.bias)
     return Watch(
-        force, former, mean, slow, slower, rest, drift, peak, variance, tide, evidence, many, age, gap
-    )
+        force, former, mean, slow, slower, rest, drift, peak, variance, tide, evidence, many, age, gap, steepest,
+    )  # fmt: skip
+
+
+@law
+def steepest_of(law, state, force):
+    """The largest rise within half of theta with this tick's reading; in free motion it fades as fast as the bias.
+
+    A step that begins in one quarter is whole between the quarters beside it, as far as the sensor's low-pass is done
+    with it in a quarter.
+    """
+    s, span = state.watch.steepest, max(0.25 * law.theta // law.tick, 1.0)
+    fading = 1.0 - law.tick / MEMORY if state.stage.phase == AIR else 1.0
+    total, rise = s.total + force, fading * s.rise
+    if state.ticks % span != 0.0:
+        return Steepest(total, s.last, s.former, rise)
+    mean = total / span
+    if state.bound.sure.stiffness == 0.0:
+        rise = max(rise, mean - s.former)
+    return Steepest(0.0, mean, s.last, rise)
 
 
 @law
@@ -149,24 +166,12 @@ def white(law, variance):
 @law
 def retared(law, w):
     """The bias after a false touch: the mean over theta, which is within what a sensor may be off."""
-    peak = min(max(w.peak, abs(w.mean - w.rest)), law.bias)
+    peak = min(max(w.peak, abs(w.slow - w.rest)), law.bias)
     drift = w.drift + (w.slow - w.rest) / MEMORY
     return Watch(
-        w.last,
-        w.former,
-        w.mean,
-        w.slow,
-        w.slow,
-        w.slow,
-        drift,
-        peak,
-        w.variance,
-        w.tide,
-        0.0,
-        w.fresh,
-        w.age,
-        w.gap,
-    )
+        w.last, w.former, w.mean, w.slow, w.slow, w.slow, drift, peak, w.variance, w.tide, 0.0, w.fresh, w.age, w.gap,
+        w.steepest,
+    )  # fmt: skip
 
 
 @law

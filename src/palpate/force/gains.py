@@ -27,7 +27,7 @@ ALPHA = 0.42
 Measured by benchmarks/force/first_touches.py: 0.45 overshoots by 9 % on the stiffest surfaces, 0.36 is a
 quarter slower.
 """
-LAW = "cautious adaptive control 6"
+LAW = "cautious adaptive control 7"
 """Its name in adaptive control (a gain that the estimate's uncertainty lowers), and which form of it.
 
 A certificate of another one is refused.

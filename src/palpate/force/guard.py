@@ -172,7 +172,7 @@ def renewed(law, state):
     s, w = law.start(), state.watch
     watch = Watch(
         0.0, 0.0, 0.0, w.rest, w.rest, w.rest, w.drift, w.peak, w.variance, w.tide, 0.0, w.fresh, 0.0,
-        law.period / law.tick,
+        law.period / law.tick, w.steepest,
     )  # fmt: skip
     return CautiousState(
         s.ticks, s.desired, watch, s.follow, s.stage, s.known, s.starts, s.bound, state.backstop

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.force.backstop import MOST, Backstop, guarded
-from palpate.force.contact_evidence import AIR, Watch, behind, listened, retared, watched, white
+from palpate.force.contact_evidence import AIR, Steepest, Watch, behind, listened, retared, watched, white
 from palpate.force.learned import Learned, begun, taken
 from palpate.force.onset import NO_STARTS, Starts
 from palpate.force.regression import NOTHING, Fit
@@ -92,12 +92,12 @@ class Cautious(NamedTuple):
     def start(self):
         """In the air, knowing nothing."""
         fit, variance = Fit(NOTHING, ZERO3), max(self.noise * self.noise, self.least)
+        tide, steepest = white(self, variance), Steepest(0.0, 0.0, 0.0, 0.0)
+        watch = Watch(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variance, tide, 0.0, 0.0, 0.0, 0.0, steepest)
         return CautiousState(
             0.0,
             0.0,
-            Watch(
-                0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variance, white(self, variance), 0.0, 0.0, 0.0, 0.0
-            ),
+            watch,
             Follow(ZERO3, 0.0, 0.0, 0.0, 0.0),
             Stage(AIR, 0.0, 0.0, 0.0),
             Learned(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
@@ -112,8 +112,9 @@ class Cautious(NamedTuple):
         follow = followed(self, state, position)
         starts = listened(self, state, follow, force)
         watch = watched(self, state, starts, force)
-        stage = staged(self, state, watch, desired, before)
-        if state.stage.phase != AIR and is_false(self, state, watch):
+        false = is_false(self, state, watch)
+        stage = staged(self, state, watch, desired, before, false)
+        if false:
             watch = retared(self, watch)
         known = begun(self, state.known, state.stage, stage, watch, follow, starts, behind(self, state))
         known = taken(self, known, state, stage, watch, follow, force)

@@ -23,14 +23,14 @@ class Stage(NamedTuple):
 
 
 @law
-def staged(law, state, w, desired, before):
-    """Where in a press this tick is."""
+def staged(law, state, w, desired, before, false):
+    """Where in a press this tick is, `false` if what was taken for a touch was the sensor's bias."""
     stage, felt = state.stage, w.mean - w.rest
     since = stage.since + 1.0
     firm = stage.firm + 1.0 if felt > sqrt(w.variance) else 0.0
     if stage.phase == AIR:
         return Stage(LEARNING, 0.0, 0.0, firm) if w.evidence >= CONTACT else Stage(AIR, since, 0.0, firm)
-    if w.evidence <= 0.0 or is_false(law, state, w):
+    if w.evidence <= 0.0 or false:
         return Stage(AIR, 0.0, 0.0, 0.0)
     if stage.phase == LOCKED and abs(desired - before) > 0.2 * abs(before):
         return Stage(LEARNING, 0.0, 0.0, firm)

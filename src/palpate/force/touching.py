@@ -7,12 +7,16 @@ readings are noisy. What is proved of the one is tried on the other.
 from typing import NamedTuple
 
 from palpate._jit import kernel, law, part
-from palpate._vector import ZERO3, Mat3, Vec3, cos, sin
+from palpate._vector import ZERO3, Mat3, Vec3, cos, sin, sqrt
+
+SKIN, DULL = 1e6, 0.6
+"""Stiffness between a torque arm's tip and a surface with mass [N/m], as of steel on steel under a small tip, and its
+damping in units of sqrt(stiffness times mass)."""
 
 
 @part
 class Surface(NamedTuple):
-    """A one-sided surface: f = K p^n + B p^(n-1) pdot.
+    """A one-sided surface: f = K p^n + B p^(n-1) pdot, or f = K p + B pdot + M pddot.
 
     Args:
         stiffness: K [N/m^n].
@@ -24,6 +28,7 @@ class Surface(NamedTuple):
         later: K after `change` [N/m].
         change: time of that [s]; the force stays, what is in contact then being as deep as that takes.
         depth: of the surface's own deflection then [m].
+        mass: M, of what moves with the tip [kg]; 0, or from 0.02 (the step is explicit) with an exponent of 1, at rest.
     """
 
     stiffness: float
@@ -35,6 +40,7 @@ class Surface(NamedTuple):
     later: float
     change: float
     depth: float
+    mass: float
 
 
 @part
@@ -89,6 +95,7 @@ class BodyState(NamedTuple):
     z: Vec3  # of the sensor's low-pass
     reading: float
     samples: float  # taken so far
+    u: float  # speed of a surface with mass [m/s]
 
 
 @law
@@ -120,11 +127,22 @@ def contact_of_mass(surface, K, x, v):
 
 
 @law
+def contact_of_heavy(world, surface, K, x, v, p, u, h):
+    """Force, deflection and speed of a surface with mass, which the arm's own spring presses, or the tip's skin."""
+    spring, damper = world.stiffness, 0.0
+    if world.torque > 0.0:
+        spring, damper = SKIN, DULL * sqrt(SKIN * min(surface.mass, world.first))
+    force = max(spring * (x - p) + damper * (v - u), 0.0) if x > p else 0.0
+    u += h * (force - K * p - surface.damping * u) / surface.mass
+    return force, p + h * u, u
+
+
+@law
 def moved(world, surface, body, held, t, h, noise, at, error):
     """The body a step later: `held` is the commanded position or the torque as a force, `error` the sensor's [N]."""
     swing = surface.sway * sin(surface.frequency * t)
     place = surface.place + swing
-    K, p = surface.stiffness, body.p
+    K, p, u = surface.stiffness, body.p, body.u
     if t >= surface.change:
         K = surface.later
         deeper = surface.depth * (1.0 - surface.stiffness / surface.later)
@@ -132,15 +150,20 @@ def moved(world, surface, body, held, t, h, noise, at, error):
         if t - h < surface.change:
             p -= deeper
     if world.torque > 0.0:
-        force = contact_of_mass(
-            surface, K, body.x - place, body.v - surface.sway * surface.frequency * cos(surface.frequency * t)
-        )
+        sway = surface.sway * surface.frequency * cos(surface.frequency * t)
+        if surface.mass > 0.0:
+            force, p, u = contact_of_heavy(world, surface, K, body.x - place, body.v, p, u, h)
+        else:
+            force = contact_of_mass(surface, K, body.x - place, body.v - sway)
         v = body.v + h * (held - force) / world.first
         x = body.x + h * v
     else:
         v = body.v + h * (world.first * (held - body.x) - world.second * body.v)
         x = body.x + h * v
-        force, p = contact_of_position(world, surface, K, x - place, p, h)
+        if surface.mass > 0.0:
+            force, p, u = contact_of_heavy(world, surface, K, x - place, v, p, u, h)
+        else:
+            force, p = contact_of_position(world, surface, K, x - place, p, h)
     z = world.E @ body.z + force * world.e
     reading, samples = body.reading, body.samples
     if t + h >= world.phase + samples / world.sampling:
@@ -149,7 +172,7 @@ def moved(world, surface, body, held, t, h, noise, at, error):
             reading = world.resolution * round(reading / world.resolution)
         reading = min(max(reading, -world.full_scale), world.full_scale)
         samples += 1.0
-    return BodyState(x, v, p, force, z, reading, samples)
+    return BodyState(x, v, p, force, z, reading, samples, u)
 
 
 @law
@@ -168,7 +191,7 @@ def touch(world, surface, control, start, desired, noise, error, line, out):
         out: shape (n, 5).
     """
     state = control.start()
-    body = BodyState(start, 0.0, 0.0, 0.0, ZERO3, world.noise * noise[0] + error[0], 0.0)
+    body = BodyState(start, 0.0, 0.0, 0.0, ZERO3, world.noise * noise[0] + error[0], 0.0, 0.0)
     command, h = start, world.tick / world.steps
     line[:] = start if world.torque == 0.0 else 0.0
     for k in range(len(desired)):

@@ -73,13 +73,13 @@ class Tuning(Result, shown_by="palpate.report.tuning.in_python"):
         """The proved interval of K + B/theta of the surface itself for a kind of claim [N/m]."""
         for claim in self.certificate.claims:
             if claim.kind == kind or (kind == "held" and claim.kind == "one-sided"):
-                return self._own(claim.low, claim.high)
+                return surface_ends(self.gains.arm, claim.low, claim.high)
         return None
 
     @property
     def exact(self) -> tuple[float, float]:
         """The surfaces without damping on which the loop with K_u = cap is stable [N/m]; exact for a position arm."""
-        return self._own(*exact_interval(self.gains))
+        return surface_ends(self.gains.arm, *exact_interval(self.gains))
 
     @property
     def domain(self) -> tuple[float, float] | None:
@@ -95,12 +95,6 @@ class Tuning(Result, shown_by="palpate.report.tuning.in_python"):
             return None
         seconds = [settling_bound(self.gains, K) - RISES * rise(self.gains, K) for K in self.domain]
         return {"stiffness": list(self.domain), "overshoot": OVERSHOOT, "settling_s": seconds}
-
-    def _own(self, low: float, high: float) -> tuple[float, float]:
-        arm = self.gains.arm
-        if arm.kind == "torque":
-            return low, high
-        return arm.surface(low), min(arm.surface(high), RIGID)
 
     def to_json(self) -> dict[str, Any]:
         """As `palpate tune --json` prints it."""
@@ -156,6 +150,11 @@ class Tuning(Result, shown_by="palpate.report.tuning.in_python"):
             "assumed": {} if known is None else {name: own.to_json() for name, own in known.assumed.items()},
             "warnings": [{"code": code, "text": text} for code, text in self.warnings],
         }
+
+
+def surface_ends(arm: Arm, low: float, high: float) -> tuple[float, float]:
+    """Stiffness of the surfaces [N/m] that together with a position arm's own have these; at most `RIGID`."""
+    return (low, high) if arm.kind == "torque" else (arm.surface(low), min(arm.surface(high), RIGID))
 
 
 def _number(value: float) -> float | None:

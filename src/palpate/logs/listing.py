@@ -17,9 +17,9 @@ from palpate.logs.columns import ColumnStatistics
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.own_runs import is_run
 from palpate.logs.plausibility import epoch_unit
-from palpate.logs.proposal import Proposal, clock_of, for_a_run, from_columns, from_topics
+from palpate.logs.proposal import Proposal, clock_of, from_columns, from_topics
 from palpate.logs.tables import Sheet, Stated, equal_sheets, open_table
-from palpate.text import shortened
+from palpate.text import shorten
 from palpate.units import unit, unit_in_name
 
 
@@ -91,12 +91,12 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     clock = clock_of(table, columns)
     entries = [_of_column(column, clock) for column in columns]
     entries += [Entry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
-    proposal = for_a_run() if is_run(path) else from_columns(table, columns, delimiter)
+    proposal = Proposal({}) if is_run(path) else from_columns(table, columns, delimiter)
     repeats = equal_sheets(path, limits or Limits()) if kind is Kind.SHEETS and path.is_file() else []
     if repeats:
         first = list_log(repeats[0], limits=limits).proposal
         text = f"{len(repeats)} sheets have the same columns and are pooled, as repeats of one test: "
-        named = shortened(", ".join(sheet.name for sheet in repeats), 120)
+        named = shorten(", ".join(sheet.name for sheet in repeats), 120)
         proposal = replace(first, guesses=(*first.guesses, text + named))
     facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
     return Listing(entries, unread + [note["text"] for note in table.notes], proposal, facts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from palpate.logs.columns import NAMES, ColumnStatistics
 from palpate.logs.plausibility import epoch_unit, usual_unit
 from palpate.logs.presets import preset, presets
 from palpate.logs.tables import Sheet
-from palpate.units import known_unit, unit_in_name
+from palpate.units import known_unit, unit, unit_in_name
 
 _SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}
 """Largest plausible range in SI units, and the assumed unit above it."""
@@ -26,6 +26,12 @@ _FOLLOWS = 0.3
 """Rank correlation of a force with its position above which it follows: 1 - (1 - c)^3 where it follows in a share c of
 the rows and is noise in the others, so that a contact over a ninth of the log is seen."""
 _NO_PAIR = "no two columns are a position that moves and a force that follows it"
+_JOINTS_ONLY = (
+    "the columns are those of libfranka's logToCSV: joints and their torques, without wrench and pose of the tip;"
+    " record O_F_ext_hat_K and O_T_EE of RobotState with its time, which --preset franka reads"
+)
+_STATES = 1000
+"""Fastest rate at which an arm's controller gives its state [Hz]: that of libfranka; UR's is 500."""
 _RATE = 1000
 """Of the example [Hz]; nothing is computed with it."""
 
@@ -62,22 +68,29 @@ class Proposal:
         return " ".join(["palpate identify", *map(shlex.quote, (place, *words))])
 
 
-def for_a_run() -> Proposal:
-    """A record that palpate wrote says everything itself."""
-    return Proposal({})
-
-
 def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: str | None = None) -> Proposal:
     """The command for a log of columns: a preset whose columns are all there, a wrench and a pose, or two columns."""
     guesses: list[str] = []
     length = max((len(column.values) for column in columns), default=0)
     rows = [column for column in columns if len(column.values) == length]
     options = {} if delimiter is None else {"delimiter": delimiter}
-    name = _preset_of({column.name for column in rows})
-    if name is not None:
-        time = {} if "time" in preset(name) else _timing(table, rows, guesses)[0]
-        return Proposal({**options, "preset": name, **time}, tuple(guesses), _motion(name, rows))
     timing, clock = _timing(table, rows, guesses)
+    by_member = {_member(column.name): replace(column, name=_member(column.name)) for column in rows}
+    name = _preset_of(by_member)
+    if name is not None:
+        facts = _motion(name, list(by_member.values()))
+        if "time" in preset(name):
+            return Proposal({**options, "preset": name}, (), facts)
+        timing, guesses = _state_time(clock) if clock else (timing, guesses)
+        names = {_member(column.name): column.name for column in rows}
+        given = {
+            key: ",".join(names[member] for member in value.split(","))
+            for key, value in _columns_of(name).items()
+        }
+        changed = {} if given == _columns_of(name) else given
+        return Proposal({**options, "preset": name, **timing, **changed}, tuple(guesses), facts)
+    if all(f"{part}[{i}]" in by_member for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
+        return Proposal(None, (_JOINTS_ONLY,))
     others = [column for column in rows if column is not clock and column.changes and not column.counts_rows]
     space = _in_space(table, others, guesses)
     if space:
@@ -88,6 +101,24 @@ def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: s
     position, force = pair
     place, load = (_with_unit(table, *column, guesses) for column in ((position, "length"), (force, "force")))
     return Proposal({**options, **timing, "position": place, "force": load}, tuple(guesses))
+
+
+def _member(name: str) -> str:
+    """The member of a driver's state that a column holds: `O_T_EE[3]` of `state.O_T_EE[3]` and `O_T_EE_3`."""
+    return re.sub(
+        r"^(?:state\.)?((?:O_T_EE|O_F_ext_hat_K|q|tau_ext_hat_filtered))[\[_.](\d+)\]?$", r"\1[\2]", name
+    )
+
+
+def _columns_of(name: str) -> dict[str, str]:
+    """Wrench and pose of a preset."""
+    return {key: preset(name)[key] for key in ("wrench", "pose")}
+
+
+def _state_time(clock: ColumnStatistics) -> tuple[dict[str, str], list[str]]:
+    """The time of a driver's states: no controller gives them faster than `_STATES`, which leaves one unit."""
+    symbol = next((s for s in ("us", "ms") if clock.step * unit(s).factor * _STATES > 0.5), "s")
+    return {"time": clock.name if symbol == "s" else f"{clock.name}:{symbol}"}, []
 
 
 def _preset_of(names: Container[str]) -> str | None:
@@ -313,11 +344,9 @@ def from_topics(bag: Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
             )
         return Proposal(options, tuple(guesses))
     pair = _joint(bag, fields, guesses) or _fields_by_name(fields, guesses)
-    return (
-        Proposal(pair, tuple(guesses))
-        if pair
-        else Proposal(None, ("no two topics are a position and a force",))
-    )
+    if not pair:
+        return Proposal(None, ("no two topics are a position and a force",))
+    return Proposal(pair, tuple(guesses))
 
 
 def _topic(topics: Sequence[Topic], what: str, guesses: list[str]) -> Topic | None:

@@ -230,5 +230,7 @@ def _list_guesses(path: Path, proposal: Proposal) -> str:
     """The guesses of a log whose signals nobody named, and the command that would be tried."""
     guesses = "; ".join(proposal.guesses)
     if proposal.options is None:
-        return f"{path}: {guesses}; name them with --time, --position and --force (palpate topics {path} lists them)"
+        return (
+            f"{path}: {guesses} (palpate topics {path} lists them; --time, --position and --force name them)"
+        )
     return f"{path}: {guesses}. If that is right: {proposal.command(path)}"

@@ -24,7 +24,7 @@ def with_half(value: float, half: float) -> str:
     value, half = value / 10.0**power, half / 10.0**power
     decimals = _decimals(half)
     text = " ± ".join(f"{round(number, decimals):.{max(0, decimals)}f}" for number in (value, half))
-    return f"({text})·10{_raised(power)}" if power else text
+    return f"({text})·10{_superscript(power)}" if power else text
 
 
 def between(low: float, high: float) -> str:
@@ -35,7 +35,7 @@ def between(low: float, high: float) -> str:
     power = _power(max(abs(low), abs(high)))
     decimals = _decimals(half / 10.0**power)
     text = " to ".join(f"{round(end / 10.0**power, decimals):.{max(0, decimals)}f}" for end in (low, high))
-    return f"({text})·10{_raised(power)}" if power else text
+    return f"({text})·10{_superscript(power)}" if power else text
 
 
 def _decimals(half: float) -> int:
@@ -48,7 +48,7 @@ def _power(size: float) -> int:
     return 3 * math.floor(math.log10(size) / 3) if not _SMALL <= size < _LARGE else 0
 
 
-def _raised(power: int) -> str:
+def _superscript(power: int) -> str:
     return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
@@ -66,19 +66,19 @@ def quantity(value: float, unit: str, half: float | None = None, digits: int = 3
         half: half-width of its 95 % interval.
         digits: of a value without one.
     """
-    factor, prefix = prefixed(value, unit)
+    factor, prefix = si_prefix(value, unit)
     number = plain(value / factor, digits) if half is None else with_half(value / factor, half / factor)
     return f"{number} {prefix}{unit}" if unit != "1" else number
 
 
 def quantity_between(low: float, high: float, unit: str) -> str:
     """`5139 to 5348 N/m`: the ends of an interval, with the prefix of the larger."""
-    factor, prefix = prefixed(max(abs(low), abs(high)), unit)
+    factor, prefix = si_prefix(max(abs(low), abs(high)), unit)
     text = between(low / factor, high / factor)
     return f"{text} {prefix}{unit}" if unit != "1" else text
 
 
-def prefixed(value: float, unit: str) -> tuple[float, str]:
+def si_prefix(value: float, unit: str) -> tuple[float, str]:
     """The factor and the letter of the SI prefix that keeps a number short."""
     size = abs(value)
     if unit in _PREFIXED:

@@ -38,7 +38,7 @@ class OneDirection:
         self.world: World = world_of(arm, noise=arm.sensor.noise)
         self.bias = bias
         self._rng = np.random.default_rng(seed)
-        self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0)
+        self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0, 0.0)
         self.command, self.time = -gap, 0.0
         self._line = [-gap if self.world.torque == 0.0 else 0.0] * max(self.world.delay, 1)
 

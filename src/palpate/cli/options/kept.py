@@ -140,12 +140,12 @@ def _value_of(words: Sequence[str], flag: str) -> str | None:
 
 
 def _preset(name: str, known: set[str]) -> dict[str, Any]:
-    return _checked(preset(name), f"preset {name}", known)
+    return _check(preset(name), f"preset {name}", known)
 
 
 def _file(path: Path, known: set[str]) -> dict[str, Any]:
     table = read_toml(read_text(path, "options"), str(path))
-    kept = _checked(table, str(path), known)
+    kept = _check(table, str(path), known)
     if "preset" in table:
         kept = _preset(str(table["preset"]), known) | kept
     for key in _PATHS & set(kept):
@@ -153,7 +153,7 @@ def _file(path: Path, known: set[str]) -> dict[str, Any]:
     return kept
 
 
-def _checked(table: Mapping[str, Any], where: str, known: set[str]) -> dict[str, Any]:
+def _check(table: Mapping[str, Any], where: str, known: set[str]) -> dict[str, Any]:
     kept = {}
     for key, value in table.items():
         name = key.replace("_", "-")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.text import shortened
+from palpate.text import shorten
 
 LONGEST = 200
 """Letters of a name; what is longer is text, and is shown by its beginning and its end."""
@@ -95,8 +95,8 @@ class Sheet:
     notes: list[dict[str, Any]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.names = [shortened(name, LONGEST) for name in self.names]
-        self.stated = {shortened(name, LONGEST): own for name, own in self.stated.items()}
+        self.names = [shorten(name, LONGEST) for name in self.names]
+        self.stated = {shorten(name, LONGEST): own for name, own in self.stated.items()}
 
     def resolve(self, name: str) -> int:
         """The place of a column given by its name, or else by its number from 0.
@@ -139,7 +139,7 @@ class Sheet:
         columns = {self.names[place]: own for place, own in zip(places, cells, strict=True)}
         for name, own in columns.items():
             if own.wrong:
-                where, text = own.wrong[0], shortened(own.wrong[1], _QUOTED)
+                where, text = own.wrong[0], shorten(own.wrong[1], _QUOTED)
                 raise InputError(
                     f"{self.path}: column {name!r}, {where} holds {text!r}, which is no finite number; mend it,"
                     f" or say --missing {shlex.quote(text)} if it means that there is no reading"

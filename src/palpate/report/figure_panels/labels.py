@@ -15,7 +15,7 @@ _UNIT = re.compile(r"\[([^\]]+)\]\s*$")
 
 def plain(text: str) -> str:
     """A label without its formulas: `$K_e$ [N/m]` is Kₑ [N/m]; a letter that is not written so keeps its underscore."""
-    return re.sub(r"\$([^$]*)\$", lambda found: _spelled(found[1]), text).replace("\n", " ").strip()
+    return re.sub(r"\$([^$]*)\$", lambda found: _spell(found[1]), text).replace("\n", " ").strip()
 
 
 def unit(text: str) -> str:
@@ -29,13 +29,13 @@ def title(axes: Axes) -> str:
     return plain(axes.get_title(loc="left") or axes.get_title() or axes.get_title(loc="right"))
 
 
-def _spelled(formula: str) -> str:
+def _spell(formula: str) -> str:
     for sign, letter in _SIGNS.items():
         formula = formula.replace(sign, letter)
-    formula = re.sub(r"_\{?(\w)\}?", _lowered, formula)
+    formula = re.sub(r"_\{?(\w)\}?", _lower, formula)
     return re.sub(r"\\[a-z]+|[{}^]", "", formula)
 
 
-def _lowered(found: re.Match[str]) -> str:
+def _lower(found: re.Match[str]) -> str:
     letter = found[1].translate(_BELOW)
     return found[0] if letter == found[1] else letter

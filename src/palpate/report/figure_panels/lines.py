@@ -40,7 +40,7 @@ def chart_of(axes: Axes, names: Mapping[Kind, str]) -> dict[str, Any]:
     curves = [_within(one, low, high) for one in drawn if isinstance(one, Curve)]
     if not any(len(one.x) >= FEWEST and one.connected for one in curves):
         raise NotLines
-    x, values = _joined(curves)
+    x, values = _join(curves)
     columns = {"t": _column(x, axes.get_xscale())}
     series: list[dict[str, Any]] = []
     for one, column in zip(curves, values, strict=True):
@@ -71,7 +71,7 @@ def _within(one: Curve, low: float, high: float) -> Curve:
     return Curve(one.x[inside], one.y[inside], one.label, one.kind, one.look)
 
 
-def _joined(curves: Sequence[Curve]) -> tuple[Array, list[Array]]:
+def _join(curves: Sequence[Curve]) -> tuple[Array, list[Array]]:
     """All places of thinned curves in order, and each curve's values there: infinite where it has no place."""
     thin = []
     for same in _alike(curves):

@@ -14,7 +14,7 @@ from pathlib import Path
 from palpate.files import write_text
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report.many.rows import POINT, LogRow, has_number, quantities
-from palpate.report.numbers import prefixed, with_half
+from palpate.report.numbers import si_prefix, with_half
 
 ENDINGS = (".csv", ".md", ".tex")
 _MARK = "log (palpate)"
@@ -50,7 +50,7 @@ def cells(rows: Sequence[LogRow], pooled: Pooled | None) -> tuple[Row, list[Row]
     scales = {name: _scale(rows, name) for name in names}
     head = (
         "log",
-        *(text for name in names for text in (f"{_called(name)} {scales[name][1]}".strip(), "± 95 %")),
+        *(text for name in names for text in (f"{_title(name)} {scales[name][1]}".strip(), "± 95 %")),
     )
     body = [(row.source.title, *_values(row, scales)) for row in rows]
     if pooled:
@@ -79,14 +79,14 @@ def _names(rows: Sequence[LogRow], whole: dict[str, PooledParameter]) -> list[st
     return [name for name in there if name in ("E", POINT) or name in own]
 
 
-def _called(name: str) -> str:
+def _title(name: str) -> str:
     return "stiffness" if name == POINT else name
 
 
 def _scale(rows: Sequence[LogRow], name: str) -> tuple[float, str]:
     """The factor and the unit of a column: that of its largest number."""
     found = [p for row in rows if (p := row.value_of(name)) is not None and p.value is not None]
-    factor, prefix = prefixed(max(abs(p.value or 0.0) for p in found), found[0].unit)
+    factor, prefix = si_prefix(max(abs(p.value or 0.0) for p in found), found[0].unit)
     return factor, "" if found[0].unit == "1" else f"[{prefix}{found[0].unit}]"
 
 
@@ -123,11 +123,11 @@ def _deviation(p: PooledParameter | None, factor: float) -> tuple[str, str]:
 
 def _csv(head: Row, body: list[Row]) -> str:
     file = io.StringIO()
-    csv.writer(file, lineterminator="\n").writerows([(_MARK, *head[1:]), *(_unarmed(row) for row in body)])
+    csv.writer(file, lineterminator="\n").writerows([(_MARK, *head[1:]), *(_text_cell(row) for row in body)])
     return file.getvalue()
 
 
-def _unarmed(row: Row) -> Row:
+def _text_cell(row: Row) -> Row:
     """The name of a log that a spreadsheet would take for a formula is a text."""
     return (f"'{row[0]}", *row[1:]) if row[0][:1] in {"=", "+", "-", "@", "\t"} else row
 

@@ -101,7 +101,7 @@ def _arm_panel(arm: SerialArm, place: Place, q: Array, seconds: float) -> list[s
     ground = np.column_stack([bones[0][:, :2], 0.0 * bones[0][:, 2]])
     view = _view_of(np.vstack([bones[0], bones[-1], patch, ground]))
     seen = [view(b) for b in bones]
-    moving = _animated("points", [_points(s) for s in seen], seconds)
+    moving = _animation("points", [_points(s) for s in seen], seconds)
     return [
         f'<polygon class="surface" points="{_points(view(patch))}" fill-opacity="0.55"/>',
         f'<polyline class="shadow" points="{_points(view(ground))}"/>',
@@ -124,8 +124,8 @@ def _tip_panel(record: Record, rows: NDArray[np.intp], seconds: float) -> list[s
         f"{middle - 26:.1f},{p - 60:.1f} {middle:.1f},{p:.1f} {middle + 26:.1f},{p - 60:.1f}" for p in places
     ]
     return [
-        f'<polygon class="surface" points="{dents[0]}">{_animated("points", dents, seconds)}</polygon>',
-        f'<polygon class="probe" points="{probes[0]}">{_animated("points", probes, seconds)}</polygon>',
+        f'<polygon class="surface" points="{dents[0]}">{_animation("points", dents, seconds)}</polygon>',
+        f'<polygon class="probe" points="{probes[0]}">{_animation("points", probes, seconds)}</polygon>',
         _text(left, top + height + 18, f"the tip; its deepest is {1e3 * float(depth.max()):.3g} mm"),
     ]
 
@@ -145,7 +145,7 @@ def _force_panel(record: Record, rows: NDArray[np.intp], seconds: float) -> list
     line = np.column_stack([x, top + height * (1.0 - force / most)])
     asked = np.column_stack([x, top + height * (1.0 - want / most)])
     across, along = (
-        _animated(name, [f"{v:.1f}" for v in values], seconds)
+        _animation(name, [f"{v:.1f}" for v in values], seconds)
         for name, values in zip(("cx", "cy"), line.T, strict=True)
     )
     return [
@@ -161,7 +161,7 @@ def _text(x: float, y: float, words: str) -> str:
     return f'<text x="{x:g}" y="{y:g}">{words}</text>'
 
 
-def _animated(name: str, values: Sequence[str], seconds: float) -> str:
+def _animation(name: str, values: Sequence[str], seconds: float) -> str:
     return (
         f'<animate attributeName="{name}" dur="{max(seconds, 0.1):.3f}s" repeatCount="indefinite" '
         f'values="{";".join(values)}"/>'

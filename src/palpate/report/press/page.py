@@ -17,10 +17,11 @@ from palpate.report.answer import Answer, Card, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
-from palpate.report.numbers import NONE, plain, quantity, with_half
+from palpate.report.numbers import NONE, plain, quantity
 from palpate.report.page import Table, embedded
 from palpate.report.press.film import film
 from palpate.report.run.cards import force_cards
+from palpate.report.run.table import alert_line, surface_table
 from palpate.report.run.words import alerts, settling
 from palpate.report.run.words import sentence as outcome
 
@@ -96,18 +97,14 @@ def _surface(found: dict[str, Any], truth: dict[str, Any]) -> list[Card]:
 def _alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
     """Failures first, then the notes of the press."""
     shown = alerts(summary)
-    told = {_joined(alert) for alert in shown}
+    told = {alert_line(alert) for alert in shown}
     others = [note for note in notes(summary) if note not in told]
     return [*shown, *({"tone": "warn", "title": "", "text": note, "advice": ""} for note in others)]
 
 
-def _joined(alert: dict[str, str]) -> str:
-    return " ".join(part for part in (alert["title"], alert["text"], alert["advice"]) if part)
-
-
 def notes(summary: dict[str, Any]) -> list[str]:
     """Warnings of the page."""
-    found = [_joined(alert) for alert in alerts(summary)]
+    found = [alert_line(alert) for alert in alerts(summary)]
     if summary["sensor_saturated"]:
         share = f"{100 * summary['sensor_saturated']:.2g} % of the ticks"
         found.append(f"The force sensor was saturated in {share}: its reading is not the force.")
@@ -128,7 +125,8 @@ def tables(summary: dict[str, Any]) -> list[Table]:
     if summary["force"] is None:
         return []
     found = (summary["identified"] or {}).get("parameters", {})
-    return [_force_table(summary), *([_identified_table(found, summary["truth"])] if found else [])]
+    surface = surface_table("The surface, by palpate identify", found, summary["truth"])
+    return [_force_table(summary), *([surface] if found else [])]
 
 
 def _force_table(summary: dict[str, Any]) -> Table:
@@ -147,19 +145,6 @@ def _force_table(summary: dict[str, Any]) -> Table:
             ("tip slipped by", f"{summary['tip']['slipped_mm']:.3f} mm"),
         ),
     )
-
-
-def _identified_table(found: dict[str, Any], truth: dict[str, Any]) -> Table:
-    rows = []
-    for name in ("K", "B", "M"):
-        p = found.get(name)
-        if p is None:
-            continue
-        ends = p["ci95"]
-        value = NONE if p["value"] is None or not ends else with_half(p["value"], 0.5 * (ends[1] - ends[0]))
-        true = plain(truth[name]["value"]) if name in truth else NONE
-        rows.append((f"{name} [{p['unit']}]", value, p["verdict"], true, p["reason"]))
-    return Table("The surface, as palpate identify finds it", ("", "95 %", "verdict", "truth", "why"), rows)
 
 
 def _touch(record: Record, asked: Asked) -> tuple[Figure, str]:

@@ -12,7 +12,7 @@ from palpate.text import printable
 def force_cards(summary: dict[str, Any]) -> list[Card]:
     """Contact, settling, overshoot and error, of a summary whose contact was made."""
     f = summary["force"]
-    cards = [_contact(summary), _settled(f)]
+    cards = [_contact(summary), _settling(f)]
     if f["overshoot_N"] is not None:
         fraction = 100 * f["overshoot_N"] / abs(f["desired_N"]) if f["desired_N"] else 0.0
         cards.append(Card("Overshoot", plain(f["overshoot_N"], 2), "N", why=f"{fraction:.0f} % of the step"))
@@ -27,7 +27,7 @@ def _contact(summary: dict[str, Any]) -> Card:
     return Card("Contact", "kept" if kept else "lost", why=why, tone="ok" if kept else "fail")
 
 
-def _settled(force: dict[str, Any]) -> Card:
+def _settling(force: dict[str, Any]) -> Card:
     if force["settling_s"] is not None:
         return Card("Settled in", plain(force["settling_s"], 3), "s", why="within 5 % of the first force")
     if force["overshoot_N"] is None:

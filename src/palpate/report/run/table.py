@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from palpate.identification.result import Identification
-from palpate.report.identification.words import CALLED, formatted
+from palpate.report.identification.words import CALLED
 from palpate.report.numbers import NONE, plain, quantity, with_half
 from palpate.report.page import Table
 from palpate.report.run.words import alerts, settling
@@ -15,13 +16,21 @@ def tables(summary: dict[str, Any], found: Identification | None) -> list[Table]
     """The tables of a run: the force, the surface, the thesis' columns."""
     if summary["force"] is None:
         return []
-    own = [surface_table(summary, found)] if found is not None else []
+    own = []
+    if found is not None:
+        title = f"Surface, by palpate identify: {found.model}"
+        own = [surface_table(title, found.to_json()["parameters"], summary["truth"])]
     return [Table("Force", ("", "value"), force_rows(summary)), *own, thesis_table(summary)]
 
 
 def notes(summary: dict[str, Any]) -> list[str]:
     """Warnings of the table."""
-    return [" ".join(part for part in (a["title"], a["text"], a["advice"]) if part) for a in alerts(summary)]
+    return [alert_line(alert) for alert in alerts(summary)]
+
+
+def alert_line(alert: Mapping[str, str]) -> str:
+    """A warning's title, text and advice on one line."""
+    return " ".join(part for part in (alert["title"], alert["text"], alert["advice"]) if part)
 
 
 def force_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
@@ -41,21 +50,18 @@ def force_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def surface_table(summary: dict[str, Any], found: Identification) -> Table:
-    """Answer of `palpate identify` for the record, beside the truth."""
-    truth = summary["truth"]
-    rows = []
-    for name, p in found.parameters.items():
-        known = truth.get(name, {}).get("value")
-        rows.append(
-            (
-                f"{name}, {CALLED[name]}" if name in CALLED else name,
-                formatted(p) if p.value is not None else "no number",
-                str(p.verdict),
-                quantity(known, truth[name]["unit"], digits=4) if known is not None else NONE,
-            )
-        )
-    return Table(f"Surface, by palpate identify: {found.model}", ("", "95 %", "verdict", "truth"), rows)
+def surface_table(title: str, found: Mapping[str, Any], truth: Mapping[str, Any]) -> Table:
+    """Parameters of `palpate identify` for a record, as its JSON has them, beside the simulation's own."""
+    rows, names = [], {"K", "B", "M", *truth}
+    for name, p in found.items():
+        if p["value"] is None and name not in names:
+            continue
+        low, high = p["ci95"] or (0.0, 0.0)
+        number = "no number" if p["value"] is None else quantity(p["value"], p["unit"], (high - low) / 2)
+        known = quantity(truth[name]["value"], p["unit"], digits=4) if name in truth else NONE
+        called = f"{name}, {CALLED[name]}" if name in CALLED else name
+        rows.append((called, number, p["verdict"], next(iter(p["budget"]), NONE), known))
+    return Table(title, ("", "95 %", "verdict", "limited by", "truth"), rows)
 
 
 def thesis_table(summary: dict[str, Any]) -> Table:

@@ -1,4 +1,4 @@
-"""Output of `palpate tune`."""
+"""Output of `palpate tune` and `palpate certify`."""
 
 from __future__ import annotations
 
@@ -10,13 +10,18 @@ from rich.text import Text
 
 from palpate.force.describe import UNCOVERED, sentence
 from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
-from palpate.force.tuning import RIGID, Tuning
+from palpate.force.tuning import RIGID, Tuning, surface_ends
 from palpate.report.numbers import quantity
 from palpate.report.terminal import print_hanging
 from palpate.text import printable
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.console import Console
+
+    from palpate.force import Certificate
+    from palpate.force.certificate import Verdict
 
 
 def rows(told: Tuning) -> list[tuple[str, str]]:
@@ -101,9 +106,8 @@ def lines(told: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
     yield Text(f"Margins on the stiffest surface: gain × {at.gain:.2g}, phase {phase}, delay {delay}.")
     held = told.surface_stiffness("held")
     if held is not None:
-        high = "up" if held[1] >= RIGID else f"to {quantity(held[1], 'N/m')}"
-        span = f"from {quantity(held[0], 'N/m')} {high}"
-        yield Text(f"Proved for surfaces with K + B/theta {span} (theta {1e3 * gains.theta:.2g} ms).")
+        theta = f"(theta {1e3 * gains.theta:.2g} ms)"
+        yield Text(f"Proved for surfaces with K + B/theta from {_span(*held)} {theta}.")
     for name, assumed in (told.known.assumed if told.known else {}).items():
         value = f"{quantity(assumed.value, assumed.unit)} assumed" if isfinite(assumed.value) else "no bound"
         why = {"damping": "B is unknown", "stiffness": "K of the surface alone is unknown"}.get(name, name)
@@ -112,6 +116,47 @@ def lines(told: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
     if codes:
         yield Text(printable(f"Seen, too: {', '.join(codes)} (--verbose explains each)."), "yellow")
     yield Text(f"Not proved: {len(UNCOVERED)} cases, which --verbose lists.")
+
+
+def _span(low: float, high: float) -> str:
+    end = "up" if high >= RIGID else f"to {quantity(high, 'N/m')}"
+    return f"{quantity(low, 'N/m')} {end}"
+
+
+def proof_lines(certificate: Certificate, verdict: Verdict, written: Path | None = None) -> Iterator[Text]:
+    """A certificate: whether it holds, and the surfaces that each of its claims covers, a line each."""
+    gains, place = certificate.gains, f"   written: {written}" if written else ""
+    if not certificate.claims:
+        yield Text("✕ Nothing could be proved.", "bold red")
+    elif verdict.holds:
+        title = (
+            f"✓ The certificate holds: {verdict.cells} cells, each contracts by more than its rounding error."
+        )
+        yield Text(title, "bold green").append(printable(place), "default")
+        yield Text(f"Stable on surfaces with K + B/theta (theta {1e3 * gains.theta:.2g} ms) of")
+    else:
+        yield Text(printable(f"✕ The certificate does not hold: {verdict.why}."), "bold red")
+    for claim in certificate.claims:
+        low, high = surface_ends(gains.arm, claim.low, claim.high)
+        times, span = "", _span(low, high)
+        if claim.kind == "one-sided":
+            span = (
+                f"up to {quantity(high, 'N/m')}, over gaps of up to {quantity(gains.force / claim.low, 'm')}"
+            )
+        elif claim.kind == "adapting":
+            ticks = f"{claim.jitter} tick{'s' * (claim.jitter > 1)}"
+            times = (
+                f", at {claim.shares[0]:g} to {claim.shares[1]:g} times the ideal gain, jitter up to {ticks}"
+            )
+            span = "any stiffness" if gains.arm.kind == "position" else span
+        elif claim.shares[1] > 1.0:
+            times = f", at up to {claim.shares[1]:g} times the gain"
+        damping = f"; B/K up to {quantity(claim.most, 's')}" if claim.most else "; B = 0"
+        yield Text(f"  {_CLAIMS[claim.kind]:24}{span}{times}{damping}")
+    yield Text(f"Not covered: {len(UNCOVERED)} cases, which --verbose lists.")
+
+
+_CLAIMS = {"held": "constant gain", "one-sided": "contact lost and found", "adapting": "adapting gain"}
 
 
 def show_all(told: Tuning, console: Console) -> None:
