@@ -104,7 +104,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
 
 def propose(table: Sheet) -> Proposal:
     """Options that identify a table of columns."""
-    return from_columns(table, _seen(table)[0])
+    return from_columns(table, _read_columns(table)[0])
 
 
 def _fields(bag: Bag, name: str) -> tuple[str, ...]:
