@@ -114,7 +114,7 @@ def open_journal(path: Path, head: JournalHead) -> Iterator[RunJournal]:
         end = at
         if 0 <= row.run < head.runs:
             finished.add(row.run)
-    with journal.opened(path, end) as file:
+    with journal.open_end(path, end) as file:
         yield RunJournal(path, file, finished)
 
 
