@@ -1,4 +1,4 @@
-"""Output of the scanners of bags, the intact part of a file, and decompression up to the stated size and the limit."""
+"""Results of the scanners of bags, the intact part of a file, and decompression up to the stated size and the limit."""
 
 from __future__ import annotations
 
