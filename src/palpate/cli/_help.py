@@ -139,7 +139,7 @@ _SHOWN = {
 }
 """Options that a short help shows, where they are not the first ones."""
 _MOST = 8
-"""Options of a short help: with usage, two examples and options of two lines it fits a terminal of 24 lines."""
+"""Options of a short help: with usage, two examples and options of two lines it is some 24 lines, a terminal."""
 
 
 def short_help(app: App, command: str) -> list[str]:
