@@ -445,6 +445,7 @@ def main() -> int:
     asked.add_argument("--page", type=Path, help="put the tables between the marks of this page")
     words = asked.parse_args()
     os.environ["CYCLONEDDS_URI"] = ALONE
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it, and each press would inherit that
     words.state.parent.mkdir(exist_ok=True)
     found = {} if words.again else made(words.state)
     wanted = [

@@ -17,27 +17,19 @@ _GAP = " ... "
 _KEPT = "\n\t\u200c\u200d"  # the last two join letters of several scripts
 
 
-_KEYWORDS = {
-    name: name.replace("-", "_")
-    for name in (
-        *(
-            "lag",
-            "lag-std",
-            "force-filter",
-            "series-stiffness",
-            "mass",
-            "model",
-            "method",
-            "calibration",
-            "tolerance",
-        ),
-        *("bonded", "cutoff", "rate", "start", "end", "missing", "delimiter", "time", "position", "force"),
-        *("fixed-lag", "normal", "wrench-frame", "force-sign"),
-    )
-} | {"robot-stiffness": "series_stiffness", "force-column": "force"}
-_OPTION = re.compile(
+_NAMES = (
+    "lag lag-std force-filter series-stiffness mass model method calibration tolerance bonded cutoff rate start end "
+    "missing delimiter time position force fixed-lag normal wrench-frame force-sign robot-mass robot-stiffness-from"
+)
+_KEYWORDS = {name: name.replace("-", "_") for name in _NAMES.split()} | {
+    "robot-stiffness": "series_stiffness",
+    "force-column": "force",
+}
+"""Options of the command line, and the keywords of `palpate.identify` and `palpate.identify_log` for them."""
+OPTION = re.compile(
     rf"(?<![\w-])--({'|'.join(sorted(_KEYWORDS, key=len, reverse=True))})(?![\w-])( [A-Z]+\b)?"
 )
+"""An option of `palpate identify` in a sentence, with its value's name."""
 
 
 _COMMAND = re.compile(r"palpate identify ((?:'[^']*'|[^\s'-]\S*)(?: --[\w-]+ (?:'[^']*'|\S+))+)$")
@@ -52,7 +44,7 @@ def _call(words: list[str]) -> str:
 def in_python(text: str) -> str:
     """Advice for the command line in Python's words: `--force-filter` is `force_filter=`, a whole command a call."""
     text = _COMMAND.sub(lambda found: _call(shlex.split(found[1])), text)
-    return _OPTION.sub(lambda found: f"{_KEYWORDS[found[1]]}=", text)
+    return OPTION.sub(lambda found: f"{_KEYWORDS[found[1]]}=", text)
 
 
 def printable(text: str) -> str:

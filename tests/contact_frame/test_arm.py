@@ -87,6 +87,9 @@ def test_a_high_stiffness_of_joints_is_a_lower_bound():
     assert stiffness.verdict is Verdict.NOT_IDENTIFIABLE
     assert "a lower bound" in stiffness.reason
     assert stiffness.ci95[0] < 5000
+    point = found.to_json()["working_point"]["stiffness"]
+    assert point["verdict"] == "not identifiable", "of the surface, as K is"
+    assert point["reason"].startswith("a lower bound of the surface's stiffness, at least ")
 
 
 def test_a_low_one_stands_and_a_tip_s_is_not_doubted():

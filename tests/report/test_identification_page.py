@@ -18,6 +18,7 @@ from palpate.report import style
 from palpate.report.identification.page import page
 from palpate.report.identification.source import Source, as_json
 from palpate.report.identification.words import ADVICE, interval, sentence
+from palpate.report.page import advice
 from report.outcomes import OUTCOMES
 
 NASTY = "<script>alert(1)</script>"
@@ -181,7 +182,16 @@ def test_every_warning_says_what_to_do(found, read):
     assert read.text.count("What to do:") == len(found.warnings)
     for warn in found.warnings:
         assert warn.code.word in read.text
-        assert ADVICE[warn.code] in read.text
+        assert ADVICE[warn.code] in re.sub(r"\s*\(option of\s+palpate identify\s*\)", "", read.text)
+
+
+def test_an_option_on_a_page_names_its_command_once_a_sentence():
+    text = advice("give --lag, <b> or --mass KG")
+    assert text == (
+        "give <code>--lag</code> (option of <code>palpate identify</code>), &lt;b&gt; or <code>--mass KG</code>"
+    )
+    assert advice("palpate identify LOG --lag S") == "palpate identify LOG <code>--lag S</code>"
+    assert advice("press more often") == "press more often"
 
 
 def test_nothing_is_fetched(html, read):

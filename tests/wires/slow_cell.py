@@ -50,7 +50,7 @@ ALONE = (
 )
 """Of DDS, which is kept on the loopback."""
 DOMAIN = 20 + os.getpid() % 180
-PATIENCE = 20.0
+PATIENCE = 60.0
 """For which a process may take to start, or to end [s]."""
 LATE = re.compile(
     r"late, more than the loop's lag|no reading[^;]* for \S+ ms|stood still for|clock runs too slow"
@@ -58,7 +58,7 @@ LATE = re.compile(
 )
 """How a press says that this machine was late; that is no fault of the press, which is to stop then."""
 WORDS = ("--force", "10:N", "--normal", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",
-         "--travel-limit", "30:mm", "--time-limit", "20:s", "--ordinary-priority")  # fmt: skip
+         "--travel-limit", "30:mm", "--time-limit", "20:s")  # fmt: skip
 
 
 def cell(folder: Path, **changed: float) -> Path:

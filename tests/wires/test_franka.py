@@ -168,6 +168,15 @@ def test_a_second_master_nothing_at_the_address_and_another_protocol_are_named(
             first.close()
 
 
+@pytest.mark.long
+def test_a_slow_start_of_our_own_process_is_no_arm_that_does_not_answer(folder, here, address, monkeypatch):
+    (here / "sitecustomize.py").write_text("import time\ntime.sleep(3.0)\n")
+    with controller(folder, address):
+        monkeypatch.setenv("PYTHONPATH", str(here))
+        monkeypatch.setattr("palpate.wires.franka.FrankaWire.answer", 2.0)
+        open_wire(f"franka:{address}").close()
+
+
 def test_gains_of_another_rate_are_refused(here, tmp_path, folder, capsys, address):
     text = (folder / "gains.toml").read_text().replace("rate = 1000", "rate = 500")
     (tmp_path / "other.toml").write_text(text)

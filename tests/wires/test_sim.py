@@ -338,16 +338,16 @@ def test_an_untared_sensor_is_refused(folder, here, capsys):
     [
         ((), "--wire is missing"),
         (
-            ("--wire", "x", "--gains", "G", *WORDS[:-1], "--surface", "K=5000"),
+            ("--wire", "x", "--gains", "G", *WORDS, "--surface", "K=5000"),
             "--surface is for a simulated arm",
         ),
         (("--wire", "sim:127.0.0.1:9"), "--gains, --force, --normal, --force-limit"),
-        (("--wire", "x", "--gains", "G", *WORDS[:-1], "--normal", "0,0,0"), "must have a length"),
-        (("--wire", "x", "--gains", "G", *WORDS[:-1], "--force-limit", "9:N"), "must lie between the force"),
-        (("--wire", "x", "--gains", "G", *WORDS[:-1], "--speed-limit", "0.001:mm/s"), "certified approach"),
-        (("--wire", "x", "--gains", "G", *WORDS[:-1], "--travel-limit", "-1:mm"), "travel limit"),
+        (("--wire", "x", "--gains", "G", *WORDS, "--normal", "0,0,0"), "must have a length"),
+        (("--wire", "x", "--gains", "G", *WORDS, "--force-limit", "9:N"), "must lie between the force"),
+        (("--wire", "x", "--gains", "G", *WORDS, "--speed-limit", "0.001:mm/s"), "certified approach"),
+        (("--wire", "x", "--gains", "G", *WORDS, "--travel-limit", "-1:mm"), "travel limit"),
         (
-            ("--wire", "x", "--gains", "G", *WORDS[:-1], "--time-limit", "5:kg"),
+            ("--wire", "x", "--gains", "G", *WORDS, "--time-limit", "5:kg"),
             "unknown unit of time in --time-limit",
         ),
     ],

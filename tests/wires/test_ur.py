@@ -103,6 +103,28 @@ def test_the_controller_stops_the_arm_where_its_master_dies(folder, here, addres
 
 
 @pytest.mark.long
+def test_the_watchdog_stops_the_arm_where_the_library_dies_too(folder, here, address):
+    """Its connection is closed then, and the script of a UR runs on: nothing but RTDE's watchdog ends the motion."""
+    with controller(folder, address, "--gap", "0.05"):
+        wire = open_wire(f"rtde:{address}")
+        wire.begin(0.1)
+        for _ in range(20):
+            wire.read(1.0)
+            wire.write(Command((0.0, 0.0, -0.01), (0.0, 0.0, 0.0)))
+        last = wire.read(1.0)
+        wire._driver.kill()
+        wire.close()
+        again = open_wire(f"rtde:{address}")
+        time.sleep(1.0)  # the slow arm's own lag
+        senses = [again.read(1.0) for _ in range(40)]
+        again.close()
+    depth = [sense.position[2] for sense in senses]
+    assert np.ptp(depth) < 1e-5
+    way = last.position[2] - depth[0]
+    assert 0.01 * 0.1 < way < 0.01 * 0.5  # the silence, and what the arm lags behind
+
+
+@pytest.mark.long
 def test_a_second_master_is_refused(folder, here, capsys, address):
     with controller(folder, address):
         first = open_wire(f"rtde:{address}")

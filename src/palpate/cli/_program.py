@@ -30,6 +30,7 @@ COMMANDS = {
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
     "excite": "Design a force that identifies a surface, and predict the uncertainty.",
+    "map": "Map the stiffness of a surface from presses, and choose the next ones.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
@@ -44,7 +45,7 @@ COMMANDS = {
 
 
 GROUPS = {
-    Group("From a log", sort_key=1): ("identify", "topics", "payload", "excite"),
+    Group("From a log", sort_key=1): ("identify", "topics", "payload", "excite", "map"),
     Group("Force loop", sort_key=2): ("tune", "certify", "press"),
     Group("Simulate", sort_key=3): ("run", "live", "study", "export", "checks"),
     Group("Thesis", sort_key=4): ("thesis", "laboratory"),

@@ -1,4 +1,4 @@
-"""`palpate export`: an identified surface as the contact of a simulator's scene."""
+"""`palpate export`: an identified surface as the contact of a simulator's scene, or a law as C."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
+from palpate.cli._export_law import LawOptions, export_law
 from palpate.cli._identified import read_found
 from palpate.cli._program import command
 from palpate.cli._terminal import STYLE, console, head, place, show_table
@@ -29,7 +30,7 @@ class SceneOptions:
     Parameters
     ----------
     to
-        mujoco, drake, newton, or mjcf-spring: a plate on a slide joint.
+        mujoco, drake, newton, mjcf-spring: a plate on a slide joint; or c: a law, with the gains of palpate tune.
     model
         The scene: MJCF for mujoco, SDF or URDF for drake.
     geom
@@ -38,7 +39,7 @@ class SceneOptions:
         The probe, likewise; every geom that can touch the surface if not given.
     """
 
-    to: Literal["mujoco", "drake", "newton", "mjcf-spring"]
+    to: Literal["mujoco", "drake", "newton", "mjcf-spring", "c"]
     model: Path | None = None
     geom: str | None = None
     probe: str | None = None
@@ -73,11 +74,12 @@ class OutputOptions(FileOptions):
     ----------
     out
         The file; SCENE-GEOM beside the scene if not given. A comment in it, and FILE.json beside it, list intervals
-        and assumptions.
+        and assumptions. Of C the folder.
     replace
         Replace an earlier export.
     check
-        Press the contact in the simulator, and state the error in K and B; exit code 1 if one is above 0.1 %.
+        Press the contact in the simulator, and state the error in K and B; exit code 1 if one is above 0.1 %. Of C:
+        compile it here, and repeat a million ticks of Python's; exit code 1 if one differs in a bit.
     """
 
     out: Path | None = None
@@ -86,29 +88,36 @@ class OutputOptions(FileOptions):
 
 
 def export(
-    found: Path,
+    found: Path | None = None,
     /,
     *,
     scene: SceneOptions,
     given: GivenOptions | None = None,
+    law: LawOptions | None = None,
     output: OutputOptions | None = None,
 ) -> int:
-    """Write an identified surface as the contact of a simulator's scene, and press it there.
+    """Write an identified surface as the contact of a simulator's scene, and press it there; or a law as C.
 
     palpate identify press.csv --time time_s --position position_mm:mm --force force_N:N --json > found.json
 
     palpate export found.json --to mujoco --model scene.xml --geom foam --check
+
+    palpate export gains.toml --to c --out force_loop --check
 
     The scene's own file is not changed: the new file includes it (MuJoCo) or is a copy (Drake).
 
     Parameters
     ----------
     found
-        The output of palpate identify --json.
+        The output of palpate identify --json; for a force loop in C the gains file of palpate tune.
     """
+    given, output = given or GivenOptions(), output or OutputOptions()
+    if scene.to == "c":
+        return export_law(found, law or LawOptions(), output)
     from palpate.export import Request, contact_from, prepare
 
-    given, output = given or GivenOptions(), output or OutputOptions()
+    if found is None:
+        raise InputError("nothing to export; give the output of palpate identify --json")
     request = Request(scene.to, scene.model, scene.geom, scene.probe)
     out = output.out or request.default_place()
     beside = out.with_name(f"{out.name}.json")

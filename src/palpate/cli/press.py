@@ -12,7 +12,14 @@ from palpate.cli._program import command
 from palpate.cli._terminal import console, place, print_lines, show_answer
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.kept import CellOptions
-from palpate.cli.options.press import AskOptions, LimitOptions, SimulatedOptions, WireOptions, only
+from palpate.cli.options.press import (
+    AskOptions,
+    LimitOptions,
+    PhantomOptions,
+    SimulatedOptions,
+    WireOptions,
+    only,
+)
 from palpate.files import RECORD, fresh_folder, signed, write_json
 from palpate.text import printable
 
@@ -28,6 +35,7 @@ def press(
     wire: WireOptions | None = None,
     limits: LimitOptions | None = None,
     cell: CellOptions | None = None,
+    phantom: PhantomOptions | None = None,
     json: Annotated[bool, FLAG] = False,
 ) -> int:
     """Press on a surface with a desired force: with a simulated arm, or with a real one over its wire.
@@ -36,6 +44,10 @@ def press(
     readings of its encoders and its force sensor:
 
     palpate press --arm fr3 --force 20:N --surface K=5000,B=50 --out runs/press
+
+    It maps a phantom, a surface with lumps, by presses at places that it chooses itself:
+
+    palpate press --arm ur5e --force 5:N --map phantom.toml --presses 40 --stiffer-than 2:kN/m --out runs/map
 
     For a real arm, --dry-run reads the arm, prints the planned motion and moves nothing:
 
@@ -65,7 +77,12 @@ def press(
     if wire.wire is None:
         for part in (wire, limits):
             only(part, "a real arm, and --wire is missing; add --wire")
-        code = _simulate(asked, simulated, json)
+        if phantom is not None and phantom.map is not None:
+            from palpate.cli._press_map import press_map
+
+            code = press_map(asked, simulated, phantom, json=json)
+        else:
+            code = _simulate(asked, simulated, json)
     else:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
         from palpate.cli._press_wire import press_over

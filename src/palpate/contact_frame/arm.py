@@ -29,13 +29,14 @@ def with_arm(found: Identification, arm: Arm, tolerance: float, *, from_pose: bo
     parameters = dict(found.parameters)
     if "M" in parameters and parameters["M"].unit == "kg":
         parameters["M"] = _of_swing(_without_tool(parameters["M"], arm, tolerance), arm)
-    warnings = list(found.warnings)
+    warnings, point = list(found.warnings), found.working_point
     warning = _compliance(parameters, arm, from_pose)
     if warning is not None:
         warnings.append(warning)
         if arm.position_from == "joints":
             parameters["K"] = _lower_bound(parameters["K"])
-    return replace(found, parameters=parameters, warnings=tuple(warnings))
+            point = point and replace(point, stiffness=_lower_bound(point.stiffness))
+    return replace(found, parameters=parameters, working_point=point, warnings=tuple(warnings))
 
 
 def robot_stiffness(wall: Identification, name: str) -> tuple[float, float]:

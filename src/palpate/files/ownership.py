@@ -34,8 +34,8 @@ _MARKS = re.compile(
             rb"Software\x00palpate",
             rb'<meta name="generator" content="palpate">',
             rb'\A\s*\{\s*"written_by": ?"palpate',
-            rb"^(?:#|//|<!--|%) Made by palpate",
-            rb"\Alog \(palpate\),",  # a table of identifications
+            rb"^(?:#|//|<!--|%|comment) Made by palpate",
+            rb"\A(?:log|map) \(palpate\),",  # a table of identifications, a map
             rb"\A%s\r?\n" % ",".join(FORCE).encode(),
             rb"\ASQLite format 3\x00(?s:.{52})palp",  # where the application id stands
             rb'\A[0-9a-f]{8} \{"title":.*"palpate":',  # the head of a journal of runs

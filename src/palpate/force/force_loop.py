@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from palpate._jit import kernel, law
+from palpate._jit import kernel, law, part
+from palpate._vector import Vec3
 from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.force.contact_evidence import AIR
@@ -55,8 +55,8 @@ def flat_step(numbers, state, desired, force, position, missed):
 _step = kernel(flat_step)
 
 
-@dataclass(frozen=True)
-class SurfaceEstimate:
+@part
+class SurfaceEstimate(NamedTuple):
     """Estimate of the surface.
 
     Args:
@@ -72,6 +72,12 @@ class SurfaceEstimate:
     damping: float
     damping_std: float
     bound: float
+
+
+@law
+def surface_estimate(cap, theta, found, std, bound):
+    """The estimate in SI units, of numbers in caps."""
+    return SurfaceEstimate(cap * found.x, cap * std.x, cap * theta * found.y, cap * theta * std.y, bound)
 
 
 class ForceLoop:
@@ -160,13 +166,8 @@ class ForceLoop:
         s, cap, theta = self._state, self.gains.seen_cap, self.gains.theta
         if s[PHASE] == AIR or s[STD] == 0.0:
             return None
-        return SurfaceEstimate(
-            float(cap * s[FOUND]),
-            float(cap * s[STD]),
-            float(cap * theta * s[FOUND + 1]),
-            float(cap * theta * s[STD + 1]),
-            float(s[BOUND]),
-        )
+        found, std = (Vec3(*s[at : at + 3].tolist()) for at in (FOUND, STD))
+        return surface_estimate(cap, theta, found, std, float(s[BOUND]))
 
     @property
     def phase(self) -> str:

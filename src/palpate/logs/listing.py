@@ -101,6 +101,11 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     return Listing(entries, unread + [note["text"] for note in table.notes], proposal, facts)
 
 
+def propose(table: Sheet) -> Proposal:
+    """Options that identify a table of columns."""
+    return from_columns(table, _seen(table)[0])
+
+
 def _fields(bag: Bag, name: str) -> tuple[str, ...]:
     topic = bag.topics[name]
     if not (topic.known and topic.count):

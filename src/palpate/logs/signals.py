@@ -2,6 +2,7 @@
 
 # No annotations from the future: the command line looks for those of a base class where it inherits them.
 import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -12,12 +13,13 @@ from palpate.files.limits import Limits
 from palpate.logs import read
 from palpate.logs.arm_logs import read_wrench_and_pose
 from palpate.logs.kinds import Kind, kind_of
-from palpate.logs.listing import list_log
+from palpate.logs.listing import list_log, propose
 from palpate.logs.own_runs import is_run, read_run
 from palpate.logs.presets import preset
 from palpate.logs.proposal import Proposal
 from palpate.logs.roles import POSE, WRENCH
 from palpate.logs.tables import open_table
+from palpate.logs.tables.frame import read_frame
 from palpate.logs.tables.parquet import stored_about
 from palpate.records import Record
 from palpate.units import split_spec
@@ -194,7 +196,7 @@ class Signals:
 def read_log(path: str | Path | Any, **options: Any) -> Record:
     """Read a log as `palpate.logs.read.read_log` does, or as what its own names say where no column is named."""
     if not isinstance(path, str | Path):
-        return read.read_log(path, **options)
+        return read.read_log(path, **(options | _columns_of(path, options)))
     path = Path(path)
     own: dict[str, Any] = {
         name: options[name] for name in ("rate", "start", "end", "missing", "delimiter") if name in options
@@ -206,6 +208,18 @@ def read_log(path: str | Path | Any, **options: Any) -> Record:
         own |= {"max_size": options["limits"].size / 1e9, "max_seconds": options["limits"].seconds}
     signals, others = Signals(**own).complete(path)
     return read_as(signals.read(path), others.get("read_as", ""))
+
+
+def _columns_of(table: Any, options: Mapping[str, Any]) -> dict[str, str]:
+    """Time, position and force of a table in memory, if its names, units and values leave nothing to guess."""
+    sheet = read_frame(table)
+    if {"rate", "time", "position", "force"} & {*options} or {"position", "force"} & {*sheet.names}:
+        return {}
+    proposal = propose(sheet)
+    alone = proposal.options is not None and not proposal.guesses and "preset" not in proposal.options
+    return (
+        dict(proposal.options or {}) if alone and {"position", "force"} <= {*(proposal.options or {})} else {}
+    )
 
 
 def read_as(record: Record, words: str) -> Record:

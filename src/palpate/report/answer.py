@@ -86,16 +86,23 @@ class Answer:
     source: tuple[str, str] = ("", "")
 
 
-def answer_page(answer: Answer, *, room: str, command: str) -> str:
+def answer_page(
+    answer: Answer, *, room: str, command: str, package: str = "", codes: Sequence[str] = (), **values: Any
+) -> str:
     """The page as HTML.
 
     Args:
         answer: its content.
         room: what it is of, in the page's head.
         command: that made it.
+        package: of a template with the room's name, which extends `page.html`; none where there is nothing to add.
+        codes: scripts of that template, beside the page's own.
+        values: what that template shows.
     """
+    shown = shown_in(answer.figures)
     return render(
-        "page.html",
+        f"{room}.html" if package else "page.html",
+        *filter(None, [package]),
         title=printable(answer.title),
         sentence=printable(answer.sentence),
         about=printable(answer.about),
@@ -111,7 +118,8 @@ def answer_page(answer: Answer, *, room: str, command: str) -> str:
         tables=(),
         room=room,
         command=printable(command),
-        **shown_in(answer.figures),
+        **shown | {"scripts": (*shown["scripts"], *codes)},
+        **values,
     )
 
 

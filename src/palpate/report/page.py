@@ -7,9 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palpate.files import SIGNATURE
+from palpate.text import OPTION
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,18 @@ def render(template: str, *packages: str, **values: Any) -> str:
     folders = dict.fromkeys((*packages, "palpate.report"))
     loader = ChoiceLoader([PackageLoader(folder, "") for folder in folders])
     environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["advice"] = advice
     return environment.get_template(template).render(version=__version__, signature=SIGNATURE, **values)
+
+
+def advice(text: str) -> Markup:
+    """A text for a page, on which nobody types: options as code, and the first of them with its command."""
+    from markupsafe import Markup, escape
+
+    code = OPTION.sub(lambda option: f"<code>{option[0]}</code>", str(escape(text)))
+    if "palpate " not in text:
+        code = code.replace("</code>", "</code> (option of <code>palpate identify</code>)", 1)
+    return Markup(code)  # noqa: S704 - escaped above
 
 
 def png(path: Path) -> str:

@@ -12,12 +12,14 @@ import socket
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 from palpate.errors import InputError
 from palpate.wires import link
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError
+from palpate.wires.realtime import schedule
 
+_START = 60.0
+"""For which the start of our own process may take on a busy computer [s]: the arm has not been asked yet."""
 _ANSWER = 12.0
 """For which opening, taring and beginning may take: a script of a UR is uploaded and started within eight [s]."""
 _PATIENCE = 2.0
@@ -50,6 +52,7 @@ class ApartWire:
         theirs.close()
         self._link.setblocking(False)
         try:
+            self._answered(link.STARTED, _START)
             about = self._answered(link.READY, self.answer)
         except BaseException as error:
             self._driver.kill()  # nothing moves yet
@@ -79,8 +82,7 @@ class ApartWire:
         """Take the arm over; all threads of the library's process get this thread's priority."""
         policy = os.sched_getscheduler(0)
         if policy != os.SCHED_OTHER:
-            for thread in Path(f"/proc/{self._driver.pid}/task").iterdir():
-                os.sched_setscheduler(int(thread.name), policy, os.sched_getparam(0))
+            schedule(self._driver.pid, policy, os.sched_getparam(0).sched_priority)
         self._begun = True
         self._ask(link.begin(silence), link.BEGUN)
 

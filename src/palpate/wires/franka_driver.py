@@ -163,6 +163,7 @@ def main() -> None:
     address, sign, number = sys.argv[1:4]
     wire = socket.socket(fileno=int(number))
     wire.setblocking(False)
+    wire.send(link.text(link.STARTED))
     try:
         robot = pylibfranka.Robot(address, pylibfranka.RealtimeConfig.kIgnore)
         title = f"a Franka at {address}, over its control interface"

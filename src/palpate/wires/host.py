@@ -151,6 +151,7 @@ def main() -> None:
     prepare()
     kind, where, number = sys.argv[1:4]
     theirs = socket.socket(fileno=int(number))
+    theirs.send(link.text(link.STARTED))
     try:
         wire = opened(kind, where)
         theirs.send(link.text(link.READY, f"{wire.title}\n{wire.watchdog}\n{wire.source}"))

@@ -6,7 +6,7 @@ import struct
 
 from palpate.wires.protocol import Command, Sense
 
-READY, STATE, FAILED, REFUSED, BEGUN, TARED, RESTED = b"rsfxbtq"
+STARTED, READY, STATE, FAILED, REFUSED, BEGUN, TARED, RESTED = b"arsfxbtq"
 TARE, BEGIN, MOVE, REST = b"TBMR"
 LARGEST = 4096
 

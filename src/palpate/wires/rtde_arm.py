@@ -249,7 +249,7 @@ class Server:
         self.selector.unregister(one)
         client = self.clients.pop(one, None)
         if client is not None and client is self.controller.master:
-            self.controller.master, self.controller.speed, self.controller.height = None, 0.0, None
+            self.controller.master = None  # its script runs on: the watchdog alone ends the motion
         one.close()
 
     def _dashboard(self, one: socket.socket, data: bytes) -> None:

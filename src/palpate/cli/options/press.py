@@ -16,6 +16,7 @@ from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.contact_frame import Payload
+    from palpate.environments.kelvin_voigt import KelvinVoigt
     from palpate.press.prepare import Question
     from palpate.wires import Limits, Task
 
@@ -114,20 +115,21 @@ class SimulatedOptions:
     out: Path | None = None
     replace: Annotated[bool, FLAG] = False
 
-    def question(self, asked: AskOptions) -> Question:
-        """The press to simulate."""
+    def question(self, asked: AskOptions, surface: KelvinVoigt | None = None) -> Question:
+        """The press to simulate, on a surface that is given here or by --surface."""
         from palpate.press.prepare import Question, surface_of
 
         if self.arm is None:
             raise InputError(
                 "no arm is named; give --arm for a simulated one, as ur5e, or --wire for a real one"
             )
-        if self.surface is None:
+        if surface is None and self.surface is None:
             raise InputError(
                 "the surface is missing; add --surface, as --surface K=5000,B=50 in N/m and N s/m"
             )
+        touched = surface if surface is not None else surface_of(str(self.surface))
         return Question(
-            arm=self.arm, force=asked.desired, surface=surface_of(self.surface), site=self.site, mode=self.mode,
+            arm=self.arm, force=asked.desired, surface=touched, site=self.site, mode=self.mode,
             physics=self.physics, controller=self.controller, gains=asked.gains, at=vector("at", self.at, "length"),
             normal=vector("normal", asked.normal, "number"), seconds=asked.seconds,
             probe=0.2 if asked.probe is None else asked.probe, seed=self.seed, payload=asked.tool,
@@ -141,6 +143,27 @@ class SimulatedOptions:
             if self.out is not None
             else Path("runs") / f"press-{Path(str(self.arm)).stem}-{self.seed}"
         )
+
+
+@Parameter(name="*", group=Group("A map of a phantom, by a simulated arm", sort_key=5))
+@dataclass(frozen=True, kw_only=True)
+class PhantomOptions:
+    """The phantom and its map.
+
+    Parameters
+    ----------
+    map
+        A phantom, a TOML file: size, stiffness, damping and [[lumps]] with at, radius, stiffness and edge, in m, N/m
+        and N s/m.
+    presses
+        How many presses: sixteen on a grid, then where the map is worst known.
+    stiffer_than
+        A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it.
+    """
+
+    map: Path | None = None
+    presses: Annotated[int, WHOLE] = 40
+    stiffer_than: str | None = None
 
 
 @Parameter(name="*", group=Group("A real arm, over its wire", sort_key=3))

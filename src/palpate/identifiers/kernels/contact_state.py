@@ -7,9 +7,8 @@ are summed and held above zero (Page, Continuous inspection schemes, 1954); a hy
 change in distribution, 1971), for noise that is normal, white and known.
 """
 
-from math import log
-
 from palpate._jit import law
+from palpate._jit.elementary import log
 from palpate._vector import Vec3
 from palpate.identifiers.kernels.dimension import Four
 from palpate.identifiers.kernels.error_covariance import long_run_variance

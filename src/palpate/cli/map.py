@@ -1,0 +1,262 @@
+"""`palpate map`: the stiffness of a surface at every place, from presses at some, and where to press next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Group, Parameter
+
+from palpate.cli._answer import print_answer
+from palpate.cli._one_log import OneLog
+from palpate.cli._program import command
+from palpate.cli._progress import bar
+from palpate.cli._terminal import console, show_answer
+from palpate.cli._terminal import place as show_place
+from palpate.cli.identify import ModelOptions
+from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.options.flags import FLAG
+from palpate.cli.options.log import LogOptions
+from palpate.cli.options.names import QUIET
+from palpate.cli.options.written import WRITTEN, JsonOption, ReportOption
+from palpate.errors import InputError
+from palpate.files import check_place, write_text
+from palpate.units import split_spec, unit
+
+if TYPE_CHECKING:
+    from palpate.maps.presses import Presses
+    from palpate.maps.result import MapRequest, MapResult
+
+MAP = Group("The map", sort_key=2)
+
+
+@Parameter(name="*", group=MAP)
+@dataclass(frozen=True, kw_only=True)
+class PlaceOptions:
+    """Where the presses are.
+
+    Parameters
+    ----------
+    table
+        A table with a row a press instead of logs: columns x, y (and z), stiffness and half, the half-width of its 95 %
+        interval; a name such as x_mm carries its unit.
+    columns
+        Columns of the table, as x:mm,y:mm,K:N/mm,half:N/mm.
+    place
+        Columns of a log that hold its place, as x:mm,y:mm or x,y,z; the pose's position if not given.
+    each_contact
+        Each contact of a log is a press of its own, at its own place; else a log is one press.
+    """
+
+    table: Path | None = None
+    columns: str | None = None
+    place: str | None = None
+    each_contact: Annotated[bool, FLAG] = False
+
+
+@Parameter(name="*", group=MAP)
+@dataclass(frozen=True, kw_only=True)
+class MapOptions:
+    """Options of the map itself.
+
+    Parameters
+    ----------
+    next
+        How many next presses to choose.
+    goal
+        What they are for: the interval everywhere, the edge of what is stiffer, or the maximum; edge if --stiffer-than
+        is given, else interval.
+    stiffer_than
+        A stiffness, as 2000 or 2:kN/m: lumps above it, their areas, and the probability at each place.
+    until
+        A half-width of the interval in per cent: how many more presses bring it under that.
+    common
+        Standard deviation of an error that all presses share, such as the sensor's scale, in per cent.
+    start
+        Where the robot stands, as 10,20:mm; with --way a next press costs the way to it.
+    way
+        That the robot travels in the time of one press, as 50:mm.
+    """
+
+    next: int = 5
+    goal: Annotated[Literal["interval", "edge", "maximum"] | None, QUIET] = None
+    stiffer_than: str | None = None
+    until: float | None = None
+    common: float = 0.0
+    start: str | None = None
+    way: str | None = None
+
+    def request(self) -> MapRequest:
+        """The same for the library."""
+        from palpate.maps.result import MapRequest
+
+        if self.until is not None and not 0.0 < self.until < 1e3:
+            raise InputError(f"--until must be above 0 %, got {self.until:g}")
+        if not 0.0 <= self.common < 100.0:
+            raise InputError(f"--common must be from 0 to 100 %, got {self.common:g}")
+        if not 0 <= self.next <= 1000:
+            raise InputError(f"--next must be from 0 to 1000, got {self.next}")
+        threshold = (
+            None if self.stiffer_than is None else _number("--stiffer-than", self.stiffer_than, "stiffness")
+        )
+        way = float("inf") if self.way is None else _number("--way", self.way, "length")
+        start = None
+        if self.start is not None:
+            numbers, symbol = split_spec(self.start)
+            start = tuple(
+                _number("--start", f"{each}:{symbol or 'm'}", "length", least=None)
+                for each in numbers.split(",")
+            )
+        goal = self.goal or ("interval" if threshold is None else "edge")
+        half = None if self.until is None else self.until / 100.0
+        return MapRequest(self.next, goal, threshold, half, self.common / 100.0, start, way)
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions(ReportOption, JsonOption):
+    """Files to write.
+
+    Parameters
+    ----------
+    figure
+        Where to write a picture of the map, PNG, SVG or PDF by its ending.
+    csv
+        Where to write the map as a table: place, stiffness, both intervals.
+    ply
+        Where to write the map as coloured points, for a viewer of point clouds.
+    """
+
+    figure: Path | None = None
+    csv: Path | None = None
+    ply: Path | None = None
+
+    def check(self) -> None:
+        """Check every path before any work is done."""
+        self.page()
+        for path, option, endings in (
+            (self.figure, "--figure", (".png", ".svg", ".pdf")),
+            (self.csv, "--csv", (".csv",)),
+            (self.ply, "--ply", (".ply",)),
+        ):  # fmt: skip
+            if path is not None:
+                ending = path.suffix.lower()
+                check_place(path, option, ending=ending if ending in endings else endings[0])
+
+
+def map(  # noqa: A001 - the command's name
+    *logs: Path,
+    places: PlaceOptions | None = None,
+    asked: MapOptions | None = None,
+    source: LogOptions | None = None,
+    frame: FrameOptions | None = None,
+    arm: ArmOptions | None = None,
+    fitted: ModelOptions | None = None,
+    output: OutputOptions | None = None,
+) -> int:
+    """Map the stiffness of a surface from presses at places, and choose the next presses.
+
+    A folder of logs, each of one press with the pose of the probe; options are those of palpate identify:
+
+    palpate map presses/ --report map.html
+
+    A table with a row a press; lumps stiffer than 2 kN/m, and where to press to find their edges:
+
+    palpate map --table places.csv --stiffer-than 2:kN/m --next 5
+
+    Each place has a 95 % interval, of the surface and of a next press. Outside the hull of the presses nothing is said.
+    Exit code 1: presses of the folder are left out, since they give no stiffness.
+
+    Parameters
+    ----------
+    logs
+        Logs or folders of logs.
+    """
+    places, output = places or PlaceOptions(), output or OutputOptions()
+    output.check()
+    request = (asked or MapOptions()).request()
+    if (places.table is None) == (not logs):
+        raise InputError("palpate map needs logs or a folder of them, or --table with places and stiffnesses")
+    from palpate.maps.result import map_of
+
+    one = OneLog(
+        fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
+    )
+    result = map_of(_presses(logs, places, one), request)
+    _write(result, output, places.table.name if places.table else logs[0].name)
+    if output.json:
+        print_answer(result.to_json())
+    else:
+        _show(result, output)
+    return 1 if result.presses.refused else 0
+
+
+def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses:
+    from palpate.maps.presses import read_logs, read_table
+
+    if places.table is not None:
+        if places.place is not None:
+            raise InputError("--place is of logs; the columns of a table are given with --columns")
+        return read_table(places.table, places.columns.split(",") if places.columns else ())
+    if places.columns is not None:
+        raise InputError("--columns is of --table; the place in logs is given with --place")
+    from palpate.logs.gathered import gathered
+
+    with bar(console(stderr=True)) as progress:
+
+        def track(paths: Sequence[Path]) -> Iterable[Path]:
+            return progress.track(paths, description="identifying")
+
+        named = places.place.split(",") if places.place else ()
+        return read_logs(gathered(logs), one.identifier, named, places.each_contact, track)
+
+
+def _write(result: MapResult, output: OutputOptions, name: str) -> None:
+    from palpate.report.map import page
+
+    if output.figure is not None:
+        from palpate.report.style import save
+
+        save(page.draw_map(result), output.figure)
+    if output.csv is not None:
+        result.write_csv(output.csv)
+    if output.ply is not None:
+        result.write_ply(output.ply)
+    if output.report is not None:
+        write_text(output.report, page.page(result, f"Stiffness map of {name}", command()))
+
+
+def _show(result: MapResult, output: OutputOptions) -> None:
+    from palpate.report.map import page
+
+    more = page.further(result)
+    answer = page.sentence(result) + (f" {' '.join(more)}." if more else "")
+    screen = show_answer(
+        f"{len(result.map)} presses", f": {answer}", page.tables(result), page.warnings(result)
+    )
+    for kind, path in (
+        ("report", output.report),
+        ("figure", output.figure),
+        ("table", output.csv),
+        ("points", output.ply),
+    ):
+        if path is not None:
+            show_place(screen, f"{kind}:", path)
+
+
+def _number(option: str, text: str, quantity: str, least: float | None = 0.0) -> float:
+    """A number with or without its unit, in SI units, above `least`."""
+    plain, symbol = split_spec(text)
+    known = unit(symbol) if symbol else unit({"stiffness": "N/m", "length": "m"}[quantity])
+    try:
+        value = float(plain) * known.factor
+    except ValueError:
+        raise InputError(f"{option} needs a number, as 2000 or 2:kN/m, got {text!r}") from None
+    if known.quantity != quantity:
+        raise InputError(f"{symbol!r} of {option} is a unit of {known.quantity}; it needs one of {quantity}")
+    if not isfinite(value) or (least is not None and value <= least):
+        raise InputError(f"{option} must be finite{'' if least is None else ' and above 0'}, got {text!r}")
+    return value

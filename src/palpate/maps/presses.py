@@ -1,0 +1,218 @@
+"""Presses with their places: from a table, or from logs that hold the pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.errors import InputError, PalpateError
+from palpate.from_log import LogIdentifier
+from palpate.logs.kinds import kind_of
+from palpate.logs.read import read_log
+from palpate.logs.roles import POSE
+from palpate.logs.signals import Signals
+from palpate.logs.tables import Sheet, open_table
+from palpate.units import split_spec, unit, unit_in_name
+
+if TYPE_CHECKING:
+    from palpate.identification import Identification
+
+AXES = ("x", "y", "z")
+_NAMES = {"stiffness": ("stiffness", "K", "k"), "half": ("half", "half_width", "K_half")}
+_QUANTITIES = {"stiffness": "stiffness", "half": "stiffness"} | dict.fromkeys(AXES, "length")
+
+
+@dataclass(frozen=True)
+class Presses:
+    """Presses at places.
+
+    Args:
+        places: (n, 2) or (n, 3) [m].
+        stiffness: (n,) [N/m].
+        half: half-width of each 95 % interval (n,) [N/m].
+        names: of the presses: a log's name, or a row of the table.
+        refused: logs that give no stiffness, by name, each with the reason.
+    """
+
+    places: Array
+    stiffness: Array
+    half: Array
+    names: Sequence[str]
+    refused: dict[str, str] = field(default_factory=dict)
+
+
+def read_table(path: Path, columns: Sequence[str] = ()) -> Presses:
+    """Presses from a table with a row each.
+
+    Args:
+        path: of text, Parquet, a spreadsheet or a MATLAB file.
+        columns: of x, y, stiffness and half, or of x, y, z, stiffness and half, each NAME or NAME:UNIT; by the names
+            x, y, z, stiffness or K, and half if none are given. A name such as x_mm carries its unit.
+
+    Raises:
+        InputError: a column is missing, or a number is none.
+    """
+    sheet = open_table(path, kind_of(path))
+    roles = _roles(sheet, columns)
+    places = [sheet.resolve(split_spec(spec)[0]) for spec in roles.values()]
+    values = {}
+    for (role, spec), place, numbers in zip(roles.items(), places, sheet.numbers(places, ()), strict=True):
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if len(bad):
+            raise InputError(f"{path}: row {bad[0] + 1} has no {role}; remove the row, or fill it in")
+        values[role] = numbers * _factor(role, spec, sheet.names[place])
+    where = np.column_stack([values[axis] for axis in AXES if axis in values])
+    names = [f"row {i + 1}" for i in range(len(where))]
+    return Presses(where, values["stiffness"], values["half"], names)
+
+
+def _roles(sheet: Sheet, columns: Sequence[str]) -> dict[str, str]:
+    if columns:
+        if len(columns) not in (4, 5):
+            raise InputError(
+                f"--columns needs x,y,stiffness,half or x,y,z,stiffness,half, got {len(columns)} names"
+            )
+        return dict(zip((*AXES[: len(columns) - 2], "stiffness", "half"), columns, strict=True))
+    plain = {_without_unit(name, role): name for role in _QUANTITIES for name in sheet.names}
+    found = {role: plain[name] for role in _QUANTITIES for name in _NAMES.get(role, (role,)) if name in plain}
+    lacking = [role for role in ("x", "y", "stiffness", "half") if role not in found]
+    if lacking:
+        raise InputError(
+            f"{sheet.path} has no column {', '.join(lacking)}; name them with --columns x,y,stiffness,half; there are: "
+            f"{', '.join(sheet.names[:12])}"
+        )
+    return {role: found[role] for role in _QUANTITIES if role in found}
+
+
+def _without_unit(name: str, role: str) -> str:
+    symbol = unit_in_name(name, _QUANTITIES[role])
+    return (
+        name
+        if symbol is None
+        else name.rstrip(" ])").replace("[", "_").replace("(", "_").rsplit("_", 1)[0].strip()
+    )
+
+
+def _factor(role: str, spec: str, name: str) -> float:
+    symbol = split_spec(spec)[1] or unit_in_name(name, _QUANTITIES[role])
+    if symbol is None:
+        return 1.0
+    if unit(symbol).quantity != _QUANTITIES[role]:
+        raise InputError(
+            f"{symbol!r} of {name!r} is a unit of {unit(symbol).quantity}; {role} needs one of {_QUANTITIES[role]}"
+        )
+    return unit(symbol).factor
+
+
+def read_logs(
+    logs: Sequence[Path],
+    identifier: LogIdentifier,
+    place: Sequence[str] = (),
+    each_contact: bool = False,
+    track: Callable[[Sequence[Path]], Iterable[Path]] = iter,
+) -> Presses:
+    """Identify presses, each at the place of its pose while it presses.
+
+    Args:
+        logs: their paths.
+        identifier: options of reading and identification.
+        place: columns of the place, x,y or x,y,z, each NAME or NAME:UNIT; the pose's position if none are given.
+        each_contact: whether each contact of a log is a press of its own; else a log is one press.
+        track: shows the progress.
+
+    Returns:
+        The presses with a stiffness; a log or a contact without one is refused with its reason.
+
+    Raises:
+        InputError: no log has a place and a stiffness.
+    """
+    places, numbers, names, refused = [], [], [], dict[str, str]()
+    for log in track(logs):
+        try:
+            parts = _contacts(log, identifier) if each_contact else {log.name: identifier}
+        except (PalpateError, OSError) as error:
+            parts, refused[log.name] = {}, " ".join(str(error).split())
+        for name, part in parts.items():
+            try:
+                where = _named_place(log, part, place) if place else _pose_of(log, part)
+                numbers.append(_stiffness(part.identify(log)[0]))
+            except (PalpateError, OSError) as error:
+                refused[name] = " ".join(str(error).split())
+                continue
+            places.append(where)
+            names.append(name)
+    if not places:
+        raise InputError(
+            f"none of {len(logs)} logs gives a press with a place: {next(iter(refused.values()))}"
+        )
+    if len({len(where) for where in places}) > 1:
+        raise InputError("some logs have a place of two coordinates and some of three; a map has one frame")
+    stiffness, half = np.array(numbers).T
+    return Presses(np.array(places), stiffness, half, names, refused)
+
+
+def _contacts(log: Path, identifier: LogIdentifier) -> dict[str, LogIdentifier]:
+    """An identifier of each contact with half of the free motion before and after it."""
+    contacts = identifier.identify(log)[0].contacts
+    ends = [0.5 * (before + after) for (_, before), (after, _) in pairwise(contacts)]
+    first = identifier.signals.start or 0.0
+    cuts = [identifier.signals.start, *(first + end for end in ends), identifier.signals.end]
+    return {
+        f"{log.name}, contact {k + 1}": replace(
+            identifier, signals=replace(identifier.signals, start=start, end=end)
+        )
+        for k, (start, end) in enumerate(pairwise(cuts))
+    }
+
+
+def _stiffness(result: Identification) -> tuple[float, float]:
+    """Stiffness and half-width at the working point, else of the model."""
+    point = result.working_point
+    for parameter in ([point.stiffness] if point else []) + [result.parameters.get("K")]:
+        if parameter is not None and parameter.value is not None and parameter.ci95 is not None:
+            low, high = parameter.ci95
+            return float(parameter.value), 0.5 * float(high - low)
+    raise InputError("its stiffness is not identified; palpate identify says why")
+
+
+def _named_place(log: Path, identifier: LogIdentifier, columns: Sequence[str]) -> Array:
+    """The median of each column of the place over the rows that are read."""
+    if len(columns) not in (2, 3):
+        raise InputError(f"--place needs the columns x,y or x,y,z, got {len(columns)}")
+    signals = _completed_signals(log, identifier)
+    options: dict[str, Any] = {
+        "start": signals.start,
+        "end": signals.end,
+        "missing": signals.missing,
+        "limits": signals.limits,
+    }
+    if signals.time is not None:
+        options["time"] = signals.time
+    named: dict[str, Any] = dict(zip(POSE, columns, strict=False))
+    record = read_log(log, rate=signals.rate, delimiter=signals.delimiter, **options, **named)
+    return np.array([np.nanmedian(record[role]) for role in named])
+
+
+def _pose_of(log: Path, identifier: LogIdentifier) -> Array:
+    """The median position of the pose while the force is above half of its largest."""
+    record = _completed_signals(log, identifier).read(log)
+    if "force_x" not in record.columns:
+        raise InputError(
+            f"{log} has no place: it holds one axis; name its columns with --place x,y, or give a log with a pose"
+        )
+    force = np.column_stack([record[f"force_{axis}"] for axis in AXES])
+    size = np.linalg.norm(force - np.nanmedian(force[: max(len(force) // 50, 1)], axis=0), axis=1)
+    pressed = size >= 0.5 * np.nanmax(size)
+    return np.array([np.nanmedian(record[f"position_{axis}"][pressed]) for axis in AXES])
+
+
+def _completed_signals(log: Path, identifier: LogIdentifier) -> Signals:
+    """The signals with what the log's own names leave no doubt of."""
+    known_frame = identifier.frame.wrench_frame is not None
+    return identifier.signals.complete(log, known_frame=known_frame)[0]

@@ -1,0 +1,188 @@
+"""Everything that `palpate map` says of presses: the map on a grid, lumps, next presses, disagreement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.files import write_text
+from palpate.maps.lumps import Lump, lumps_of
+from palpate.maps.next_press import Goal, NextPresses
+from palpate.maps.presses import AXES, Presses
+from palpate.maps.stiffness_map import Prediction, StiffnessMap
+from palpate.maps.surface import Grid
+
+SHOWN = 2500
+"""Places of the grid that is shown and printed: finer than presses lie, and a page of 200 kB."""
+
+
+@dataclass(frozen=True)
+class MapRequest:
+    """Options of a map.
+
+    Args:
+        next: number of next presses.
+        goal: for which they are chosen.
+        stiffer_than: threshold of lumps [N/m]; None for none.
+        half: relative half-width for which the number of further presses is foretold; None for none.
+        common: standard deviation of the error common to all presses, relative [1].
+        start: where the robot stands (d,) [m].
+        way: that it travels in the time of a press [m].
+    """
+
+    next: int = 5
+    goal: Goal = "interval"
+    stiffer_than: float | None = None
+    half: float | None = None
+    common: float = 0.0
+    start: tuple[float, ...] | None = None
+    way: float = float("inf")
+
+
+@dataclass(frozen=True)
+class MapResult:
+    """A map of presses and what follows from it.
+
+    Args:
+        presses: with their places.
+        request: what was asked.
+        map: of the presses.
+    """
+
+    presses: Presses
+    request: MapRequest
+    map: StiffnessMap
+
+    @cached_property
+    def grid(self) -> Grid:
+        """Places that are shown."""
+        return self.map.grid(SHOWN)
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """The stiffness at the grid."""
+        return self.map.predict(self.grid.places)
+
+    @cached_property
+    def lumps(self) -> list[Lump]:
+        """Parts stiffer than the threshold; none without a threshold."""
+        threshold = self.request.stiffer_than
+        return [] if threshold is None else lumps_of(self.grid, self.prediction, threshold)
+
+    @cached_property
+    def next(self) -> NextPresses:
+        """Where to press next."""
+        return self.choose(max(self.request.next, 1), None, start=self.request.start)
+
+    def choose(self, count: int, candidates: Array | None, *, start: Any) -> NextPresses:
+        """The next presses among candidates (m, d) [m], for a robot that stands at `start` (d,) [m]."""
+        r = self.request
+        return self.map.next(
+            count, candidates, goal=r.goal, stiffer_than=r.stiffer_than, start=start, way=r.way
+        )
+
+    @cached_property
+    def disagreeing(self) -> list[int]:
+        """Presses that their neighbours contradict."""
+        return self.map.disagreeing()
+
+    @property
+    def repeat(self) -> float:
+        """Relative half-width by which two presses at one place differ, 95 %, beyond their own intervals."""
+        return float(np.expm1(1.96 * self.map.process.repeat))
+
+    def to_json(self) -> dict[str, Any]:
+        """The answer for programs; docs/json.md has the keys."""
+        inside, seen = self.grid.inside, self.prediction
+        columns = {"stiffness": seen.stiffness, "low": seen.ci95[:, 0], "high": seen.ci95[:, 1],
+                   "next_low": seen.next95[:, 0], "next_high": seen.next95[:, 1]}  # fmt: skip
+        if self.request.stiffer_than is not None:
+            columns["stiffer"] = seen.exceeds(self.request.stiffer_than)
+        found: dict[str, Any] = {
+            "places": _rows(
+                self.map.places, {"stiffness": self.map.stiffness, "half": self.map.half}, self.presses.names
+            ),
+            "map": _rows(
+                self.grid.places[inside], {name: values[inside] for name, values in columns.items()}
+            ),
+            "next": _rows(self.next.places, {"expected_half": self.next.expected_half})[: self.request.next],
+            "repeat_half": self.repeat,
+            "disagreeing": [self.presses.names[i] for i in self.disagreeing],
+            "refused": self.presses.refused,
+        }
+        if self.request.stiffer_than is not None:
+            found |= {
+                "stiffer_than": self.request.stiffer_than,
+                "lumps": [asdict(lump) for lump in self.lumps],
+            }
+        if self.request.half is not None:
+            found |= {
+                "half_asked": self.request.half,
+                "presses_until": self.map.presses_until(self.request.half),
+            }
+        return found
+
+    def write_csv(self, path: Path) -> None:
+        """The map as a table: a row a place, in m and N/m."""
+        rows = self.to_json()["map"]
+        lines = [",".join(["map (palpate)", *rows[0]])]
+        lines += [
+            ",".join([str(i + 1), *(f"{value:.6g}" for value in row.values())]) for i, row in enumerate(rows)
+        ]
+        write_text(path, "\n".join(lines) + "\n")
+
+    def write_presses(self, path: Path) -> None:
+        """The presses as a table that `palpate map --table` reads, in m and N/m."""
+        rows = zip(self.presses.places, self.presses.stiffness, self.presses.half, strict=True)
+        lines = [",".join(["map (palpate)", *AXES[: self.presses.places.shape[1]], "stiffness", "half"])]
+        lines += [",".join(f"{v:.9g}" for v in (i + 1, *at, k, half)) for i, (at, k, half) in enumerate(rows)]
+        write_text(path, "\n".join(lines) + "\n")
+
+    def write_ply(self, path: Path) -> None:
+        """The map as points in the PLY format, coloured from soft (dark) to stiff (light), with the stiffness."""
+        inside = self.grid.inside
+        places = self.grid.places[inside]
+        spread = self.prediction.mean[inside]
+        light = (255 * (spread - spread.min()) / max(float(np.ptp(spread)), 1e-12)).astype(int)
+        z = places[:, 2] if places.shape[1] == 3 else np.zeros(len(places))
+        head = [
+            "ply",
+            "format ascii 1.0",
+            "comment Made by palpate, m and N/m",
+            f"element vertex {len(places)}",
+        ]
+        head += [f"property float {name}" for name in (*AXES, "stiffness", "low", "high")]
+        head += [f"property uchar {name}" for name in ("red", "green", "blue")] + ["end_header"]
+        stiffness, ci95 = self.prediction.stiffness[inside], self.prediction.ci95[inside]
+        body = [
+            f"{x:.6g} {y:.6g} {h:.6g} {k:.6g} {low:.6g} {high:.6g} {level // 3} {level} {155 + level // 3}"
+            for (x, y), h, k, (low, high), level in zip(places[:, :2], z, stiffness, ci95, light, strict=True)
+        ]
+        write_text(path, "\n".join([*head, *body]) + "\n")
+
+
+def map_of(presses: Presses, request: MapRequest) -> MapResult:
+    """The map of presses.
+
+    Raises:
+        InputError: they span no surface, or one place has two stiffnesses.
+    """
+    result = StiffnessMap(request.common)
+    result.update(presses.places, presses.stiffness, presses.half)
+    result.surface.grid(1)
+    return MapResult(presses, request, result)
+
+
+def _rows(places: Array, columns: dict[str, Array], names: Sequence[str] = ()) -> list[dict[str, Any]]:
+    rows = []
+    for i, place in enumerate(places):
+        where = dict(zip(AXES, map(float, place), strict=False))
+        row = where | {name: float(values[i]) for name, values in columns.items()}
+        rows.append(row | ({"name": names[i]} if names else {}))
+    return rows

@@ -1,0 +1,245 @@
+"""A map of the stiffness of a surface from presses at places, with an interval everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from palpate.arrays import Array
+from palpate.errors import InputError
+from palpate.maps.gaussian_process import GaussianProcess, fit
+from palpate.maps.next_press import Goal, NextPresses, choose, importance, travel
+from palpate.maps.surface import Grid, Surface
+
+Z95 = float(norm.ppf(0.975))
+"""Half-width of a normal distribution's central 95 % over its standard deviation."""
+CANDIDATES = 600
+"""Places among which the next press is chosen: in a plane 25 by 25, as fine as hundreds of presses are apart."""
+MOST_PRESSES = 1000
+"""Presses that `presses_until` foretells at most."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The stiffness at places.
+
+    Args:
+        mean: of its natural logarithm (n,).
+        std: of the logarithm of the surface's own stiffness (n,).
+        next_std: of the logarithm that a next press would state (n,).
+        common: standard deviation of the error that all presses share, relative to the stiffness [1].
+    """
+
+    mean: Array
+    std: Array
+    next_std: Array
+    common: float
+
+    @property
+    def stiffness(self) -> Array:
+        """The median of the stiffness (n,) [N/m]."""
+        return np.exp(self.mean)
+
+    @property
+    def ci95(self) -> Array:
+        """95 % interval of the surface's stiffness (n, 2) [N/m]."""
+        return self._interval(np.hypot(self.std, self.common))
+
+    @property
+    def next95(self) -> Array:
+        """95 % interval of what a next press states (n, 2) [N/m]; it shares the error common to all."""
+        return self._interval(self.next_std)
+
+    def exceeds(self, threshold: float) -> Array:
+        """Probability that the stiffness is above a threshold [N/m] (n,)."""
+        return np.asarray(norm.sf(np.log(threshold), self.mean, np.hypot(self.std, self.common)))
+
+    def _interval(self, std: Array) -> Array:
+        return np.exp(self.mean[:, None] + Z95 * np.outer(std, [-1.0, 1.0]))
+
+
+class StiffnessMap:
+    """A Gaussian process on the logarithm of the stiffness over a surface.
+
+    Args:
+        common: standard deviation of an error that all presses share, such as the scale of the force sensor, relative
+            to the stiffness [1].
+    """
+
+    def __init__(self, common: float = 0.0):
+        if not 0.0 <= common < 1.0:
+            raise InputError(f"common must be at least 0 and below 1, got {common:g}")
+        self._common = common
+        self._places, self._stiffness, self._half = np.empty((0, 2)), np.empty(0), np.empty(0)
+        self._process: GaussianProcess | None = None
+
+    def __repr__(self) -> str:
+        return f"StiffnessMap({len(self)} presses)"
+
+    def __len__(self) -> int:
+        return len(self._stiffness)
+
+    @property
+    def places(self) -> Array:
+        """Of the presses (n, d) [m]."""
+        return self._places
+
+    @property
+    def stiffness(self) -> Array:
+        """Of the presses (n,) [N/m]."""
+        return self._stiffness
+
+    @property
+    def half(self) -> Array:
+        """Half-width of each press' own 95 % interval (n,) [N/m]."""
+        return self._half
+
+    @property
+    def surface(self) -> Surface:
+        """The hull of the presses."""
+        return Surface(self._places)
+
+    def update(self, places: Any, stiffness: Any, half: Any) -> None:
+        """Add presses.
+
+        Args:
+            places: (n, 2) or (n, 3) [m], of one frame.
+            stiffness: (n,) [N/m].
+            half: half-width of each 95 % interval (n,) [N/m].
+
+        Raises:
+            InputError: shapes differ, a number is not finite or not above zero, or one place has two stiffnesses.
+        """
+        where, value, width = (np.asarray(each, dtype=float) for each in (places, stiffness, half))
+        if where.ndim != 2 or where.shape[1] not in (2, 3) or not len(where) == value.size == width.size:
+            raise InputError(
+                "a map takes places (n, 2) or (n, 3), stiffness (n,) and half (n,), got shapes "
+                f"{where.shape}, {value.shape} and {width.shape}"
+            )
+        if len(self) and where.shape[1] != self._places.shape[1]:
+            raise InputError(
+                f"the map has places of {self._places.shape[1]} coordinates, these have {where.shape[1]}; a map has "
+                "one frame"
+            )
+        for name, each in (("places", where), ("stiffness", value), ("half", width)):
+            bad = ~np.isfinite(each) if each is where else ~(np.isfinite(each) & (each > 0.0))
+            if bad.any():
+                raise InputError(
+                    f"{name} must be finite{'' if each is where else ' and above 0'}, got {each[bad][0]:g} at press "
+                    f"{int(np.argwhere(bad)[0][0]) + 1}"
+                )
+        together = [np.concatenate(pair) for pair in (
+            (self._places.reshape(-1, where.shape[1]), where), (self._stiffness, value), (self._half, width),
+        )]  # fmt: skip
+        _refuse_contradictions(*together)
+        self._places, self._stiffness, self._half = together
+        self._process = None
+
+    @property
+    def process(self) -> GaussianProcess:
+        """The Gaussian process of all presses."""
+        if self._process is None:
+            self.surface  # noqa: B018 - refuses presses that span no surface
+            noise = self._half / (Z95 * self._stiffness)
+            self._process = fit(self._places, np.log(self._stiffness), noise)
+        return self._process
+
+    def predict(self, places: Any) -> Prediction:
+        """The stiffness at places (n, d) [m], and that of a next press whose own interval is the presses' median."""
+        mean, variance = self.process.predict(np.atleast_2d(np.asarray(places, dtype=float)))
+        return Prediction(mean, np.sqrt(variance), np.sqrt(variance + self._noise), self._common)
+
+    def next(
+        self,
+        count: int = 1,
+        candidates: Any = None,
+        *,
+        goal: Goal = "interval",
+        stiffer_than: float | None = None,
+        start: Any = None,
+        way: float = np.inf,
+    ) -> NextPresses:
+        """Where to press next.
+
+        Args:
+            count: places.
+            candidates: among which to choose (m, d) [m]; a grid within the hull of the presses if None.
+            goal: least `interval` over the candidates, the `edge` where the stiffness crosses a threshold, or the
+                `maximum`.
+            stiffer_than: threshold of the edge [N/m].
+            start: where the robot stands (d,) [m].
+            way: that the robot travels in the time of one press [m]; infinite where travel costs nothing.
+        """
+        if not 1 <= count <= MOST_PRESSES:
+            raise InputError(f"the next presses must be 1 to {MOST_PRESSES}, got {count}")
+        among = self._candidates() if candidates is None else np.asarray(candidates, dtype=float)
+        mean, variance = self.process.predict(among)
+        weights = importance(goal, mean, variance, None if stiffer_than is None else np.log(stiffer_than))
+        cost = None if np.isinf(way) else travel(among, None if start is None else np.asarray(start), way)
+        covariance = self.process.likeliest.covariance(among)
+        chosen, left = choose(covariance, weights, self._noise, count, cost)
+        std = np.sqrt(
+            left[chosen] + np.maximum(variance - np.diag(covariance), 0.0)[chosen] + self._common**2
+        )
+        return NextPresses(among[chosen], np.exp(mean[chosen]) * np.sinh(Z95 * std))
+
+    def presses_until(self, half: float) -> int | None:
+        """Presses after which the interval is under a half-width nearly everywhere.
+
+        Args:
+            half: of the 95 % interval relative to the stiffness, asked of 95 % of the surface [1].
+
+        Returns:
+            How many more presses; None if it needs more than `MOST_PRESSES` or the presses' common error is larger.
+        """
+        if not half > 0.0:
+            raise InputError(f"the half-width must be above 0, got {half:g}")
+        asked = (np.log1p(half) / Z95) ** 2 - self._common**2
+        covariance, noise = self.process.likeliest.covariance(self._candidates()), self._noise
+        weights = np.ones(len(covariance))
+        for pressed in range(MOST_PRESSES + 1):
+            if np.quantile(np.diag(covariance), 0.95) <= asked:
+                return pressed
+            gain = weights @ (covariance * covariance) / (np.diag(covariance) + noise)
+            best = int(np.argmax(gain))
+            column = covariance[:, best].copy()
+            covariance -= np.outer(column, column) / (column[best] + noise)
+        return None
+
+    def disagreeing(self) -> list[int]:
+        """Presses that their neighbours contradict: of such a deviation n presses have one in 20 maps by chance."""
+        bound = norm.ppf(1.0 - 0.025 / len(self))
+        return [int(i) for i in np.flatnonzero(np.abs(self.process.likeliest.leave_one_out()) > bound)]
+
+    def grid(self, count: int = 10_000) -> Grid:
+        """A grid of some `count` places over the hull of the presses."""
+        return self.surface.grid(count)
+
+    @property
+    def _noise(self) -> float:
+        """Variance of a next press, of the logarithm."""
+        return float(np.median(self._half / (Z95 * self._stiffness)) ** 2 + self.process.repeat**2)
+
+    def _candidates(self) -> Array:
+        grid = self.grid(CANDIDATES)
+        return grid.places[grid.inside]
+
+
+def _refuse_contradictions(places: Array, stiffness: Array, half: Array) -> None:
+    """Presses at one place may differ by their intervals, or by what the whole map varies; not by more."""
+    value, std = np.log(stiffness), half / (Z95 * stiffness)
+    _, place = np.unique(places, axis=0, return_inverse=True)
+    place = place.ravel()
+    order = np.argsort(place, kind="stable")
+    for i, j in pairwise(order):
+        spread = float(np.std(value)) if len(value) > 2 else 0.0
+        if place[i] == place[j] and abs(value[i] - value[j]) > 2.0 * max(np.hypot(std[i], std[j]), spread):
+            where = ", ".join(f"{1e3 * c:.6g}" for c in places[i])
+            raise InputError(
+                f"presses {i + 1} and {j + 1} are at one place ({where} mm) with {stiffness[i]:.4g} and "
+                f"{stiffness[j]:.4g} N/m, further apart than their intervals and than the map; leave the wrong one out"
+            )

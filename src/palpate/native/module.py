@@ -1,0 +1,322 @@
+"""A law as a C module: header, source, and functions of its own beside the translated ones that call them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.native.expressions import number
+from palpate.native.structs import by_pointer, is_struct, leaves, members, plain
+from palpate.native.translation import Translation
+
+WIDTH = 118
+"""Columns of a line of C, unless a name is longer."""
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A parameter of a function in the header.
+
+    Args:
+        name: of it.
+        meaning: with its unit.
+        shape: of an array; () for a number.
+        out: whether the function writes it.
+    """
+
+    name: str
+    meaning: str
+    shape: tuple[int, ...] = ()
+    out: bool = False
+
+    @property
+    def count(self) -> int:
+        """How many numbers it is."""
+        return int(np.prod(self.shape, dtype=int))
+
+    @property
+    def text(self) -> str:
+        """The parameter as C has it."""
+        if not self.shape:
+            return f"double {self.name}"
+        return f"{'' if self.out else 'const '}double {self.name}[{self.count}]"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A function in the header.
+
+    Args:
+        name: of it, behind the prefix.
+        law: of Python, called with gains, state and the arguments; one that changes a state of parts gives
+            it back last.
+        meaning: of it and of its value.
+        arguments: beside gains and state.
+    """
+
+    name: str
+    law: Callable[..., Any]
+    meaning: str
+    arguments: tuple[Argument, ...] = ()
+
+
+@dataclass(frozen=True)
+class Module:
+    """A law and how it is called.
+
+    Args:
+        name: of the files and the functions, as `palpate_force`.
+        title: what it is, in words.
+        gains: numbers of the law, a part.
+        start: the law that makes the state of the gains, or the numbers of the first state.
+        entries: functions in the header.
+        words: of a number of the state, by the function's name: the way to it, and a text for each of its values.
+        notes: lines at the head of both files: version, hashes.
+    """
+
+    name: str
+    title: str
+    gains: Any
+    start: Callable[..., Any] | Array
+    entries: tuple[Entry, ...]
+    words: Mapping[str, tuple[tuple[str, ...], Mapping[float, str]]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Sources:
+    """A module in C.
+
+    Args:
+        header: text of the .h file.
+        source: text of the .c file.
+        numbers: in the state.
+    """
+
+    header: str
+    source: str
+    numbers: int
+
+
+def sources_of(module: Module) -> Sources:
+    """The C of a module.
+
+    Raises:
+        OutsideSubset: a law has something that no C stands for.
+    """
+    return _Writer(module).sources()
+
+
+class _Writer:
+    """Writes a module's two files."""
+
+    def __init__(self, module: Module):
+        import numba
+
+        self.module, self.whole = module, Translation(module.name)
+        self.kind = plain(numba.typeof(module.gains))
+        self.flat = isinstance(module.start, np.ndarray)
+        for _, inner in members(self.kind):
+            self._publish(inner)
+        self.gains = f"{module.name}_gains"
+        self.whole.structs.publish(self.kind, self.gains)
+        self.state = f"{module.name}_state"
+        self.functions: list[str] = []
+        self.declared: list[str] = []
+        self.state_kind, self.numbers = self._publish_state()
+
+    def _publish(self, kind: Any) -> None:
+        self.whole.structs.publish(kind)
+
+    def _publish_state(self) -> tuple[Any, int]:
+        from numba import types
+
+        structs = self.whole.structs
+        if isinstance(self.module.start, np.ndarray):
+            kind, count = types.Array(types.float64, 1, "C"), len(self.module.start)
+            structs.name(kind)
+            structs.header.append(
+                f"/* All that is remembered; {self.module.name}_init writes it. */\n"
+                f"typedef struct {{\n    double numbers[{count}];\n}} {self.state};"
+            )
+            return kind, count
+        kind = plain(self.whole.rules.result(self.module.start, (self.kind,)))
+        structs.publish(kind, self.state)
+        return kind, leaves(kind)
+
+    def sources(self) -> Sources:
+        """The texts of both files of the module."""
+        self._init()
+        for entry in self.module.entries:
+            self._entry(entry)
+        for name, (way, texts) in self.module.words.items():
+            self._words(name, way, texts)
+        default = f"{self.module.name}_default_gains"
+        table = self._tables(default)
+        return Sources(self._header(default), self._source(table), self.numbers)
+
+    def _declare(self, text: str, meaning: str, arguments: tuple[Argument, ...] = ()) -> None:
+        says = [meaning, *(f"{a.name}: {a.meaning}" for a in arguments)]
+        self.declared.append("/* " + "\n * ".join(says) + f" */\n{text};")
+
+    def _init(self) -> None:
+        name = f"{self.module.name}_init"
+        head = f"void {name}(const {self.gains} *gains, {self.state} *state)"
+        self._declare(head, "The state before the first tick.")
+        if isinstance(self.module.start, np.ndarray):
+            self.functions.append(
+                f"{_runs(name, self.module.start)}\n\n{head} {{\n{_FILL.format(name=name)}}}"
+            )
+            return
+        start = self.whole.function(self.module.start, (self.kind,))
+        self.functions.append(f"{head} {{\n    *state = {start.name}(gains);\n}}")
+
+    def _entry(self, entry: Entry) -> None:
+        from numba import types
+
+        structs = self.whole.structs
+        kinds = [
+            types.Array(types.float64, len(a.shape), "C") if a.shape else types.float64
+            for a in entry.arguments
+        ]
+        kinds = [self.kind, self.state_kind, *kinds]
+        result = plain(self.whole.rules.result(entry.law, tuple(kinds)))
+        inner = members(result) if is_struct(result) else []
+        changes = not self.flat and bool(inner) and inner[-1][1] == self.state_kind
+        public = structs.publish(inner[0][1] if changes else result)
+        known = self.whole.function(entry.law, tuple(kinds))
+        values = ["gains" if by_pointer(self.kind) else "*gains"]
+        values.append(f"(array1){{(double *)state->numbers, {{{self.numbers}}}}}" if self.flat else "state")
+        values += [
+            f"({structs.name(kind)}){{{'' if a.out else '(double *)'}{a.name}, {{{', '.join(map(str, a.shape))}}}}}"
+            if a.shape
+            else a.name
+            for a, kind in zip(entry.arguments, kinds[2:], strict=True)
+        ]
+        call = f"{known.name}({', '.join(values)})"
+        constant = "" if changes or (known.writes and self.flat) else "const "
+        arguments = [f"const {self.gains} *gains", f"{constant}{self.state} *state"]
+        arguments += [argument.text for argument in entry.arguments]
+        head = f"{public} {self.module.name}_{entry.name}({', '.join(arguments)})"
+        self._declare(head, entry.meaning, entry.arguments)
+        if changes:
+            of = structs.name(known.result)
+            body = f"    const {of} value = {call};\n    *state = value.{inner[-1][0]};\n    return value.v0;"
+        else:
+            body = f"    {'' if public == 'void' else 'return '}{call};"
+        self.functions.append(f"{head} {{\n{body}\n}}")
+
+    def _words(self, name: str, way: tuple[str, ...], texts: Mapping[float, str]) -> None:
+        head = f"const char *{self.module.name}_{name}(const {self.state} *state)"
+        self._declare(head, f"The {name} in words.")
+        choices = "".join(
+            f'    if (state->{".".join(way)} == {number(float(value))}) {{\n        return "{text}";\n    }}\n'
+            for value, text in texts.items()
+            if text
+        )
+        self.functions.append(f'{head} {{\n{choices}    return "";\n}}')
+
+    def _tables(self, default: str) -> str:
+        """The gains as a constant, and the tables in them."""
+        tables, texts = [], []
+        for value, (name, kind) in zip(self.module.gains, members(self.kind), strict=True):
+            if not isinstance(value, np.ndarray):
+                texts.append(self.whole.constants.initial(value, kind))
+                continue
+            rows = ",\n    ".join(
+                ", ".join(number(float(x)) for x in row) for row in value.reshape(-1, value.shape[-1])
+            )
+            tables.append(f"static const double {name}[{value.size}] = {{\n    {rows},\n}};\n")
+            texts.append(f"{{(double *){name}, {{{', '.join(map(str, value.shape))}}}}}")
+        inner = ",\n    ".join(texts)
+        return "\n".join([*tables, f"const {self.gains} {default} = {{\n    {inner},\n}};"])
+
+    def _header(self, default: str) -> str:
+        guard = f"{self.module.name.upper()}_H"
+        parts = [
+            self._head(f"{self.module.name}.h"),
+            f"#ifndef {guard}\n#define {guard}\n\n#include <stdbool.h>\n#include <stdint.h>",
+            '#ifdef __cplusplus\nextern "C" {\n#endif',
+            *self.whole.structs.header,
+            f"/* The gains of the file that this was made of. */\nextern const {self.gains} {default};",
+            *self.declared,
+            f"#ifdef __cplusplus\n}}\n#endif\n\n#endif /* {guard} */\n",
+        ]
+        return _fold("\n\n".join(parts))
+
+    def _source(self, table: str) -> str:
+        parts = [
+            self._head(f"{self.module.name}.c"),
+            f'#include "{self.module.name}.h"\n\n#include <float.h>\n#include <math.h>\n#include <stddef.h>',
+            _IEEE,
+            *self.whole.structs.definitions,
+            *self.whole.constants.definitions,
+            *self.whole.definitions,
+            table,
+            *self.functions,
+        ]
+        return _fold("\n\n".join(parts) + "\n")
+
+    def _head(self, file: str) -> str:
+        lines = [f"// Made by palpate: {file}, {self.module.title}.", *self.module.notes]
+        return "\n".join(f"// {line.removeprefix('// ')}" for line in lines)
+
+
+_IEEE = """#if defined(__FAST_MATH__) || (defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0)
+#error "each operation is to be that of IEEE doubles: no -ffast-math, no -mfpmath=387"
+#endif
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF
+#endif"""
+_FILL = """    (void)gains;
+    for (size_t i = 0; i < sizeof {name}_runs / sizeof *{name}_runs; ++i) {{
+        for (int64_t k = 0; k < {name}_runs[i].count; ++k) {{
+            state->numbers[{name}_runs[i].at + k] = {name}_runs[i].value;
+        }}
+    }}
+"""
+
+
+def _runs(name: str, numbers: Array) -> str:
+    """Numbers of a first state as runs of equal ones."""
+    words = numbers.view(np.int64)
+    begins = [0, *(1 + np.flatnonzero(words[1:] != words[:-1])).tolist(), len(numbers)]
+    runs = ((at, end - at, number(float(numbers[at]))) for at, end in pairwise(begins))
+    rows = "".join(f"    {{{at}, {count}, {value}}},\n" for at, count, value in runs)
+    return (
+        f"static const struct {{\n    int64_t at, count;\n    double value;\n}} {name}_runs[] = {{\n{rows}}};"
+    )
+
+
+_BREAKS = (", ", " && ", " || ", " + ", " ? ", " : ", " /* ", " = ")
+"""Where a line of C may be broken, the best places first."""
+
+
+def _fold(text: str) -> str:
+    """Lines of C broken behind commas and before operators of conditions where they are too long."""
+    return "\n".join(piece for line in text.split("\n") for piece in _pieces(line))
+
+
+def _pieces(line: str) -> list[str]:
+    if len(line) <= WIDTH or line.startswith(("//", " *", "#")) or '"' in line:
+        return [line]
+    indent = line[: len(line) - len(line.lstrip())]
+    pieces, more = [], indent + "    "
+    while len(line) > WIDTH:
+        places = [
+            line.rfind(sign, len(more) + 8, WIDTH)
+            for sign in (", ", " && ", " || ", " + ", " ? ", " : ", " /* ", " = ")
+        ]
+        strong = max(places[:3])
+        place = strong if strong > WIDTH // 2 else max(places)
+        if place < 0:
+            break
+        cut = place + (1 if line[place] == "," else 0)
+        pieces.append(line[:cut])
+        line = more + line[cut:].lstrip()
+    return [*pieces, line]

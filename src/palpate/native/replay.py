@@ -1,0 +1,141 @@
+"""The program that repeats recorded ticks in C and counts those that differ from Python's in a bit."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.errors import InputError
+from palpate.native.module import Module, Sources
+
+FLAGS = "-std=c99 -O2 -ffp-contract=off -Wall -Wextra -Wconversion -Wpedantic -Werror"
+MARK = "# Made by palpate: recorded ticks, rows of little-endian doubles behind this line.\n"
+_PROGRAM = """// Made by palpate: repeats recorded ticks and counts those that differ from Python's in a bit.
+#include "{name}.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum {{ INPUTS = {inputs}, ROW = INPUTS + 3 }};
+
+static uint64_t digest_of(const {name}_state *state) {{
+    uint64_t hash = 14695981039346656037u, word;
+    double value;
+    for (size_t i = 0; i < sizeof *state / sizeof value; ++i) {{
+        memcpy(&value, (const char *)state + i * sizeof value, sizeof value);
+        memcpy(&word, &value, sizeof word);
+        hash = (hash ^ (value != value ? 1u : word)) * 1099511628211u;
+    }}
+    return hash;
+}}
+
+int main(int count, char **arguments) {{
+    static {name}_state state;
+    static double row[ROW];
+{scratch}    const {name}_gains *gains = &{name}_default_gains;
+    const double *in = row + 1;
+    long ticks = 0, unequal = 0;
+    int sign = 0;
+    FILE *file = fopen(count > 1 ? arguments[1] : "press.bin", "rb");
+    if (!file) {{
+        puts("no recorded ticks: name their file");
+        return 2;
+    }}
+    while (sign != '\\n' && sign != EOF) {{
+        sign = fgetc(file);
+    }}
+    while (fread(row, sizeof row, 1, file) == 1) {{
+        uint64_t expected = 0;
+        double value;
+        if (row[0] > 0.0) {{
+            {name}_init(gains, &state);
+        }}
+        value = (double){call};
+        memcpy(&expected, &row[ROW - 1], sizeof expected);
+        if (memcmp(&value, &row[ROW - 2], sizeof value) != 0 || (expected != 0 && digest_of(&state) != expected)) {{
+            ++unequal;
+        }}
+        ++ticks;
+    }}
+    fclose(file);
+    printf("ticks %ld unequal %ld\\n", ticks, unequal);
+    return ticks == 0 || unequal > 0;
+}}
+"""
+
+
+def program(module: Module, inputs: int) -> str:
+    """The C of the program for a module."""
+    update = module.entries[0]
+    texts, at, scratch = [], 0, ""
+    for argument in update.arguments:
+        if argument.out:
+            scratch += f"    static double {argument.name}[{argument.count}];\n"
+            texts.append(argument.name)
+        else:
+            texts.append(f"&in[{at}]" if argument.shape else f"in[{at}]")
+            at += max(argument.count, 1) if argument.shape else 1
+    call = f"{module.name}_update(gains, &state, {', '.join(texts)})"
+    return _PROGRAM.format(name=module.name, inputs=inputs, call=call, scratch=scratch)
+
+
+def write_rows(path: Path, presses: Iterable[Array], done: Callable[[int], None] | None = None) -> None:
+    """Writes recorded presses to a file that the program reads."""
+    ticks = 0
+    with path.open("wb") as file:
+        file.write(MARK.encode())
+        for rows in presses:
+            file.write(np.ascontiguousarray(rows, "<f8").tobytes())
+            ticks += len(rows)
+            if done is not None:
+                done(ticks)
+
+
+def compiler() -> list[str]:
+    """The command of the machine's C compiler: `CC`, or the first that there is.
+
+    Raises:
+        InputError: there is none.
+    """
+    named = shlex.split(os.environ.get("CC", ""))
+    for command in [named] if named else [["cc"], ["gcc"], ["clang"]]:
+        if shutil.which(command[0]):
+            return command
+    raise InputError(
+        f"no C compiler: {named[0] if named else 'cc'} is not there; install gcc or clang, or name one in CC"
+    )
+
+
+def unequal_ticks(module: Module, sources: Sources, inputs: int, presses: Iterable[Array]) -> tuple[int, int]:
+    """Compiles a module, repeats presses in it, and counts: ticks, and those that differ in a bit.
+
+    Raises:
+        InputError: no compiler, or one that refuses the sources.
+    """
+    command = compiler()
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        for name, text in ((f"{module.name}.c", sources.source), (f"{module.name}.h", sources.header)):
+            (folder / name).write_text(text, encoding="utf-8")
+        (folder / "replay.c").write_text(program(module, inputs), encoding="utf-8")
+        build = [*command, *shlex.split(FLAGS), f"{module.name}.c", "replay.c", "-o", "replay", "-lm"]
+        built = subprocess.run(build, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+        if built.returncode != 0:
+            first = next((line for line in built.stderr.splitlines() if "error" in line), built.stderr[:200])
+            raise InputError(f"{command[0]} refuses the C: {first}; name another compiler in CC")
+        write_rows(folder / "press.bin", presses)
+        run = subprocess.run([folder / "replay"], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+    words = run.stdout.split()
+    if run.returncode not in (0, 1) or len(words) != 4:
+        raise InputError(
+            f"the compiled law ended with code {run.returncode}: compile it with -fsanitize=address,undefined"
+        )
+    return int(words[1]), int(words[3])

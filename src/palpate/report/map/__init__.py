@@ -1,0 +1,1 @@
+"""A stiffness map on a terminal and on a page."""

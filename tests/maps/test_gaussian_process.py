@@ -1,0 +1,86 @@
+"""The Gaussian process against its definition: gradients, conditioning, precision, places left out."""
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import cdist
+
+from palpate.maps.gaussian_process import Conditioned, Hyperparameters, fit, loss
+
+RNG = np.random.default_rng(3)
+PLACES = RNG.uniform(0.0, 0.1, (25, 2))
+NOISE = RNG.uniform(0.01, 0.05, 25)
+VALUES = 7.0 + np.sin(60.0 * PLACES[:, 0]) * 0.4 + NOISE * RNG.normal(size=25)
+PARAMETERS = Hyperparameters(smooth=0.4, long=0.05, rough=0.2, short=0.01, repeat=0.02)
+
+
+def prior_covariance(p, places, others):
+    s, r = np.sqrt(5.0) * cdist(places, others) / p.long, np.sqrt(3.0) * cdist(places, others) / p.short
+    return p.smooth**2 * (1 + s + s**2 / 3) * np.exp(-s) + p.rough**2 * (1 + r) * np.exp(-r)
+
+
+def test_the_gradient_is_that_of_the_likelihood():
+    theta = np.log([0.4, 0.05, 0.2, 0.01, 0.02])
+    distance, step = cdist(PLACES, PLACES), 1e-5
+    numeric = [
+        (
+            loss(theta + step * e, distance, VALUES, NOISE)[0]
+            - loss(theta - step * e, distance, VALUES, NOISE)[0]
+        )
+        / (2 * step)
+        for e in np.eye(5)
+    ]
+    assert loss(theta, distance, VALUES, NOISE)[1] == pytest.approx(numeric, rel=1e-5, abs=1e-6)
+
+
+def test_conditioning_is_that_of_a_normal_distribution_whose_mean_is_unknown():
+    """A mean of a very wide prior, in one dense solution, is the limit that the restricted likelihood takes."""
+    at = RNG.uniform(0.0, 0.1, (7, 2))
+    wide = 1e6
+    K = prior_covariance(PARAMETERS, PLACES, PLACES) + wide + np.diag(NOISE**2 + PARAMETERS.repeat**2)
+    k = prior_covariance(PARAMETERS, PLACES, at) + wide
+    mean = k.T @ np.linalg.solve(K, VALUES)
+    covariance = prior_covariance(PARAMETERS, at, at) + wide - k.T @ np.linalg.solve(K, k)
+    process = Conditioned(PLACES, VALUES, NOISE, PARAMETERS)
+    found, variance = process.predict(cdist(PLACES, at))
+    assert found == pytest.approx(mean, rel=1e-5)
+    assert variance == pytest.approx(np.diag(covariance), rel=1e-3)
+    assert process.covariance(at) == pytest.approx(covariance, abs=1e-3 * covariance.max())
+
+
+def test_a_value_left_out_is_foretold_as_by_the_process_of_the_others():
+    process = Conditioned(PLACES, VALUES, NOISE, PARAMETERS)
+    for i in (0, 11, 24):
+        rest = np.arange(25) != i
+        others = Conditioned(PLACES[rest], VALUES[rest], NOISE[rest], PARAMETERS)
+        mean, variance = others.predict(cdist(PLACES[rest], PLACES[i : i + 1]))
+        std = np.sqrt(variance[0] + NOISE[i] ** 2 + PARAMETERS.repeat**2)
+        assert process.leave_one_out()[i] == pytest.approx((VALUES[i] - mean[0]) / std, rel=1e-6)
+
+
+def test_single_precision_changes_no_interval_by_a_hundredth():
+    process = fit(PLACES, VALUES, NOISE)
+    at = RNG.uniform(0.0, 0.1, (700, 2))
+    mean, variance = process.predict(at)
+    exact = [node.predict(cdist(PLACES, at)) for node in process.nodes]
+    means, variances = np.array([m for m, _ in exact]), np.array([v for _, v in exact])
+    expected = process.weights @ means
+    spread = process.weights @ (variances + (means - expected) ** 2)
+    assert np.max(np.abs(mean - expected) / np.sqrt(spread)) < 0.01
+    assert np.sqrt(variance) == pytest.approx(np.sqrt(spread), rel=0.01)
+
+
+def test_the_scale_of_the_places_does_not_matter():
+    one, other = fit(PLACES, VALUES, NOISE), fit(1e3 * PLACES, VALUES, NOISE)
+    at = RNG.uniform(0.0, 0.1, (50, 2))
+    for a, b in zip(one.predict(at), other.predict(1e3 * at), strict=True):
+        assert a == pytest.approx(b, rel=2e-3)
+
+
+def test_presses_beyond_one_block_are_fitted_too():
+    places = RNG.uniform(0.0, 0.1, (420, 2))
+    values = np.sin(60.0 * places[:, 0]) + 0.05 * RNG.normal(size=420)
+    process = fit(places, values, np.full(420, 0.02))
+    at = RNG.uniform(0.01, 0.09, (200, 2))
+    mean, _ = process.predict(at)
+    assert np.sqrt(np.mean((mean - np.sin(60.0 * at[:, 0])) ** 2)) < 0.05
+    assert process.repeat == pytest.approx(np.sqrt(0.05**2 - 0.02**2), rel=0.25)

@@ -1,0 +1,204 @@
+"""A law in C is the law in Python, to the last bit; and a law that is changed is not."""
+
+import dataclasses
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from palpate._jit import law
+from palpate.cli import main
+from palpate.force import load_arm
+from palpate.force.gains import gains_for
+from palpate.native.exporting import LawRequest, exported_law
+from palpate.native.replay import program, write_rows
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+
+
+@pytest.fixture(scope="module")
+def gains(tmp_path_factory):
+    path = tmp_path_factory.mktemp("gains") / "gains.toml"
+    path.write_text(gains_for(load_arm("ur5e"), 20.0).to_toml())
+    return path
+
+
+@pytest.fixture(scope="module")
+def force(gains):
+    return exported_law(LawRequest(gains=gains))
+
+
+@pytest.fixture(scope="module")
+def squares():
+    return exported_law(LawRequest("recursive-least-squares", forgetting=0.99))
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["force", "squares"])
+def test_no_tick_differs_in_a_bit(name, request):
+    assert request.getfixturevalue(name).check(20_000) == (20_000, 0)
+
+
+@needs_compiler
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "request_of",
+    [
+        LawRequest("contact-identifier", sampling=480.0),
+        LawRequest("recursive-least-squares", parameters=4, forgetting=0.98),
+    ],
+)
+def test_no_tick_of_the_larger_laws_differs_in_a_bit(request_of):
+    assert exported_law(request_of).check(100_000) == (100_000, 0)
+
+
+@needs_compiler
+def test_a_law_that_differs_by_one_operator_fails_the_check(squares):
+    text = squares.sources.source
+    changed = text.replace("double a = r + ", "double a = r - ")
+    assert changed != text
+    other = dataclasses.replace(squares, sources=dataclasses.replace(squares.sources, source=changed))
+    assert other.check(4_000)[1] > 3_000
+
+
+def test_the_c_is_of_the_law_as_it_stands(squares):
+    """Another operator in Python is another operator in C: there is no second copy."""
+    module = dataclasses.replace(
+        squares.module, entries=(dataclasses.replace(squares.module.entries[0], law=sum_of_squares),)
+    )
+    from palpate.native.module import sources_of
+
+    assert "total = total + regressor.at[i] * regressor.at[i]" in sources_of(module).source
+
+
+@law
+def sum_of_squares(gains, state, regressor, force):
+    """The sum of the squares, and of the force's."""
+    total = force * force
+    for i in range(len(regressor)):
+        total += regressor[i] * regressor[i]
+    return total
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["force", "squares"])
+def test_the_strictest_compiler_finds_nothing(name, request, tmp_path):
+    exported = request.getfixturevalue(name)
+    exported.write(tmp_path / "law", "0", replace=False)
+    own = exported.module.name
+    subprocess.run(
+        ["cc", "-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror",
+         "-fsanitize=address,undefined", "-fno-sanitize-recover", "-I.", f"{own}.c", "test/replay.c", "-lm", "-o", "r"],
+        cwd=tmp_path / "law", check=True,
+    )  # fmt: skip
+    write_rows(tmp_path / "rows", exported.recording.presses(8_000, 3))
+    run = subprocess.run(
+        [tmp_path / "law" / "r", tmp_path / "rows"], capture_output=True, text=True, check=False
+    )
+    assert (run.stdout, run.stderr) == ("ticks 8000 unequal 0\n", "")
+
+
+@needs_compiler
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="there is no CMake")
+def test_the_folder_builds_installs_and_passes_its_own_test(force, tmp_path):
+    force.write(tmp_path / "law", "0", replace=False)
+    for words in (
+        ("cmake", "-S", "law", "-B", "build", "-DCMAKE_INSTALL_PREFIX=there"),
+        ("cmake", "--build", "build"),
+        ("ctest", "--test-dir", "build"),
+        ("cmake", "--install", "build"),
+    ):
+        subprocess.run(words, cwd=tmp_path, check=True, capture_output=True)
+    (tmp_path / "use").mkdir()
+    (tmp_path / "use" / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(use CXX)\nfind_package(palpate_force REQUIRED)\n"
+        "set(CMAKE_CXX_STANDARD 17)\nadd_executable(use use.cpp)\n"
+        "target_link_libraries(use palpate_force::palpate_force)\n"
+    )
+    (tmp_path / "use" / "use.cpp").write_text(
+        "#include <palpate_force.hpp>\n"
+        "int main() { palpate::Force loop; return loop.update(20.0, 0.0, 0.0, 0.0) > 0.0 ? 0 : 1; }\n"
+    )
+    for words in (
+        ("cmake", "-S", "use", "-B", "used", f"-DCMAKE_PREFIX_PATH={tmp_path / 'there'}"),
+        ("cmake", "--build", "used"),
+        ("used/use",),
+    ):
+        subprocess.run(words, cwd=tmp_path, check=True, capture_output=True)
+
+
+@needs_compiler
+def test_the_example_presses_with_the_desired_force(force, tmp_path):
+    force.write(tmp_path / "law", "0", replace=False)
+    words = ["cc", "-std=c99", "-O2", "-I.", "example/press.c", "palpate_force.c", "-lm", "-o", "press"]
+    subprocess.run(words, cwd=tmp_path / "law", check=True)
+    lines = subprocess.run([tmp_path / "law" / "press"], capture_output=True, text=True, check=True).stdout
+    *rows, last = lines.splitlines()
+    assert all(abs(float(row.split()[2]) - 20.0) < 1.0 for row in rows[3:])
+    assert "locked" in rows[-1]
+    assert 3000.0 < float(last.split()[1]) < 6000.0
+
+
+def test_the_state_has_four_kilobytes_at_most(force):
+    assert 8 * force.sources.numbers <= 4096
+
+
+def test_the_header_names_law_and_gains(force, gains):
+    from palpate.force import load_gains
+
+    own = load_gains(gains)
+    assert f"// law: {own.law}\n// gains: {own.digest}\n" in force.sources.header
+
+
+@needs_compiler
+def test_the_command_writes_checks_and_answers(gains, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("palpate.native.exporting.ExportedLaw.check", lambda law: (7, 0))
+    assert main(["export", str(gains), "--to", "c", "--out", "law", "--check", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["check"]["unequal"] == 0
+    assert answer["state_bytes"] <= 4096
+    assert main(["export", str(gains), "--to", "c", "--out", "law", "--replace"]) == 0
+    assert (tmp_path / "law" / "palpate_force.c").is_file()
+    monkeypatch.setattr("palpate.native.exporting.ExportedLaw.check", lambda law: (7, 1))
+    assert main(["export", str(gains), "--to", "c", "--check"]) == 1
+
+
+def refused(capsys, *words):
+    assert main(["export", *words]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    return printed.err
+
+
+def test_bad_input_is_one_line(gains, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    own = str(gains)
+    assert "nothing to do" in refused(capsys, own, "--to", "c")
+    assert "gains file of palpate tune" in refused(capsys, "--to", "c", "--out", "a").replace(
+        "the file", "gains file"
+    )
+    assert "takes no gains" in refused(capsys, own, "--to", "c", "--law", "contact-identifier", "--out", "a")
+    assert "did you mean" in refused(capsys, own, "--to", "c", "--law", "force-lop", "--out", "a")
+    assert "3 or 4" in refused(
+        capsys, "--to", "c", "--law", "recursive-least-squares", "--parameters", "7", "--out", "a"
+    )
+    older = tmp_path / "older.toml"
+    older.write_text(gains.read_text().replace("adaptive control", "adaptive control of old"))
+    assert "tune again" in refused(capsys, str(older), "--to", "c", "--out", "a")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("mine")
+    assert "exists" in refused(capsys, own, "--to", "c", "--out", "mine")
+    assert "thesis.tex" in refused(capsys, own, "--to", "c", "--out", "mine", "--replace")
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert "install gcc or clang" in refused(capsys, own, "--to", "c", "--check")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "older.toml"]
+
+
+def test_the_program_reads_arrays_and_numbers_in_their_order(squares):
+    text = program(squares.module, squares.recording.inputs)
+    assert "palpate_squares_update(gains, &state, &in[0], in[3])" in text
+    assert np.isnan(next(iter(squares.recording.presses(4000, 1)))[:, 1:4]).any()
