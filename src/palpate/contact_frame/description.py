@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from palpate.identification.options import LEAST_SQUARES
 from palpate.units import GRAVITY
 
 _FAR = 0.01
@@ -91,8 +90,6 @@ def _arm(arm: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"force filtered by {arm['force_filter']} before it was sampled; the position goes through the same"
         )
-    if arm.get("method", LEAST_SQUARES) != LEAST_SQUARES:
-        lines.append(f"parameters by {arm['method']}; the models were chosen by {LEAST_SQUARES}")
     return lines
 
 

@@ -14,7 +14,6 @@ from palpate.contact_frame.projecting import project
 from palpate.contact_frame.signals_in_base import FORCE
 from palpate.errors import InputError
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
-from palpate.identification.options import LEAST_SQUARES
 from palpate.records import Record
 
 
@@ -72,7 +71,6 @@ def identify_contact(
     if wrong_sign(inertia):
         found = _mistaken(found)
     about = _about(arm) | {"force_filter": str(options.get("force_filter") or "none")}
-    about["method"] = options.get("method", LEAST_SQUARES)
     record = replace(record, meta={**record.meta, "arm": about})
     return with_arm(found, arm, tolerance, from_pose=in_space), record
 
