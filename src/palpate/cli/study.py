@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 _SHOWN = 3
-"""Tables that the terminal shows; the page has all."""
+"""Tables that the terminal shows: the factors, the settings, the results of the runs. The page has all metrics."""
 
 
 @Parameter(name="*", group=Group("A cluster", sort_key=1))

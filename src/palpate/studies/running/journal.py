@@ -101,7 +101,7 @@ def opened(path: Path, head: Head) -> Iterator[Journal]:
         end = at
         if 0 <= row.run < head.runs:
             finished.add(row.run)
-    with journal.opened(path, end) as file:
+    with journal.open_end(path, end) as file:
         yield Journal(path, file, finished)
 
 
