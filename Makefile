@@ -45,7 +45,7 @@ check: lint test ## everything that has to pass before a commit
 
 bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold start cost here
 	$(BIN)/palpate speed
-	-$(BIN)/python benchmarks/c_yardstick/compare.py
+	$(BIN)/python benchmarks/c_yardstick/compare.py
 	$(BIN)/python benchmarks/side_by_side.py
 	$(BIN)/python benchmarks/many_runs.py
 	$(BIN)/python benchmarks/least_squares.py
@@ -68,6 +68,7 @@ soak: .venv/dev.stamp ## feed each on-line estimator 5e7 samples and 2e7 hostile
 trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
 	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md
 	$(BIN)/python benchmarks/identification/foreign/cases.py --markdown docs/trust.md || true
+	$(BIN)/python benchmarks/identification/plain_presses.py --worlds 60 --repeats 4 --markdown docs/trust.md
 
 leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
 	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md

@@ -6,9 +6,7 @@
 The presses, the surfaces, the noise and the bound are those of `accuracy.py`. What each row is given:
 
 - palpate, force filter known: `identify` with the force sensor's low-pass and lag, least squares.
-- palpate, lag known: `identify` with the lag alone, which here holds the mean wait of a fresh reading for its row too;
-  least squares, instrumental variables, output error. Output error starts at what instrumental variables find, and
-  fails where that is a mass below zero.
+- palpate, lag known: `identify` with the lag alone, which here holds the mean wait of a fresh reading for its row too.
 - palpate on line: `ContactIdentifier` before recursive least squares or a Kalman filter.
 - thesis: recursive least squares as the bench runs it, on the thesis' signals (force through 120 Hz, acceleration
   through 35 Hz, the rest raw) and on raw ones; and the neural identifier with the thesis' scales and probe, from
@@ -128,9 +126,9 @@ def smoothed(signal: Array) -> Array:
     return np.asarray(lfilter(*butter(2, CUTOFF, fs=RATE), signal - signal[0])) + signal[0]
 
 
-def by_identify(case: Case, method: str) -> Found:
+def by_identify(case: Case) -> Found:
     """`identify` that is told the lag only."""
-    found = identify(case.log, model="kelvin-voigt-mass", lag=case.waited, method=method).estimate
+    found = identify(case.log, model="kelvin-voigt-mass", lag=case.waited).estimate
     if found is None:
         raise InputError("no contact was found")
     return _named(found.names, found.theta, found.std)
@@ -272,9 +270,7 @@ def by_rollouts(case: Case) -> Found:
 
 
 METHODS: dict[str, Callable[[Case], Found]] = {
-    "palpate, lag known, least squares": partial(by_identify, method="least-squares"),
-    "palpate, lag known, instruments": partial(by_identify, method="instrumental-variables"),
-    "palpate, lag known, output error": partial(by_identify, method="output-error"),
+    "palpate, lag known": by_identify,
     "palpate on line, least squares": partial(by_squares, fed=on_line),
     "palpate on line, Kalman filter": partial(by_kalman, fed=on_line),
     "thesis, least squares": partial(by_thesis, front="thesis"),
@@ -286,7 +282,7 @@ METHODS: dict[str, Callable[[Case], Found]] = {
     "filterpy Kalman behind palpate's front-end": partial(by_filterpy, fed=on_line, rate=SAMPLING),
     MUJOCO: by_rollouts,
 }
-MATCHED = "palpate, force filter known, least squares"
+MATCHED = "palpate, force filter known"
 
 
 def trials(condition: Condition, seed: int, skipped: tuple[str, ...]) -> dict[str, Trial]:

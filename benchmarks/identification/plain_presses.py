@@ -1,6 +1,6 @@
 """Presses at constant speed as testing machines and arms make them: whether the tangent at the named force holds.
 
-    python benchmarks/identification/plain_presses.py --worlds 60 --repeats 4 --seed 0
+    python benchmarks/identification/plain_presses.py --worlds 60 --repeats 4 --seed 0 --markdown docs/trust.md
     python benchmarks/identification/plain_presses.py --show 17
 
 A world is a material (spring, Hertz, power law, exponential; elastic, or relaxing as a standard linear solid, a Prony
@@ -22,9 +22,14 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from foreign.tables import between
 
 from palpate.errors import InputError
 from palpate.identification import Identification, identify
@@ -36,6 +41,7 @@ Rng = np.random.Generator
 LAWS = ("spring", "hertz", "power", "exponential")
 TIMES = ("elastic", "solid", "prony", "power-law")
 MOTIONS = ("loading", "loading-unloading", "unloading", "ramp-hold", "cycles", "tension")
+BEGIN, END = "<!-- presses: begin -->", "<!-- presses: end -->"
 _FEWEST = 300
 _MOST = 60_000
 
@@ -83,14 +89,15 @@ class World:
         table = {"time": self.time, "position": columns[0], "force": columns[1]}
         return Record(table, {"time": "s", "position": "m", "force": "N"})
 
-    def tangent(self, force: float, sign: float) -> float | None:
+    def tangent(self, force: float, sign: float, from_rest: bool) -> float | None:
         """Slope at a force that an answer names [N/m], the mean over the strokes; None where the log never has it.
 
         Args:
-            force: as named: from its rest where the log shows one, else as logged [N].
+            force: as named [N].
             sign: by which the answer counts the log's force.
+            from_rest: whether it counts from the force in free motion, and not as the log has it.
         """
-        level = sign * force + (self.rest if self.free else 0.0)
+        level = sign * force + (self.rest if from_rest else 0.0)
         found = []
         for first, last in self.strokes:
             x, f = self.position[first:last], self.force[first:last]
@@ -251,7 +258,7 @@ def judged(world: World, found: Identification) -> Judged:
     assert own.ci95 is not None
     assert own.value is not None
     sign = -1.0 if "force-sign-reversed" in found.codes else 1.0
-    truth = world.tangent(point.force_N, sign)
+    truth = world.tangent(point.force_N, sign, "contact-at-start" not in found.codes)
     half = (own.ci95[1] - own.ci95[0]) / 2
     if truth is None:
         return Judged("names a force that the log never has", own.value, half, point.force_N)
@@ -314,6 +321,7 @@ def main() -> None:
     parser.add_argument(
         "--misses", action="store_true", help="name the worlds that are missed or not answered"
     )
+    parser.add_argument("--markdown", type=Path, help="write the table into that page, between its two marks")
     parser.add_argument("--show", help="SEED: one world and its answer")
     asked = parser.parse_args()
     if asked.show:
@@ -330,7 +338,14 @@ def main() -> None:
                 j = bad[0]
                 kind = f"{world.motion}/{world.law}/{world.times}{' free' if world.free else ''}"
                 print(f"{seed:5} {kind:44} {len(bad)}: {j.what}, {j.value:.5g} ± {j.half:.2g}, {j.truth:.5g}")
-    print(*table(every), sep="\n")
+    rows = table(every)
+    print(*rows, sep="\n")
+    if asked.markdown:
+        size = f"--worlds {asked.worlds} --repeats {asked.repeats} --seed {asked.seed}"
+        command = f"    python benchmarks/identification/plain_presses.py {size}\n"
+        page = asked.markdown.read_text(encoding="utf-8")
+        text = "\n".join([command, "```", *rows, "```"])
+        asked.markdown.write_text(between(page, (BEGIN, END), text), encoding="utf-8")
 
 
 def show(seed: int) -> None:

@@ -22,7 +22,7 @@ _READ = {name for name, own in signature(read).parameters.items() if own.kind is
 _OPTIONS = {
     name for name, own in signature(identify_record).parameters.items() if own.kind is own.KEYWORD_ONLY
 }
-_WORDS = {"model", "method", "force_filter", "bonded"}
+_WORDS = {"model", "force_filter", "bonded"}
 _PAIRS = {"mass", "series_mass"}
 
 

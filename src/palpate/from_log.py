@@ -12,7 +12,6 @@ from palpate.contact_frame import Arm, ContactFrame, Payload, identify_contact, 
 from palpate.errors import InputError, unknown
 from palpate.identification import Identification, identify
 from palpate.identification.indenter import Indenter, with_modulus
-from palpate.identification.options import LEAST_SQUARES
 from palpate.logs.gathered import log_of
 from palpate.logs.own_runs import is_run, measured_by
 from palpate.logs.presets import preset
@@ -57,8 +56,6 @@ class LogIdentifier:
         """
         own, words = self._complete(log)
         known: dict[str, Any] = measured_by(log) if own.signals.plain and is_run(log) else {}
-        if self.options.get("method", LEAST_SQUARES) != LEAST_SQUARES:
-            known.pop("force_filter", None)  # only least squares make use of it
         known |= self.options
         samples = known.get("force_filter") is not None
         record = read_as(own.signals.read(log, samples=samples), words)

@@ -15,7 +15,6 @@ from cli import asked
 from identification.synthetic_contacts import pressed
 from palpate import identify, read_log
 from palpate.cli import main
-from palpate.identification.options import METHODS
 from palpate.identification.warning_codes import Code
 
 SKIN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_mN:mN")
@@ -241,27 +240,6 @@ def test_a_rate_stands_for_the_time(log, capsys):
     assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    "method", [pytest.param(m, marks=pytest.mark.long if m == "output-error" else ()) for m in METHODS]
-)
-def test_the_method_is_that_of_the_library(shaken, capsys, method):
-    _, found = ask(capsys, shaken, *OWN, "--model", "kelvin-voigt-mass", "--lag", "0", "--method", method)
-    own = identify(read_log(shaken, **COLUMNS), model="kelvin-voigt-mass", lag=0.0, method=method)
-    assert {n: p["ci95"] for n, p in found["parameters"].items()} == {
-        n: p["ci95"] for n, p in own.to_json()["parameters"].items()
-    }
-    assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
-
-
-@pytest.mark.long
-def test_another_method_is_said(shaken, capsys):
-    words = ("--model", "kelvin-voigt-mass", "--method", "output-error", "--report", "a.html", "--no-figure")
-    assert main(["identify", str(shaken), *OWN, *words, "--verbose"]) == 0
-    line = "parameters by output-error; the models were chosen by least-squares"
-    assert line in capsys.readouterr().out
-    assert line in Path("a.html").read_text()
-
-
 def test_no_contact_is_an_answer_and_the_answer_is_no(log, capsys):
     rows = np.loadtxt(log, delimiter=",", skiprows=1)
     rows[:, 2] = np.random.default_rng(0).normal(0, 0.05, len(rows))
@@ -286,19 +264,6 @@ WRONG = {
     "unknown unit": ([*OWN[:-1], "force_N:stone"], "unknown unit 'stone'"),
     "one column": (OWN[2:4], "name the columns of .*--time, --force.*time_s"),
     "unknown model": ([*OWN, "--model", "hooke"], "unknown model 'hooke'"),
-    "unknown method": (
-        [*OWN, "--method", "output-eror"],
-        "'output-eror'; did you mean 'output-error'.*least-squares",
-    ),
-    "method and filter": (
-        [*OWN, "--method", "output-error", "--force-filter", "butterworth3:120"],
-        "leave --force-filter out for output-error",
-    ),
-    "no mass to simulate": (
-        [*OWN, "--method", "output-error", "--model", "kelvin-voigt-mass", "--lag", "0"],
-        "this log shows none .*; take least-squares",
-    ),
-    "no mass at all": ([*OWN, "--method", "output-error"], "use least squares"),
     "tolerance": ([*OWN, "--tolerance", "2"], r"tolerance must be in \(0, 1\]"),
     "lag in what": ([*OWN, "--lag", "7.6"], "is 7.6 ms meant.*--lag 7.6:ms"),
     "lag in N": ([*OWN, "--lag", "7.6:N"], "needs one of time"),

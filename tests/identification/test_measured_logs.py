@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.synthetic_contacts import coloured, record, shaken
-from palpate.errors import InputError
+from identification.synthetic_contacts import coloured, record
 from palpate.identification import Verdict, identify
 from palpate.logs import read_log
 
@@ -73,20 +72,3 @@ def test_a_bistable_structure_has_no_confident_stiffness(size, bonded):
     for lag in (None, 0.0):
         found = identify(log, bonded=bonded, lag=lag)
         assert found.parameters["K"].verdict is not Verdict.IDENTIFIED
-
-
-@pytest.mark.parametrize("method", ["instrumental-variables", "output-error"])
-def test_other_estimators_stand_noise_of_the_position(method):
-    log = shaken(n=3000, noise=1e-3, position_noise=1e-4)
-    asked = {"lag": 0.0, "bonded": True, "cutoff": 60.0, "model": "kelvin-voigt-mass"}
-    found = identify(log, method=method, **asked)
-    low, high = found.parameters["M"].ci95_if_model_holds
-    assert low < 0.5 < high
-    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
-
-
-def test_methods_that_there_are_none_of():
-    with pytest.raises(InputError, match="unknown method 'guessing'"):
-        identify(shaken(n=2500), method="guessing")
-    with pytest.raises(InputError, match="a known force filter is for least-squares"):
-        identify(shaken(n=2500), method="output-error", force_filter="butterworth3:120")

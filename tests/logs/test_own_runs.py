@@ -74,15 +74,6 @@ def test_it_is_shown(path, capsys):
     assert "a run's record: x_measured and force_sampled" in capsys.readouterr().out
 
 
-@pytest.mark.long
-def test_another_method_makes_no_use_of_the_filter(path, capsys):
-    words = ["--model", "kelvin-voigt-mass", "--method", "instrumental-variables", "--json"]
-    assert main(["identify", str(path), *words]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["lag_s"]["value"] == pytest.approx(KNOWN + DELAY)
-    assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
-
-
 def test_a_record_that_does_not_say_is_a_log_like_others(tmp_path):
     silent = run_record(force={"filter": "unknown", "sampling_Hz": 480.0, "delay_s": 0.0})
     path = write_record(silent, tmp_path / "silent.parquet")

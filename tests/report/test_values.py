@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import palpate
+from force.gained import gains_of
 from palpate.bench import build, load
+from palpate.force import ForceLoop
 from palpate.identifiers import RecursiveLeastSquares, RestartingLeastSquares
 from palpate.robots import Planar3R, SerialArm
 from palpate.signals import Estimate
@@ -23,6 +25,16 @@ def fed(estimator):
     for k in range(50):
         estimator.update([np.sin(k), np.cos(k), 1e-3 * k], 2.0 * np.sin(k) + 5.0 * k)
     return estimator
+
+
+def test_a_force_loop_says_its_phase_its_trouble_and_its_gains():
+    loop = ForceLoop(gains_of())
+    loop.update(float("nan"), 0.0)
+    text = repr(loop)
+    assert text.startswith(
+        f"<ForceLoop: {loop.phase}, trouble {loop.trouble}, force 20 N, arm position at 500 Hz"
+    )
+    assert loop.trouble in loop._repr_html_()
 
 
 def test_a_parameter_says_number_interval_and_verdict(found):

@@ -156,7 +156,10 @@ def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, 
     for name, p in found.parameters.items():
         if str(p.verdict) != "identified" or p.value is None or p.ci95 is None:
             continue
-        if name in own:
+        tangent = _tangent(log, found) if name == "K" else None
+        if tangent is not None:
+            truth, defined = tangent, log.plan.surface.linear
+        elif name in own:
             truth, defined = own[name], True
         elif name in log.truth and (name == "M" or found.model != "hunt-crossley"):
             truth, defined = log.truth[name], name in log.defined
@@ -165,6 +168,14 @@ def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, 
         model_ci = getattr(p, "ci95_if_model_holds", None)
         answers.append(judged(name, p.value, p.ci95, truth, defined, model_ci, bound.get(name)))
     return tuple(answers)
+
+
+def _tangent(log: Log, found: Any) -> Range | None:
+    """The true slope where K is said to be the press' tangent at a force; None where it is not."""
+    point = getattr(found, "working_point", None)
+    if point is None or str(point.source) != "press" or found.K.value != point.stiffness.value:
+        return None
+    return working_truth(log, "press", None, point.force_N)
 
 
 def judged(
@@ -208,7 +219,7 @@ def _untold_arm(log: Log) -> float:
     return np.inf if "series_stiffness" in log.options else float(log.plan.recording.series)
 
 
-def working_truth(log: Log, source: str, frequency: float | None) -> Range | None:
+def working_truth(log: Log, source: str, frequency: float | None, force: float) -> Range | None:
     """The true stiffness at a working point [N/m], from the press without sensors; None where it has none.
 
     An arm in series that is not told may be in it or not, and so may the inertia of a payload.
@@ -222,7 +233,7 @@ def working_truth(log: Log, source: str, frequency: float | None) -> Range | Non
             inertia = (2 * np.pi * frequency) ** 2 * log.plan.recording.payload
             ends = [z - more for k in own for z in (k, k / (1 + k / arm)) for more in (0.0, inertia)]
             return min(ends), max(ends)
-    slope = press_stiffness(surface, dense)
+    slope = press_stiffness(surface, dense, force)
     return None if slope is None else (slope[0] / (1 + slope[0] / arm), slope[1])
 
 
@@ -231,7 +242,7 @@ def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:
     p = getattr(point, "stiffness", None)
     if p is None or p.value is None or p.ci95 is None:
         return ()
-    truth = working_truth(log, str(point.source), point.frequency_Hz)
+    truth = working_truth(log, str(point.source), point.frequency_Hz, point.force_N)
     if truth is None:
         return ()
     answer = judged(WORKING_POINT, p.value, p.ci95, truth)

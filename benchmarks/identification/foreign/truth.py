@@ -106,13 +106,20 @@ def _level(line: Array, values: Array) -> Array:
     return values - np.polyval(np.polyfit(line, values, 1), line)
 
 
-def press_stiffness(surface: Surface, dense: Dense, low: float = 0.4, high: float = 0.95) -> Range | None:
-    """Lowest and highest slope of force over depth on the ways in, between two shares of their force [N/m].
+ABOUT = 0.05
+"""Half of the share of the largest force about a force at which the slope is taken."""
+
+
+def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) -> Range | None:
+    """Lowest and highest slope of force over depth on the ways in [N/m]: about a force, or from 40 to 95 % of theirs.
 
     A way in is a contact's first advance to its peak force. Two slopes are as true as each other: of the force as it
     was, and of the force without what is no spring (damper, mass, friction), on the same way.
     """
-    short = dense.thinned(1000.0)
+    short, low, high = dense.thinned(1000.0), 0.4, 0.95
+    if force is not None:
+        share = min(force / float(short.force.max() or 1.0), 1 - ABOUT)
+        low, high = max(share - ABOUT, 0.0), max(share + ABOUT, 2 * ABOUT)
     v = np.gradient(short.depth, short.dt)
     slow = surface.scaled(B=0.0, D=0.0, M=0.0, Fc=0.0)
     calm = touch(slow, short.depth, v, np.gradient(v, short.dt), short.dt).force
@@ -132,7 +139,7 @@ def _slope_in(dense: Dense, force: Array, edges: NDArray[np.intp], low: float, h
         x, f = x[:top], f[:top]
         if len(x) < 5 or np.ptp(x) < 0.5 * deepest:
             continue
-        below = np.flatnonzero(f < f[0] + low * (f[-1] - f[0]))
+        below = np.flatnonzero(f < low / high * f.max())
         first = int(below[-1]) + 1 if len(below) else 0
         x, f = x[first:], f[first:]
         xx += float(((x - x.mean()) ** 2).sum())

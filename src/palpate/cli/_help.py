@@ -18,7 +18,7 @@ EXAMPLE = "palpate "
 _INDENT = 4
 """Letters by which a command stands in from the text."""
 _WIDTH = 80
-"""Letters of a line of the short help."""
+"""Letters of a line of the short help: the width with which a terminal opens."""
 _PHRASE = (".", ",", ";", ":", ")", "]")
 """Last characters of a phrase."""
 _BROKEN = 0.3
@@ -137,8 +137,9 @@ _SHOWN = {
     "tune": ("arm", "force", "stiffness", "damping-max", "out", "report", "verbose", "json"),
     "press": ("arm", "force", "surface", "gains", "wire", "dry-run", "out", "json"),
 }
-"""Options that a short help shows, where they are not the first eight."""
+"""Options that a short help shows, where they are not the first ones."""
 _MOST = 8
+"""Options of a short help: with usage, two examples and options of two lines it is some 24 lines, a terminal."""
 
 
 def short_help(app: App, command: str) -> list[str]:

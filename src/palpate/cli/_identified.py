@@ -12,7 +12,7 @@ _LARGEST = 1 << 26
 """Largest size in bytes: the output for a thousand contacts is a hundredth of it."""
 
 _DIGITS = 18
-"""Of a whole number that fits into 64 bits."""
+"""Digits of a whole number that surely fits into 64 bits: 10^18 < 2^63 < 10^19. A longer one is read as a float."""
 
 
 def read_found(path: Path) -> dict[str, Any]:

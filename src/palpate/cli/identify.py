@@ -16,7 +16,7 @@ from palpate.cli.options.flags import FLAG, SIGNED
 from palpate.cli.options.indenter import IndenterOptions
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET, Method, Model
+from palpate.cli.options.names import QUIET, Model
 from palpate.cli.options.values import lag_of, with_std
 from palpate.cli.options.written import WRITTEN, PictureOptions
 from palpate.errors import InputError
@@ -51,8 +51,6 @@ class ModelOptions:
         Whether the probe is fixed to the surface; detected if not given.
     cutoff
         Cut-off of the filters of all channels, in Hz; chosen if not given.
-    method
-        least-squares; or instrumental-variables or output-error, if noise of the position would bias it.
     """
 
     model: Annotated[Model | None, QUIET] = None
@@ -63,7 +61,6 @@ class ModelOptions:
     calibration: float = 0.0
     bonded: bool | None = None
     cutoff: float | None = None
-    method: Annotated[Method, QUIET] = "least-squares"
 
     def known(self) -> dict[str, Any]:
         """The keywords of `palpate.identify`."""
@@ -75,7 +72,7 @@ class ModelOptions:
             known["force_filter"] = None if self.force_filter == "none" else self.force_filter
         if self.mass is not None:
             known["mass"] = with_std("mass", self.mass, "0.5:0.02")
-        names = ("model", "tolerance", "calibration", "bonded", "cutoff", "method")
+        names = ("model", "tolerance", "calibration", "bonded", "cutoff")
         return known | {name: getattr(self, name) for name in names}
 
 
@@ -160,7 +157,7 @@ def identify(
         Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the folder
         of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book are logs of their own.
     """
-    from palpate.logs.gathered import gathered, is_folder_of_logs, log_of, sheets_as_logs
+    from palpate.logs.gathered import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
 
     output, cell = output or OutputOptions(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
@@ -179,7 +176,7 @@ def identify(
     from palpate.cli._many_logs import many
 
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
-    return many(gathered(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
+    return many(gather_logs(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
 
 
 def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:

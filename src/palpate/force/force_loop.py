@@ -33,6 +33,7 @@ from palpate.force.flat import (
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import LEAST, TROUBLES, safe_step
 from palpate.force.stage import LEARNING, LOCKED
+from palpate.results import Readable
 
 if TYPE_CHECKING:
     from palpate.force.certificate import Certificate
@@ -80,7 +81,7 @@ def surface_estimate(cap, theta, found, std, bound):
     return SurfaceEstimate(cap * found.x, cap * std.x, cap * theta * found.y, cap * theta * std.y, bound)
 
 
-class ForceLoop:
+class ForceLoop(Readable):
     """Presses with the force asked for, on any surface within the gains' cap, from the air on.
 
     In the user's own loop, once a tick::

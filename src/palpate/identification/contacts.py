@@ -10,13 +10,15 @@ from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
-from palpate.identification.free_motion import Drift, FreeMotion, free_motion_of
+from palpate.identification.free_motion import FLAT, Drift, FreeMotion, free_motion_of
 from palpate.identification.options import NOTHING_SAID, Options
 from palpate.identification.payload import Payload, payload_of
+from palpate.identification.prior import lag_prior
 from palpate.identification.sampling import Channels, thinned
+from palpate.identification.strokes import Stroke, strokes_of
+from palpate.identification.tangents import SteadyPress, steady_press
 from palpate.identification.warning_codes import Code, Warn
-from palpate.signals.runs import runs
-from palpate.signals.spectral import detrend
+from palpate.signals.samples import detrend, runs
 
 ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""
@@ -34,6 +36,8 @@ _FEWEST = 20
 _ROUNDS = 3
 _SIGNED = 0.6
 """Correlation of block means of force and position below which nobody can tell which way they count."""
+_BESIDE = 0.05
+"""Share of a stroke before and after it in which the probe is still speeding up or slowing down."""
 _OVERSAMPLED = 16.0
 """Samples in a period of the cut-off that are kept: means of more readings droop by 0.6 % there, on both alike."""
 
@@ -55,6 +59,7 @@ class Contacts:
             out of contact shows.
         payload: mass that the force has in the air, counted into the surface; None if it has none.
         drift: of the force, straight lines of which were taken out; None if the log shows none.
+        press: at constant speed, of a log that is little else; None of another.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -68,6 +73,7 @@ class Contacts:
     signed: bool = True
     payload: Payload | None = None
     drift: Drift | None = None
+    press: SteadyPress | None = None
 
 
 def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
@@ -84,11 +90,16 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
         )
     chain = Chain(cutoff or highest, channels.dt)
     air = None if options.bonded else _air(channels, chain, options.assumed_lag)
-    drift = None
+    strokes, drift = strokes_of(channels), None
+    if air is not None and strokes and not _crossed(channels, air, strokes):
+        air = None
     if air is not None and air.drifts:
         drift = Drift(air.stays * channels.dt, air.levels)
         channels = _without_drift(channels, air)
-    contacts = replace(find_contacts(channels, chain, air, options), drift=drift)
+    contacts = replace(find_contacts(channels, chain, air, options, strokes), drift=drift)
+    contacts = _pressed(channels, contacts, strokes, options)
+    if strokes and contacts.press is None:
+        strokes, contacts = (), replace(find_contacts(channels, chain, air, options), drift=drift)
     if not contacts.spans:
         return channels, chain, contacts
     chosen = cutoff or _chosen_cutoff(channels, contacts)
@@ -97,8 +108,45 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
     size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
     fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
-    again = replace(find_contacts(fewer, narrow, air, options), drift=drift)
+    again = find_contacts(fewer, narrow, air, options, strokes)
+    again = replace(again, drift=drift, press=contacts.press)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
+
+
+def _crossed(channels: Channels, air: FreeMotion, strokes: tuple[Stroke, ...]) -> bool:
+    """Whether the strokes pass the air of a press and the force stays: places at rest have no slope to tell."""
+    limit, slopes = air.way * air.limit, []
+    for stroke in strokes:
+        more = _BESIDE * (stroke.end - stroke.begin)
+        rows = replace(stroke, begin=stroke.begin - more, end=stroke.end + more).rows(channels)
+        x, f = air.way * channels.position[rows], channels.force[rows]
+        inside = x < limit
+        if np.count_nonzero(inside) >= _SEVERAL:
+            slopes.append((float(np.ptp(x[inside])), _rise(x[inside], f[inside]), _rise(x, f)))
+    return any(abs(own) < FLAT * abs(whole) for _, own, whole in slopes)
+
+
+def _rise(x: Array, f: Array) -> float:
+    """Slope of a force over a position."""
+    u = x - x.mean()
+    return float(u @ f) / max(float(u @ u), 1e-300)
+
+
+def _pressed(
+    channels: Channels, contacts: Contacts, strokes: tuple[Stroke, ...], options: Options
+) -> Contacts:
+    """The contacts with the press that the strokes are, whose contact is the whole log where no other is seen."""
+    if not strokes:
+        return contacts
+    seen = (
+        contacts
+        if contacts.spans
+        else _never_left(channels, channels.force, channels.position, options, strokes)
+    )
+    lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
+    signs = seen.position_sign, seen.force_sign
+    press = steady_press(channels, strokes, signs, seen.resting, lag, contacts.drift)
+    return contacts if press is None or press.headline.stiffness <= 0 else replace(seen, press=press)
 
 
 def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
@@ -110,7 +158,11 @@ def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
 
 
 def find_contacts(
-    channels: Channels, chain: Chain, air: FreeMotion | None, options: Options = NOTHING_SAID
+    channels: Channels,
+    chain: Chain,
+    air: FreeMotion | None,
+    options: Options = NOTHING_SAID,
+    strokes: tuple[Stroke, ...] = (),
 ) -> Contacts:
     """Find the stretches in contact.
 
@@ -122,6 +174,7 @@ def find_contacts(
         chain: the filter that the fit will use, so that the spans count its delay.
         air: of the log, if it shows any.
         options: whether the probe is fixed to the surface, and which way the force counts, if that is known.
+        strokes: of a press at constant speed.
     """
     force, position = chain(channels.force), chain(channels.position)
     payload = payload_of(channels, chain, air, options.assumed_lag) if air else None
@@ -129,7 +182,7 @@ def find_contacts(
         force = force - payload.mass * chain(channels.position, 2, options.assumed_lag)
     low, high = _ends(_calm(force, channels.dt))
     if air is None and options.bonded is not False:
-        return _never_left(channels, force, position, options)
+        return _never_left(channels, force, position, options, strokes)
     rest = air.rest if air else low if abs(low) <= abs(high) else high
     peak = max(low, high, key=lambda end: abs(end - rest))
     sign = 1.0 if peak > rest else -1.0
@@ -186,18 +239,36 @@ def _without_drift(channels: Channels, air: FreeMotion) -> Channels:
     return replace(channels, force=channels.force - air.drift(rows), raw=raw, warnings=warnings)
 
 
-def _never_left(channels: Channels, force: Array, position: Array, options: Options) -> Contacts:
-    """The whole log as one contact. Its channels count as they stand, or as told."""
+def _never_left(
+    channels: Channels, force: Array, position: Array, options: Options, strokes: tuple[Stroke, ...]
+) -> Contacts:
+    """The whole log as one contact. Its channels count as they stand, or as told; of a press so that both grow."""
     sign = float(options.force_sign or 1)
-    spans = ((0, len(force)),)
+    if strokes and not options.force_sign:
+        low, high = _ends(channels.force)
+        sign = 1.0 if abs(high) >= abs(low) else -1.0
+    rows = [stroke.rows(channels) for stroke in strokes]
+    rises = sum(float(np.cov(sign * channels.force[own], channels.position[own])[0, 1]) for own in rows)
+    way = -1.0 if rises < 0 else 1.0
+    found = Contacts(((0, len(force)),), True, sign, way, 0.0, -np.inf, (), clear=False)
     if options.bonded:
-        return Contacts(spans, True, sign, 1.0, 0.0, -np.inf, (), clear=False)
-    along = _correlation(sign * force, position, channels.dt)
+        return found if not strokes else replace(found, warnings=_turned(sign, way, options))
+    along = _correlation(sign * force, way * position, channels.dt)
     text = "the probe never leaves the surface: the force at rest is not known and is estimated as an offset"
-    warnings = [Warn(Code.CONTACT_AT_START, text)]
-    return Contacts(
-        spans, True, sign, 1.0, 0.0, -np.inf, tuple(warnings), clear=False, signed=along > _SIGNED
-    )
+    warnings = (Warn(Code.CONTACT_AT_START, text), *_turned(sign, way, options))
+    return replace(found, warnings=warnings, signed=bool(strokes) or along > _SIGNED)
+
+
+def _turned(sign: float, way: float, options: Options) -> tuple[Warn, ...]:
+    """The channels of a press whose signs were reversed, though nobody told."""
+    warnings = []
+    if sign < 0 and options.force_sign is None:
+        text = "the force is farther below zero than above; its sign was reversed"
+        warnings.append(Warn(Code.FORCE_SIGN_REVERSED, text))
+    if way < 0:
+        text = "the position falls as the force grows; its sign was reversed"
+        warnings.append(Warn(Code.POSITION_SIGN_REVERSED, text))
+    return tuple(warnings)
 
 
 def _correlation(force: Array, position: Array, dt: float) -> float:

@@ -11,11 +11,6 @@ from palpate.identification.models import NAMES
 from palpate.identification.prior import USUAL_LAG
 from palpate.signals.low_pass import LowPass
 
-LEAST_SQUARES = "least-squares"
-METHODS = (LEAST_SQUARES, "instrumental-variables", "output-error")
-"""Least squares on the force; refined instrumental variables, where the position is the noisier channel; output error,
-the same by simulation, which takes a curved spring too. They differ in `ci95_if_model_holds` alone."""
-
 
 @dataclass(frozen=True)
 class Options:
@@ -33,7 +28,6 @@ class Options:
     cutoff: float | None = None
     force_filter: LowPass | None = None
     mass: tuple[float, float] | None = None
-    method: str = LEAST_SQUARES
     force_sign: int | None = None
 
     @classmethod
@@ -74,14 +68,8 @@ class Options:
 def _check(o: Options) -> None:
     if o.model is not None and o.model not in NAMES:
         raise unknown("model", o.model, NAMES)
-    if o.method not in METHODS:
-        raise unknown("method", o.method, METHODS)
     if o.force_sign not in (None, 1, -1):
         raise InputError(f"the force sign must be +1 or -1, got {o.force_sign}")
-    if o.method != LEAST_SQUARES and o.force_filter is not None:
-        raise InputError(
-            f"a known force filter is for {LEAST_SQUARES}: leave --force-filter out for {o.method}"
-        )
     _check_masses(o)
     _check_numbers(o)
 

@@ -67,7 +67,7 @@ def outcome(
         parameters=parameters,
         contacts=tuple(_clock(channels, chain, problem.contacts, span) for span in problem.contacts.spans),
         lag=_lag(choice),
-        r2=found.fit.r2,
+        r2=max(found.fit.r2, 0.0),
         rmse=found.fit.rmse,
         n=len(problem.force),
         warnings=(*warnings, *_late(press, problem, warnings), *_doubts(parameters, problem, options, terms)),
@@ -110,11 +110,11 @@ def nothing(
 
 
 def _plain_options(options: Options) -> dict[str, object]:
-    """The given options, and two that are always listed; a lag of 0 and "not bonded" are given too."""
+    """The given options, and the tolerance; a lag of 0 and "not bonded" are given too."""
     told = {
         own.name: getattr(options, own.name)
         for own in fields(options)
-        if own.name in {"tolerance", "method"} or getattr(options, own.name) != own.default
+        if own.name == "tolerance" or getattr(options, own.name) != own.default
     }
     return told | ({"force_filter": str(options.force_filter)} if options.force_filter else {})
 

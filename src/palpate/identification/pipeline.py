@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from palpate.identification import in_series
 from palpate.identification.contacts import contacts_of
-from palpate.identification.estimators.methods import estimated_by
+from palpate.identification.estimators.fit import fit
 from palpate.identification.evidence import evidence_of
-from palpate.identification.options import LEAST_SQUARES, Options
+from palpate.identification.options import Options
 from palpate.identification.outcome import nothing, outcome
 from palpate.identification.problem import problem_of, reduced
 from palpate.identification.result import Identification
@@ -39,7 +39,6 @@ def identify(
     cutoff: float | None = None,
     force_filter: LowPass | str | None = None,
     mass: tuple[float, float] | None = None,
-    method: str = LEAST_SQUARES,
     force_sign: int | None = None,
 ) -> Identification:
     """Find what a probe touched, and how far to trust it.
@@ -65,7 +64,6 @@ def identify(
             The position then goes through the same, and is read at the sensor's own samples. The lag, if it is given,
             is that of a fresh reading, this low-pass included.
         mass: prior of the mass, value and standard deviation [kg]; 0 fixes it.
-        method: least-squares; instrumental-variables or output-error, where noise of the position would pull it.
         force_sign: 1 if the force grows as the probe presses, -1 if it falls; None to find out.
 
     Raises:
@@ -74,7 +72,7 @@ def identify(
     options = Options.of(
         model=model, lag=lag, lag_std=lag_std, tolerance=tolerance, calibration=calibration,
         series_stiffness=series_stiffness, series_std=series_std, series_mass=series_mass, bonded=bonded,
-        cutoff=cutoff, force_filter=force_filter, mass=mass, method=method, force_sign=force_sign,
+        cutoff=cutoff, force_filter=force_filter, mass=mass, force_sign=force_sign,
     )  # fmt: skip
     channels = channels_of(record)
     options.check_lag(channels.duration)
@@ -87,9 +85,10 @@ def identify(
     problem = reduced(problem_of(channels, chain, contacts, options))
     terms = replace(terms, band=problem.band)
     choice = choose(problem, options)
-    holds = estimated_by(method, choice.answer, choice.problem, channels)
+    problem, fitted = choice.problem, choice.answer.fit
+    holds = fit(fitted.model, problem.motion, problem.force, problem.lag, fitted.lag)
     follows = max(choice.answer.fit.r2, holds.r2) > _FOLLOWS
-    if not (contacts.clear or bonded or follows):
+    if not (contacts.clear or bonded or follows or contacts.press):
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
         return nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))

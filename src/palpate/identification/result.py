@@ -170,6 +170,8 @@ class WorkingPoint(Readable):
         frequency_Hz: middle of the octave; of a press, one over four times its rise.
         source: octave or press.
         prediction95: interval for the same measured once more; None if it was measured once.
+        from_surface: whether the depth counts from the surface, which free motion shows; else from the middle of the
+            motion.
     """
 
     stiffness: Parameter
@@ -178,6 +180,7 @@ class WorkingPoint(Readable):
     frequency_Hz: float
     source: str
     prediction95: tuple[float, float] | None = None
+    from_surface: bool = True
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""

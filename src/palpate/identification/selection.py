@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,8 +53,13 @@ class Choice:
 
     @property
     def explains(self) -> bool:
-        """Whether less than a third of the force's amplitude is left, in the octaves and in time."""
-        return 1 - min(self.answer.explained, self._followed) < THIRD**2
+        """Whether less than a third of the force's amplitude is left."""
+        return self.left < THIRD
+
+    @property
+    def left(self) -> float:
+        """Share of the force's amplitude that is left, in the octaves or in time, whichever is more."""
+        return float(np.sqrt(max(1 - min(self.answer.explained, self._followed), 0.0)))
 
     @property
     def _followed(self) -> float:
@@ -77,6 +82,20 @@ class Choice:
 
 
 def choose(problem: Problem, options: Options) -> Choice:
+    """The model; of a press at constant speed the force by a plain one is that of least squares in time."""
+    choice = _chosen(problem, options)
+    found = choice.answer
+    if problem.contacts.press is None or found.fit.model.nonlinear:
+        return choice
+    fitted = found.fit.in_time(found.problem.motion, found.problem.force)
+    tried = [
+        replace(own, r2=fitted.r2, rmse=fitted.rmse) if own.model == fitted.model.name else own
+        for own in choice.tried
+    ]
+    return replace(choice, answer=replace(found, fit=fitted), tried=tuple(tried))
+
+
+def _chosen(problem: Problem, options: Options) -> Choice:
     """Answer the plain model, and a richer one if it is asked for or earns its place.
 
     A richer model earns it by explaining at least half of what any plainer one leaves, with everything that it has more

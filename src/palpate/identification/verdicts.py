@@ -81,6 +81,8 @@ def verdicts(
         parameters = {name: _refused(p, _UNTOUCHED) for name, p in parameters.items()}
     if reason := unrecovered(found):
         parameters = {name: _refused(p, reason) for name, p in parameters.items()}
+    if point is not None and choice.problem.contacts.press is not None and not found.fit.model.nonlinear:
+        parameters = _of_press(parameters, point)
     return parameters, _warnings(parameters, found, lag, terms)
 
 
@@ -114,9 +116,8 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
     bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_shown(unit)}".rstrip()
     clear = interval[0] > 0 or interval[1] < 0
     if not choice.explains:
-        left = float(np.sqrt(1 - found.explained))
-        reason = f"the model leaves {left:.0%} of the force's amplitude unexplained ({bounds})"
-        return said(Verdict.REJECTED, reason, clear and name == "K", interval)
+        reason = f"the model leaves {choice.left:.0%} of the force's amplitude unexplained"
+        return said(Verdict.REJECTED, reason, number=False)
     if half <= terms.tolerance * abs(value) and clear:
         return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}")
     limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
@@ -167,10 +168,22 @@ def _contradicted(
         f"the model's stiffness at {point.frequency_Hz:.3g} Hz is {_digits(foretold)} {unit}, the log's dynamic"
         f" stiffness there {_digits(shown)}"
     )
-    return {
-        name: replace(p, verdict=Verdict.REJECTED, reason=reason) if p.verdict is Verdict.IDENTIFIED else p
+    return {name: _rejected(p, reason) for name, p in parameters.items()}
+
+
+def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
+    """Of a press at constant speed K is its tangent, unless a model alone knows it; such a motion shows no more."""
+    shown = {
+        name: replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=_STEADY)
         for name, p in parameters.items()
+        if p.verdict is Verdict.REJECTED
     }
+    K, tangent = parameters["K"], point.stiffness
+    kept = K.verdict is Verdict.IDENTIFIED and tangent.verdict is not Verdict.IDENTIFIED
+    return parameters | shown | {"K": K if kept else tangent}
+
+
+_STEADY = "the log does not show it: the probe moves at constant speed"
 
 
 def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> dict[str, Parameter]:
@@ -181,11 +194,7 @@ def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Te
         f"it depends on a force lag of {_digits(1e3 * found[LAG], 2)} ms that the fit estimates and no calibration"
         " confirms: calibrate the lag and give it with --lag"
     )
-    refused = {
-        name: Parameter(None, None, None, p.unit, Verdict.REJECTED, reason, None, p.budget)
-        for name, p in parameters.items()
-        if name in _IN_TIME
-    }
+    refused = {name: _without_number(p, reason) for name, p in parameters.items() if name in _IN_TIME}
     return parameters | refused
 
 
@@ -207,11 +216,7 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
         touched = ("K", *_IN_TIME) if weighed else _IN_TIME
     else:
         return parameters
-    return parameters | {
-        name: replace(_refused(p, reason), verdict=Verdict.REJECTED)
-        for name, p in parameters.items()
-        if name in touched and p.verdict is Verdict.IDENTIFIED
-    }
+    return parameters | {name: _rejected(p, reason) for name, p in parameters.items() if name in touched}
 
 
 _UNSIGNED = "the log does not show the signs of force and position: begin it in the air, or give --force-sign"
@@ -219,6 +224,16 @@ _UNTOUCHED = (
     "a power law needs depth and force from the touch on, and the log never leaves the surface:"
     " let it begin in the air"
 )
+
+
+def _without_number(p: Parameter, reason: str) -> Parameter:
+    """Rejected: a number that a model gives which does not hold stands nowhere."""
+    return Parameter(None, None, None, p.unit, Verdict.REJECTED, reason, None, p.budget)
+
+
+def _rejected(p: Parameter, reason: str) -> Parameter:
+    """The same, if it was identified."""
+    return _without_number(p, reason) if p.verdict is Verdict.IDENTIFIED else p
 
 
 def _refused(p: Parameter, reason: str) -> Parameter:

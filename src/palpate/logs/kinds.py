@@ -58,7 +58,9 @@ def kind_of(path: Path) -> Kind:
             for file in path.iterdir()
         ):
             return Kind.FOLDER
-        raise InputError(f"{path} is a folder and no ROS 2 bag; give a log file, or a bag's own folder")
+        raise InputError(
+            f"{path} is a folder and no ROS 2 bag; give a log file, or a bag's own folder (identify pools logs)"
+        )
     if not path.is_file():
         raise InputError(f"{path} is a pipe or a device; a log is read more than once, so save it as a file")
     with path.open("rb") as file:

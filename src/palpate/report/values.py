@@ -83,6 +83,16 @@ def _planar(robot: Any) -> Facts:
     return [("", "three revolute joints in a plane"), ("links", f"{lengths} m")]
 
 
+def _force_loop(loop: Any) -> Facts:
+    estimate = loop.estimate
+    known = (
+        []
+        if estimate is None
+        else [("stiffness", quantity(estimate.stiffness, "N/m", 1.96 * estimate.stiffness_std))]
+    )
+    return [("", loop.phase), *known, ("trouble", loop.trouble or "none"), *_gains(loop.gains)]
+
+
 def _gains(gains: Any) -> Facts:
     return [
         ("force", quantity(gains.force, "N")),
@@ -166,6 +176,7 @@ _FACTS: dict[str, Callable[[Any], Facts]] = {
     "DynamicStiffness": _octave,
     "Estimate": _estimate,
     "Experiment": _experiment,
+    "ForceLoop": _force_loop,
     "Gains": _gains,
     "NeuralProbe": _of_estimator,
     "Parameter": _parameter,

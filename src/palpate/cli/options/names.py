@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     Controller = str
     Experiment = str
     LoopArm = str
-    Method = str
     Model = str
     Mode = str
     Physics = str
@@ -43,9 +42,8 @@ if TYPE_CHECKING:
     Study = str
 else:
     Controller = _known("cautious", "hybrid", "proportional-integral", "impedance")
-    Experiment = _shipped("bench/experiments", "bench/one_direction")
+    Experiment = _shipped("bench/experiments", "bench/presses")
     LoopArm = _shipped("force/arms")
-    Method = _known("least-squares", "instrumental-variables", "output-error")
     Model = _known(*MODELS)
     Mode = _known("torque", "position")
     Physics = _known("own", "mujoco")

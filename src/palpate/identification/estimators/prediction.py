@@ -55,5 +55,18 @@ class Prediction:
         spread = float(np.mean((force - force.mean()) ** 2))
         return cls(model, theta, lag, predicted, residuals, 1 - rmse**2 / spread if spread else 0.0, rmse)
 
+    def in_time(self, motion: Motion, force: Array) -> Prediction:
+        """The same model, its linear parameters by least squares in time, which see a motion that no octave has.
+
+        Args:
+            motion: the position.
+            force: measured, shape (n,).
+        """
+        columns = np.column_stack(self.model.columns(motion, self.theta, self.lag))
+        size = np.abs(columns).max(axis=0)
+        scaled, *_ = np.linalg.lstsq(columns / np.where(size > 0, size, 1.0), force, rcond=1e-9)
+        theta = dict(zip(self.model.linear, (scaled / np.where(size > 0, size, 1.0)).tolist(), strict=True))
+        return Prediction.of(self.model, motion, force, self.theta | theta, self.lag)
+
     def __getitem__(self, name: str) -> float:
         return self.theta[name]

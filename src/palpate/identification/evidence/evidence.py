@@ -10,10 +10,10 @@ from palpate.arrays import Array
 from palpate.identification import in_series
 from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.evidence.loadings import loadings_in
-from palpate.identification.evidence.press import press_of
+from palpate.identification.evidence.press import at_constant_speed, press_of
 from palpate.identification.evidence.slope import slope_of
 from palpate.identification.evidence.spectrum import dynamic_stiffness
-from palpate.identification.evidence.working_point import working_point
+from palpate.identification.evidence.working_point import steady_point, working_point
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, WorkingPoint
@@ -37,12 +37,17 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
     spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std)
     whole = problem.with_touches or problem  # a press may be over before a filter has settled
     press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
+    steady = problem.contacts.press
+    if steady is not None:
+        press = at_constant_speed(steady, press, problem.origin)
     if options.series_stiffness is not None:
         series = options.series_stiffness, options.series_std
         spectrum = in_series.spectrum_without_series(spectrum, *series)
         press = None if press is None else in_series.press_without_series(press, *series)
     if options.series_mass is not None:
         spectrum = in_series.spectrum_without_swing(spectrum, *options.swing)
+    if steady is not None:
+        return spectrum, press, steady_point(steady.headline, problem, options, unit)
     point = working_point(whole, spectrum, options, unit, hidden)
     return spectrum, press, point
 

@@ -17,6 +17,7 @@ from palpate.identification.evidence.work import unloading_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import Press, Tangent
+from palpate.identification.tangents import SteadyPress
 
 _LEVELS = (0.3, 0.5, 0.7, 0.9)
 
@@ -44,6 +45,23 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
         relaxation(problem, lag, segments, slope_between(loadings, later)),
         back.late,
     )
+
+
+def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) -> Press:
+    """A press at constant speed, with the lost work and the relaxation that its log shows.
+
+    Args:
+        steady: its strokes' tangents and curves.
+        seen: the press by the filtered contact, if that shows one.
+        origin: position of the surface [m].
+    """
+    tangents = [Tangent(own.force, own.stiffness, own.half) for own in (*steady.others, steady.headline)]
+    surface = np.array([[origin], [0.0]])
+    ordered = tuple(sorted(tangents, key=lambda own: own.force))
+    curves = steady.loading - surface, steady.unloading - surface
+    if seen is None:
+        return Press(ordered, *curves)
+    return replace(seen, tangent=ordered, loading=curves[0], unloading=curves[1])
 
 
 def _tangent(loadings: list[Loading], later: list[Loading], level: float) -> Tangent | None:

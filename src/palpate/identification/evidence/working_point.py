@@ -14,6 +14,7 @@ from palpate.identification.in_series import slope_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Parameter, Verdict, WorkingPoint
+from palpate.identification.tangents import Slopes
 
 _EXCITED = 0.05
 """Share of the position's variance that makes an octave worth a headline: one part in twenty of the motion."""
@@ -77,13 +78,31 @@ def working_point(
     if against:
         reason = f"{stiffness.reason}; {against}"
         stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
+    source = "press" if use_press else "octave"
+    return WorkingPoint(stiffness, force - rest, depth, float(frequency), source, again, not contacts.bonded)
+
+
+def steady_point(own: Slopes, problem: Problem, options: Options, unit: str) -> WorkingPoint:
+    """The tangent of a press at constant speed, and the force and depth that it belongs to.
+
+    Args:
+        own: at the force that is named.
+        problem: of the log.
+        options: with the tolerance, and the stiffness in series with the surface.
+        unit: of a stiffness.
+    """
+    value, half, again = own.stiffness, own.half, own.again
+    if options.series_stiffness is not None:
+        series = options.series_stiffness, options.series_std
+        gain = slope_without_series(value, 0.0, *series)[0] / value
+        value, half = slope_without_series(value, half, *series)
+        again = None if again is None else gain**2 * again
+    budget = _scaled(own.budget, half / own.half if own.half else 1.0)
+    stiffness = replace(_judged(value, half, options.tolerance, unit), budget=_largest(budget, half))
+    interval = None if again is None else (value - again, value + again)
+    depth = own.depth - problem.origin
     return WorkingPoint(
-        stiffness,
-        force - rest,
-        depth,
-        float(frequency),
-        "press" if use_press else "octave",
-        again,
+        stiffness, own.force, depth, 0.25 / own.rise, "press", interval, not problem.contacts.bonded
     )
 
 

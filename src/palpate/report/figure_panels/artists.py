@@ -21,7 +21,7 @@ Kind = tuple[str, str, str]
 _NAMES = {code: name for name, code in (DATA | SERIES).items()}
 _NAMES |= {PAIRS[name][0]: name for name in ("ink", "quiet", "grid", "line", "card")}
 _DOTS = {"o": 5.0, ".": 3.5, "s": 5.0, "^": 5.0, "x": 5.0}
-"""Marks that are drawn as dots of so many points."""
+"""Marks of matplotlib that a page draws as dots, and their diameters [points] in the style of the figures."""
 _DASHES = {"-": [], "--": [6, 4], ":": [2, 3], "-.": [8, 3, 2, 3]}
 
 

@@ -119,7 +119,7 @@ def _loss(found: Identification, point: WorkingPoint) -> str:
 def place_of(found: Identification, point: WorkingPoint) -> str:
     """`at 13 N, 2.4 mm deep and 0.57 Hz`."""
     force, depth, frequency = facts_of(found, point)
-    deep = " deep" if point.depth_m > 0 else " from the middle of the motion"
+    deep = " deep" if point.from_surface and point.depth_m > 0 else " from the middle of the motion"
     return f"at {force}, {depth}{deep} and {frequency}"
 
 
