@@ -167,7 +167,7 @@ class Stand:
         self.again: list[subprocess.Popen] = []
 
     def run(self) -> Result | None:
-        """All of it; None where a busy machine ended the press before its fault."""
+        """All of it; None where a busy machine ended the press before its fault, or the arm had not moved."""
         with contextlib.ExitStack() as stack:
             arm, at = stack.enter_context(self._arm())
             relay = stack.enter_context(self._relay()) if self.fault.way == "relay" else None
@@ -305,10 +305,13 @@ class Stand:
             told = {}
         return press.poll(), str(told.get("ended", "-"))
 
-    def _judged(self, begun: float, code: int | None, ended: str) -> Result:
+    def _judged(self, begun: float, code: int | None, ended: str) -> Result | None:
+        """Judgement of the trace; None of an arm that did not move before the fault: it shows nothing."""
         trace = np.fromfile(self.trace)
         times, command, _, force = trace[: len(trace) // 4 * 4].reshape(-1, 4).T
         after = times > begun
+        if np.ptp(command[~after]) <= STILL:
+            return None
         gaps = (
             np.diff(times, prepend=times[0]) > 0.5
         )  # between an arm that was killed and another in its place
@@ -456,7 +459,7 @@ def main() -> int:
     for kind, fault in wanted:
         result = next(filter(None, (tried(kind, fault) for _ in range(TRIES))), None)
         if result is None:
-            print(f"{kind}: {fault.name}: the press ended before its fault, three times", flush=True)
+            print(f"{kind}: {fault.name}: the arm did not move before its fault, three times", flush=True)
             continue
         found[f"{kind}: {fault.name}"] = asdict(result)
         kept = (made(words.state) if not words.again else {}) | found
