@@ -45,7 +45,7 @@ check: lint test ## everything that has to pass before a commit
 
 bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold start cost here
 	$(BIN)/palpate speed
-	-$(BIN)/python benchmarks/c_yardstick/compare.py
+	$(BIN)/python benchmarks/c_yardstick/compare.py
 	$(BIN)/python benchmarks/side_by_side.py
 	$(BIN)/python benchmarks/many_runs.py
 	$(BIN)/python benchmarks/least_squares.py

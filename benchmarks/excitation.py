@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import build, load
-from palpate.bench.experiments.tables import changed, parse
+from palpate.bench.tables import changed, parse
 from palpate.excitation import Budget, Design, HybridLoop, Problem, SurfaceRange, design
 from palpate.identification import identify
 from palpate.records import Record

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.excitation import Budget, Design, KnownBandwidth, Problem, Sensors, SurfaceRange, design
-from palpate.excitation.fisher_information import ForceChain
+from palpate.excitation.spectra import ForceChain
 from palpate.identifiers import ContactIdentifier
-from palpate.references.waves import Multisine
+from palpate.references import Multisine
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 from palpate.bench import build, load
-from palpate.bench.experiments.tables import changed
 from palpate.bench.speed import cores
+from palpate.bench.tables import changed
 
 SHORT = {"approach.hold": 0.2, "approach.first": 0.464, "run.duration": 6.0, "run.press": 5.0}
 RUNS, ROUNDS = 12, 5

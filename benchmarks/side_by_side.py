@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import build, load, march, start_at
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS
 from palpate.bench.tick import Loop, compiled_march
 from palpate.controllers.hybrid import Hybrid
 from palpate.environments import KelvinVoigt

@@ -3,7 +3,7 @@
 import msgspec
 
 from palpate.bench import build, load
-from palpate.bench.experiments.tables import Run
+from palpate.bench.tables import Run
 from palpate.environments import KelvinVoigtSurface
 
 foam = load("foam-hybrid")

@@ -7,7 +7,7 @@ gives additional information about K.
 
 import palpate
 from palpate.bench import build
-from palpate.bench.experiments.tables import parse
+from palpate.bench.tables import parse
 from palpate.excitation import Budget, Problem, SurfaceRange, design
 from palpate.records import Record
 from palpate.report.excitation.files import experiment

@@ -6,7 +6,7 @@ The model is the derivative of the bench's own tick about a press at rest: three
 
 from palpate.analysis import linearise, margins, stable_intervals, stable_stiffness
 from palpate.bench import load
-from palpate.bench.experiments.tables import changed
+from palpate.bench.tables import changed
 
 foam = load("foam-hybrid")
 loop = linearise(foam)

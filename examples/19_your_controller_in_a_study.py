@@ -9,9 +9,9 @@ from student import Damped
 from palpate.checks import controller_checks, outcomes
 from palpate.plugins import permit
 from palpate.studies import run
-from palpate.studies.definition.plan import plan
-from palpate.studies.definition.study import parse
-from palpate.studies.findings.pairing import comparisons
+from palpate.studies.pairing import comparisons
+from palpate.studies.plan import plan
+from palpate.studies.study import parse
 
 STUDY = """
 title = "Damped push or PI, on random foam"

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from palpate.bench import build, load
-from palpate.bench.experiments.tables import DesiredForce, Run
+from palpate.bench.tables import DesiredForce, Run
 
 
 def main(path: Path) -> None:

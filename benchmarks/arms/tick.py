@@ -23,7 +23,7 @@ from palpate.press.cell import Reading, Touch, body_at, compiled_tick
 from palpate.press.loops import loop_of
 from palpate.press.setting import cell_of, place_of
 from palpate.robots import SerialArm
-from palpate.robots.serial.to_mujoco import mjcf, scene_of
+from palpate.robots.serial.serial_arm import mjcf, scene_of
 
 STEPS, REPEATS, WANTED = 1000, 400, 3.0
 NAMES = ("ur5e", "panda", "fr3", "iiwa14")

@@ -447,8 +447,8 @@ TREES: dict[str, tuple[str, tuple[str, ...]]] = {
     "FOUND, tuned": ("found.json", ("tune", "FILE", "--arm=ur5e", "--force=10")),
     "gains, certified": ("gains.toml", ("certify", "FILE", "--held-only", "--json")),
     "certificate, checked": ("certificate.json", ("certify", "--check", "FILE")),
-    "experiment, edited": ("experiment.toml", ("checks", "FILE")),
-    "study, edited": ("study.toml", ("study", "FILE", "--scheduler=nonsense://", "--yes")),
+    "experiment, edited": ("experiment.toml", ("@experiment", "FILE")),
+    "study, edited": ("study.toml", ("@study", "FILE")),
 }  # fmt: skip
 
 

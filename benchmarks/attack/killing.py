@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -215,13 +216,20 @@ def _whole_files(folder: Path) -> str:
     return f"defect: half-written {spoiled}" if spoiled else "whole files only"
 
 
-KINDS = {
-    "run killed": run_killed,
-    "run, Ctrl-C": run_interrupted,
-    "study killed": study_killed,
-    "disk full": disks_full,
-    **{kind: partial(killed, kind) for kind in COMMANDS if kind not in {"run", "study"}},
+LONG, SHORT = 1, 5
+"""Shares of commands that take some seconds or compile, and of those that take less."""
+_QUICK = {"certify", "export", "payload", "tune", "excite"}
+KINDS: dict[str, tuple[int, Callable[[int, Path, int], Counter[str]]]] = {
+    "run killed": (LONG, run_killed),
+    "run, Ctrl-C": (LONG, run_interrupted),
+    "study killed": (LONG, study_killed),
+    "disk full": (LONG, disks_full),
+    **{
+        kind: (SHORT if kind in _QUICK else LONG, partial(killed, kind))
+        for kind in COMMANDS
+        if kind not in {"run", "study"}
+    },
 }
-"""What is done to a command, by its name: (count, folder, seed) -> outcomes, counted."""
+"""By kind: its share of the kills, and who does it: (count, folder, seed) -> outcomes, counted."""
 
 os.environ.setdefault("MPLBACKEND", "Agg")

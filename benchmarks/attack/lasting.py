@@ -37,7 +37,7 @@ class Lasted:
 def lasted(name: str, seconds: float) -> Lasted:
     """Runs an experiment for so long, whatever becomes of its contact, and keeps no row."""
     from palpate.bench import build, load
-    from palpate.bench.row import COLUMNS
+    from palpate.bench.sequence import COLUMNS
     from palpate.bench.tick import compiled_march, start_at
 
     bench = build(load(name))

@@ -131,20 +131,12 @@ def _read(kind: str, path: Path) -> str:
     from palpate.errors import InputError
 
     try:
-        if kind == "experiment":
-            from palpate.bench import build
-            from palpate.bench.experiments.tables import load
-
-            build(load(str(path)))
-        elif kind == "study":
-            from palpate.studies.definition.plan import plan
-            from palpate.studies.definition.study import load as load_study
-
-            plan(load_study(str(path)), str(path))
+        if f"@{kind}" in LOADED:
+            LOADED[f"@{kind}"](str(path))
         elif kind == "journal":
-            from palpate.studies.running import journal
+            from palpate.studies import run_study
 
-            with journal.opened(path, HEAD()) as book:
+            with run_study.open_journal(path, HEAD()) as book:
                 list(book.rows())
         elif kind == "gains":
             _press(path)
@@ -179,7 +171,7 @@ def _read_by(commands: list[list[str]]) -> str:
     for words in commands:
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            codes.append(_arm(words) if words[0] == "@arm" else main(words))
+            codes.append(_by_library(words) if words[0] in LOADED else main(words))
         said = err.getvalue().splitlines()
         if codes[-1] not in {0, 1, 2} or (codes[-1] == 2 and len(_errors(said)) != 1):
             return f"defect: {words} ended with {codes[-1]}: {(said or ['?'])[-3:]}"
@@ -195,18 +187,38 @@ def _errors(lines: list[str]) -> list[str]:
     return [line for line in lines if line.startswith("palpate: ")]
 
 
-def _arm(words: list[str]) -> int:
-    """An arm from its file, and its dynamics at home, with the program's edge around them."""
-    from palpate.cli._edge import guarded
+def _load_arm(path: str) -> None:
+    """An arm from its file, and its dynamics at home."""
     from palpate.press.prepare import arm_of
 
-    def load() -> int:
-        arm = arm_of(words[1], "l2" if words[1].endswith("urdf") else None)
-        arm.forward_kinematics(arm.home)
-        arm.mass_matrix(arm.home)
-        return 0
+    arm = arm_of(path, "l2" if path.endswith("urdf") else None)
+    arm.forward_kinematics(arm.home)
+    arm.mass_matrix(arm.home)
 
-    return guarded(load)
+
+def _load_experiment(path: str) -> None:
+    from palpate.bench import build
+    from palpate.bench.tables import load
+
+    build(load(path))
+
+
+def _load_study(path: str) -> None:
+    from palpate.studies.plan import plan
+    from palpate.studies.study import load
+
+    plan(load(path), path)
+
+
+LOADED = {"@arm": _load_arm, "@experiment": _load_experiment, "@study": _load_study}
+"""Files that are read by the library alone, as a command would do more than read them."""
+
+
+def _by_library(words: list[str]) -> int:
+    """The exit code of reading a file, with the program's edge around it."""
+    from palpate.cli._edge import guarded
+
+    return guarded(lambda: LOADED[words[0]](words[1]))
 
 
 def _columns(path: Path, columns: tuple[str, ...]) -> tuple[str, ...]:

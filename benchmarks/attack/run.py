@@ -1,6 +1,6 @@
 """`make attack`: hostile inputs, faults of the disk, kills, long runs; the last result stands in docs/reliability.md.
 
-    python benchmarks/attack/run.py --inputs 10000 --faults 200 --kills 75 --seconds 3600 --write
+    python benchmarks/attack/run.py --inputs 10000 --faults 200 --kills 300 --seconds 3600 --write
     python benchmarks/attack/run.py --minutes 2
 
 The first resumes where it was stopped, as long as neither palpate nor the attack was changed. The second begins with a
@@ -10,6 +10,7 @@ new seed each time, prints it, and takes as much of each part as there is time f
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import sys
 import tempfile
@@ -72,7 +73,7 @@ class Amount:
     Args:
         inputs: hostile ones, of all kinds together.
         faults: of the disk, of each command.
-        kills: of each kind of violence.
+        kills: of all commands together.
         seconds: simulated, of each experiment.
         seed: of all of it.
     """
@@ -101,10 +102,11 @@ def parts(amount: Amount) -> list[Part]:
             for k in COMMANDS
             if find_spec("palpate_thesis") or k not in OPTIONAL
         ]
-    for kind, kill in KINDS.items():
-        if kind in OPTIONAL and not find_spec("palpate_thesis"):
-            continue
-        counts = {start + first: min(FEW, amount.kills - first) for first in range(0, amount.kills, FEW)}
+    there = {k: own for k, own in KINDS.items() if find_spec("palpate_thesis") or k not in OPTIONAL}
+    share = amount.kills / sum(own for own, _ in there.values())
+    for kind, (own, kill) in there.items():
+        count = math.ceil(share * own)
+        counts = {start + first: min(FEW, count - first) for first in range(0, count, FEW)}
         found.append(
             [
                 Part("killed", f"{kind} {n}", lambda f, v=kill, c=c, n=n: _many(v, c, f, n))
@@ -266,7 +268,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--inputs", type=int, default=10000, help="hostile inputs, of all kinds together")
     parser.add_argument("--faults", type=int, default=200, help="of the disk, of each command")
-    parser.add_argument("--kills", type=int, default=75, help="of each kind of violence")
+    parser.add_argument("--kills", type=int, default=300, help="of all commands together")
     parser.add_argument("--seconds", type=float, default=3600.0, help="simulated, of each experiment")
     parser.add_argument(
         "--minutes", type=float, help="stop after so long; with a new seed, unless one is given"

@@ -90,10 +90,10 @@ def study(path: Path) -> None:
 
 def journal(path: Path) -> None:
     """Finished runs of a study."""
-    from palpate.studies.running import journal as journals
-    from palpate.studies.running.run_one import Row
+    from palpate.studies import run_study as journals
+    from palpate.studies.run_one import Row
 
-    with journals.opened(path, HEAD()) as book:
+    with journals.open_journal(path, HEAD()) as book:
         for run in range(10):
             book.append(
                 Row(run, {"a": 0.1 * run, "seed": 0}, "done", "as asked for", (1.0 / (run + 1),), 0.01)
@@ -123,9 +123,9 @@ def _wrote(path: Path, *words: str) -> None:
 
 def HEAD() -> object:
     """Of the journal."""
-    from palpate.studies.running.journal import Head
+    from palpate.studies.run_study import JournalHead
 
-    return Head("T", "study", "0.1.0", "sources", 10)
+    return JournalHead("T", "study", "0.1.0", "sources", 10)
 
 
 SAMPLES: dict[str, tuple[str, Callable[[Path], None]]] = {

@@ -117,7 +117,7 @@ def _serve(said: Path) -> None:
 def _become(words: list[str], folder: str, environment: dict[str, str], trouble: Trouble, said: Path) -> None:
     os.chdir(folder)
     os.setpgid(0, 0)
-    os.environ.update(environment)
+    os.environ.update(environment, ATTACK_LEARN="1" if trouble == NONE else "")
     nowhere = os.open(os.devnull, os.O_RDWR)
     errors = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     for number, target in enumerate((nowhere, nowhere, errors)):
@@ -152,7 +152,7 @@ def _run(said: Path) -> int:
     from palpate.cli import main
 
     code = main()
-    if not os.environ.get("ATTACK_FAIL", "0").strip("0"):
+    if os.environ["ATTACK_LEARN"]:  # a disturbed command may not write even this
         said.with_suffix(".modules").write_text(json.dumps(sorted(sys.modules)))
     return code
 

@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.equilibrium import exact
-from palpate.analysis.flatten import vector
+from palpate.analysis.linear_loop import vector
+from palpate.analysis.linear_model import exact
 from palpate.bench import build, load, start_at
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS
 from palpate.bench.tick import Loop, compiled_march
 from palpate.controllers import alone
 from palpate.environments.surface import alone as alone_surface

@@ -6,7 +6,7 @@
 
 typedef struct { double b0, b1, b2, a1, a2, rate; } biquad;
 typedef struct { v3 length, mass, com, moment, limits, rotor; } arm_t;
-typedef struct { v3 sigma0, sigma1, sigma2, coulomb, fixed, stribeck; } friction_t;
+typedef struct { v3 sigma0, sigma1, sigma2, coulomb, fixed, stribeck; double asymmetry; } friction_t;
 typedef struct { double stiffness, damping, mass; } surface_t;
 typedef struct { double stiffness, damping, friction; } side_t;
 typedef struct { double bits, full_scale; } converter;
@@ -27,6 +27,7 @@ typedef struct {
     biquad line;
     double filtered;
     converter input;
+    double roughness;
     converter3 output;
     arm_t model;
     biquad motion, smooth;

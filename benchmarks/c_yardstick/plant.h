@@ -6,12 +6,13 @@
 
 typedef struct { double deflection, rate; int contact; } surface_state;
 typedef struct { v3 q, qd, bristles; surface_state surface; double bend; } plant_state;
-typedef struct { double normal, tangential, penetration; v3 friction; } touch_t;
+typedef struct { double normal, tangential, penetration, rate; v3 friction; } touch_t;
 typedef struct { memory first, second; double computing, held; memory line_filter; double line; } sensor_state;
 
-INLINE double joint_friction(double s0, double s1, double s2, double coulomb, double fixed, double stribeck, double *z,
-                             double v, double dt) {
-    double r = v / stribeck, level = coulomb + (fixed - coulomb) * exp(-(r * r)), slip = fabs(v) / level;
+INLINE double joint_friction(double s0, double s1, double s2, double coulomb, double fixed, double stribeck, double asymmetry,
+                             double *z, double v, double dt) {
+    double r = v / stribeck, side = (double)((v > 0.0) - (v < 0.0));
+    double level = (coulomb + (fixed - coulomb) * exp(-(r * r))) * (1.0 + asymmetry * side), slip = fabs(v) / level;
     double next = (*z + dt * v) / (1.0 + dt * s0 * slip), damping = s1 / (1.0 + 0.25 * s1 * slip);
     double torque = s0 * next + 1.0 / dt * damping * (next - *z) + s2 * v;
     *z = next;
@@ -19,9 +20,12 @@ INLINE double joint_friction(double s0, double s1, double s2, double coulomb, do
 }
 INLINE v3 friction_step(const friction_t *f, v3 *z, v3 v, double dt) {
     return vec(
-        joint_friction(f->sigma0.x, f->sigma1.x, f->sigma2.x, f->coulomb.x, f->fixed.x, f->stribeck.x, &z->x, v.x, dt),
-        joint_friction(f->sigma0.y, f->sigma1.y, f->sigma2.y, f->coulomb.y, f->fixed.y, f->stribeck.y, &z->y, v.y, dt),
-        joint_friction(f->sigma0.z, f->sigma1.z, f->sigma2.z, f->coulomb.z, f->fixed.z, f->stribeck.z, &z->z, v.z, dt));
+        joint_friction(f->sigma0.x, f->sigma1.x, f->sigma2.x, f->coulomb.x, f->fixed.x, f->stribeck.x,
+                       f->asymmetry, &z->x, v.x, dt),
+        joint_friction(f->sigma0.y, f->sigma1.y, f->sigma2.y, f->coulomb.y, f->fixed.y, f->stribeck.y,
+                       f->asymmetry, &z->y, v.y, dt),
+        joint_friction(f->sigma0.z, f->sigma1.z, f->sigma2.z, f->coulomb.z, f->fixed.z, f->stribeck.z,
+                       f->asymmetry, &z->z, v.z, dt));
 }
 INLINE double slide_step(const side_t *s, double *bend, double rate, double normal, double dt) {
     double pull = s->stiffness * (*bend + dt * rate) + s->damping * rate;
@@ -86,6 +90,7 @@ INLINE touch_t plant_step(const numbers *n, plant_state *s, v3 torque, double dt
     felt.normal = pressed + impulse / dt;
     felt.tangential = -slide;
     felt.penetration = p;
+    felt.rate = dot(normal, s->qd);
     return felt;
 }
 

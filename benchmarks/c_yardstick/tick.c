@@ -236,7 +236,8 @@ static void tick(bench *b, long k, double noise, double *out) {
     double dt = n->tick / n->steps;
     for (int j = 0; j < steps; j++) {
         b->felt = plant_step(n, &b->plant, torque, dt);
-        sensor_step(n, &b->sensor, b->felt.normal, k * steps + j, noise, b->sensor_code);
+        double rough = noise * (1.0 + n->roughness * fabs(b->felt.rate));
+        sensor_step(n, &b->sensor, b->felt.normal, k * steps + j, rough, b->sensor_code);
     }
 }
 

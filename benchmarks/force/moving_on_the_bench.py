@@ -23,8 +23,8 @@ import numpy as np
 from touches import Key, resumed
 
 from palpate.bench.build import build
-from palpate.bench.experiments.tables import changed, load
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS
+from palpate.bench.tables import changed, load
 from palpate.environments.surface import alone, join
 from palpate.force.law import CautiousState
 

@@ -17,7 +17,7 @@ import numpy as np
 from touches import Key, resumed
 
 from palpate.bench.build import build
-from palpate.bench.experiments.tables import changed, load
+from palpate.bench.tables import changed, load
 
 CONTROLLERS = ("foam-cautious", "foam-hybrid", "foam-pi", "foam-neural")
 PRESS = 4.0

@@ -11,7 +11,7 @@ from presses import FIELDS, NAMES, SPREAD, log_of
 
 from palpate.bench import ForceSensor, given_motion, load
 from palpate.environments import KelvinVoigt
-from palpate.excitation.fisher_information import ForceChain, bound, phase_std
+from palpate.excitation.spectra import ForceChain, cramer_rao_bound, phase_std
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 
@@ -169,5 +169,5 @@ def _bound(record: Record, truth: dict[str, float], low_pass: LowPass, kind: str
         return dict.fromkeys(lacks, np.inf)
     span = float(record["t"][inside[0]]), float(record["t"][inside[-1]])
     chain = ForceChain(low_pass, SAMPLING, NOISE, phase_std(SAMPLING, RATE))
-    best = bound(record["t"], np.maximum(record["x"], 0.0), truth, chain, span=span)
+    best = cramer_rao_bound(record["t"], np.maximum(record["x"], 0.0), truth, chain, span=span)
     return {name: float(best.std[best.names.index(name)]) / truth[name] for name in lacks}

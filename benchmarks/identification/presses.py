@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from palpate.bench import build, load
-from palpate.bench.experiments.tables import changed
-from palpate.excitation.fisher_information import ForceChain, bound, phase_std
+from palpate.bench.tables import changed
+from palpate.excitation.spectra import ForceChain, cramer_rao_bound, phase_std
 from palpate.identification import Identification, identify
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
@@ -157,5 +157,5 @@ def _bound(
     chain = ForceChain(low_pass, sensor["sampling"], sensor["noise"], phase_std(sensor["sampling"], 1000))
     known = {} if condition.lag_known else {"lag": np.inf}
     known |= {"fixed": {"M": 0.0}, "prior": {"M": truth["M"] / 2}, "free": {}}[condition.mass]
-    best = bound(record["t"], record["penetration"], truth, chain, known=known, span=span)
+    best = cramer_rao_bound(record["t"], record["penetration"], truth, chain, known=known, span=span)
     return dict(zip(best.names, best.std.tolist(), strict=True))

@@ -16,13 +16,7 @@ from pressing import NOISE, Array
 from scipy.signal import lfilter
 from update import START, TRUTH, VAGUE, waves
 
-from palpate.identifiers import (
-    Directional,
-    KalmanFilter,
-    RecursiveLeastSquares,
-    RestartingLeastSquares,
-    SIFt,
-)
+from palpate.identifiers import Directional, KalmanFilter, RecursiveLeastSquares, RestartingLeastSquares, SIFt
 
 DRIFT = 1e-5 * np.sqrt(np.diag(VAGUE))
 MAKERS = {

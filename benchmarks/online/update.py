@@ -16,13 +16,7 @@ import numpy as np
 from others import Filterpy, Network, Padasip, Thesis
 from pressing import NOISE, TONES, Array
 
-from palpate.identifiers import (
-    Directional,
-    KalmanFilter,
-    RecursiveLeastSquares,
-    RestartingLeastSquares,
-    SIFt,
-)
+from palpate.identifiers import Directional, KalmanFilter, RecursiveLeastSquares, RestartingLeastSquares, SIFt
 
 TRUTH = np.array([0.1, 200.0, 5200.0])  # M [kg], B [N s/m], K [N/m]: the thesis' foam
 START, VAGUE = np.zeros(3), np.diag([1e2, 1e6, 1e10])

@@ -1,9 +1,12 @@
-"""The two kinds of array that pass between functions; each docstring states shapes and units."""
+"""Kinds of array that pass between functions; each docstring states shapes and units."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]

@@ -5,9 +5,9 @@ import pytest
 
 from analysis.worlds import surface
 from palpate.analysis import linearise, stable_intervals, stable_stiffness
-from palpate.analysis.stability_cells import growth, stable_pieces
+from palpate.analysis.boundaries import growth, stable_pieces
 from palpate.bench import build
-from palpate.bench.experiments.tables import changed
+from palpate.bench.tables import changed
 from palpate.errors import InputError
 from palpate.force.boundary import stable_between
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from palpate.analysis.equilibrium import at_equilibrium, pressing
-from palpate.analysis.flatten import leaves, rebuilt, vector
-from palpate.analysis.motion import Motion
+from palpate.analysis.linear_loop import LoopMotion, leaves, rebuilt, vector
+from palpate.analysis.linear_model import at_equilibrium, pressing
 from palpate.bench import build, load, start_at
 
 
@@ -30,5 +29,5 @@ def test_arrays_are_not_shared():
 def test_only_the_controller_that_acts_moves():
     for name, size in (("foam-pi", 3), ("foam-impedance", 1)):
         bench = build(load(name))
-        motion = Motion(*pressing(at_equilibrium(bench.loop, 20.0, friction=False), 20.0, 1.0))
+        motion = LoopMotion(*pressing(at_equilibrium(bench.loop, 20.0, friction=False), 20.0, 1.0))
         assert sum(n.startswith("controller") for n in motion.names) == size

@@ -8,7 +8,7 @@ import pytest
 from analysis.worlds import surface
 from palpate.analysis import growth_with, linearise, loop_gain, margins
 from palpate.bench import load
-from palpate.bench.experiments.tables import changed
+from palpate.bench.tables import changed
 from palpate.errors import InputError
 
 

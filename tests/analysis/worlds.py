@@ -4,8 +4,8 @@ import numpy as np
 
 from palpate._vector import Vec3, solve
 from palpate.bench import load
-from palpate.bench.experiments.tables import changed
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS
+from palpate.bench.tables import changed
 from palpate.bench.tick import compiled_march
 
 NONE = (0.0, 0.0, 0.0)

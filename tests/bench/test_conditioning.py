@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from palpate._vector import Vec3
-from palpate.bench.conditioning import Conditioning
+from palpate.bench.force_input import Conditioning
 from palpate.robots.arm3 import Arm3
 from palpate.signals.filters import butterworth2
 

@@ -6,7 +6,7 @@ import pytest
 
 from palpate._vector import Vec3
 from palpate.bench import Bench, build, load
-from palpate.bench.experiments.tables import Experiment
+from palpate.bench.tables import Experiment
 
 FOAM = {"kind": "kelvin-voigt", "stiffness": 5200.0, "damping": 200.0, "mass": 0.10}
 VISCOELASTIC = {

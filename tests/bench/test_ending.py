@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from palpate.bench.ending import StopCondition
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS, StopCondition
 
 
 def rows(phases, start=0):

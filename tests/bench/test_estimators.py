@@ -5,7 +5,7 @@ import numpy as np
 from bench.quick import quick
 from palpate._vector import ZERO3, Vec3
 from palpate.bench import build
-from palpate.bench.conditioning import Signals
+from palpate.bench.force_input import ConditionedSignals
 from palpate.signals.types import Sense
 
 ESTIMATORS = build(quick("foam-hybrid")).loop.estimators
@@ -14,7 +14,7 @@ X = 0.465
 
 def signals(x, force):
     sense = Sense(ZERO3, ZERO3, Vec3(x, 0.0, 0.0), ZERO3, Vec3(force, 0.0, 0.0))
-    return Signals(sense, 0.0, 0.0, 0.0, force)
+    return ConditionedSignals(sense, 0.0, 0.0, 0.0, force)
 
 
 def after(state, samples, pressing=False):

@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from palpate.bench import Experiment, build, changed, load, names, source
-from palpate.bench.experiments.tables import parse
+from palpate.bench.tables import parse
 from palpate.errors import InputError
 
 GOOD = """

@@ -28,7 +28,7 @@ def shake(plant, line, state, base, swing, force, readings):
     way = line.start()
     for k in range(len(force)):
         if k % 20 == 0:
-            readings[k // 20] = line.sampled(way)
+            readings[k // 20] = line.reading(way)
         t = k / 20000.0
         torque = base + (math.sin(31.4 * t) + 0.3 * math.sin(199.0 * t)) * swing
         state, felt = plant.advance(state, torque, 1.0 / 20000.0)

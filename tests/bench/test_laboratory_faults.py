@@ -7,8 +7,7 @@ import pytest
 
 from palpate._vector import Vec3
 from palpate.bench import build, changed, load
-from palpate.bench.elastic_mode import RIGID, elastic_mode
-from palpate.bench.plant import Plant
+from palpate.bench.plant import RIGID, Plant, elastic_mode
 from palpate.bench.sequence import CONTACT
 from palpate.environments import KelvinVoigt, StickSlip, join
 from palpate.errors import InputError
@@ -31,7 +30,7 @@ def test_a_mode_under_a_constant_force_gives_way_by_force_over_stiffness():
 def test_a_struck_mode_swings_at_its_frequency_and_dies_away_by_its_damping():
     f, zeta, impulse = 40.0, 0.05, 0.01
     mode = elastic_mode(1e5, f, zeta)
-    state, bends = mode.struck(mode.start(), impulse), []
+    state, bends = mode.after_impulse(mode.start(), impulse), []
     for _ in range(4000):
         state = mode.step(state, mode.acceleration(state), DT)
         bends.append(state.bend)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate._vector import Mat3, Vec3
-from palpate.bench.matched_channels import Centring, Matched, centred
+from palpate.bench.estimators import Centring, Matched, centre
 from palpate.identifiers.kernels.least_squares import LeastSquares
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth3, delay, state_variable
@@ -71,8 +71,8 @@ vectors = st.tuples(numbers, numbers, numbers)
 
 @given(vectors, vectors, st.floats(0.0, 1e6))
 def test_centring_means_the_same_on_values_and_arrays(mean, value, weight):
-    by_value = centred(Vec3(*mean), Vec3(*value), weight)
-    by_array = centred(np.array(mean), np.array(value), weight)
+    by_value = centre(Vec3(*mean), Vec3(*value), weight)
+    by_array = centre(np.array(mean), np.array(value), weight)
     for ours, theirs in zip(by_value, by_array, strict=True):
         np.testing.assert_array_equal(np.array(ours), theirs)
 

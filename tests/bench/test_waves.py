@@ -5,7 +5,7 @@ import pytest
 
 from bench.quick import quick
 from palpate.bench import build, changed, load
-from palpate.bench.experiments.tables import parse
+from palpate.bench.tables import parse
 from palpate.errors import InputError
 from palpate.references import Chirp, Multisine
 

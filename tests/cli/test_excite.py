@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cli import asked
-from palpate.bench.experiments.tables import parse
+from palpate.bench.tables import parse
 from palpate.cli import main
 from palpate.logs.store import read_record
 from palpate.report.excitation.table import percent
@@ -186,6 +186,9 @@ BAD = [
     (("--kind", "step"), "unknown excitation 'step'"),
     (("--criterion", "G"), "unknown criterion 'G'"),
     (("--noise", "0"), "noise of a force chain must be above 0"),
+    (("--noise", "1e308"), "no robot has such a force"),
+    (("--drive", "1e308"), "no robot has such a force"),
+    (("--rate", "1.8e308"), "must be a finite number"),
     (("--sampling", "0"), "--sampling must be between 1 and 200000 Hz"),
     (("--sampling", "4.5"), "sampling"),
     (("--rate", "-1000"), "--rate must be between 1 and 200000 Hz"),

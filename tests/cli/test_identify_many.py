@@ -12,7 +12,7 @@ from cli import asked
 from identification.synthetic_contacts import pressed
 from palpate.cli import main
 from palpate.cli._one_log import OneLog
-from palpate.logs.gathered import gathered, is_folder_of_logs, log_of
+from palpate.logs.gathered import gather_logs, is_folder_of_logs, log_of
 
 OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
 
@@ -153,9 +153,9 @@ def test_a_bag_s_own_folder_is_one_log(presses):
     (bag / "metadata.yaml").write_text("rosbag2_bagfile_information:")
     (presses / "sub").mkdir()
     (presses / ".hidden.csv").write_text("")
-    names = [path.name for path in gathered([presses])]
+    names = [path.name for path in gather_logs([presses])]
     assert names == ["bag", "press_2.csv", "press_9.csv", "press_10.csv"]
-    assert gathered([bag]) == (bag,)
+    assert gather_logs([bag]) == (bag,)
 
 
 def test_the_folder_of_a_run_is_one_log(tmp_path):
@@ -166,7 +166,7 @@ def test_the_folder_of_a_run_is_one_log(tmp_path):
             (tmp_path / name / file).touch()
     records = tuple(tmp_path / name / "record.parquet" for name in ("run-1", "run-2"))
     assert log_of(tmp_path / "run-1") == records[0]
-    assert gathered([tmp_path]) == records
+    assert gather_logs([tmp_path]) == records
     assert not is_folder_of_logs(tmp_path / "run-1")
     (tmp_path / "run-1" / "summary.json").unlink()
     assert is_folder_of_logs(tmp_path / "run-1")

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from palpate.bench.experiments.tables import load
+from palpate.bench.tables import load
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.plugins import consent, permit, plugin

@@ -19,7 +19,7 @@ from cli.asked import References
 from palpate.bench import bench as running
 from palpate.bench import names, simulation, source
 from palpate.bench.any_experiment import FILES as EXPERIMENTS
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS
 from palpate.cli import main
 from palpate.logs import read_record
 

@@ -6,9 +6,8 @@ from itertools import count
 import pytest
 
 from palpate.bench import build, load, speed
-from palpate.bench.experiments.tables import changed
-from palpate.bench.row import COLUMNS
-from palpate.bench.sequence import CONTACT
+from palpate.bench.sequence import COLUMNS, CONTACT
+from palpate.bench.tables import changed
 from palpate.cli import main
 
 

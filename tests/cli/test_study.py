@@ -14,7 +14,7 @@ import pytest
 from cli import asked
 from cli.asked import References
 from palpate.cli import main
-from palpate.studies.definition.study import names
+from palpate.studies.study import names
 from studies.small import NEAR, SMALL, text
 
 MANY = SMALL.replace("points = 3", "points = 60")

@@ -8,7 +8,7 @@ import pytest
 from contact_frame.synthetic_arm import any_world
 from contact_frame.synthetic_arm import log_of as press_of
 from palpate.contact_frame import ContactFrame, identify_contact
-from palpate.contact_frame.free_motion.inertia import free_inertia
+from palpate.contact_frame.free_motion import free_inertia
 from palpate.records import Record
 
 
@@ -69,5 +69,5 @@ def test_a_wrong_sign_is_named_and_damping_refused(left, named):
     assert bool(said) is (left != 0.0)  # a tool's own mass is told too, and taken out
     assert ("wrong sign" in found.parameters["B"].reason) is named
     assert found.parameters["K"].value == pytest.approx(5000, rel=0.05)
-    value, std = along.meta["contact_frame"]["air_inertia_kg"]
+    value, std = along.meta["contact_frame"]["free_inertia_kg"]
     assert abs(value - left) < 4 * std

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.synthetic_contacts import pressed, shaken
-from palpate.contact_frame.free_motion.level import free_level
+from palpate.contact_frame.free_motion import free_level
 
 TIME = np.arange(4000) / 1000
 DEPTH = 1e-3 * np.sin(7 * TIME)

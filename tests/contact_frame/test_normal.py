@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.contact_frame.normal import Normal, across_per_along, direction_of, scale_std
+from palpate.contact_frame.load import Normal, across_per_along, direction_of, scale_std
 
 TRIALS = 300
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.contact_frame.saturation import saturated_rows
+from palpate.contact_frame.signals_in_base import saturated_rows
 
 TIME = np.arange(1000) / 1000
 PLACE = np.column_stack([0 * TIME, 0 * TIME, np.sin(4 * TIME)])

@@ -8,7 +8,7 @@ from palpate.bench import build, changed
 from palpate.checks import controllers as laws
 from palpate.checks.controllers import TICK, WALL
 from palpate.controllers import ControllerTable
-from palpate.signals.tables import example, kinds
+from palpate.signals.types import example, kinds
 
 each = pytest.mark.parametrize(
     "table", [example(kind) for kind in kinds(ControllerTable)], ids=lambda t: t.__struct_config__.tag
@@ -24,14 +24,14 @@ def test_it_is_known_by_its_word_and_says_what_it_is(table):
 @each
 @pytest.mark.parametrize("law", laws.IN_PLAIN, ids=lambda law: law.__name__)
 def test_it_obeys_the_laws_that_users_run_on_theirs(table, law):
-    law(table.made(TICK, WALL))
+    law(table.build(TICK, WALL))
 
 
 @pytest.mark.long
 @each
 @pytest.mark.parametrize("law", laws.LAWS[len(laws.IN_PLAIN) :], ids=lambda law: law.__name__)
 def test_it_obeys_those_that_compile_it(table, law):
-    law(table.made(TICK, WALL))
+    law(table.build(TICK, WALL))
 
 
 @each

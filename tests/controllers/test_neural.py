@@ -11,8 +11,7 @@ from palpate.controllers import Hybrid, Neural, join
 from palpate.errors import InputError
 from palpate.networks import Perceptron, layers_of, network, random_layers
 from palpate.robots.arm3 import Arm3
-from palpate.signals.parameters import alike
-from palpate.signals.types import Sense, Task
+from palpate.signals.types import Sense, Task, alike
 
 ALONG_X = Vec3(1.0, 0.0, 0.0)
 replaced = msgspec.structs.replace

@@ -7,14 +7,7 @@ from hypothesis import strategies as st
 
 from palpate.checks import surfaces as laws
 from palpate.checks.surfaces import DT, press, recover
-from palpate.environments import (
-    HuntCrossley,
-    KelvinVoigt,
-    StandardLinearSolid,
-    SurfaceState,
-    join,
-    touch,
-)
+from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, SurfaceState, join, touch
 from palpate.environments.surface import alone, members
 
 SURFACES = {

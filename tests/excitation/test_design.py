@@ -18,9 +18,9 @@ from palpate.excitation import (
     design,
     remedies,
 )
-from palpate.excitation.fisher_information import ForceChain
 from palpate.excitation.multisine import PERIOD
-from palpate.references.waves import Chirp, Multisine
+from palpate.excitation.spectra import ForceChain
+from palpate.references import Chirp, Multisine
 
 RANGE = SurfaceRange((3000.0, 8000.0), (50.0, 300.0), (0.1, 0.3))
 KNOWN = SurfaceRange((5200.0, 5200.0), (200.0, 200.0), (0.1, 0.1))

@@ -9,7 +9,7 @@ from palpate.bench import build, changed, load
 from palpate.errors import InputError
 from palpate.excitation import HybridLoop, KnownBandwidth, Surface
 from palpate.excitation.force_loops import contact_force
-from palpate.excitation.phases import low_peak
+from palpate.excitation.multisine import low_peak
 
 RUBBER = Surface(34500.0, 480.0, 0.05)
 OMEGA = 2 * np.pi * np.array([0.5, 5.0, 40.0])

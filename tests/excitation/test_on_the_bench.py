@@ -7,7 +7,7 @@ import pytest
 
 import palpate
 from palpate.bench import build
-from palpate.bench.experiments.tables import changed, parse
+from palpate.bench.tables import changed, parse
 from palpate.excitation import Budget, Problem, SurfaceRange, design
 from palpate.records import Record
 from palpate.report.excitation.files import experiment

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.excitation.phases import low_peak, schroeder, summed
-from palpate.references.waves import Multisine
+from palpate.excitation.multisine import low_peak, schroeder, sum_of_sines
+from palpate.references import Multisine
 
 
 def crest(amplitudes, harmonics, phases):
-    signal = summed(amplitudes * np.exp(1j * phases), harmonics, 64)
+    signal = sum_of_sines(amplitudes * np.exp(1j * phases), harmonics, 64)
     return np.abs(signal).max() / np.sqrt((amplitudes**2).sum() / 2)
 
 
 def test_the_sum_is_that_of_the_reference():
     harmonics, amplitudes, phases = np.array([1, 4, 7]), np.array([1.0, 0.5, 2.0]), np.array([0.3, -1.0, 2.0])
-    signal = summed(amplitudes * np.exp(1j * phases), harmonics)
+    signal = sum_of_sines(amplitudes * np.exp(1j * phases), harmonics)
     time = np.arange(len(signal)) / len(signal)
     wave = Multisine(tuple(harmonics.astype(float)), tuple(amplitudes), tuple(phases))
     assert signal == pytest.approx(wave.at(time), abs=1e-12)

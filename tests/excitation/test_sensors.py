@@ -7,9 +7,8 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.excitation import Sensors, Surface
-from palpate.excitation.fisher_information import ForceChain, bound
-from palpate.excitation.sensors import LAG_UNIT
-from palpate.excitation.spectra import covariance
+from palpate.excitation.problem import LAG_UNIT
+from palpate.excitation.spectra import ForceChain, covariance, cramer_rao_bound
 
 FOAM = Surface(5200.0, 200.0, 0.1)
 
@@ -27,7 +26,7 @@ def test_it_is_that_of_the_samples_of_the_same_motion():
     phasors = force / FOAM.impedance(omega)
     x = 3e-3 + np.imag(np.exp(1j * np.multiply.outer(t, omega)) @ phasors)
     truth = dict(zip("KBM", FOAM.values, strict=True))
-    std = bound(t, x, truth, chain, known={"lag": 1e-4}).std
+    std = cramer_rao_bound(t, x, truth, chain, known={"lag": 1e-4}).std
     expected = [std[0] / 5200.0, std[1] / 200.0, std[2] / 0.1]
     # The ends of the motion, and the offset that the samples must find as well, cost a little.
     assert relative[:3] == pytest.approx(expected, rel=0.02)

@@ -28,7 +28,7 @@ def arm_mjcf(folder: Path, name: str) -> Path:
     import mujoco
 
     from palpate.robots import SerialArm
-    from palpate.robots.serial.to_mujoco import mjcf as arm_of
+    from palpate.robots.serial.serial_arm import mjcf as arm_of
 
     arm = SerialArm.named(name)
     place = arm.forward_kinematics(arm.home)

@@ -17,7 +17,7 @@ def exported(folder, to, model=None, K=5000.0, B=50.0, M=None, probe=None, name=
     request = Request(to, model, "foam", probe)
     out = folder / f"{name}{model.suffix if model else '.sdf'}"
     made = prepare(contact, request, out)
-    written = made.commented("Made by palpate")
+    written = made.with_comment("Made by palpate")
     out.write_text(text(written) if text else written)
     made.validate(out)
     return made, made.check(out)
@@ -67,7 +67,7 @@ def test_what_everyone_writes_is_refused_by_the_check(tmp_path):
 
     _, (checked,) = exported(tmp_path, "mujoco", scenes.mjcf(tmp_path), text=naive)
     assert checked.error_K > 0.5
-    assert not checked.passed
+    assert not checked.within_tolerance
 
 
 def test_an_export_for_one_mass_fails_under_another(tmp_path):
@@ -95,7 +95,7 @@ def test_an_unstable_time_step_is_named_and_fails(tmp_path):
     scene = scenes.mjcf(tmp_path, mass=0.01, options='cone="elliptic" timestep="0.005"')
     made, (checked,) = exported(tmp_path, "mujoco", scene, K=5e4)
     assert any("unstable" in note for note in made.notes)
-    assert not checked.passed
+    assert not checked.within_tolerance
 
 
 @pytest.mark.parametrize("mass", [0.5, pytest.param(8.0, marks=pytest.mark.long)])
@@ -125,7 +125,7 @@ def test_drake_replaces_what_was_said_of_the_contact_and_keeps_the_rest(tmp_path
     assert "<!-- ours -->" in made.text
     assert "hydroelastic" not in made.text
     assert made.text.count("relaxation_time>") == 4
-    assert checked.passed
+    assert checked.within_tolerance
 
 
 def test_drake_fails_where_the_probe_is_left_as_it_was(tmp_path):
@@ -136,7 +136,7 @@ def test_drake_fails_where_the_probe_is_left_as_it_was(tmp_path):
         return head + tail.partition("</drake:proximity_properties>")[2]
 
     _, (checked,) = exported(tmp_path, "drake", scenes.sdf(tmp_path), text=one_sided)
-    assert not checked.passed
+    assert not checked.within_tolerance
 
 
 def test_a_plate_on_a_spring(tmp_path):
@@ -147,7 +147,7 @@ def test_a_plate_on_a_spring(tmp_path):
 def test_newton_has_both_shapes_and_says_where_its_damper_works(tmp_path):
     made = prepare(contact_from(scenes.found(), "f"), Request("newton"), tmp_path / "out.py")
     names = {}
-    exec(made.commented("Made by palpate"), names)
+    exec(made.with_comment("Made by palpate"), names)
     builder = type(
         "Builder", (), {"shape_material_ke": [0.0, 0.0, 1.0], "shape_material_kd": [0.0, 0.0, 1.0]}
     )

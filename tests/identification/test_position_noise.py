@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.identification.filters.position_noise import NOISELESS, PositionNoise, position_noise
-from palpate.signals.quantise import quantise
+from palpate.signals.samples import quantise
 
 SAMPLES = 6000
 TIME = np.arange(SAMPLES) / 1000

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from palpate.errors import InputError
 from palpate.identifiers import ContactIdentifier, RecursiveLeastSquares
 from palpate.identifiers.contact_identifier import NAMES
-from palpate.identifiers.kernels.sample_clock import UNSET, sampled_at
-from palpate.signals.low_pass import LowPass
-from palpate.signals.taps import read, taps
+from palpate.identifiers.kernels.contact_stream import UNSET, sampled_at
+from palpate.signals.low_pass import LowPass, read, taps
 
 RATE = 1000.0
 SENSOR = LowPass.parse("butterworth3:120")

@@ -8,10 +8,16 @@ from hypothesis import strategies as st
 from palpate._vector import Mat3, Vec3
 from palpate.errors import InputError
 from palpate.identifiers import RecursiveLeastSquares
-from palpate.identifiers.forgetting import Directional, Exponential, SIFt
+from palpate.identifiers.estimator import Directional, Exponential, SIFt
 from palpate.identifiers.kernels.dimension import Three
-from palpate.identifiers.kernels.error_covariance import ErrorCovariance, long_run_variance, unsure
-from palpate.identifiers.kernels.least_squares import LeastSquares, learned, rls
+from palpate.identifiers.kernels.least_squares import (
+    ErrorCovariance,
+    LeastSquares,
+    learn_sample,
+    long_run_variance,
+    rls,
+    unsure,
+)
 
 SIZES = [3, 4, 5]  # three and four parameters go by value, other numbers by array
 
@@ -122,7 +128,7 @@ def test_laws_mean_the_same_on_values_and_arrays(n, policy):
     S, doubt, floor = 100.0 * np.eye(n), unsure(theta, 100.0 * np.eye(n), np.eye(n)), np.full(n, 1e-4)
     for regressor, force in zip(phi, y, strict=True):
         S, _ = policy.forget(S, regressor, floor)
-        theta, S, doubt, _, _ = learned(theta, S, doubt, regressor, force, policy.keep, NumPy(n))
+        theta, S, doubt, _, _ = learn_sample(theta, S, doubt, regressor, force, policy.keep, NumPy(n))
     np.testing.assert_allclose(estimator.theta, theta, rtol=1e-9)
     np.testing.assert_allclose(estimator.covariance, S @ S.T, rtol=1e-8, atol=1e-12 * (S @ S.T).max())
     np.testing.assert_allclose(estimator.estimate().covariance, doubt.covariance(n), rtol=1e-7)
@@ -169,8 +175,8 @@ def test_vectors_and_arrays_agree_in_each_law(theta, phi, rows, y, keep):
         0.1 * root, 0.5 * root, root @ root.T, root @ root.T, np.array(phi), 5.0, 4.0, 3.0, 2.0, 1.0, 99.0
     )
     same = ErrorCovariance(*map(by_hand, doubt[:4]), Vec3(*phi), *doubt[5:])
-    by_array = learned(np.array(theta), root, doubt, np.array(phi), y, keep, NumPy(3))
-    by_value = learned(Vec3(*theta), by_hand(root), same, Vec3(*phi), y, keep, Three())
+    by_array = learn_sample(np.array(theta), root, doubt, np.array(phi), y, keep, NumPy(3))
+    by_value = learn_sample(Vec3(*theta), by_hand(root), same, Vec3(*phi), y, keep, Three())
     for ours, theirs in zip(
         by_value[:2] + by_value[2] + by_value[3:], by_array[:2] + by_array[2] + by_array[3:], strict=True
     ):

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate._vector import outer, solve
-from palpate.identifiers.kernels.any_size import eliminated
-from palpate.identifiers.kernels.dimension import AnyNumber, Four, Three, size_of
+from palpate.identifiers.kernels.dimension import AnyNumber, Four, Three, eliminate, size_of
 
 KINDS = [Three(), Four(), AnyNumber(3), AnyNumber(4), AnyNumber(6)]
 kinds = pytest.mark.parametrize("size", KINDS, ids=str)
@@ -69,7 +68,7 @@ def test_elimination_solves_whatever_the_pivots(n, seed, sparse):
     A, b = random.standard_normal((n, n)) + 0.1 * np.eye(n), random.standard_normal(n)
     if sparse:  # zeros on the diagonal: there is no going on without a swap
         A = random.permutation(np.eye(n)) * random.uniform(0.1, 10.0, n)
-    x = eliminated(A.copy(), b.copy())
+    x = eliminate(A.copy(), b.copy())
     np.testing.assert_allclose(A @ x, b, rtol=1e-7, atol=1e-9 * np.linalg.cond(A))
 
 

@@ -8,8 +8,7 @@ import pytest
 
 from palpate._jit import kernel
 from palpate.errors import InputError
-from palpate.instruments import ForceSensor, force_sensor
-from palpate.instruments.converter import Converter
+from palpate.instruments import Converter, ForceSensor, force_sensor
 from palpate.signals.filters import butterworth3, lowpass2
 
 

@@ -8,10 +8,9 @@ import headless
 import numpy as np
 import pytest
 
-from palpate.bench.experiments.tables import changed, load
-from palpate.live.feed import Feed
-from palpate.live.player import Player
-from palpate.live.server import served
+from palpate.bench.tables import changed, load
+from palpate.live.player import Feed, Player
+from palpate.live.server import serve
 from palpate.live.simulation import Simulation
 from palpate.live.view import AT, COLUMNS
 
@@ -86,7 +85,7 @@ def playing(source):
         clients.append(Stream(address, **options))
         return clients[-1]
 
-    with Player(source, Feed()) as player, served(player) as address:
+    with Player(source, Feed()) as player, serve(player) as address:
         try:
             yield player, address, client
         finally:

@@ -10,11 +10,10 @@ import pytest
 
 from live.conftest import PATIENCE, near, playing
 from live.test_server import Clock
-from palpate.live.of_log import restarted
 from palpate.live.pressing import PressingArm
-from palpate.live.replay import Replay, Signals
+from palpate.live.recorded_run import clear_at_restarts
 from palpate.live.simulation import Simulation
-from palpate.live.view import View
+from palpate.live.view import Replay, ReplayedSignals, View
 
 MS = 1000 * PATIENCE
 by_the_clock = pytest.mark.flaky(reruns=2, reruns_delay=2)
@@ -216,11 +215,14 @@ def test_an_arm_in_space_is_drawn_and_seen_from_elsewhere(browser):
 
 def test_a_log_shows_what_it_has_and_nothing_else(browser):
     t = np.arange(2000) / 1000.0
-    columns, notes = restarted({"t": t, "measured": np.sin(9 * t), "depth": t})
+    columns, notes = clear_at_restarts({"t": t, "measured": np.sin(9 * t), "depth": t})
     view = View(
         title="log", about="", kind="replay", rate=0.0, notes=notes, units={"depth": "mm", "measured": "N"}
     )
-    with playing(Replay(view, Signals(columns))) as (_, address, _client), opened(browser, address) as page:
+    with (
+        playing(Replay(view, ReplayedSignals(columns))) as (_, address, _client),
+        opened(browser, address) as page,
+    ):
         until(page, "palpate.live.rows > 100")
         assert page.locator("#charts h3").all_text_contents() == ["Force", "Position"]
         assert not page.locator("#stiffness").is_visible()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.live.feed import Feed
+from palpate.live.player import Feed
 from palpate.live.view import COLUMNS
 
 

@@ -13,8 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from live.conftest import PATIENCE, playing
 from live.test_server import Clock
 from palpate.errors import InputError
-from palpate.live.feed import Feed
-from palpate.live.player import Player
+from palpate.live.player import Feed, Player
 
 foxglove = pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
 PROTOCOL = "foxglove.sdk.v1"
@@ -87,7 +86,7 @@ def test_a_viewer_with_the_address_is_served(address, origin):
 
 def test_an_arm_is_a_scene_of_lines():
     """As Foxglove's own library encodes it: an arm and a surface, in SI."""
-    from palpate.bench.experiments.tables import load
+    from palpate.bench.tables import load
     from palpate.live.foxglove import viewers
     from palpate.live.simulation import Simulation
 

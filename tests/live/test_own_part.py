@@ -3,7 +3,7 @@
 import pytest
 
 from palpate.bench import load
-from palpate.bench.experiments.tables import changed
+from palpate.bench.tables import changed
 from palpate.live.simulation import sliders_of
 
 pytestmark = pytest.mark.usefixtures("permitted")

@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.live.of_log import restarted
-from palpate.live.replay import Replay, Signals
-from palpate.live.view import AT, STRIDE, View
+from palpate.live.recorded_run import clear_at_restarts
+from palpate.live.view import AT, STRIDE, Replay, ReplayedSignals, View
 
 VIEW = View(title="log", about="", kind="replay", rate=0.0)
 
 
 def signals(n=2000, rate=1000.0, **more):
     t = 5.0 + np.arange(n) / rate
-    return Signals({"t": t, "measured": np.sin(40 * t), "depth": t, **more})
+    return ReplayedSignals({"t": t, "measured": np.sin(40 * t), "depth": t, **more})
 
 
 def played(replay, seconds, step=0.01):
@@ -53,10 +52,10 @@ def test_the_ends_of_the_measured_force_are_not_lost():
     own = signals(n=20000)
     own.columns["measured"][12345] = 9.0
     own.columns["measured"][17777] = -9.0
-    rows = np.concatenate([Replay(VIEW, Signals(own.columns)).advance(100.0)])
+    rows = np.concatenate([Replay(VIEW, ReplayedSignals(own.columns)).advance(100.0)])
     assert rows[:, AT["measured"]].max() == 9.0 or rows[:, AT["measured"]].min() == -9.0
     shifted = {name: values[5:] for name, values in own.columns.items()}
-    other = Replay(VIEW, Signals(shifted)).advance(100.0)[:, AT["measured"]]
+    other = Replay(VIEW, ReplayedSignals(shifted)).advance(100.0)[:, AT["measured"]]
     assert {9.0, -9.0} & {
         rows[:, AT["measured"]].max(),
         other.max(),
@@ -72,7 +71,7 @@ def test_a_slow_log_keeps_all_its_rows():
 
 def test_rows_whose_time_does_not_grow_are_left_out_and_counted():
     t = np.array([0.0, 1.0, 1.0, np.nan, 0.5, 2.0])
-    kept, notes = restarted({"t": t, "measured": np.arange(6.0)})
+    kept, notes = clear_at_restarts({"t": t, "measured": np.arange(6.0)})
     assert kept["t"].tolist() == [0.0, 1.0, 2.0]
     assert kept["measured"].tolist() == [0.0, 1.0, 5.0]
     assert notes == ("3 rows are left out: their time does not grow.",)
@@ -81,7 +80,7 @@ def test_rows_whose_time_does_not_grow_are_left_out_and_counted():
 @pytest.mark.parametrize("t", [[], [1.0, 2.0], [0.0, 1.0, 1.0, 2.0], [0.0, 2.0, 1.0]])
 def test_nothing_to_play_is_said(t):
     with pytest.raises(InputError, match=r"nothing to show|do not grow"):
-        Replay(VIEW, Signals({"t": np.array(t), "measured": np.ones(len(t))}))
+        Replay(VIEW, ReplayedSignals({"t": np.array(t), "measured": np.ones(len(t))}))
 
 
 def test_what_was_measured_does_not_change():

@@ -11,9 +11,8 @@ import pytest
 
 from live.conftest import PATIENCE, Stream, playing
 from palpate.errors import InputError
-from palpate.live.feed import Feed
-from palpate.live.player import Player
-from palpate.live.server import READERS, served
+from palpate.live.player import Feed, Player
+from palpate.live.server import READERS, serve
 from palpate.live.view import AT, COLUMNS, State, View
 
 
@@ -211,7 +210,7 @@ def test_a_page_that_comes_back_gets_the_seconds_that_it_missed():
 
 def test_a_slow_reader_loses_rows_not_memory():
     source = Clock()
-    with Player(source, feed := Feed(rows=400)) as player, served(player) as address:
+    with Player(source, feed := Feed(rows=400)) as player, serve(player) as address:
         parts = urlsplit(str(address))
         slow = socket.create_connection((parts.hostname, parts.port), timeout=PATIENCE)
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
@@ -250,13 +249,13 @@ def test_a_port_in_use_is_said_in_a_line():
         with (
             Player(Clock(), Feed()) as player,
             pytest.raises(InputError, match=f"port {port} is in use"),
-            served(player, port),
+            serve(player, port),
         ):
             pass
     with (
         Player(Clock(), Feed()) as player,
         pytest.raises(InputError, match="0 to 65535"),
-        served(player, 70000),
+        serve(player, 70000),
     ):
         pass
 
@@ -294,7 +293,7 @@ def test_threads_end_with_the_block():
 def test_a_shared_page_is_steered_by_the_first_alone():
     """On the loopback's second address, which stands for one on a network."""
     player = Player(Clock(), Feed())
-    with player, served(player, host="127.0.0.2") as address:
+    with player, serve(player, host="127.0.0.2") as address:
         assert str(address).startswith("http://127.0.0.2:")
         assert asked(address)[0] == 200
         assert asked(address, Host="palpate.example")[0] == 403
@@ -311,7 +310,7 @@ def test_a_shared_page_is_steered_by_the_first_alone():
 
 
 def test_the_qr_code_is_that_of_the_address():
-    from palpate.live.sharing import qr_code
+    from palpate.live.server import qr_code
 
     drawn = qr_code("http://192.168.0.10:8080/token/").splitlines()
     assert len(drawn) > 10

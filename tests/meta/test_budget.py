@@ -20,25 +20,23 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=601, lines=73526, tokens=489065),
-    "packages/palpate-thesis/src/palpate_thesis": Weight(files=67, lines=10585, tokens=80850),
+    "src/palpate": Weight(files=490, lines=73206, tokens=488039),
+    "packages/palpate-thesis/src/palpate_thesis": Weight(files=67, lines=10575, tokens=80801),
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 414, 148
+PARTICIPLES, SHORT_DOCSTRINGS = 248, 75
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 TWICE = frozenset(
     {
-        "Answer", "Arm", "ArmOptions", "Bound", "Budget", "Call", "Cautious", "Cell", "Chain", "Channel",
-        "Choice", "Claim", "Command", "Comparison", "Compensation", "Course", "Curve", "Data", "Entry",
-        "FirstSeconds", "Fit", "Fitted", "ForceLoop", "ForceSensor", "Found", "Head", "Identification",
-        "Inside", "Job", "Joint", "Journal", "Kernel", "Limits", "Line", "Look", "Margins", "Mean",
-        "Motion", "Noise", "OneDirection", "Outcome", "OutputOptions", "Pair", "Parameter", "Part",
-        "Payload", "Plan", "PositionNoise", "Prediction", "Press", "Pressed", "Problem", "Raw", "Result",
-        "Robot", "Rows", "Runner", "Scene", "Search", "Seen", "Sense", "Server", "Setting", "Signals",
-        "Simulation", "Source", "Spectrum", "Stage", "State", "Step", "Study", "Surface", "SurfaceOptions",
-        "System", "Table", "Task", "Touch", "Verdict", "Watch", "Wire", "World", "Written", "_Asked",
-        "_Log", "_Rows",
+        "Answer", "Arm", "ArmOptions", "Bound", "Budget", "Cautious", "Cell", "Chain", "Channel", "Choice",
+        "Claim", "Command", "Compensation", "Course", "Curve", "Data", "Entry", "FirstSeconds", "Fit",
+        "ForceLoop", "ForceSensor", "Found", "Head", "Identification", "Inside", "Kernel", "Limits", "Line",
+        "Look", "Margins", "OneDirection", "Outcome", "OutputOptions", "Pair", "Parameter", "Part", "Payload",
+        "Plan", "Prediction", "Press", "Pressed", "Problem", "Raw", "Result", "Robot", "Search", "Seen",
+        "Sense", "Server", "Setting", "Simulation", "Spectrum", "Stage", "State", "Step", "Study", "Surface",
+        "SurfaceOptions", "Table", "Task", "Touch", "Verdict", "Wire", "World", "Written", "_Asked", "_Log",
+        "_Rows",
     }
 )  # fmt: skip
 """Class names that stand for two things. None is added; whoever renames one takes it off."""

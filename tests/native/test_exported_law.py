@@ -2,13 +2,15 @@
 
 import dataclasses
 import json
+import math
 import shutil
 import subprocess
 
 import numpy as np
 import pytest
 
-from palpate._jit import law
+from palpate._jit import kernel, law
+from palpate._jit.elementary import log
 from palpate.cli import main
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
@@ -202,3 +204,135 @@ def test_the_program_reads_arrays_and_numbers_in_their_order(squares):
     text = program(squares.module, squares.recording.inputs)
     assert "palpate_squares_update(gains, &state, &in[0], in[3])" in text
     assert np.isnan(next(iter(squares.recording.presses(4000, 1)))[:, 1:4]).any()
+
+
+CROSS = ("aarch64-linux-gnu-gcc", "qemu-aarch64-static")
+
+
+@pytest.mark.skipif(
+    any(shutil.which(name) is None for name in CROSS), reason="there is no cross compiler for aarch64"
+)
+@pytest.mark.parametrize("name", ["force", "squares"])
+def test_no_tick_differs_on_aarch64(name, request, tmp_path):
+    exported = request.getfixturevalue(name)
+    exported.write(tmp_path / "law", "0", replace=False)
+    own = f"{exported.module.name}.c"
+    build = [CROSS[0], "-std=c99", "-O3", "-ffp-contract=off", "-static", "-I.", own, "test/replay.c", "-lm"]
+    subprocess.run([*build, "-o", "r"], cwd=tmp_path / "law", check=True)
+    run = [CROSS[1], "r", "test/press.bin"]
+    done = subprocess.run(run, cwd=tmp_path / "law", capture_output=True, text=True, check=False)
+    assert done.stdout == "ticks 2000 unequal 0\n"
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        ("grows", "test_exported_law.py:"),
+        ("joins", "a law, or abs"),
+        ("raises_to", "** 0.5 for a root"),
+        ("prints_into", "a number or a truth"),
+        ("walks_over", "count with range"),
+    ],
+)
+def test_a_law_outside_the_subset_is_refused_with_file_line_and_remedy(function, says):
+    from numba import types
+
+    from palpate.native.source import OutsideSubset
+    from palpate.native.translation import Translation
+
+    with pytest.raises(OutsideSubset, match=r"test_exported_law\.py:\d+: ") as refusal:
+        Translation("palpate_test").function(globals()[function], (types.float64,))
+    assert says in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+@law
+def grows(x):
+    """A law with a list."""
+    values = [x, x]
+    return values[0]
+
+
+@law
+def joins(x):
+    """A law with a function that compilers compute differently."""
+    return np.tan(x)
+
+
+@law
+def raises_to(x):
+    """A law with a general power."""
+    return x**1.7
+
+
+@law
+def prints_into(x):
+    """A law with a text."""
+    unit = "N"
+    return x if len(unit) > 0 else 0.0
+
+
+@law
+def walks_over(x):
+    """A law with a loop over a tuple."""
+    total = 0.0
+    for y in (x, x):
+        total += y
+    return total
+
+
+@needs_compiler
+def test_the_operators_of_python_are_those_of_c(tmp_path):
+    """Remainder, quotient and extremes of Python by numbers of either sign, zeros and numbers that are none."""
+    from palpate.native.translation import HELPERS
+
+    values = [0.0, -0.0, 1.0, -1.0, 2.5, -7.5, 1e300, -1e-300, 3.0, float("inf"), float("-inf"), float("nan")]
+    compiled = {"modulo": remainder, "floored": quotient, "larger": larger, "smaller": smaller}
+    cases = [(name, a, b) for name in compiled for a in values for b in values]
+    calls = "".join(f'    printf("%a\\n", {name}({spelled(a)}, {spelled(b)}));\n' for name, a, b in cases)
+    functions = "".join(f"static double {name}{HELPERS[name, 'double']}\n" for name in compiled)
+    text = f"#include <math.h>\n#include <stdio.h>\n{functions}int main(void) {{\n{calls}    return 0;\n}}\n"
+    (tmp_path / "operators.c").write_text(text)
+    words = ["cc", "-std=c99", "-ffp-contract=off", "operators.c", "-lm", "-o", "operators"]
+    subprocess.run(words, cwd=tmp_path, check=True)
+    lines = subprocess.run(
+        [tmp_path / "operators"], capture_output=True, text=True, check=True
+    ).stdout.split()
+    for (name, a, b), line in zip(cases, lines, strict=True):
+        ours, theirs = compiled[name](a, b), float("nan") if "nan" in line else float.fromhex(line)
+        assert ours.hex() == theirs.hex() or (ours != ours and theirs != theirs), (name, a, b)
+
+
+def spelled(x):
+    return "NAN" if x != x else ("-" if x < 0.0 else "") + "INFINITY" if abs(x) == float("inf") else repr(x)
+
+
+@kernel
+def remainder(a, b):
+    return a % b
+
+
+@kernel
+def quotient(a, b):
+    return a // b
+
+
+@kernel
+def larger(a, b):
+    return max(a, b)
+
+
+@kernel
+def smaller(a, b):
+    return min(a, b)
+
+
+def test_the_logarithm_of_both_languages_is_right_to_a_unit_in_the_last_place():
+    numbers = np.concatenate([10.0 ** np.linspace(-320.0, 308.0, 4001), 1.0 + np.linspace(-0.3, 0.5, 4001)])
+    for x in numbers.tolist():
+        assert abs(log(x) - math.log(x)) <= math.ulp(math.log(x)), x
+    assert log(0.0) == -math.inf
+    assert log(math.inf) == math.inf
+    assert log(1.0) == 0.0
+    assert math.isnan(log(-1.0))
+    assert math.isnan(log(math.nan))

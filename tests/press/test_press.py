@@ -311,7 +311,7 @@ def test_a_force_that_the_motors_cannot_give():
 #: A user's model: position servos, a gripper, damping, a floor in the way, a keyframe, and no site.
 def cell(damping=0.0):
     from palpate.robots import SerialArm
-    from palpate.robots.serial.to_mujoco import mjcf
+    from palpate.robots.serial.serial_arm import mjcf
 
     arm = SerialArm.named("iiwa14")
     text = mjcf(arm).replace('armature="0.1"', f'armature="0.1" damping="{damping}"')

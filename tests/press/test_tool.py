@@ -46,7 +46,7 @@ def test_the_arms_mass_is_that_of_both():
     """By MuJoCo, in which the tool is a body of its own."""
     import mujoco
 
-    from palpate.robots.serial.to_mujoco import mjcf
+    from palpate.robots.serial.serial_arm import mjcf
 
     arm = SerialArm.named("panda")
     spec = mujoco.MjSpec.from_string(mjcf(arm))
@@ -156,7 +156,7 @@ def test_a_sensor_that_meets_the_end_of_its_scale_under_way_is_named():
 def test_a_tool_that_is_too_heavy_and_a_model_that_is_mujocos_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"takes \S+ N m of"):
         pressing(changed(mass=40.0))
-    from palpate.robots.serial.to_mujoco import mjcf
+    from palpate.robots.serial.serial_arm import mjcf
 
     path = tmp_path / "cell.xml"
     path.write_text(mjcf(SerialArm.named("iiwa14")))

@@ -6,8 +6,8 @@ import pytest
 
 from opened_pages import open_page
 from palpate.cli import main
-from palpate.studies.findings.summary import present
-from palpate.studies.running.run_study import Work
+from palpate.studies.run_study import Work
+from palpate.studies.summary import present
 from studies.small import Formula, planned, text
 
 EXCITE = (
@@ -70,7 +70,7 @@ def test_curves_of_a_study_are_read_with_their_range_and_zoomed_together(browser
         tail='[[curves]]\nx = "controller.ki"\nmetric = "force_rms"\npanels = "surface.stiffness"',
     )
     study, runner = planned(source), Formula(lambda at: at["controller.ki"] + at["surface.damping"])
-    frame = Work(study, source, tmp_path, runner).done(replace=False)
+    frame = Work(study, source, tmp_path, runner).run(replace=False)
     present(frame, study, tmp_path, source, "palpate study T")
     with open_page(browser, tmp_path / "report.html", viewport={"width": 1400, "height": 900}) as page:
         plots = page.locator(".panel .plot")

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from palpate._jit import kernel
 from palpate._vector import Vec3
-from palpate.signals.quantise import quantise, whole
+from palpate.signals.samples import quantise, whole
 
 reasonable = st.floats(-1e12, 1e12)
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate.signals.runs import runs
+from palpate.signals.samples import runs
 
 
 @given(st.lists(st.booleans(), max_size=30))

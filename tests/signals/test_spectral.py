@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 from scipy.fft import next_fast_len
 
-from palpate.signals.spectral import convolve, detrend, periodogram, quadrature
+from palpate.signals.samples import convolve, detrend, periodogram, quadrature
 
 LENGTHS = (3, 16, 101, 4097)
 """Even, odd, below and above the length of a direct convolution."""

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from palpate.signals.low_pass import LowPass
-from palpate.signals.taps import FRACTIONS, read, taps
+from palpate.signals.low_pass import FRACTIONS, LowPass, read, taps
 
 DT = 1e-3
 SENSOR = LowPass(((3, 120.0),))

@@ -2,9 +2,9 @@
 
 import msgspec
 
-from palpate.studies.definition.plan import plan
-from palpate.studies.definition.study import parse
-from palpate.studies.running.run_one import Row
+from palpate.studies.plan import plan
+from palpate.studies.run_one import Row
+from palpate.studies.study import parse
 
 NEAR = """
 [fixed]

@@ -16,12 +16,10 @@ from distributed import KilledWorker
 
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.studies.running import cluster as clusters
-from palpate.studies.running.cluster import Certificates, Cluster, run_batch
-from palpate.studies.running.local import Local
-from palpate.studies.running.run_one import Job
-from palpate.studies.running.run_study import Work
-from palpate.studies.running.sources import sources
+from palpate.studies import cluster as clusters
+from palpate.studies.cluster import Certificates, Cluster, run_batch
+from palpate.studies.run_one import Local, RunJob, sources
+from palpate.studies.run_study import Work
 from studies.cluster import local_cluster
 from studies.small import SMALL, Formula, planned, text
 
@@ -32,7 +30,7 @@ MORE = SMALL.replace("points = 3", "points = 20")
 def here(tmp_path_factory):
     """The table of `MORE` from the threads of this process."""
     folder = tmp_path_factory.mktemp("here") / "out"
-    Work(planned(MORE), MORE, folder, Local()).done()
+    Work(planned(MORE), MORE, folder, Local()).run()
     return (folder / "results.parquet").read_bytes()
 
 
@@ -47,7 +45,7 @@ def on(address, folder, **options):
     """The table of `MORE` from a cluster."""
     runner = Cluster(address, **options)
     try:
-        Work(planned(MORE), MORE, folder, runner).done()
+        Work(planned(MORE), MORE, folder, runner).run()
     finally:
         runner.close()
     return (folder / "results.parquet").read_bytes()
@@ -80,10 +78,10 @@ def test_a_cluster_that_goes_away_loses_nothing(cluster, tmp_path, here, monkeyp
 
     runner = Cluster(cluster.address)
     with pytest.raises(InputError, match="disappeared") as gone:
-        Work(planned(source), source, folder, runner, leave).done()
+        Work(planned(source), source, folder, runner, leave).run()
     runner.close()
     assert "the same command resumes" in str(gone.value)
-    Work(planned(source), source, folder, Local()).done()
+    Work(planned(source), source, folder, Local()).run()
     assert (folder / "results.parquet").read_bytes() == here
 
 
@@ -179,7 +177,7 @@ def test_a_cluster_is_reached_through_tls(tmp_path):
 
 def jobs(count):
     plan = planned(SMALL)
-    return [Job(plan.setting(i), tuple(plan.study.metrics), None, False) for i in range(count)]
+    return [RunJob(plan.setting(i), tuple(plan.study.metrics), None, False) for i in range(count)]
 
 
 def test_a_worker_with_other_sources_refuses():
@@ -197,8 +195,8 @@ class Deadly:
 
 def test_of_runs_that_kill_workers_each_is_tried_alone_and_becomes_a_row():
     hand = clusters.Hand(None, "tcp://somewhere", 1.0)
-    assert hand.taken(Deadly(), jobs(2)) is None
-    ((row, record),) = hand.taken(Deadly(), jobs(1))
+    assert hand.take(Deadly(), jobs(2)) is None
+    ((row, record),) = hand.take(Deadly(), jobs(1))
     assert (row.run, row.result, row.metrics, record) == (0, "failed", (None, None, None), None)
     assert "tcp://10.0.0.7:1" in row.why
 

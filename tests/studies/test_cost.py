@@ -3,16 +3,15 @@
 import time
 
 from palpate.bench.speed import cores
-from palpate.studies.running.cost import in_words, seconds_a_run, too_much
-from palpate.studies.running.local import Local
-from palpate.studies.running.run_one import Job
+from palpate.studies.preview import in_words, seconds_a_run, too_much
+from palpate.studies.run_one import Local, RunJob
 from studies.small import SMALL, planned, text
 
 
 def test_the_cost_of_a_run_is_about_what_runs_take():
     plan = planned(SMALL.replace("press = 0.2", "press = 1.0").replace("duration = 1.5", "duration = 3.0"))
     seconds = seconds_a_run(plan)
-    jobs = [Job(plan.setting(i), ("force_rms",), None, False) for i in range(len(plan))]
+    jobs = [RunJob(plan.setting(i), ("force_rms",), None, False) for i in range(len(plan))]
     begun = time.perf_counter()
     list(Local(1).run(jobs))
     taken = (time.perf_counter() - begun) / len(jobs)

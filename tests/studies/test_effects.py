@@ -5,12 +5,12 @@ import polars
 import pytest
 
 from palpate.errors import InputError
-from palpate.studies.definition.plan import plan
-from palpate.studies.definition.study import parse
-from palpate.studies.findings.effects import effects, effects_table, sentence
-from palpate.studies.findings.ranking import rankings
-from palpate.studies.findings.summary import headline, tables
-from palpate.studies.running.dry_run import check_cases
+from palpate.studies.effects import effect_sentence, effects, effects_table
+from palpate.studies.plan import plan
+from palpate.studies.preview import check_cases
+from palpate.studies.ranking import rankings
+from palpate.studies.study import parse
+from palpate.studies.summary import headline, tables
 
 STUDY = """
 title = "Two factors"
@@ -45,11 +45,11 @@ def table(metric="force_rms", seeds=10, failing=()):
 def test_each_factor_is_apart_and_the_largest_effect_is_first():
     frame, planned = table()
     first, second = effects(frame, planned)
-    assert sentence(first, "pairs of runs") == (
+    assert effect_sentence(first, "pairs of runs") == (
         "controller.ki 16 has the smallest force_rms: 2.00 N (95 %: 2.00 to 2.00) better than with controller.ki 1, "
         "the worst, and better on 20 of 20 pairs of runs."
     )
-    assert sentence(second, "pairs of runs") == (
+    assert effect_sentence(second, "pairs of runs") == (
         "controller.kf 1 has the smaller force_rms on 30 of 30 pairs of runs, by 0.500 N (95 %: 0.500 to 0.500)."
     )
     rows = effects_table([first, second]).rows
@@ -60,7 +60,7 @@ def test_a_factor_without_an_effect_is_said_to_have_none():
     frame, planned = table()
     coin = polars.Series(np.random.default_rng(1).normal(0.0, 1.0, len(frame)))
     told = {
-        next(iter(one.of)): sentence(one, "pairs")
+        next(iter(one.of)): effect_sentence(one, "pairs")
         for one in effects(frame.with_columns(force_rms=coin), planned)
     }
     assert told["controller.kf"].startswith("controller.kf does not change force_rms significantly")
@@ -73,7 +73,7 @@ def test_a_signed_error_is_judged_by_its_magnitude():
         force_error=polars.when(polars.col("controller.kf") == 1.0).then(-20.0).otherwise(1.0)
     )
     told = next(one for one in effects(signed, planned) if "controller.kf" in one.of)
-    assert sentence(told, "pairs").startswith(
+    assert effect_sentence(told, "pairs").startswith(
         "controller.kf 0 has the smaller force_error by magnitude on 30 of 30"
     )
     assert rankings(signed, planned)[0].settings[0].at["controller.kf"] == 0.0

@@ -9,18 +9,14 @@ from palpate.bench import load
 from palpate.bench.metrics import METRICS
 from palpate.errors import InputError
 from palpate.report.study.axes import Scale
-from palpate.studies.definition.plan import MAIN
-from palpate.studies.definition.tables import Map
-from palpate.studies.findings.figures import draw
-from palpate.studies.findings.figures.curves import lines, references
-from palpate.studies.findings.figures.maps import cells
-from palpate.studies.findings.figures.rows import Rows
-from palpate.studies.findings.figures.scatter import points
-from palpate.studies.findings.figures.stability_boundary import bounds, equivalent
-from palpate.studies.findings.ranking import Mean, rankings
-from palpate.studies.findings.summary import interval, present, tables
-from palpate.studies.running.results import table
-from palpate.studies.running.run_one import Row
+from palpate.studies import figures
+from palpate.studies.figures import bounds, cells, equivalent, lines, points, references
+from palpate.studies.pairing import StudyRows
+from palpate.studies.plan import MAIN
+from palpate.studies.ranking import MetricMean, rankings
+from palpate.studies.run_one import Row, table
+from palpate.studies.study import Map
+from palpate.studies.summary import interval, present, tables
 from studies.small import planned, text
 
 GRID = text(
@@ -81,7 +77,7 @@ def lost(at):
 
 
 def test_every_figure_that_is_asked_for_is_drawn_and_none_is_left_open(plan, tmp_path):
-    files = draw.draw(list(draw.figures(results(plan, lost), plan)), tmp_path)
+    files = figures.draw(list(figures.figures(results(plan, lost), plan)), tmp_path)
     assert [path.name for path in files] == ["map1.png", "map2.png", "curves1.png"]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in files)
     assert all(caption.endswith(".") for caption in files.values())
@@ -89,7 +85,7 @@ def test_every_figure_that_is_asked_for_is_drawn_and_none_is_left_open(plan, tmp
 
 
 def test_a_cell_is_the_median_of_its_runs_and_crossed_where_most_failed(plan):
-    frame = Rows(results(plan, lost), plan)
+    frame = StudyRows(results(plan, lost), plan)
     asked = plan.study.maps[0]
     x, y = frame.scale(asked.x), frame.scale(asked.y)
     (_, _, foam), (title, value, rubber) = frame.panels(asked)
@@ -104,14 +100,14 @@ def test_a_cell_is_the_median_of_its_runs_and_crossed_where_most_failed(plan):
 
 
 def test_words_are_what_most_runs_came_to(plan):
-    frame = Rows(results(plan, lost), plan)
+    frame = StudyRows(results(plan, lost), plan)
     asked = plan.study.maps[1]
     words = cells(frame.part(), asked, METRICS["outcome"], frame.scale("world"), frame.scale("controller.ki"))
     assert words[0].tolist() == [["follows", "follows"], ["follows", "follows"], ["lost contact", "follows"]]
 
 
 def test_lines_have_median_and_range_and_stop_where_a_run_failed(plan):
-    frame = Rows(results(plan, lost), plan)
+    frame = StudyRows(results(plan, lost), plan)
     asked, x = plan.study.curves[0], frame.scale("controller.ki")
     _, foam, rows = frame.panels(asked)[0]
     drawn = list(lines(frame, rows, asked, x))
@@ -135,11 +131,11 @@ def test_points_that_were_drawn_make_clouds(tmp_path):
     )
     drawn = planned(source)
     frame = results(drawn)
-    assert [f.name for f in draw.draw(list(draw.figures(frame, drawn)), tmp_path)] == [
+    assert [f.name for f in figures.draw(list(figures.figures(frame, drawn)), tmp_path)] == [
         "clouds-force_rms.png",
         "clouds-outcome.png",
     ]
-    own = Rows(frame, drawn)
+    own = StudyRows(frame, drawn)
     found = list(points(own, METRICS["force_rms"], "controller.ki", own.axis("world")))
     assert [one.label for one in found] == ["a", "b"]
     for one in found:
@@ -148,7 +144,7 @@ def test_points_that_were_drawn_make_clouds(tmp_path):
 
 def test_figures_are_suggested_where_none_are_asked_for(plan, tmp_path):
     plain = planned(GRID[: GRID.index("[[maps]]")] + GRID[GRID.index("[parameters]") :])
-    names = [one.name for one in draw.figures(results(plain), plain)]
+    names = [one.name for one in figures.figures(results(plain), plain)]
     assert names == ["map1", "map2", "curves1"]  # a map of each metric; curves of quantities only
 
 
@@ -173,7 +169,7 @@ def test_runs_that_feel_no_surface_are_a_report_too(tmp_path, parameters):
 
 
 def test_a_figure_may_be_about_some_of_the_runs(plan):
-    frame = Rows(results(plan), plan)
+    frame = StudyRows(results(plan), plan)
     some = msgspec.structs.replace(plan.study.curves[0], panels="", where={"world": "rubber"})
     ((_, _, rows),) = frame.panels(some)
     assert set(rows["world"]) == {"rubber"}
@@ -199,7 +195,7 @@ def test_cells_lie_around_their_values():
 )
 def test_values_that_go_by_factors_are_drawn_so(values, logarithmic):
     plan = planned(text(f'"controller.ki" = {values}'))
-    assert Rows(results(plan), plan).scale("controller.ki").log == logarithmic
+    assert StudyRows(results(plan), plan).scale("controller.ki").log == logarithmic
 
 
 def test_the_tables_have_the_best_for_each_surface_and_of_what_it_is_compared_with(plan):
@@ -214,7 +210,11 @@ def test_the_tables_have_the_best_for_each_surface_and_of_what_it_is_compared_wi
 
 @pytest.mark.parametrize(
     ("mean", "told"),
-    [(Mean(1.23456, 0.0123), "1.235 ± 0.012"), (Mean(123.4, 15.0), "123 ± 15"), (Mean(0.5, None), "0.5")],
+    [
+        (MetricMean(1.23456, 0.0123), "1.235 ± 0.012"),
+        (MetricMean(123.4, 15.0), "123 ± 15"),
+        (MetricMean(0.5, None), "0.5"),
+    ],
 )
 def test_a_mean_has_the_digits_of_its_interval(mean, told):
     assert interval(mean) == told

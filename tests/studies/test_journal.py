@@ -6,14 +6,14 @@ import os
 import pytest
 
 from palpate.errors import InputError
-from palpate.studies.running.journal import Finished, Head, opened, rows
-from palpate.studies.running.run_one import Row
+from palpate.studies.run_one import Row
+from palpate.studies.run_study import Finished, JournalHead, open_journal, rows
 
 YESTERDAY = (
     b'60054b54 {"title":"T","study":"study","palpate":"0.1.0","sources":"sources","runs":10,"format":1}\n'
     b'42b338d8 [4,{"a":0.4,"seed":0},"done","as asked for",[0.2,null],0.01]\n'
 )
-HEAD = Head("T", "study", "0.1.0", "sources", 10)
+HEAD = JournalHead("T", "study", "0.1.0", "sources", 10)
 
 
 def row(run):
@@ -24,14 +24,14 @@ def row(run):
 def path(tmp_path):
     """A journal with runs 0 to 4."""
     path = tmp_path / "runs.jsonl"
-    with opened(path, HEAD) as book:
+    with open_journal(path, HEAD) as book:
         for run in range(5):
             book.append(row(run))
     return path
 
 
 def finished(path, head=HEAD):
-    with opened(path, head) as book:
+    with open_journal(path, head) as book:
         return [run for run in range(head.runs) if run in book.finished]
 
 
@@ -41,7 +41,7 @@ def test_rows_come_back_bit_for_bit(path):
 
 
 def test_a_run_is_written_once(path):
-    with opened(path, HEAD) as book:
+    with open_journal(path, HEAD) as book:
         book.append(row(3))
         book.append(row(7))
         book.append(row(7))
@@ -53,7 +53,7 @@ def test_a_torn_last_line_is_run_again(path, cut):
     whole = path.read_bytes()
     path.write_bytes(whole[:-cut])
     assert finished(path) == [0, 1, 2, 3]
-    with opened(path, HEAD) as book:
+    with open_journal(path, HEAD) as book:
         book.append(row(4))
     assert path.read_bytes() == whole
 
@@ -77,12 +77,12 @@ def test_whatever_one_byte_is_changed_to_at_most_one_run_is_lost(path):
 
 def test_another_study_and_another_version_are_refused(path):
     for other, told in (
-        (Head("T", "another", "0.1.0", "sources", 10), "another study"),
-        (Head("T", "study", "0.2.0", "sources", 10), "another version"),
-        (Head("T", "study", "0.1.0", "other", 10), "another version"),
+        (JournalHead("T", "another", "0.1.0", "sources", 10), "another study"),
+        (JournalHead("T", "study", "0.2.0", "sources", 10), "another version"),
+        (JournalHead("T", "study", "0.1.0", "other", 10), "another version"),
     ):
         before = path.read_bytes()
-        with pytest.raises(InputError, match=told), opened(path, other):
+        with pytest.raises(InputError, match=told), open_journal(path, other):
             pass
         assert path.read_bytes() == before
 
@@ -90,7 +90,7 @@ def test_another_study_and_another_version_are_refused(path):
 def test_another_file_is_refused(path):
     for content in ("run,force\n0,1.0\n", "", "no line end", '{"title": "T", "palpate": "0.1.0"}\n'):
         path.write_text(content)
-        with pytest.raises(InputError, match="palpate did not write it"), opened(path, HEAD):
+        with pytest.raises(InputError, match="palpate did not write it"), open_journal(path, HEAD):
             pass
         assert path.read_text() == content
 
@@ -98,7 +98,7 @@ def test_another_file_is_refused(path):
 def test_a_spoiled_head_is_refused_and_kept(path):
     spoiled = path.read_bytes().replace(b'"T"', b'"U"', 1)
     path.write_bytes(spoiled)
-    with pytest.raises(InputError, match="no journal of a study"), opened(path, HEAD):
+    with pytest.raises(InputError, match="no journal of a study"), open_journal(path, HEAD):
         pass
     assert path.read_bytes() == spoiled
 
@@ -117,7 +117,7 @@ def test_a_full_disk_leaves_whole_lines(path, monkeypatch):
             return self.file.fileno()
 
     before = path.read_bytes()
-    with opened(path, HEAD) as book:
+    with open_journal(path, HEAD) as book:
         monkeypatch.setattr(book, "_file", Full(book._file))
         with pytest.raises(InputError, match=os.strerror(errno.ENOSPC)) as refused:
             book.append(row(8))

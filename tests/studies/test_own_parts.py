@@ -8,12 +8,11 @@ from own_parts import controller
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.studies import run
-from palpate.studies.definition.part_check import check_parts_of
-from palpate.studies.definition.plan import plan, resolved
-from palpate.studies.definition.study import parse
-from palpate.studies.running.cluster import run_batch
-from palpate.studies.running.run_one import Job, run_one
-from palpate.studies.running.sources import sources
+from palpate.studies.cluster import run_batch
+from palpate.studies.plan import plan, resolve
+from palpate.studies.preview import check_parts_of
+from palpate.studies.run_one import RunJob, run_one, sources
+from palpate.studies.study import parse
 from studies.small import NEAR, text
 
 pytestmark = pytest.mark.usefixtures("permitted")
@@ -64,7 +63,7 @@ def test_an_identifier_and_a_metric_of_ones_own_are_columns(tmp_path):
 def test_a_study_knows_its_plugins_by_their_sources():
     planned = plan(parse(OWN, "T"), "T")
     assert [one.name for one in planned.plugins] == ["own_parts:Push", "own_parts:mean_force"]
-    assert planned.plugins[0].stamp.encode() in resolved(planned)
+    assert planned.plugins[0].stamp.encode() in resolve(planned)
 
 
 def test_a_worker_imports_them_and_refuses_other_sources():
@@ -72,7 +71,7 @@ def test_a_worker_imports_them_and_refuses_other_sources():
     from dataclasses import replace
 
     planned = plan(parse(IDENTIFIED, "T"), "T")
-    job = Job(planned.setting(0), tuple(planned.study.metrics), None, False, planned.plugins)
+    job = RunJob(planned.setting(0), tuple(planned.study.metrics), None, False, planned.plugins)
     ((row, _),) = run_batch(pickle.dumps([job]), sources(), job.plugins)
     assert row.metrics == run_one(job)[0].metrics
     other = replace(planned.plugins[0], stamp="0123456789abcdef")

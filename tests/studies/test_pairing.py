@@ -7,11 +7,10 @@ import pytest
 from scipy import stats
 
 from palpate.errors import InputError
-from palpate.studies.findings.comparison_table import comparison_table, sentence
-from palpate.studies.findings.pairing import Entrant, compared, comparisons, median_interval
-from palpate.studies.findings.summary import present
-from palpate.studies.running.results import table
-from palpate.studies.running.run_one import Row
+from palpate.studies.effects import comparison_sentence, comparison_table
+from palpate.studies.pairing import Entrant, compare, comparisons, median_interval
+from palpate.studies.run_one import Row, table
+from palpate.studies.summary import present
 from studies.small import planned, text
 
 N = 64
@@ -57,8 +56,8 @@ def test_the_law_wins_and_not_the_easiest_surface():
     assert pair.won == 0.0
     assert pair.decided
     assert (pair.won_low, pair.won_high) == pytest.approx(stats.binomtest(0, N).proportion_ci(0.95))
-    assert sentence(first).startswith("C has the smaller force_rms")
-    assert "on 64 of 64 surfaces, by" in sentence(first)
+    assert comparison_sentence(first).startswith("C has the smaller force_rms")
+    assert "on 64 of 64 surfaces, by" in comparison_sentence(first)
 
 
 def test_the_interval_of_the_median_is_that_of_the_sign_test():
@@ -78,9 +77,9 @@ def test_it_covers_the_median_at_its_rate():
 
 def test_a_run_that_failed_is_worse_than_any():
     one, other = entrant([1.0, 1.0, math.nan, math.nan]), entrant([2.0, math.nan, 2.0, math.nan])
-    pair = compared(one, other, most=False)
+    pair = compare(one, other, most=False)
     assert (pair.won, pair.lost, pair.surfaces) == (pytest.approx(2 / 3), pytest.approx(1 / 3), 3)
-    assert compared(other, one, most=True).lost == pytest.approx(1 / 3)
+    assert compare(other, one, most=True).lost == pytest.approx(1 / 3)
 
 
 def test_failures_count_where_contact_is_lost_on_most_surfaces():
@@ -99,7 +98,7 @@ def test_failures_count_where_contact_is_lost_on_most_surfaces():
 def test_laws_that_do_not_differ_are_not_told_apart():
     random = np.random.default_rng(3)
     values = random.standard_normal(200)
-    pair = compared(entrant(values + 0.1 * random.standard_normal(200)), entrant(values), most=False)
+    pair = compare(entrant(values + 0.1 * random.standard_normal(200)), entrant(values), most=False)
     assert not pair.decided
     assert 0.4 < pair.won < 0.6
 

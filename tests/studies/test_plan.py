@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate.bench import load
-from palpate.studies.definition.plan import resolved
-from palpate.studies.definition.sobol import Sobol
+from palpate.studies.plan import Sobol, resolve
 from studies.small import SMALL, planned, text
 
 
@@ -186,6 +185,6 @@ def test_a_thousand_million_runs_are_planned_in_no_time():
 
 def test_only_what_decides_the_rows_tells_studies_apart():
     same = SMALL.replace('"Small"', '"Renamed"') + '\n[[curves]]\nx = "controller.ki"\nmetric = "force_rms"\n'
-    assert resolved(planned(same)) == resolved(planned(SMALL))
+    assert resolve(planned(same)) == resolve(planned(SMALL))
     for change in (("seeds = 2", "seeds = 3"), ("points = 3", "points = 4"), ("press = 0.2", "press = 0.3")):
-        assert resolved(planned(SMALL.replace(*change))) != resolved(planned(SMALL))
+        assert resolve(planned(SMALL.replace(*change))) != resolve(planned(SMALL))

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from palpate.studies.findings.ranking import mean, rankings
-from palpate.studies.running.results import table
-from palpate.studies.running.run_one import Row
+from palpate.studies.ranking import mean, rankings
+from palpate.studies.run_one import Row, table
 from studies.small import planned, text
 
 SEEDS = 6

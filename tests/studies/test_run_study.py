@@ -12,10 +12,9 @@ import pytest
 from palpate.bench import Bench
 from palpate.errors import InputError
 from palpate.logs import read_record
-from palpate.studies.running import run_one as one_run
-from palpate.studies.running.local import Local, unordered
-from palpate.studies.running.run_one import Job
-from palpate.studies.running.run_study import Work
+from palpate.studies import run_one as one_run
+from palpate.studies.run_one import Local, RunJob, map_unordered
+from palpate.studies.run_study import Work
 from studies.small import NEAR, SMALL, Formula, planned, text
 
 GRID = text(
@@ -40,12 +39,12 @@ def table(folder):
 @pytest.fixture
 def uninterrupted(tmp_path):
     """The table of `GRID`."""
-    work(GRID, tmp_path / "whole", Formula(formula)).done()
+    work(GRID, tmp_path / "whole", Formula(formula)).run()
     return table(tmp_path / "whole")
 
 
 def test_the_table_has_a_row_for_each_run_in_order(tmp_path):
-    frame = work(GRID, tmp_path / "out", Formula(formula, backwards=True)).done()
+    frame = work(GRID, tmp_path / "out", Formula(formula, backwards=True)).run()
     assert frame["run"].to_list() == list(range(60))
     assert frame.columns == ["run", "controller.ki", "seed", "result", "why", "force_rms", "settling"]
     for row in frame.rows(named=True):
@@ -54,7 +53,7 @@ def test_the_table_has_a_row_for_each_run_in_order(tmp_path):
 
 
 def test_the_order_of_the_runs_does_not_show(tmp_path, uninterrupted):
-    work(GRID, tmp_path / "out", Formula(formula, backwards=True)).done()
+    work(GRID, tmp_path / "out", Formula(formula, backwards=True)).run()
     assert table(tmp_path / "out") == uninterrupted
 
 
@@ -62,10 +61,10 @@ def test_the_order_of_the_runs_does_not_show(tmp_path, uninterrupted):
 def test_an_interrupted_study_goes_on_and_its_table_is_the_same_to_the_byte(tmp_path, uninterrupted, after):
     folder, first = tmp_path / "out", Formula(formula, stops_after=after)
     with pytest.raises(KeyboardInterrupt):
-        work(GRID, folder, first).done()
+        work(GRID, folder, first).run()
     assert not (folder / "results.parquet").exists()
     second, seen = Formula(formula), []
-    work(GRID, folder, second, progress=seen.append).done()
+    work(GRID, folder, second, progress=seen.append).run()
     assert table(folder) == uninterrupted
     assert sorted(first.ran + second.ran) == list(range(60))  # each run once
     assert seen[0] == after
@@ -74,7 +73,7 @@ def test_an_interrupted_study_goes_on_and_its_table_is_the_same_to_the_byte(tmp_
 
 def test_a_finished_study_runs_nothing_again(tmp_path, uninterrupted):
     again = Formula(formula)
-    work(GRID, tmp_path / "whole", again).done()
+    work(GRID, tmp_path / "whole", again).run()
     assert again.ran == []
     assert table(tmp_path / "whole") == uninterrupted
 
@@ -82,16 +81,16 @@ def test_a_finished_study_runs_nothing_again(tmp_path, uninterrupted):
 def test_another_study_in_the_folder_is_refused_unless_it_is_to_go(tmp_path, uninterrupted):
     other = GRID.replace("seeds = 3", "seeds = 2")
     with pytest.raises(InputError, match="another study"):
-        work(other, tmp_path / "whole", Formula(formula)).done()
+        work(other, tmp_path / "whole", Formula(formula)).run()
     assert table(tmp_path / "whole") == uninterrupted
-    assert len(work(other, tmp_path / "whole", Formula(formula)).done(replace=True)) == 40
+    assert len(work(other, tmp_path / "whole", Formula(formula)).run(replace=True)) == 40
 
 
 def test_a_folder_of_other_files_is_never_touched(tmp_path):
     (tmp_path / "thesis.docx").write_text("years of work")
     for replace, said in ((False, "holds other files"), (True, "thesis.docx, which palpate did not write")):
         with pytest.raises(InputError, match=said):
-            work(GRID, tmp_path, Formula(formula)).done(replace=replace)
+            work(GRID, tmp_path, Formula(formula)).run(replace=replace)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.docx"]
 
 
@@ -99,15 +98,15 @@ def test_a_journal_of_other_making_is_not_removed_by_replace(tmp_path):
     (tmp_path / "runs.jsonl").write_text("mine\n")
     for replace in (False, True):
         with pytest.raises(InputError, match="palpate did not write"):
-            work(GRID, tmp_path, Formula(formula)).done(replace=replace)
+            work(GRID, tmp_path, Formula(formula)).run(replace=replace)
     assert (tmp_path / "runs.jsonl").read_text() == "mine\n"
 
 
 def test_real_runs_on_threads_are_what_the_bench_gives(tmp_path):
-    frame = work(SMALL, tmp_path / "out", Local(2)).done()
+    frame = work(SMALL, tmp_path / "out", Local(2)).run()
     assert set(frame["result"]) == {"done"}
     assert frame["K_error_matched"].is_not_null().all()
-    alone = work(SMALL, tmp_path / "alone", Local(1)).done()
+    alone = work(SMALL, tmp_path / "alone", Local(1)).run()
     assert frame.equals(alone)
     assert table(tmp_path / "out") == table(tmp_path / "alone")
 
@@ -122,7 +121,7 @@ def test_a_failing_run_is_a_row_and_the_others_go_on(tmp_path):
         fixed=NEAR.replace("duration = 1.5", "duration = 1.5, losses = 1")
         + '"force.period" = 0.05\n"approach.release" = 4.0\n',
     )
-    frame = work(source, tmp_path / "out", Local(2)).done()
+    frame = work(source, tmp_path / "out", Local(2)).run()
     by = {(r["controller.ki"], r["wall.x"], r["force.second"]): r for r in frame.rows(named=True)}
     assert by[5.0, 0.465, 20.0]["result"] == "done"
     assert by[-1.0, 0.465, 20.0]["result"] == "refused"
@@ -138,7 +137,7 @@ def test_an_error_within_a_run_is_its_result(tmp_path, monkeypatch):
         raise ZeroDivisionError("a metric that\nfails")
 
     monkeypatch.setattr(one_run, "Look", broken)
-    frame = work(SMALL, tmp_path / "out", Local(2)).done()
+    frame = work(SMALL, tmp_path / "out", Local(2)).run()
     assert set(frame["result"]) == {"failed"}
     assert set(frame["why"]) == {"ZeroDivisionError: a metric that fails"}
 
@@ -146,7 +145,7 @@ def test_an_error_within_a_run_is_its_result(tmp_path, monkeypatch):
 @pytest.mark.long
 def test_records_are_kept_where_they_are_asked_for(tmp_path):
     source = SMALL.replace("seeds = 2", "seeds = 1\nkeep_records = true")
-    frame = work(source, tmp_path / "out", Local(2)).done()
+    frame = work(source, tmp_path / "out", Local(2)).run()
     files = sorted((tmp_path / "out" / "records").iterdir())
     assert [path.name for path in files] == [f"{run}.parquet" for run in range(6)]
     peaks = [float(read_record(files[run])["force"][-200:].max()) for run in (0, 5)]
@@ -164,7 +163,7 @@ def test_records_are_not_kept_in_memory(tmp_path, monkeypatch):
         return found
 
     monkeypatch.setattr(Bench, "run", counted)
-    work(SMALL.replace("seeds = 2", "seeds = 4"), tmp_path / "out", Local(2)).done()
+    work(SMALL.replace("seeds = 2", "seeds = 4"), tmp_path / "out", Local(2)).run()
     assert len(made) == 24
     assert max(alive) <= 4
 
@@ -179,7 +178,7 @@ def test_memory_does_not_grow_with_the_number_of_runs(tmp_path):
         with pytest.raises(KeyboardInterrupt):
             one.runner.left = runs - 1  # before the table is made, which has them all
             one.runner.ran = Counted()
-            one.done()
+            one.run()
         size = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return size
@@ -210,7 +209,7 @@ def test_items_are_taken_as_they_are_needed():
             taken.append(i)
             yield i
 
-    results = unordered(lambda i: i, items(), threads=2)
+    results = map_unordered(lambda i: i, items(), threads=2)
     next(results)
     assert len(taken) <= 4
     results.close()
@@ -224,7 +223,7 @@ def test_stopping_stops_the_runs_under_way():
 
     def jobs():
         for run in range(2):
-            yield Job(plan.setting(run), ("force_rms",), None, False)
+            yield RunJob(plan.setting(run), ("force_rms",), None, False)
         raise KeyboardInterrupt
 
     before = set(threading.enumerate())
@@ -237,5 +236,5 @@ def test_stopping_stops_the_runs_under_way():
 
 
 def test_replace_in_a_new_folder_has_nothing_to_remove(tmp_path, uninterrupted):
-    work(GRID, tmp_path / "new", Formula(formula)).done(replace=True)
+    work(GRID, tmp_path / "new", Formula(formula)).run(replace=True)
     assert table(tmp_path / "new") == uninterrupted

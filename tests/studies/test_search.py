@@ -6,8 +6,8 @@ import optuna
 import polars
 import pytest
 
-from palpate.studies.running.run_study import Work
-from palpate.studies.running.search import NAME, Searching, objective
+from palpate.studies.run_study import Work
+from palpate.studies.search import NAME, Searching, objective
 from studies.small import Formula, planned, text
 
 SEARCH = text(
@@ -30,7 +30,7 @@ def bowl(at):
 
 
 def searched(folder, runner, source=SEARCH):
-    return Work(planned(source), source, folder, runner).done()
+    return Work(planned(source), source, folder, runner).run()
 
 
 @pytest.fixture(scope="module")

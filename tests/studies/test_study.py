@@ -3,7 +3,7 @@
 import pytest
 
 from palpate.errors import InputError
-from palpate.studies.definition.study import load, names, parse
+from palpate.studies.study import load, names, parse
 from studies.small import NEAR, SMALL, planned, text
 
 LOG = '"controller.ki" = { log = [1.0, 10.0], points = 3 }'
@@ -19,7 +19,7 @@ def test_the_studies_that_come_with_palpate_make_plans(name):
 
 
 def planned_named(name):
-    from palpate.studies.definition.plan import plan
+    from palpate.studies.plan import plan
 
     return plan(load(name), name)
 

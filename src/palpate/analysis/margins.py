@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palpate.analysis.constant_modes import moving
-from palpate.analysis.linear_loop import LinearLoop
-from palpate.arrays import Mask
+from palpate.analysis.linear_loop import LinearLoop, moving
+from palpate.arrays import Complex, Mask
 from palpate.errors import InputError
 
 Array = NDArray[np.floating]
-Complex = NDArray[np.complexfloating]
 CUT = "force.line"
 """The loop is opened at the force on the controller's converter."""
 POINTS = 1200

@@ -10,9 +10,9 @@ from palpate._jit import law, part
 from palpate._vector import Vec3
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.experiments.tables import Experiment, ForceSensor, changed, load, names, source
 from palpate.bench.given_motion import GivenMotion, given_motion
-from palpate.bench.metrics.summary import summarise
+from palpate.bench.metrics.window import summarise
+from palpate.bench.tables import Experiment, ForceSensor, changed, load, names, source
 from palpate.bench.tick import Loop, march, start_at
 
 __all__ = [

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 
 from palpate._vector import Vec3
 from palpate.arrays import Array
-from palpate.bench.ending import DONE, INTERRUPTED, NO_CONTACT, Ending, StopCondition
-from palpate.bench.identifier_watch import Identifier, watched
-from palpate.bench.row import COLUMNS
+from palpate.bench.estimators import Identifier, watch_run
+from palpate.bench.sequence import COLUMNS, DONE, INTERRUPTED, NO_CONTACT, Ending, StopCondition
 from palpate.bench.simulation import Simulation
 from palpate.bench.tick import Loop, start_at
 from palpate.controllers.controller import controller
@@ -96,7 +95,7 @@ class Bench(Readable):
         progress: Progress | None = None,
         waiting: Callable[[], None] | None = None,
     ) -> Record:
-        """Runs from rest in the air.
+        """Runs from rest in free motion.
 
         Args:
             duration: at most so long [s].
@@ -133,7 +132,7 @@ class Bench(Readable):
         record = Record(columns, COLUMNS, meta)
         if self.identifier is None:
             return record
-        return watched(record, self.identifier(), self.loop.estimators, compiled=compiled)
+        return watch_run(record, self.identifier(), self.loop.estimators, compiled=compiled)
 
     def simulation(
         self, seed: int = 0, *, compiled: bool = True, waiting: Callable[[], None] | None = None

@@ -2,24 +2,94 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law
 from palpate.arrays import Array
-from palpate.bench.experiments.tables import ForceSensor
-from palpate.bench.force_input import ForceInput, ForceInputState
-from palpate.bench.force_reading import force_input
-from palpate.bench.paths import Path, positions
+from palpate.bench.force_input import ForceInput, ForceInputState, force_input
+from palpate.bench.tables import ForceSensor
 from palpate.environments import SurfaceState, join
 from palpate.environments.surface import members
 from palpate.environments.surface_state import follow
 from palpate.errors import InputError
 from palpate.records import Record
-from palpate.signals.quantise import quantise
+from palpate.signals.samples import quantise
+
+Path = Callable[[Array], Array] | ArrayLike
+"""A function of times [s], or positions [m] at ticks, shape (n,), or at steps of the physics, shape (n, steps)."""
+LEAST = 4
+"""Ticks that a path must have: a cubic spline needs so many."""
+
+
+def positions(path: Path, duration: float | None, tick: float, steps: int) -> Array:
+    """Positions [m] at each step of n ticks, and at one step before and after: shape (n steps + 2,).
+
+    Raises:
+        InputError: no finite numbers, another shape, a duration that is missing, too short or not asked for.
+    """
+    if callable(path):
+        x = _sample_function(path, duration, tick, steps)
+    else:
+        if duration is not None:
+            raise InputError(
+                "duration belongs to a path that is a function; an array has its own, leave it out"
+            )
+        x = _extend(np.asarray(path, dtype=np.float64), steps)
+    if not np.isfinite(x).all():
+        raise InputError("path must be finite numbers, got some that are not; look for NaN in it")
+    return x
+
+
+def _sample_function(
+    path: Callable[[Array], Array],
+    duration: float | None,
+    tick: float,
+    steps: int,
+) -> Array:
+    if duration is None or not duration >= LEAST * tick:
+        raise InputError(
+            f"duration must be at least {LEAST * tick:g} s for a path that is a function, got {duration}"
+        )
+    times: Array = np.arange(-1.0, round(duration / tick) * steps + 1) * (tick / steps)
+    x = np.asarray(path(times), dtype=np.float64)
+    if x.shape != times.shape:
+        raise InputError(f"path must give one position for each time, {times.shape}, got {x.shape}")
+    return x
+
+
+def _extend(path: Array, steps: int) -> Array:
+    if path.ndim not in {1, 2} or len(path) < LEAST or (path.ndim == 2 and path.shape[1] != steps):
+        raise InputError(
+            f"path must be of shape (n,), one position a tick, or (n, {steps}), one a step of the physics, with n at "
+            f"least {LEAST}; got {path.shape}"
+        )
+    if path.ndim == 1:
+        return _interpolate(path, steps)
+    flat = path.ravel()
+    # One step on at constant acceleration.
+    before, after = (3.0 * (a - b) + c for a, b, c in (flat[:3], flat[:-4:-1]))
+    return np.concatenate([[before], flat, [after]])
+
+
+def _interpolate(at_ticks: Array, steps: int) -> Array:
+    """By a cubic spline: acceleration has no jumps, which a mass would feel."""
+    from scipy.interpolate import CubicSpline
+
+    if not np.isfinite(at_ticks).all():
+        return at_ticks
+    spline = CubicSpline(np.arange(len(at_ticks)), at_ticks)
+    powers = (np.arange(steps) / steps) ** np.arange(3, -1, -1)[:, None]
+    inside = (spline.c.T @ powers).ravel()
+    before = spline(-1.0 / steps)
+    last = spline(len(at_ticks) - 1 + np.arange(steps + 1) / steps)
+    return np.concatenate([[before], inside, last])
+
 
 COLUMNS = {
     "t": "s",
@@ -53,7 +123,7 @@ def march_path(surface, line, state, way, x, rest, k, steps, noise, out):
                 force = surface.force(state, now, (after - before) / (2.0 * dt))
                 force += surface.mass * (after - 2.0 * now + before) / (dt * dt)
             if j == 0:
-                out[i, 0], out[i, 1] = max(force, 0.0), line.sampled(way)
+                out[i, 0], out[i, 1] = max(force, 0.0), line.reading(way)
             state, impulse = follow(surface, state, force, after, (after - now) / dt, RIGID, dt)
             way = line.advance(way, max(force, 0.0) + impulse / dt, k * steps + n, noise[i])
     return state, way
@@ -127,7 +197,7 @@ class GivenMotion:
         for i, (first, last) in enumerate(self._spans(len(rows))):
             surface = self.surfaces[i][1]
             if i > 0 and state.contact == 1.0:
-                rest, state = self._changed(i, state, x[first * self.steps :], rest)
+                rest, state = self._next_surface(i, state, x[first * self.steps :], rest)
             rests.append(rest)
             piece = x[first * self.steps : last * self.steps + 2]
             numbers = noise[first:last], rows[first:last]
@@ -148,7 +218,7 @@ class GivenMotion:
             force = max(surface.force(state, now, rate) + surface.mass * second, 0.0)
         return state, self.line.settled_at(force, noise[-1], noise[-2])
 
-    def _changed(self, i: int, state: SurfaceState, x: Array, rest: float) -> tuple[float, SurfaceState]:
+    def _next_surface(self, i: int, state: SurfaceState, x: Array, rest: float) -> tuple[float, SurfaceState]:
         """Rest position [m] and state of the i-th surface, relaxed, under the force that there is already."""
         old, new = self.surfaces[i - 1][1], self.surfaces[i][1]
         now, rate, second = self._motion(x, rest)

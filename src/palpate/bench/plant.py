@@ -1,15 +1,67 @@
-"""The plant between two ticks: the arm, its friction and the surface."""
+"""The plant between two ticks: the arm, one elastic mode of it, its friction and the surface.
 
+The mode is the deflection of the tip along x, between the pose of the joints and the actual one.
+"""
+
+import math
 from typing import NamedTuple
 
 from palpate._jit import part
 from palpate._vector import Vec3, solve
-from palpate.bench.elastic_mode import RIGID, ElasticMode, ElasticState
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import Surface
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
 from palpate.friction import LuGre
 from palpate.robots.arm3 import Arm3
+
+
+@part
+class ElasticState(NamedTuple):
+    bend: float  # of the tip beyond where the joints put it [m]
+    rate: float  # [m/s]
+
+
+@part
+class ElasticMode(NamedTuple):
+    """A modal mass on a spring and a damper that the contact force drives: d'' + 2 zeta w d' + w^2 d = -mobility f.
+
+    The joints' encoders do not see it. In modal coordinates the rigid arm feels the contact force as before; that
+    torques excite the mode too is left out.
+
+    Args:
+        mobility: one over the modal mass [1/kg]; 0 makes a rigid arm.
+        frequency: w, undamped [rad/s].
+        damping: zeta.
+    """
+
+    mobility: float
+    frequency: float
+    damping: float
+
+    def start(self):
+        return ElasticState(0.0, 0.0)
+
+    def acceleration(self, state):
+        """Acceleration by spring and damper [m/s^2]."""
+        return -self.frequency * (2.0 * self.damping * state.rate + self.frequency * state.bend)
+
+    def step(self, state, acceleration, dt):
+        """The state after dt [s]; semi-implicit Euler, as the arm's."""
+        rate = state.rate + dt * acceleration
+        return ElasticState(state.bend + dt * rate, rate)
+
+    def after_impulse(self, state, impulse):
+        """The state after an impulse [N s] of the surface."""
+        return ElasticState(state.bend, state.rate - self.mobility * impulse)
+
+
+RIGID = ElasticMode(0.0, 0.0, 0.0)
+
+
+def elastic_mode(stiffness: float, frequency: float, damping: float) -> ElasticMode:
+    """The mode that gives way by 1/stiffness [m/N] at rest and swings at a frequency [Hz] with a damping ratio."""
+    w = 2.0 * math.pi * frequency
+    return ElasticMode(w * w / stiffness, w, float(damping))
 
 
 @part
@@ -23,12 +75,12 @@ class PlantState(NamedTuple):
 
 
 @part
-class Touch(NamedTuple):
+class SurfaceTouch(NamedTuple):
     """Force of the tip on the surface during a step."""
 
     normal: float  # into the surface [N], never negative
     tangential: float  # along y [N]
-    penetration: float  # of the tip [m], negative in the air
+    penetration: float  # of the tip [m], negative in free motion
     friction: Vec3  # torque lost in the joints [N m]
     inertial: float = 0.0  # force that what lies beyond the force sensor takes to be moved [N]
     rate: float = 0.0  # of the tip along x [m/s]
@@ -57,7 +109,7 @@ class Plant(NamedTuple):
     beyond: float = 0.0
 
     def start_at(self, q):
-        """At rest in the air, at the joint angles q."""
+        """At rest in free motion, at the joint angles q."""
         return PlantState(
             q,
             0.0 * q,
@@ -107,8 +159,8 @@ class Plant(NamedTuple):
             side = self.side.start()
         surface, impulse = follow(self.surface, surface, force, p, v, tip_mass, dt)
         qd -= per_normal * impulse
-        bent = self.mode.struck(bent, impulse)
+        bent = self.mode.after_impulse(bent, impulse)
         after = normal @ qd + bent.rate
         inertial = self.beyond * ((after - normal @ state.qd - state.bent.rate) / dt + model.Jdqd.x)
-        felt = Touch(max(force, 0.0) + impulse / dt, -slide, p, friction, inertial, after)
+        felt = SurfaceTouch(max(force, 0.0) + impulse / dt, -slide, p, friction, inertial, after)
         return PlantState(q, qd, bristles, surface, side, bent), felt

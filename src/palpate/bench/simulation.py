@@ -1,19 +1,195 @@
-"""The one march through a run: tick after tick, for as long as it is asked to, and changed between ticks if need be."""
+"""The one march through a run: tick after tick, for as long as it is asked to, and changed between ticks if need be.
+
+A part of the user's that fails is stepped once in plain Python, then compiled alone, for a diagnosis in one line.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate._jit import NotCompiled
+from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
-from palpate.bench.diagnosis import diagnosed
-from palpate.bench.row import COLUMNS
-from palpate.bench.sequence import CONTACT
-from palpate.bench.tick import Loop, LoopState, compiled_march, march
+from palpate.bench.sequence import COLUMNS, CONTACT
+from palpate.bench.tick import ALONG_X, Loop, LoopState, compiled_march, march, tick
+from palpate.environments.surface_state import touch
+from palpate.errors import PartError
+from palpate.plugins import reason
+from palpate.signals.types import Sense, Task
+
+DEPTH, RATE = 1e-3, 1e-3
+"""Of the tip in the surface, at which it is asked for its force [m], [m/s]."""
+
+
+class PartCall(NamedTuple):
+    """One method of a part with the arguments that the loop gives it.
+
+    Args:
+        role: what the part is in the loop.
+        part: it.
+        method: of what name.
+        arguments: for it.
+        keeps: which of the values that it returns is the state that it was given; None if none, -1 if all of it.
+    """
+
+    role: str
+    part: Any
+    method: str
+    arguments: tuple[Any, ...]
+    keeps: int | None
+
+
+def diagnose(loop: Loop, state: LoopState) -> PartError:
+    """Why a loop does not run compiled, in one line.
+
+    A mistake in a part shows itself in plain Python with the line that makes it, which is the cause of the error
+    returned. What only the compiler minds shows itself where the part's methods are compiled one by one.
+    """
+    pressed = _pressing_state(state)
+    try:
+        after = tick(loop, pressed, 0, 0.0, np.empty(len(COLUMNS)))
+    except Exception as error:  # noqa: BLE001 - whatever the user's own code raises
+        found = PartError(f"{_user_parts(loop)} fails when it is stepped: {reason(error)}")
+        found.__cause__ = error
+        return found
+    changed = [name for name in state._fields if _kinds(getattr(state, name)) != _kinds(getattr(after, name))]
+    if changed:
+        return PartError(
+            f"the state of the {changed[0]} changes its types from one tick to the next; start with the types of step"
+        )
+    return PartError(
+        uncompilable(loop, state)
+        or "the loop runs in plain Python but cannot be compiled: a part may hold, take and return only floats, "
+        "vectors and NamedTuples of them, and call only laws; run it with compiled=False"
+    )
+
+
+def uncompilable(loop: Loop, state: LoopState) -> str:
+    """Which method of the user's parts does not compile, and why; "" if all do."""
+    import numba
+
+    from palpate._jit.compiler_message import compiled_alone
+
+    for one in calls(loop, state):
+        returned, why = compiled_alone(getattr(type(one.part), one.method), one.part, *one.arguments)
+        told = f"{one.method} of the {one.role} {type(one.part).__name__}"
+        if why:
+            return f"{told} cannot be compiled: {why}"
+        if one.keeps is None:
+            continue
+        kept = returned if one.keeps < 0 else returned.types[one.keeps]
+        if kept != numba.typeof(one.arguments[0]):
+            return (
+                f"{told} returns a state of another type than start: {kept}, not {numba.typeof(one.arguments[0])}; "
+                "return the same type in every branch"
+            )
+    return ""
+
+
+def not_finite(loop: Loop, state: LoopState) -> str:
+    """Which method of the user's parts gives a number that is none at its first call; "" if none does.
+
+    Raises:
+        PartError: a method raises, or does not return what it must.
+    """
+    for one in calls(loop, state):
+        told = f"{one.method} of the {one.role} {type(one.part).__name__}"
+        try:
+            with np.errstate(all="ignore"):
+                value = getattr(one.part, one.method)(*one.arguments)
+        except Exception as error:
+            raise PartError(f"{told} fails: {reason(error)}") from error
+        wrong = _wrong(one, value)
+        if wrong:
+            raise PartError(f"{told} {wrong}")
+        if not all(map(np.isfinite, _numbers(value))):
+            return f"{told} gives {list(_numbers(value))} at its first tick; every number must be finite"
+    return ""
+
+
+def _wrong(call: PartCall, value: Any) -> str:
+    """Fault of a method's return value."""
+    if call.method == "step":
+        if not isinstance(value, tuple) or isinstance(value, Vec3) or len(value) != 2:
+            return f"returns a {type(value).__name__}; it must return (torque, state)"
+        if not isinstance(value[0], Vec3):
+            return f"returns a {type(value[0]).__name__} as its torque; it must be a Vec3, such as model.J.T @ wrench"
+    if call.method == "report" and not (len(value) == 2 and all(isinstance(v, Vec3) for v in value)):
+        return "must return two Vec3"
+    if call.method == "force" and not isinstance(value, float | int):
+        return f"returns a {type(value).__name__}; it must be a number [N]"
+    if call.keeps is not None:
+        kept = value if call.keeps < 0 else value[call.keeps]
+        if _kinds(kept) != _kinds(call.arguments[0]):
+            return "returns a state of another type than start; start with the types of step"
+    return ""
+
+
+def calls(loop: Loop, state: LoopState) -> Iterator[PartCall]:
+    """Every method of the user's parts, as the loop calls it in contact."""
+    controller, surface = loop.controller, loop.plant.surface
+    if is_own(controller):
+        sense, task, model = _moment(loop, state)
+        own = controller.start()
+        yield PartCall("controller", controller, "start", (), None)
+        yield PartCall("controller", controller, "step", (own, sense, task, model), 1)
+        yield PartCall("controller", controller, "rest", (own, sense), -1)
+        yield PartCall("controller", controller, "report", (own,), None)
+    if is_own(surface):
+        untouched = surface.start()
+        pressed, dt = touch(untouched, RATE), loop.tick / loop.steps
+        yield PartCall("surface", surface, "start", (), None)
+        yield PartCall("surface", surface, "force", (pressed, DEPTH, RATE), None)
+        yield PartCall("surface", surface, "relax", (pressed, DEPTH, RATE, dt), -1)
+        yield PartCall("surface", surface, "free", (untouched, dt), -1)
+
+
+def _moment(loop: Loop, state: LoopState) -> tuple[Sense, Task, Any]:
+    """Input of a controller in contact at the arm's start."""
+    q = loop.encoder.read(state.plant.q)
+    arm = loop.conditioning.arm
+    x = arm.pose(q)
+    sense = Sense(q, ZERO3, x, ZERO3, ZERO3)
+    task = Task(x, ZERO3, ZERO3, 10.0 * ALONG_X, ALONG_X)
+    return sense, task, arm.model(q, ZERO3)
+
+
+def is_own(part: Any) -> bool:
+    """Whether a part is the user's, not one that comes with palpate."""
+    return type(part).__module__.partition(".")[0] != "palpate"
+
+
+def _user_parts(loop: Loop) -> str:
+    """The parts of the user's in a loop."""
+    own = {"controller": loop.controller, "surface": loop.plant.surface}
+    told = [f"the {role} {type(part).__name__}" for role, part in own.items() if is_own(part)]
+    return " or ".join(told) or "a part"
+
+
+def _pressing_state(state: LoopState) -> LoopState:
+    plant = state.plant._replace(surface=touch(state.plant.surface, 0.0))
+    return state._replace(plant=plant, sequence=state.sequence._replace(phase=CONTACT))
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    if isinstance(value, tuple):
+        for one in value:
+            yield from _numbers(one)
+    elif isinstance(value, int | float):
+        yield float(value)
+
+
+def _kinds(value: object) -> object:
+    """The types of a value and of all that is in it."""
+    if isinstance(value, tuple):
+        return type(value), tuple(_kinds(v) for v in value)
+    return float if isinstance(value, float) else type(value)
+
 
 PHASE = list(COLUMNS).index("phase")
 
@@ -72,7 +248,7 @@ class Simulation:
                 self.waiting or _compiling, self.loop, self.state, self.ticks, noise, out
             )
         except NotCompiled as error:
-            found = diagnosed(self.loop, self.state)
+            found = diagnose(self.loop, self.state)
             found.compiler = str(error.__cause__)
             # The compiler's account is a hundred lines on palpate's own code: whoever wants it asks for it.
             raise found from found.__cause__

@@ -10,8 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from palpate.bench.build import build
-from palpate.bench.experiments.tables import changed, load
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS
+from palpate.bench.tables import changed, load
 from palpate.bench.tick import compiled_march, start_at
 
 EXPERIMENT = "foam-neural"

@@ -4,16 +4,14 @@ from typing import Any, NamedTuple
 
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Vec3
-from palpate.bench.conditioning import Conditioning, ConditioningState
 from palpate.bench.estimators import Estimators, EstimatorsState
-from palpate.bench.force_input import ForceInput, ForceInputState
-from palpate.bench.plant import Plant, PlantState, Touch
-from palpate.bench.row import put
-from palpate.bench.sequence import CONTACT, Sequence, SequenceState
+from palpate.bench.force_input import Conditioning, ConditioningState, ForceInput, ForceInputState
+from palpate.bench.plant import Plant, PlantState, SurfaceTouch
+from palpate.bench.sequence import CONTACT, Sequence, SequenceState, put
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 from palpate.friction import Coulomb
 from palpate.instruments import Converter, Encoder
-from palpate.references.force_schedule import ForceSchedule
+from palpate.references import ForceSchedule
 from palpate.signals.types import Task
 
 ALONG_X = Vec3(1.0, 0.0, 0.0)
@@ -57,7 +55,7 @@ class Loop(NamedTuple):
 @part
 class LoopState(NamedTuple):
     plant: PlantState
-    felt: Touch  # during the step before this tick
+    felt: SurfaceTouch  # during the step before this tick
     force: ForceInputState
     conditioning: ConditioningState
     sequence: SequenceState
@@ -76,12 +74,12 @@ class Command(NamedTuple):
 
 @law
 def start_at(loop, q):
-    """The loop at rest in the air, at joint angles q [rad]."""
+    """The loop at rest in free motion, at joint angles q [rad]."""
     seen = loop.encoder.read(q)
     conditioning = loop.conditioning.start_at(seen)
     return LoopState(
         loop.plant.start_at(q),
-        Touch(0.0, 0.0, loop.plant.arm.pose(q).x - loop.plant.wall, ZERO3, 0.0, 0.0),
+        SurfaceTouch(0.0, 0.0, loop.plant.arm.pose(q).x - loop.plant.wall, ZERO3, 0.0, 0.0),
         loop.force.start(),
         conditioning,
         loop.sequence.start(),
@@ -116,7 +114,7 @@ def think(loop, state, signals, sequence):
 def move(loop, plant, force, torque, k, noise):
     """Plant and force sensor through the steps up to the next tick."""
     dt = loop.tick / loop.steps
-    felt = Touch(0.0, 0.0, 0.0, ZERO3, 0.0, 0.0)
+    felt = SurfaceTouch(0.0, 0.0, 0.0, ZERO3, 0.0, 0.0)
     for j in range(loop.steps):
         plant, felt = loop.plant.advance(plant, torque, dt)
         rough = noise * (1.0 + loop.force.roughness * abs(felt.rate))
@@ -128,7 +126,7 @@ def move(loop, plant, force, torque, k, noise):
 def tick(loop, state, k, noise, out):
     """One tick, the k-th: the new state; its row is written into `out`. `noise`: one standard normal number."""
     q = loop.encoder.read(state.plant.q)
-    sampled = loop.force.sampled(state.force)
+    sampled = loop.force.reading(state.force)
     signals, conditioning = loop.conditioning.step(state.conditioning, q, sampled)
     sequence = loop.sequence.step(state.sequence, signals.sense.x.x, signals.sense.f.x)
     estimators = loop.estimators.step(state.estimators, signals, sequence.phase == CONTACT, sequence.x0)

@@ -29,7 +29,7 @@ class Check:
 
     @property
     def sentence(self) -> str:
-        """In words."""
+        """The outcome of the check in words."""
         return self.law.__name__.replace("_", " ")
 
 

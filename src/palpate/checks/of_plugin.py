@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from palpate.bench.experiments.own_parts import CONTROLLER, IDENTIFIER, SURFACE, Role, role_of, table_of
-from palpate.bench.experiments.tables import Experiment, load
+from palpate.bench.tables import Experiment, load
+from palpate.bench.toml_parts import CONTROLLER, IDENTIFIER, SURFACE, Role, role_of, table_of
 from palpate.checks.check import Check
 from palpate.checks.controllers import TICK, WALL, controller_checks
 from palpate.checks.identifiers import identifier_checks
@@ -58,6 +58,6 @@ def _of_experiment(name: str) -> dict[str, list[Check]]:
 
 def _checks(role: Role, table: Any, tick: float, wall: float) -> list[Check]:
     if role is IDENTIFIER:
-        return identifier_checks(partial(table.made, tick))
-    part = table.made(tick, wall)
+        return identifier_checks(partial(table.build, tick))
+    part = table.build(tick, wall)
     return controller_checks(part) if role is CONTROLLER else surface_checks(part)

@@ -145,7 +145,7 @@ def it_is_passive(surface: Any) -> None:
 
 
 def it_never_pulls_and_gives_no_energy(surface: Any) -> None:
-    """Under random pushes."""
+    """A surface under random pushes never pulls and gives no energy."""
     for seed in _SEEDS:
         random = np.random.default_rng(seed)
         mass, speed = float(random.uniform(0.3, 10.0)), float(random.uniform(0.0, 0.3))
@@ -181,7 +181,7 @@ def it_stays_at_rest_untouched(surface: Any) -> None:
 
 
 def compiled_it_is_as_in_plain_python(surface: Any) -> None:
-    """Bit for bit."""
+    """Compiled, a surface gives the forces of plain Python bit for bit."""
     push = 15.0 * np.sin(np.arange(3000) * 0.004)
     plain, compiled = np.empty((3000, 4)), np.empty((3000, 4))
     press.plain(surface, 1.5, -1e-4, 0.1, push, DT, plain)

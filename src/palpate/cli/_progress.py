@@ -87,7 +87,7 @@ class _Lines:
         self._first: int | None = None
 
     def show(self, done: int) -> None:
-        from palpate.studies.running.cost import in_words
+        from palpate.studies.preview import in_words
 
         self._first = done if self._first is None else self._first
         now = time.monotonic()

@@ -162,7 +162,7 @@ class SensorOptions:
     def sensors(self) -> Sensors:
         """The sensors."""
         from palpate.excitation import Sensors
-        from palpate.excitation.fisher_information import ForceChain, phase_std
+        from palpate.excitation.spectra import ForceChain, phase_std
         from palpate.signals.low_pass import LowPass
 
         for option, value in (("--sampling", self.sampling), ("--rate", self.rate)):

@@ -134,7 +134,7 @@ def export(
     told = _as_json(exported, out, checked)
     write_json(beside, signed(told))
     _print(exported, told, checked, (out, beside), json=output.json)
-    verdicts = [one.passed for one in checked if one.passed is not None]
+    verdicts = [one.within_tolerance for one in checked if one.within_tolerance is not None]
     return 1 if output.check and not (verdicts and all(verdicts)) else 0
 
 
@@ -152,7 +152,7 @@ def _write(exported: Exported, out: Path, wanted: bool) -> list[Checked]:
 
     mark = MADE.removeprefix("# ")
     with whole(out) as draft:
-        draft.write_text(exported.commented(f"{mark} {__version__}"), encoding="utf-8", newline="\n")
+        draft.write_text(exported.with_comment(f"{mark} {__version__}"), encoding="utf-8", newline="\n")
         exported.validate(draft)
         return check(exported, draft) if wanted else []
 
@@ -204,4 +204,4 @@ def _row(one: Checked) -> tuple[str, ...]:
         return one.probe, "-", "-", "-", "-", "failed" if one.reached else "not pressed"
     errors = [f"{100 * (error or 0.0):.2g} %" for error in (one.error_K, one.error_B)]
     numbers = f"{measured.stiffness:.7g}", errors[0], f"{measured.damping:.6g}", errors[1]
-    return (one.probe, *numbers, "passed" if one.passed else "failed")
+    return (one.probe, *numbers, "passed" if one.within_tolerance else "failed")

@@ -157,7 +157,7 @@ def identify(
         Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the folder
         of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book are logs of their own.
     """
-    from palpate.logs.gathered import gathered, is_folder_of_logs, log_of, sheets_as_logs
+    from palpate.logs.gathered import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
 
     output, cell = output or OutputOptions(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
@@ -176,7 +176,7 @@ def identify(
     from palpate.cli._many_logs import many
 
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
-    return many(gathered(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
+    return many(gather_logs(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
 
 
 def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:

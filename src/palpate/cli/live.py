@@ -22,7 +22,7 @@ from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.live.player import Player
-    from palpate.live.view import Source
+    from palpate.live.view import RowSource
 
 _DEFAULT = "foam-hybrid"
 
@@ -140,8 +140,8 @@ def live(
     return _serve(_replay(path, asked, shown.whole_approach), at)
 
 
-def _simulation(name: str, seed: int, whole: bool) -> Source:
-    from palpate.bench.experiments.tables import load
+def _simulation(name: str, seed: int, whole: bool) -> RowSource:
+    from palpate.bench.tables import load
     from palpate.live.simulation import Simulation
 
     experiment = load(name)
@@ -151,15 +151,14 @@ def _simulation(name: str, seed: int, whole: bool) -> Source:
         raise InputError(f"{name}: {error}") from error
 
 
-def _pressing(name: str, seed: int) -> Source:
+def _pressing(name: str, seed: int) -> RowSource:
     from palpate.live.pressing import PressingArm
 
     return PressingArm(name, seed, waiting=lambda: say(COMPILING))
 
 
-def _replay(path: Path, asked: Any, whole: bool) -> Source:
-    from palpate.live.of_log import of_log
-    from palpate.live.of_run import of_run
+def _replay(path: Path, asked: Any, whole: bool) -> RowSource:
+    from palpate.live.recorded_run import of_log, of_run
     from palpate.logs.own_runs import is_run
 
     found, along, source = asked.identified_along(path)
@@ -168,11 +167,9 @@ def _replay(path: Path, asked: Any, whole: bool) -> Source:
     return of_log(source.title, found, along)
 
 
-def _serve(shown: Source, at: ServedOptions) -> int:
-    from palpate.live.feed import Feed
-    from palpate.live.player import Player, made_ready
-    from palpate.live.server import HOST, served
-    from palpate.live.sharing import WARNING, network_address, qr_code
+def _serve(shown: RowSource, at: ServedOptions) -> int:
+    from palpate.live.player import Feed, Player, made_ready
+    from palpate.live.server import HOST, WARNING, network_address, qr_code, serve
 
     host = network_address() if at.share else HOST
     if at.share:
@@ -182,7 +179,7 @@ def _serve(shown: Source, at: ServedOptions) -> int:
     with _stability(shown) as (changed, latest, tell):
         player = Player(shown, Feed(), changed, latest)
         tell.append(player.news)
-        with player, served(player, at.port, host) as address, _viewers(player, at) as more:
+        with player, serve(player, at.port, host) as address, _viewers(player, at) as more:
             print_lines(str(address), *more, *(qr_code(str(address)).splitlines() if at.share else ()))
             if at.open_:
                 import webbrowser
@@ -194,7 +191,7 @@ def _serve(shown: Source, at: ServedOptions) -> int:
 
 
 @contextmanager
-def _stability(shown: Source) -> Iterator[tuple[Any, Any, list[Any]]]:
+def _stability(shown: RowSource) -> Iterator[tuple[Any, Any, list[Any]]]:
     """Stability of the loop of a simulation; a log has no loop."""
     from palpate.live.stability import Stability
 

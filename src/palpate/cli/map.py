@@ -203,7 +203,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
         return read_table(places.table, places.columns.split(",") if places.columns else ())
     if places.columns is not None:
         raise InputError("--columns is of --table; the place in logs is given with --place")
-    from palpate.logs.gathered import gathered
+    from palpate.logs.gathered import gather_logs
 
     with bar(console(stderr=True)) as progress:
 
@@ -211,7 +211,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
             return progress.track(paths, description="identifying")
 
         named = places.place.split(",") if places.place else ()
-        return read_logs(gathered(logs), one.identifier, named, places.each_contact, track)
+        return read_logs(gather_logs(logs), one.identifier, named, places.each_contact, track)
 
 
 def _write(result: MapResult, output: OutputOptions, name: str) -> None:

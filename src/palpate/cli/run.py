@@ -78,7 +78,7 @@ def run(
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    from palpate.bench.ending import DONE, INTERRUPTED
+    from palpate.bench.sequence import DONE, INTERRUPTED
 
     drawn.check()
     with (own or PluginOptions()).consent():
@@ -124,7 +124,7 @@ def _run(
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise
-    from palpate.bench.one_direction.tables import OneDirection
+    from palpate.bench.one_direction import OneDirection
     from palpate.logs import write_record
 
     with fresh_folder(folder, replace=output.replace) as fresh:
@@ -189,8 +189,7 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
 
 
 def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> Record:
-    from palpate.bench.any_experiment import build_any
-    from palpate.bench.part_check import check_parts
+    from palpate.bench.any_experiment import build_any, check_parts
 
     experiment = asked.experiment
     try:

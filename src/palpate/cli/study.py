@@ -27,10 +27,10 @@ from palpate.text import printable
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from palpate.studies.definition.plan import Plan
-    from palpate.studies.findings.summary import Findings
-    from palpate.studies.running.cluster import Cluster
-    from palpate.studies.running.run_study import Runner
+    from palpate.studies.cluster import Cluster
+    from palpate.studies.plan import Plan
+    from palpate.studies.run_study import StudyRunner
+    from palpate.studies.summary import Findings
 
 
 _SHOWN = 3
@@ -62,7 +62,7 @@ class ClusterOptions:
 
     def cluster(self) -> Cluster | None:
         """The cluster; None if none is named."""
-        from palpate.studies.running.cluster import Certificates, Cluster
+        from palpate.studies.cluster import Certificates, Cluster
 
         files = (self.tls_ca, self.tls_cert, self.tls_key)
         given = [path for path in files if path is not None]
@@ -102,7 +102,7 @@ def study(
     """
     known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or FigureOptions()
     drawn.check()
-    from palpate.studies.definition import study as studies
+    from palpate.studies import study as studies
 
     if known.list_:
         listed(studies.FILES, lambda one: studies.load(one).title)
@@ -135,12 +135,11 @@ class _Asked:
 
 def _done(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Findings:
     """Do the missing runs, and write table, page and summary."""
-    from palpate.studies.definition.part_check import check_parts_of
-    from palpate.studies.definition.plan import plan
-    from palpate.studies.definition.study import parse
-    from palpate.studies.findings.summary import present
-    from palpate.studies.running.dry_run import check_cases
-    from palpate.studies.running.run_study import Work, begun, check_folder
+    from palpate.studies.plan import plan
+    from palpate.studies.preview import check_cases, check_parts_of
+    from palpate.studies.run_study import Work, begun, check_folder
+    from palpate.studies.study import parse
+    from palpate.studies.summary import present
 
     screen, name, folder = console(stderr=True), asked.name, asked.folder
     waiting = partial(screen.print, COMPILING)
@@ -157,14 +156,14 @@ def _done(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Finding
         _ask(planned, screen, here=where.scheduler is None)
     with _runner(where, screen) as runner, counted(screen) as show:
         work = Work(planned, asked.source, folder, runner, lambda done: show("runs", done, len(planned)))
-        frame = work.done(replace=asked.replace)
+        frame = work.run(replace=asked.replace)
     told = printable(f"palpate study {shlex.quote(name)}")
     return present(frame, planned, folder, asked.source, told, drawn.endings, drawn.dpi)
 
 
 def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
     """Ask for confirmation of a very long study; for a cluster only the number of runs is known."""
-    from palpate.studies.running.cost import MANY, seconds_a_run, too_much
+    from palpate.studies.preview import MANY, seconds_a_run, too_much
 
     if not here and len(plan) < MANY:
         return
@@ -178,10 +177,10 @@ def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
 
 
 @contextmanager
-def _runner(where: ClusterOptions, screen: Console) -> Iterator[Runner]:
+def _runner(where: ClusterOptions, screen: Console) -> Iterator[StudyRunner]:
     cluster = where.cluster()
     if cluster is None:
-        from palpate.studies.running.local import Local
+        from palpate.studies.run_one import Local
 
         yield Local(waiting=lambda: screen.print(COMPILING))
         return

@@ -7,13 +7,11 @@ frame on the tool gives the point that touches, p + R r. Along the normal n thes
 
 from __future__ import annotations
 
-from palpate.contact_frame.arm import robot_stiffness, with_arm
-from palpate.contact_frame.declared import Arm, ContactFrame
-from palpate.contact_frame.description import describe
-from palpate.contact_frame.identify import identify_contact
-from palpate.contact_frame.payload import Payload, load_payload
-from palpate.contact_frame.projecting import project
-from palpate.contact_frame.weighing.weighed import Weighed, weigh
+from palpate.contact_frame.arm import describe, robot_stiffness, with_arm
+from palpate.contact_frame.load import Payload, load_payload
+from palpate.contact_frame.projecting import identify_contact, project
+from palpate.contact_frame.signals_in_base import Arm, ContactFrame
+from palpate.contact_frame.tool_payload import Weighed, weigh
 
 __all__ = [
     "Arm",

@@ -1,22 +1,64 @@
-"""From a record in three dimensions to one along the contact's normal."""
+"""From a record in three dimensions to one along the contact's normal, and to its identification.
+
+A check of lever arm, axes and torque says whether the force passes through the point that is said to touch. The arm's
+own mass and compliance are removed.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from palpate.arrays import Array
-from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.free_motion.inertia import CHANCE, free_inertia, wrong_sign, wrong_sign_of
-from palpate.contact_frame.lever import line_misses_tcp
-from palpate.contact_frame.load import load_of, turns
-from palpate.contact_frame.load_removal import Unloaded, in_range
-from palpate.contact_frame.normal import MATTERS, Normal, direction_of, scale_std
-from palpate.contact_frame.signals_in_base import Signals, signals_of
-from palpate.contact_frame.vectors import read_rows
+from palpate.arrays import Array, Mask
+from palpate.contact_frame.arm import with_arm
+from palpate.contact_frame.free_motion import CHANCE, free_inertia, wrong_sign, wrong_sign_of
+from palpate.contact_frame.load import MATTERS, Normal, direction_of, load_of, scale_std, turns
+from palpate.contact_frame.signals_in_base import (
+    FORCE,
+    Arm,
+    BaseSignals,
+    ContactFrame,
+    Unloaded,
+    in_range,
+    signals_of,
+)
+from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.errors import InputError
+from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
 from palpate.records import Record
+
+_LEAST = 0.3
+"""Of the largest force: the line of a weaker one is three times as uncertain, for the same noise of the torque."""
+
+
+def line_misses_tcp(signals: BaseSignals, free: Mask, inside: Mask, frame: ContactFrame) -> float | None:
+    """How far the contact force's line of action passes from the tool centre point [m]; the median over the contact.
+
+    A force f at r gives the torque r x f about the point that the torque is about, so the line is at
+    |f x (tau - r x f)| / |f|^2 from r. None without a torque, or where the log does not show its bias.
+
+    Args:
+        signals: force and torque in the tool's axes.
+        free: rows in which nothing is touched, shape (n,).
+        inside: rows in contact, shape (n,).
+        frame: the lever arm.
+    """
+    if signals.torque is None:
+        return None
+    there = read_rows(signals.force) & read_rows(signals.torque)
+    free, inside = free & there, inside & there
+    if free.sum() < FEWEST or inside.sum() < FEWEST or not np.ptp(signals.torque[there]):
+        return None
+    force = signals.force[inside] - signals.force[free].mean(axis=0)
+    torque = signals.torque[inside] - signals.torque[free].mean(axis=0)
+    size = np.linalg.norm(force, axis=1)
+    strong = size > _LEAST * size.max()
+    lever = np.array(frame.tcp) - np.array(frame.wrench_at)
+    left = torque[strong] - np.cross(lever, force[strong])
+    return float(np.median(np.linalg.norm(np.cross(force[strong], left), axis=1) / size[strong] ** 2))
+
 
 _FOLLOWS = 0.65
 """Correlation that noise shows once in a thousand logs of twenty independent rows (Student's t with 18 degrees)."""
@@ -49,13 +91,13 @@ def project(record: Record, frame: ContactFrame) -> Record:
     spread = scale_std(normal, *_in_contact(signals, freed))
     inertia = _inertia_in_air(signals, freed, sign, frame)
     notes += turned + _warnings(signals, freed, normal, spread) + _doubts(freed, signals, frame, inertia)
-    about = _about(signals, freed, normal, sign, frame) | {"scale_std": spread, "air_inertia_kg": inertia}
+    about = _about(signals, freed, normal, sign, frame) | {"scale_std": spread, "free_inertia_kg": inertia}
     meta = {**record.meta, "contact_frame": about, "notes": [*record.meta.get("notes", ()), *notes]}
     columns = {"time": signals.time, "position": position, "force": sign * freed.force @ normal.direction}
     return Record(columns, {"time": "s", "position": "m", "force": "N"}, meta)
 
 
-def _normal(signals: Signals, freed: Unloaded, frame: ContactFrame) -> Normal:
+def _normal(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> Normal:
     if frame.normal is None:
         direction, std = direction_of(freed.force[freed.there])
         return Normal(direction, std, found=True)
@@ -67,7 +109,7 @@ def _normal(signals: Signals, freed: Unloaded, frame: ContactFrame) -> Normal:
     return Normal(direction, 0.0, found=False)
 
 
-def _in_contact(signals: Signals, freed: Unloaded) -> tuple[Array, Array]:
+def _in_contact(signals: BaseSignals, freed: Unloaded) -> tuple[Array, Array]:
     """Forces and places in contact; of the whole log where there is none."""
     rows = freed.inside if (freed.inside & freed.there).sum() > 1 else np.ones(len(freed.inside), bool)
     placed = read_rows(signals.place)
@@ -75,7 +117,7 @@ def _in_contact(signals: Signals, freed: Unloaded) -> tuple[Array, Array]:
 
 
 def _orient(
-    signals: Signals, freed: Unloaded, normal: Normal, frame: ContactFrame
+    signals: BaseSignals, freed: Unloaded, normal: Normal, frame: ContactFrame
 ) -> tuple[float, Normal, list[dict[str, Any]]]:
     """The sign that makes the force act from the tool on the surface, and the normal into the surface."""
     together = _correlation(signals, freed, normal.direction)
@@ -96,7 +138,7 @@ def _orient(
     return sign, turned, [{"code": "position-sign-reversed", "text": text}]
 
 
-def _correlation(signals: Signals, freed: Unloaded, direction: Array) -> float:
+def _correlation(signals: BaseSignals, freed: Unloaded, direction: Array) -> float:
     """Of the force with the position along a direction, in contact; the same for the direction turned round."""
     rows = (freed.inside if freed.inside.any() else freed.there) & freed.there
     placed = read_rows(signals.place)
@@ -107,7 +149,7 @@ def _correlation(signals: Signals, freed: Unloaded, direction: Array) -> float:
     return float(np.corrcoef(position, force)[0, 1])
 
 
-def _mean_press(signals: Signals, freed: Unloaded, direction: Array) -> float:
+def _mean_press(signals: BaseSignals, freed: Unloaded, direction: Array) -> float:
     """How much larger the force along a direction is in contact than out of it [N]; 0 if the tool never leaves."""
     inside = freed.inside & freed.there
     if not (freed.free.any() and inside.any()):
@@ -115,7 +157,7 @@ def _mean_press(signals: Signals, freed: Unloaded, direction: Array) -> float:
     return float((freed.force[inside].mean(axis=0) - freed.force[freed.free].mean(axis=0)) @ direction)
 
 
-def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) -> list[dict[str, Any]]:
+def _warnings(signals: BaseSignals, freed: Unloaded, normal: Normal, spread: float) -> list[dict[str, Any]]:
     notes = []
     if signals.guess:
         notes.append({"code": "frame-guess", "text": f"{signals.guess}; say --wrench-frame if it is not so"})
@@ -138,7 +180,7 @@ def _warnings(signals: Signals, freed: Unloaded, normal: Normal, spread: float) 
 
 
 def _inertia_in_air(
-    signals: Signals, freed: Unloaded, sign: float, frame: ContactFrame
+    signals: BaseSignals, freed: Unloaded, sign: float, frame: ContactFrame
 ) -> tuple[float, float] | None:
     """The mass by which the force follows the acceleration before the touch, and its std [kg].
 
@@ -153,7 +195,7 @@ def _inertia_in_air(
 
 
 def _doubts(
-    freed: Unloaded, signals: Signals, frame: ContactFrame, inertia: tuple[float, float] | None
+    freed: Unloaded, signals: BaseSignals, frame: ContactFrame, inertia: tuple[float, float] | None
 ) -> list[dict[str, Any]]:
     """Contradictions between the free rows and the compensated or weighed tool."""
     from scipy.special import chdtri
@@ -179,7 +221,7 @@ def _doubts(
 
 
 def _about(
-    signals: Signals, freed: Unloaded, normal: Normal, sign: float, frame: ContactFrame
+    signals: BaseSignals, freed: Unloaded, normal: Normal, sign: float, frame: ContactFrame
 ) -> dict[str, Any]:
     """Declared and estimated properties, as plain values."""
     load = freed.load
@@ -204,4 +246,109 @@ def _about(
         "weight_std_N": load.weight_std if load.separable else None,
         "load_std_N": load.std,
         "line_of_action_off_m": line_misses_tcp(signals, freed.free, freed.inside, frame),
+    }
+
+
+def identify_contact(
+    record: Record,
+    frame: ContactFrame | None = None,
+    arm: Arm | None = None,
+    *,
+    tolerance: float = 0.25,
+    calibration: float = 0.0,
+    **options: Any,
+) -> tuple[Identification, Record]:
+    """Find what an arm touched.
+
+    Args:
+        record: force and position, or wrench and pose, over time.
+        frame: how wrench and pose stand to each other and to the surface; not for a record of one axis.
+        arm: mass and stiffness between the sensors and the surface.
+        tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
+        calibration: relative standard deviation of the scales of force and position together.
+        options: of `palpate.identify`.
+
+    Returns:
+        The identification, and the record along the normal that it is of.
+
+    Raises:
+        InputError: the record or an argument is wrong, in one line.
+    """
+    arm = arm or Arm()
+    arm = replace(
+        arm,
+        position_from=arm.position_from or record.meta.get("position_from"),
+        tool_mass=arm.tool_mass or record.meta.get("tool_mass_kg"),
+        stiffness=arm.stiffness or record.meta.get("robot_stiffness_N_per_m"),
+        mass=arm.mass or record.meta.get("robot_mass_kg"),
+    )
+    spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
+    in_space = FORCE[0] in record.columns
+    if in_space:
+        record = project(record, frame or ContactFrame())
+        spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "free_inertia_kg"))
+    elif inertia is not None and wrong_sign(inertia):
+        record = _note_inertia_sign(record, inertia)
+    if arm.stiffness is not None:
+        options |= {"series_stiffness": arm.stiffness[0], "series_std": arm.stiffness[1]}
+        options["series_mass"] = arm.mass
+    elif arm.mass is not None:
+        raise InputError("the robot's mass swings on the robot's own stiffness: give --robot-stiffness too")
+    scale = float(np.hypot(calibration, spread))
+    found = identify(record, tolerance=tolerance, calibration=scale, **options)
+    if in_space and not record.meta["contact_frame"]["normal_shown"]:
+        found = _refuse_direction(found)
+    if in_space and Code.NO_CONTACT.word in found.codes:
+        found, record = _all_free(found, record)
+    if wrong_sign(inertia):
+        found = _mistaken(found)
+    about = _about_arm(arm) | {"force_filter": str(options.get("force_filter") or "none")}
+    record = replace(record, meta={**record.meta, "arm": about})
+    return with_arm(found, arm, tolerance, from_pose=in_space), record
+
+
+def _note_inertia_sign(record: Record, inertia: tuple[float, float]) -> Record:
+    """A record whose tool's inertia was weighed with the wrong sign says so."""
+    note = {"code": Code.TOOL_INERTIA.word, "text": wrong_sign_of(inertia)}
+    return replace(record, meta={**record.meta, "notes": [*record.meta.get("notes", ()), note]})
+
+
+def _refuse_direction(found: Identification) -> Identification:
+    """If the force has no direction, a fit along any direction is chance."""
+    reason = "the force has no direction, so there seems to be no contact"
+    refused = {
+        name: Parameter(None, None, None, p.unit, Verdict.NOT_IDENTIFIABLE, reason)
+        for name, p in found.parameters.items()
+    }
+    warnings = [warn for warn in found.warnings if warn.code is not Code.NO_CONTACT]
+    return replace(found, parameters=refused, warnings=(*warnings, Warn(Code.NO_CONTACT, reason)))
+
+
+def _mistaken(found: Identification) -> Identification:
+    """A contact alone cannot separate a mass compensated with the wrong sign from a lag and a damping."""
+    reason = "the tool's inertia is in the force with the wrong sign (tool-inertia), which a damping and a lag hide"
+    refused = {
+        name: replace(p, verdict=Verdict.REJECTED, value=None, std=None, ci95=None, reason=reason)
+        for name, p in found.parameters.items()
+        if name in {"B", "M"}
+    }
+    return replace(found, parameters={**found.parameters, **refused})
+
+
+def _all_free(found: Identification, record: Record) -> tuple[Identification, Record]:
+    """Where nothing is touched, there is no contact that the log could begin in, no normal and no side of a force."""
+    about = {**record.meta["contact_frame"], "untouched": True}
+    warnings = tuple(
+        w for w in found.warnings if w.code not in (Code.CONTACT_AT_START, Code.NORMAL_UNCERTAIN)
+    )
+    return replace(found, warnings=warnings), replace(record, meta={**record.meta, "contact_frame": about})
+
+
+def _about_arm(arm: Arm) -> dict[str, Any]:
+    """Properties of the arm, as plain values."""
+    return {
+        "tool_mass_kg": list(arm.tool_mass) if arm.tool_mass else None,
+        "robot_stiffness_N_per_m": list(arm.stiffness) if arm.stiffness else None,
+        "robot_mass_kg": list(arm.mass) if arm.mass else None,
+        "position_from": arm.position_from,
     }

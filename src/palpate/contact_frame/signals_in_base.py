@@ -1,16 +1,111 @@
-"""A record of wrench and pose as vectors: the force in the tool's axes, the point that touches in the base's."""
+"""A record of wrench and pose as vectors: the force in the tool's axes, the point that touches in the base's.
+
+The user declares axes of the wrench, tool and normal of the contact. Saturated axes of the force sensor are detected
+before the axes are rotated; weight and bias are removed, with the rows in free motion and in contact.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from palpate.arrays import Array
-from palpate.contact_frame.declared import ContactFrame
-from palpate.contact_frame.vectors import matrices
+from palpate.arrays import Array, Mask
+from palpate.contact_frame.free_motion import contact_rows, rows_between
+from palpate.contact_frame.load import Load, known_load, load_of, no_load, robust_load, turns
+from palpate.contact_frame.vectors import Vector, matrices, read_rows
 from palpate.errors import InputError
+from palpate.identification.saturation import at_limit
 from palpate.records import Record
+
+if TYPE_CHECKING:
+    from palpate.contact_frame.load import Payload
+
+
+@dataclass(frozen=True)
+class ContactFrame:
+    """How wrench and pose stand to each other and to the surface.
+
+    Args:
+        wrench_frame: axes that the wrench is given in: the arm's base, the tool (the axes of the pose), or a sensor
+            that is turned against the tool; None to use the frames of the messages' headers.
+        sensor_rpy: how the sensor is turned against the tool: roll, pitch and yaw about fixed axes [rad].
+        tcp: the point that touches, in the tool's axes from the pose's origin [m].
+        wrench_at: the point that the torque is about, likewise [m]; only the lever arm's check needs it.
+        force_sign: `action` acts from the tool on the surface, `reaction` from the surface on the tool;
+            None to find out.
+        normal: into the surface; None to find it from the force.
+        normal_frame: axes of the normal: the base's, or the tool's.
+        gravity_compensated: the tool's weight is already subtracted from the wrench.
+        free: begin and end of a stretch in which nothing is touched [s]; None to find such stretches.
+        payload: of the sensor, if it was weighed; its wrench must be in the same axes.
+
+    Raises:
+        InputError: they contradict each other.
+    """
+
+    wrench_frame: Literal["base", "tool", "sensor"] | None = None
+    sensor_rpy: Vector | None = None
+    tcp: Vector = (0.0, 0.0, 0.0)
+    wrench_at: Vector = (0.0, 0.0, 0.0)
+    force_sign: Literal["action", "reaction"] | None = None
+    normal: Vector | None = None
+    normal_frame: Literal["base", "tool"] = "base"
+    gravity_compensated: bool = False
+    free: tuple[float, float] | None = None
+    payload: Payload | None = None
+
+    def __post_init__(self) -> None:
+        if (self.wrench_frame == "sensor") != (self.sensor_rpy is not None):
+            raise InputError("a wrench in the sensor's axes needs --sensor-rpy, and no other frame takes it")
+        if self.normal is not None and not np.linalg.norm(self.normal) > 0:
+            raise InputError(
+                "the normal must have a length, got 0,0,0; it points into the surface, as 0,0,-1"
+            )
+        if self.free is not None and not self.free[0] < self.free[1]:
+            raise InputError(
+                f"the interval of free motion must end after it begins, got {self.free[0]:g} to {self.free[1]:g} s"
+            )
+        if self.payload is not None:
+            self._check_axes(self.payload)
+
+    def _check_axes(self, payload: Payload) -> None:
+        said = (self.wrench_frame, self.sensor_rpy)
+        if self.wrench_frame is not None and said != (payload.wrench_frame, payload.sensor_rpy):
+            raise InputError(
+                f"the payload was weighed with a wrench in the {payload.wrench_frame}'s axes, and this wrench is said"
+                f" to be in the {self.wrench_frame}'s: give the same --wrench-frame and --sensor-rpy, or weigh again"
+            )
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Mass and stiffness between the sensors and the surface.
+
+    Args:
+        tool_mass: mass between the force sensor and the surface and its standard deviation [kg]; None if not known.
+        stiffness: of the arm between the position sensors and the surface, with its std [N/m]; None if not known.
+        mass: of the arm's tip before the force sensor, which swings on that stiffness, with its std [kg].
+        position_from: source of the position: encoders in the `joints`, or a sensor of the `tip`.
+
+    Raises:
+        InputError: a negative mass, or one that no stiffness holds.
+    """
+
+    tool_mass: tuple[float, float] | None = None
+    stiffness: tuple[float, float] | None = None
+    mass: tuple[float, float] | None = None
+    position_from: Literal["joints", "tip"] | None = None
+
+    def __post_init__(self) -> None:
+        if self.tool_mass is not None and not (self.tool_mass[0] >= 0 and self.tool_mass[1] >= 0):
+            raise InputError(
+                f"the tool's mass must be 0 kg or more, got {self.tool_mass[0]:g}:{self.tool_mass[1]:g}"
+            )
+        if self.mass is not None and not (self.mass[0] >= 0 and self.mass[1] >= 0):
+            raise InputError(f"the robot's mass must be 0 kg or more, got {self.mass[0]:g}:{self.mass[1]:g}")
+
 
 FORCE = ("force_x", "force_y", "force_z")
 TORQUE = ("torque_x", "torque_y", "torque_z")
@@ -19,7 +114,7 @@ QUATERNION = ("quaternion_x", "quaternion_y", "quaternion_z", "quaternion_w")
 
 
 @dataclass(frozen=True)
-class Signals:
+class BaseSignals:
     """Wrench and pose over time; NaN where there is no reading.
 
     Args:
@@ -45,7 +140,7 @@ class Signals:
     turned: bool
 
 
-def signals_of(record: Record, frame: ContactFrame) -> Signals:
+def signals_of(record: Record, frame: ContactFrame) -> BaseSignals:
     """Wrench and pose of a record in three dimensions.
 
     Raises:
@@ -61,7 +156,7 @@ def signals_of(record: Record, frame: ContactFrame) -> Signals:
     wrench_frame, guess = _wrench_frame(record, frame, turned)
     torque = _vectors(record, TORQUE) if TORQUE[0] in record.columns else None
     into_tool = _into_tool(wrench_frame, frame, rotations)
-    return Signals(
+    return BaseSignals(
         time=time,
         recorded=_vectors(record, FORCE),
         force=np.einsum("nij,nj->ni", into_tool, _vectors(record, FORCE)),
@@ -120,3 +215,106 @@ def _into_tool(wrench_frame: str, frame: ContactFrame, rotations: Array) -> Arra
 
     turn: Array = Rotation.from_euler("xyz", frame.sensor_rpy).as_matrix()
     return np.broadcast_to(turn, rotations.shape)
+
+
+def saturated_rows(force: Array, place: Array, inside: Mask) -> Mask:
+    """Rows in contact in which an axis rests at exactly its extreme value while the tool moves on, shape (n,).
+
+    Args:
+        force: in the axes that it was recorded in [N], shape (n, 3); NaN where there is no reading.
+        place: of the tool [m], shape (n, 3), likewise.
+        inside: rows in contact, shape (n,).
+    """
+    stuck = np.zeros(len(force), bool)
+    for axis in force.T:
+        there = np.isfinite(axis) & inside
+        if there.any() and np.ptp(axis[there]):
+            stuck |= at_limit(axis, place, (axis[there].max(), axis[there].min()), there)
+    return stuck
+
+
+_ROUNDS = 4
+"""At most: the weight tells the free rows and they the weight, until neither changes."""
+
+
+@dataclass(frozen=True)
+class Unloaded:
+    """The force in the base's axes without weight and bias.
+
+    Args:
+        force: [N], shape (n, 3).
+        there: rows with a force, shape (n,).
+        inside: rows in contact, shape (n,).
+        free: rows with a force in which nothing is touched, shape (n,).
+        load: the subtracted weight and bias.
+    """
+
+    force: Array
+    there: Mask
+    inside: Mask
+    free: Mask
+    load: Load
+
+
+def in_range(signals: BaseSignals, frame: ContactFrame) -> tuple[BaseSignals, Unloaded, list[dict[str, Any]]]:
+    """Take off weight and bias, and leave out the readings of a force at the end of its range.
+
+    Returns:
+        The signals without these readings, the force, and notes as a record's meta has them.
+    """
+    freed = _remove_load(signals, frame)
+    stuck = saturated_rows(signals.recorded, signals.place, freed.inside)
+    if not stuck.any():
+        return signals, freed, []
+    signals = replace(signals, force=np.where(stuck[:, None], np.nan, signals.force))
+    text = f"an axis of the force rests at its extreme value for {int(stuck.sum())} rows; they are left out"
+    return signals, _remove_load(signals, frame), [{"code": "saturated", "text": text}]
+
+
+def _remove_load(signals: BaseSignals, frame: ContactFrame) -> Unloaded:
+    there = read_rows(signals.force)
+    if frame.free is None:
+        load, inside, free = _fit_load(signals, there, frame)
+    else:
+        free = rows_between(signals.time, frame.free) & there
+        load = _load(signals, free, frame)
+        inside, _ = _contact(signals, load)
+    return Unloaded(load.taken_off(signals.force, signals.rotations), there, inside, free, load)
+
+
+def _load(signals: BaseSignals, free: Mask, frame: ContactFrame) -> Load:
+    """Weight and bias by the free rows; the weight is the payload's where there is one."""
+    force, rotations = signals.force[free], signals.rotations[free]
+    if frame.payload is not None:
+        return known_load(force, rotations, frame.payload)
+    return load_of(force, rotations, weighs=not frame.gravity_compensated)
+
+
+def _fit_load(signals: BaseSignals, there: Mask, frame: ContactFrame) -> tuple[Load, Mask, Mask]:
+    """Weight and bias by the free rows; which rows these are, depends on the weight where the tool turns."""
+    turned = signals.turned and turns(signals.rotations[there])
+    none = there & False
+    weighs = not frame.gravity_compensated
+    if frame.payload is not None:
+        load = _load(signals, none, frame)
+    else:
+        load = (
+            robust_load(signals.force[there], signals.rotations[there], weighs=weighs)
+            if turned
+            else no_load()
+        )
+    before = none
+    for _ in range(_ROUNDS if turned else 1):
+        inside, free = _contact(signals, load)
+        free &= there
+        if free.any() and np.array_equal(free, before):
+            break
+        before = free
+        if not free.any():
+            return _load(signals, none, frame) if frame.payload else no_load(), inside, free
+        load = _load(signals, free, frame)
+    return load, inside, free
+
+
+def _contact(signals: BaseSignals, load: Load) -> tuple[Mask, Mask]:
+    return contact_rows(signals.time, load.taken_off(signals.force, signals.rotations), signals.place)

@@ -6,7 +6,7 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
-from palpate.signals.quaternions import continuous
+from palpate.signals.samples import continuous
 
 Vector = tuple[float, float, float]
 FEWEST = 20

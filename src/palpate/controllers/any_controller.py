@@ -5,18 +5,18 @@ from typing import Any, NamedTuple
 
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.errors import InputError
-from palpate.signals.tables import example, kinds
+from palpate.signals.types import example, kinds
 
 
 @cache
 def members() -> tuple[Any, ...]:
     """One of each controller that shares the compiled loop, with any numbers: the type is what counts."""
-    return tuple(example(kind).made(0.001, 0.5) for kind in kinds(ControllerTable) if kind.shares_loop)
+    return tuple(example(kind).build(0.001, 0.5) for kind in kinds(ControllerTable) if kind.shares_loop)
 
 
 def controller_of(table: ControllerTable, tick: float, wall: float) -> Any:
     """The controller of a table, for a time between ticks [s] and a surface at x = `wall` [m]."""
-    one = table.made(tick, wall)
+    one = table.build(tick, wall)
     return join(one) if table.shares_loop else one
 
 

@@ -8,13 +8,12 @@ from palpate.controllers.controller import ControllerTable, controller
 from palpate.force.arm import Arm, Limits, TorqueLoop, load_arm
 from palpate.force.gains import gains_for
 from palpate.force.law import Cautious, CautiousState
-from palpate.signals.parameters import triple
-from palpate.signals.tables import NotNegativeTriple, Positive, PositiveTriple
+from palpate.signals.types import NotNegativeTriple, Positive, PositiveTriple, triple
 
 
 @part
 class CautiousPressState(NamedTuple):
-    """Of `CautiousPress`."""
+    """State of `CautiousPress` between two ticks."""
 
     inner: CautiousState
     x_c: float  # far end of the spring [m]
@@ -86,7 +85,7 @@ class CautiousController(ControllerTable, tag="cautious"):
     room: Positive = 80.0
     """Farthest that the spring is drawn beyond what is felt [N]."""
 
-    def made(self, tick: float, wall: float) -> CautiousPress:
+    def build(self, tick: float, wall: float) -> CautiousPress:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         return cautious_on_bench(tick, self.spring, self.damping, self.force, self.cap, self.room)
 

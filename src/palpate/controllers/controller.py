@@ -4,7 +4,7 @@ from typing import Any, ClassVar, TypeVar
 
 from palpate._jit import part
 from palpate._vector import ZERO3
-from palpate.signals.tables import Table
+from palpate.signals.types import Table
 
 C = TypeVar("C", bound=type)
 
@@ -44,6 +44,6 @@ class ControllerTable(Table, tag_field="kind"):
 
     shares_loop: ClassVar[bool] = False
 
-    def made(self, tick: float, wall: float) -> Any:
+    def build(self, tick: float, wall: float) -> Any:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         raise NotImplementedError

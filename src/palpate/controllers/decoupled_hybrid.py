@@ -6,8 +6,7 @@ from palpate._jit import law
 from palpate._vector import Vec3
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.resolved_acceleration import position_command, resolved_acceleration
-from palpate.signals.parameters import alike
-from palpate.signals.tables import NotNegative, Positive
+from palpate.signals.types import NotNegative, Positive, alike
 
 
 @law
@@ -84,7 +83,7 @@ class DecoupledHybridController(ControllerTable, tag="decoupled-hybrid"):
     kfv: NotNegative = 110.0
     """Of the force's rate [1/s]; not used as printed."""
 
-    def made(self, tick: float, wall: float) -> DecoupledHybrid:
+    def build(self, tick: float, wall: float) -> DecoupledHybrid:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         kp, kv, kf = alike(self.kp), alike(self.kv), alike(self.kf)
         if self.form == "printed":

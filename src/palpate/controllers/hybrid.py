@@ -6,8 +6,7 @@ from palpate._jit import law
 from palpate._vector import ZERO3, Vec3
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.resolved_acceleration import position_command, resolved_acceleration
-from palpate.signals.parameters import alike
-from palpate.signals.tables import NotNegative
+from palpate.signals.types import NotNegative, alike
 
 
 @law
@@ -44,7 +43,7 @@ class Hybrid(NamedTuple):
         return hybrid(model.J, model.Jdqd, model.M, model.h, task.s, u_x, task.f, u_f), integral
 
     def report(self, state):
-        """The force integral."""
+        """The force integral, for the record."""
         return state, ZERO3
 
 
@@ -57,6 +56,6 @@ class HybridController(ControllerTable, tag="hybrid"):
     ki: NotNegative = 0.003
     """Per sample."""
 
-    def made(self, tick: float, wall: float) -> Hybrid:
+    def build(self, tick: float, wall: float) -> Hybrid:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         return Hybrid(alike(self.kp), alike(self.kv), alike(self.kf), alike(self.ki))

@@ -6,8 +6,7 @@ from palpate._jit import law
 from palpate._vector import Vec3
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.resolved_acceleration import resolved_acceleration
-from palpate.signals.parameters import triple
-from palpate.signals.tables import NotNegativeTriple, PositiveTriple
+from palpate.signals.types import NotNegativeTriple, PositiveTriple, triple
 
 
 @law
@@ -59,7 +58,7 @@ class ImpedanceController(ControllerTable, tag="impedance"):
     beyond: float = 0.0138
     """How far beyond the wall the desired x lies [m]."""
 
-    def made(self, tick: float, wall: float) -> Impedance:
+    def build(self, tick: float, wall: float) -> Impedance:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         target = Vec3(float(wall + self.beyond), 0.0, 0.0)
         return Impedance(triple(self.mass), triple(self.damping), triple(self.stiffness), target)

@@ -13,8 +13,7 @@ from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.errors import InputError
 from palpate.networks import THESIS_AMPLITUDE, Network, NetworkState, network, random_layers, thesis_layers
-from palpate.signals.parameters import alike, coerced, triple
-from palpate.signals.tables import NotNegative, PositiveTriple, Size, Triple
+from palpate.signals.types import NotNegative, PositiveTriple, Size, Triple, alike, coerce_fields, triple
 
 INPUTS, OUTPUTS = 9, 3
 STUCK = 1e-3
@@ -38,7 +37,7 @@ def _check(self):
 
 
 @controller
-@coerced(_check)
+@coerce_fields(_check)
 class Neural(NamedTuple):
     """The hybrid controller without its integral, and a network whose force command is added through J^T.
 
@@ -141,7 +140,7 @@ class NeuralController(ControllerTable, tag="neural"):
     offset: Triple = (0.0, 0.01, 0.01)
     """Added to the poses that the network sees [m, m, rad]."""
 
-    def made(self, tick: float, wall: float) -> Neural:
+    def build(self, tick: float, wall: float) -> Neural:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         return Neural(alike(self.kp), alike(self.kv), alike(self.kf), triple(self.offset), self._network())
 

@@ -7,8 +7,7 @@ from palpate._vector import ZERO3, Vec3
 from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.hybrid import Hybrid
 from palpate.errors import InputError
-from palpate.signals.parameters import alike, require
-from palpate.signals.tables import NotNegative, Positive
+from palpate.signals.types import NotNegative, Positive, alike, require
 
 
 @controller
@@ -40,7 +39,7 @@ class ProportionalIntegral(NamedTuple):
         return Hybrid(self.kp, self.kv, self.kf, self.tick * self.ki).step(state, sense, task, model)
 
     def report(self, state):
-        """The force integral."""
+        """The force integral, for the record."""
         return state, ZERO3
 
 
@@ -64,7 +63,7 @@ class ProportionalIntegralController(ControllerTable, tag="proportional-integral
     bandwidth: Positive | None = None
     """Of the force loop [Hz], instead of ki."""
 
-    def made(self, tick: float, wall: float) -> ProportionalIntegral:
+    def build(self, tick: float, wall: float) -> ProportionalIntegral:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         if self.ki is not None and self.bandwidth is not None:
             raise InputError("ki and bandwidth in [controller] set the same gain; leave one out")

@@ -7,8 +7,7 @@ import numpy as np
 from palpate._jit import law, part
 from palpate._vector import Vec3, resolve
 from palpate.controllers.controller import ControllerTable, controller
-from palpate.signals.parameters import triple
-from palpate.signals.tables import NotNegative, NotNegativeTriple
+from palpate.signals.types import NotNegative, NotNegativeTriple, triple
 
 
 @law
@@ -54,7 +53,7 @@ class RaibertCraig(NamedTuple):
     tick: float
 
     def start(self):
-        """No error yet."""
+        """The state before the first error."""
         return RaibertCraigState(0.0 * self.stiffness, 0.0 * self.stiffness)
 
     def step(self, state, sense, task, model):
@@ -106,7 +105,7 @@ class RaibertCraigController(ControllerTable, tag="raibert-craig"):
     feed_forward: NotNegative = 1.0
     """Share of the desired force that is fed forward."""
 
-    def made(self, tick: float, wall: float) -> RaibertCraig:
+    def build(self, tick: float, wall: float) -> RaibertCraig:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         stiffness, damping, integral = triple(self.stiffness), triple(self.damping), triple(self.integral)
         return RaibertCraig(

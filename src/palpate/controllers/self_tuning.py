@@ -10,8 +10,7 @@ from palpate.controllers.controller import ControllerTable, controller
 from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
 from palpate.networks import Network, NetworkState, network, random_layers
-from palpate.signals.parameters import alike, triple
-from palpate.signals.tables import NotNegative, Positive, PositiveTriple, Size
+from palpate.signals.types import NotNegative, Positive, PositiveTriple, Size, alike, triple
 
 INPUTS, OUTPUTS = 3, 3
 
@@ -140,7 +139,7 @@ class SelfTuningController(ControllerTable, tag="self-tuning"):
     smoothing: Positive = 0.01
     """Time constant of the force rate [s]."""
 
-    def made(self, tick: float, wall: float) -> SelfTuning:
+    def build(self, tick: float, wall: float) -> SelfTuning:
         """The part, for a time between ticks [s] and a surface at x = `wall` [m]."""
         middle = (self.kf, self.ki, self.kd)
         layers = random_layers((INPUTS, *self.layers, OUTPUTS), self.weights_seed, self.scale)

@@ -8,8 +8,7 @@ from msgspec import Meta
 from palpate._jit import part
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
 from palpate.environments.surface_table import SurfaceTable
-from palpate.signals.parameters import coerced, require
-from palpate.signals.tables import NotNegative, Positive
+from palpate.signals.types import NotNegative, Positive, coerce_fields, require
 
 
 def _check(self):
@@ -20,7 +19,7 @@ def _check(self):
 
 
 @part
-@coerced(_check)
+@coerce_fields(_check)
 class HuntCrossley(NamedTuple):
     """f = K p^n + lambda p^n v + M a (Hunt and Crossley, 1975): no jump at touch, no pull at parting.
 

@@ -5,8 +5,7 @@ from typing import ClassVar, NamedTuple
 from palpate._jit import part
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
 from palpate.environments.surface_table import SurfaceTable
-from palpate.signals.parameters import coerced, require
-from palpate.signals.tables import NotNegative, Positive
+from palpate.signals.types import NotNegative, Positive, coerce_fields, require
 
 
 def _check(self):
@@ -16,7 +15,7 @@ def _check(self):
 
 
 @part
-@coerced(_check)
+@coerce_fields(_check)
 class KelvinVoigt(NamedTuple):
     """f = K p + B v + M a: the model that M, B, K estimators assume.
 

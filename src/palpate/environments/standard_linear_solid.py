@@ -5,8 +5,7 @@ from typing import ClassVar, NamedTuple
 from palpate._jit import law, part
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
 from palpate.environments.surface_table import SurfaceTable
-from palpate.signals.parameters import coerced, require
-from palpate.signals.tables import NotNegative, Positive
+from palpate.signals.types import NotNegative, Positive, coerce_fields, require
 
 
 def _check(self):
@@ -31,7 +30,7 @@ def branch_weight(time, dt):
 
 
 @part
-@coerced(_check)
+@coerce_fields(_check)
 class StandardLinearSolid(NamedTuple):
     """f = K p + B v + K_1 z + M a, with z' = v - z/tau: foam.
 

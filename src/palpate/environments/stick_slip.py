@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import clip
-from palpate.signals.parameters import coerced, require
+from palpate.signals.types import coerce_fields, require
 
 
 def _check(self):
@@ -20,7 +20,7 @@ class StickSlipState(NamedTuple):
 
 
 @part
-@coerced(_check)
+@coerce_fields(_check)
 class StickSlip(NamedTuple):
     """A spring and a damper that the slide bends, within the Coulomb cone; sliding drags the anchor along.
 

@@ -7,13 +7,13 @@ from palpate._jit import part
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.environments.surface_table import SurfaceTable
 from palpate.errors import InputError
-from palpate.signals.tables import example, kinds
+from palpate.signals.types import example, kinds
 
 
 @cache
 def members() -> tuple[Any, ...]:
     """One of each surface, with any numbers: the type is what counts."""
-    return tuple(example(kind).made() for kind in kinds(SurfaceTable))
+    return tuple(example(kind).build() for kind in kinds(SurfaceTable))
 
 
 @part
@@ -82,7 +82,7 @@ def join(one: Any) -> Surface:
 
 def surface_of(table: Any) -> Any:
     """The surface of a table: those that come with palpate in their one type, a user's own as it is."""
-    one = table.made()
+    one = table.build()
     return join(one) if isinstance(table, SurfaceTable) else one
 
 

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 from msgspec.structs import asdict
 
-from palpate.signals.tables import Table
+from palpate.signals.types import Table
 
 
 class SurfaceTable(Table, tag_field="kind"):
@@ -15,6 +15,6 @@ class SurfaceTable(Table, tag_field="kind"):
 
     part: ClassVar[type]
 
-    def made(self) -> Any:
-        """The surface."""
+    def build(self) -> Any:
+        """The surface that the table describes."""
         return self.part(**{name: float(value) for name, value in asdict(self).items()})

@@ -1,12 +1,8 @@
 """Which force to ask for, so that a surface shows its stiffness, its damping and its mass."""
 
-from palpate.excitation.budget import Budget
-from palpate.excitation.design import Design, design
-from palpate.excitation.force_loops import ForceLoop, HybridLoop, KnownBandwidth
-from palpate.excitation.problem import Problem
-from palpate.excitation.remedies import Remedy, remedies
-from palpate.excitation.sensors import Sensors
-from palpate.excitation.surfaces import Surface, SurfaceRange
+from palpate.excitation.design import Design, Remedy, design, remedies
+from palpate.excitation.force_loops import ForceLoop, HybridLoop, KnownBandwidth, Surface, SurfaceRange
+from palpate.excitation.problem import Budget, Problem, Sensors
 
 __all__ = [
     "Budget",

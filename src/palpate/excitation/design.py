@@ -1,19 +1,81 @@
-"""The design of an excitation: no longer than it must be."""
+"""The design of an excitation: no longer than it must be.
+
+A sweep goes between the two most informative frequencies, a multisine is that of `multisine`. If neither reaches the
+requested precision, remedies are changed limits that do.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from math import ceil
 
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.excitation import chirp, multisine
-from palpate.excitation.prediction import Made, Prediction, Wave
-from palpate.excitation.problem import Problem
-from palpate.references.waves import Multisine
+from palpate.excitation import multisine
+from palpate.excitation.force_loops import Made, Prediction, Wave
+from palpate.excitation.multisine import error_of_sweep
+from palpate.excitation.problem import LONGEST, Problem, used_up
+from palpate.references import Chirp, Multisine
 
-MAKERS = {"multisine": multisine.make, "chirp": chirp.make}
+_ENDS = 6  # places for each end of the sweep
+_FINE = 64  # frequencies of a sweep that are looked at
+
+
+def best_chirp(problem: Problem, seconds: float) -> Made:
+    """The best sweep of so many seconds: from where to where, and whether evenly or logarithmically."""
+    budget = problem.budget
+    grid = np.geomspace(budget.lowest, budget.highest, _ENDS)
+    sweeps = [
+        Chirp(float(low), float(high), seconds, 1.0, logarithmic)
+        for low, high, logarithmic in product(grid, grid, (False, True))
+        if low < high and low * seconds >= 1
+    ] or [Chirp(budget.lowest, budget.highest, seconds, 1.0, False)]
+    made = (_predict_chirp(problem, _within_budget(problem, sweep)) for sweep in sweeps)
+    return min(made, key=lambda found: found.excess(seconds, problem.precision))
+
+
+def _frequencies(sweep: Chirp) -> Array:
+    """Frequencies of the sweep at even times [rad/s], shape (_FINE,)."""
+    share = (np.arange(_FINE) + 0.5) / _FINE
+    if sweep.logarithmic:
+        return 2 * np.pi * sweep.low * (sweep.high / sweep.low) ** share
+    return 2 * np.pi * (sweep.low + share * (sweep.high - sweep.low))
+
+
+def _within_budget(problem: Problem, sweep: Chirp) -> Chirp:
+    omega = _frequencies(sweep)
+
+    def share(amplitude: float) -> float:
+        felt = float(np.abs(problem.forces(omega, np.full(_FINE, amplitude))).max())
+        return min(_share(problem, sweep._replace(amplitude=amplitude)), problem.budget.swing / felt)
+
+    return sweep._replace(amplitude=used_up(share, problem.budget.desired_swing))
+
+
+def _share(problem: Problem, sweep: Chirp) -> float:
+    return problem.budget.share(sweep.amplitude, 2 * np.pi * sweep.high * sweep.amplitude)
+
+
+def _predict_chirp(problem: Problem, sweep: Chirp) -> Made:
+    omega = _frequencies(sweep)
+    forces = problem.forces(omega, np.full(_FINE, sweep.amplitude))
+    sensors, predictions = problem.sensors, []
+    for surface, force in zip(problem.surfaces.surfaces(), forces, strict=True):
+        motion = force / surface.impedance(omega)
+        error = error_of_sweep(motion, omega, sweep.seconds, sensors.rate, sensors.position_step)
+        known = problem.predicted(surface, omega, force, error, sweep.seconds, together=False)
+        felt = float(np.abs(force).max())
+        travel = 2 * float(np.abs(force / surface.impedance(omega)).max())
+        between = (problem.budget.mean - felt, problem.budget.mean + felt)
+        predictions.append(
+            Prediction(surface, problem.surfaces.names, known[0], problem.prior, *known[1:], between, travel)
+        )
+    return Made(sweep, tuple(predictions), gap=0.0)
+
+
+MAKERS = {"multisine": multisine.best_multisine, "chirp": best_chirp}
 """By the kind of excitation: from a problem and a duration to the best one."""
 
 _FIRST = 10.0  # s; where the search for the shortest duration starts
@@ -112,3 +174,101 @@ def _whole(problem: Problem, seconds: float) -> float:
     """At least so many seconds, as a whole number of periods or steps, and no more than the longest."""
     step = max(multisine.PERIOD, 1 / problem.budget.lowest) if problem.kind == "multisine" else _STEP
     return min(ceil(seconds / step - 1e-6) * step if seconds < FOREVER else np.inf, problem.longest)
+
+
+_MUCH = 10.0  # times the force
+_HELPS, _SOONER = 0.95, 0.5  # of the excess, or of the time needed; what helps less is no remedy
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A change of the limits, and its effect.
+
+    Args:
+        change: in words.
+        reached: largest half-width of each parameter on any surface with it.
+        enough: whether that reaches the requested precision.
+        needed: how long it must last with it [s], the change of the duration aside; may be infinite.
+        limit: largest half-width per that asked for, however long it lasts.
+    """
+
+    change: str
+    reached: dict[str, float]
+    enough: bool
+    needed: float
+    limit: float
+
+
+def remedies(found: Design) -> list[Remedy]:
+    """Of more time, more force, faster changes, a wider band, a better known lag and a finer position those that help.
+
+    If none is enough by itself, all of them at once.
+    """
+    helpful = []
+    if found.needed <= LONGEST:
+        told = f"{ceil(found.needed)} s instead of {found.seconds:g} s"
+        helpful.append(Remedy(told, found.made.worst(found.needed), True, found.needed, 1.0))
+    together, limit = found.problem, found.made.excess(FOREVER, found.problem.precision)
+    for change in (_stronger, _steeper, _wider, _synchronous, _finer):
+        words, other = change(found.problem, found.excess)
+        if other == found.problem:
+            continue
+        tried = _try_remedy(words, other, found.seconds)
+        sooner = tried.needed < _SOONER * found.needed
+        if sooner or _excess(tried, found) < _HELPS * found.excess or tried.limit < _HELPS * limit:
+            helpful.append(tried)
+            together = change(together, found.excess)[1]
+    if len(helpful) > 1 and not any(remedy.enough for remedy in helpful):
+        helpful.append(_try_remedy("all of these", together, found.seconds))
+    return helpful
+
+
+def _try_remedy(words: str, problem: Problem, seconds: float) -> Remedy:
+    made = MAKERS[problem.kind](problem, seconds)
+    enough = made.excess(seconds, problem.precision) <= 1
+    limit = made.excess(FOREVER, problem.precision)
+    return Remedy(words, made.worst(seconds), enough, needed(made, problem), limit)
+
+
+def _excess(tried: Remedy, found: Design) -> float:
+    return max(tried.reached[name] / asked for name, asked in found.problem.precision.items())
+
+
+def _stronger(problem: Problem, excess: float) -> tuple[str, Problem]:
+    budget, more = problem.budget, min(1.1 * excess, _MUCH)
+    swing = more * budget.swing
+    mean = max(budget.mean, budget.least + swing)
+    drive = None if budget.drive is None else more * budget.drive
+    words = (
+        f"a force of {mean:.3g} N with {swing:.3g} N to each side instead of {budget.mean:g} N "
+        f"with {budget.swing:g} N"
+    )
+    return words, replace(problem, budget=replace(budget, mean=mean, peak=mean + swing, drive=drive))
+
+
+def _steeper(problem: Problem, excess: float) -> tuple[str, Problem]:
+    rate = problem.budget.rate
+    faster = min(1.1 * excess, _MUCH) * rate
+    words = f"a force that changes by {faster:.3g} N/s instead of {rate:g} N/s"
+    return words, replace(problem, budget=replace(problem.budget, rate=faster))
+
+
+def _wider(problem: Problem, _excess: float) -> tuple[str, Problem]:
+    budget = problem.budget
+    highest = max(budget.highest, min(2 * budget.highest, 0.45 * problem.sensors.force.sampling))
+    words = f"frequencies up to {highest:g} Hz instead of {budget.highest:g} Hz"
+    return words, replace(problem, budget=replace(budget, highest=highest))
+
+
+def _synchronous(problem: Problem, _excess: float) -> tuple[str, Problem]:
+    sensors = problem.sensors
+    exact = replace(sensors, lag_std=0.0, force=replace(sensors.force, phase_std=0.0))
+    words = f"a lag between force and position known exactly, not to {1e6 * sensors.lag_error:.0f} us"
+    return words, replace(problem, sensors=exact)
+
+
+def _finer(problem: Problem, _excess: float) -> tuple[str, Problem]:
+    sensors = problem.sensors
+    step = sensors.position_step / _MUCH
+    words = f"a position in steps of {1e6 * step:.3g} um instead of {1e6 * sensors.position_step:.3g} um"
+    return words, replace(problem, sensors=replace(sensors, position_step=step))

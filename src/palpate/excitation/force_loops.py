@@ -1,20 +1,88 @@
-"""Robots as an excitation sees them: how much of the desired force the surface feels, and when."""
+"""Surfaces and robots of an excitation: the force that a surface feels, and the uncertainty predicted from it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from math import pi, sqrt
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Complex
 from palpate.errors import InputError
-from palpate.excitation.surfaces import Surface
+from palpate.excitation.spectra import covariance
+from palpate.references import Chirp, Multisine
 from palpate.signals.low_pass import LowPass
+from palpate.signals.types import NORMAL
 
-Complex = NDArray[np.complexfloating[Any, Any]]
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One surface: f = M a + B v + K x.
+
+    Args:
+        stiffness: K [N/m].
+        damping: B [N s/m].
+        mass: M [kg]; 0 for a surface without one.
+    """
+
+    stiffness: float
+    damping: float
+    mass: float = 0.0
+
+    def impedance(self, omega: Array) -> NDArray[np.complexfloating[Any, Any]]:
+        """Force per displacement at angular frequencies [N/m], of their shape."""
+        return self.stiffness + 1j * omega * self.damping - self.mass * omega**2
+
+    @property
+    def values(self) -> tuple[float, float, float]:
+        """The parameters K, B, M."""
+        return self.stiffness, self.damping, self.mass
+
+
+@dataclass(frozen=True)
+class SurfaceRange:
+    """All surfaces between the lowest and the highest of each parameter.
+
+    Args:
+        stiffness: lowest and highest K [N/m].
+        damping: lowest and highest B [N s/m].
+        mass: lowest and highest M [kg]; None for surfaces without one, of which no mass is asked.
+
+    Raises:
+        InputError: a range that is upside down or not above 0.
+    """
+
+    stiffness: Range
+    damping: Range
+    mass: Range | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping", "mass"):
+            ends = getattr(self, name)
+            if ends is not None and not 0 < ends[0] <= ends[1] < np.inf:
+                raise InputError(
+                    f"{name} must be LOW:HIGH with 0 < LOW <= HIGH, got {ends[0]:g}:{ends[1]:g}; a relative "
+                    "precision needs a value above 0"
+                )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters to identify: K and B, and M if there is one."""
+        return ("K", "B") if self.mass is None else ("K", "B", "M")
+
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The middle (of the logarithms) and the corners, each once."""
+        ranges = (self.stiffness, self.damping, self.mass or (0.0, 0.0))
+        corners = [Surface(*corner) for corner in product(*ranges)]
+        middle = Surface(*(sqrt(low * high) for low, high in ranges))
+        return tuple(dict.fromkeys([middle, *corners]))
+
 
 BENCH_FILTERS = LowPass(((3, 120.0), (2, 120.0)))
 """Of the bench's sensor, and of its controller."""
@@ -132,7 +200,7 @@ class KnownBandwidth:
         return np.broadcast_to(gain, impedance.shape)
 
     def stable(self, surface: Surface) -> bool:
-        """Taken for granted."""
+        """Stability, which is taken for granted."""
         return True
 
 
@@ -158,3 +226,70 @@ def contact_force(
         if change < _SETTLED:
             break
     return force
+
+
+Wave = Multisine | Chirp
+
+ALL = ("K", "B", "M")
+POWER_KNOWN = 0.3
+"""Relative error of the position noise's power within the band of a fit, which is told from above that band."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Of one surface.
+
+    Args:
+        surface: which.
+        names: of the parameters that are identified.
+        information: about them (of their logarithms) and the lag, of a second, shape (n, n).
+        prior: information of the same parameters, shape (n, n).
+        rounding: covariance by the rounding of the position, which repeats with the motion, shape (n, n).
+        pull: share by which that rounding pulls each towards zero, shape (n,).
+        force: lowest and highest force on the surface [N].
+        travel: of the tip, from end to end [m].
+    """
+
+    surface: Surface
+    names: tuple[str, ...]
+    information: Array
+    prior: Array
+    rounding: Array
+    pull: Array
+    force: tuple[float, float]
+    travel: float
+
+    def half_widths(self, seconds: float) -> dict[str, float]:
+        """95 % half-width of each parameter, as a share of its value, after so many seconds.
+
+        A pull towards zero is corrected as well as the power of the rounding is known. No time makes that better, nor
+        the rounding itself.
+        """
+        C = covariance(seconds * self.information, self.prior)
+        C = C + self.rounding + np.diag((POWER_KNOWN * self.pull) ** 2)
+        return {name: NORMAL * float(np.sqrt(C[i, i])) for i, name in enumerate(self.names)}
+
+
+@dataclass(frozen=True)
+class Made:
+    """A wave about the mean force, and its predicted information.
+
+    Args:
+        wave: added to the mean force [N].
+        predictions: one a surface.
+        gap: by how much its spectrum may at most miss the best there is, as a share of the criterion.
+    """
+
+    wave: Wave
+    predictions: tuple[Prediction, ...]
+    gap: float
+
+    def worst(self, seconds: float) -> dict[str, float]:
+        """The largest half-width of each parameter on any surface, as a share of its value."""
+        widths = [prediction.half_widths(seconds) for prediction in self.predictions]
+        return {name: max(found[name] for found in widths) for name in self.predictions[0].names}
+
+    def excess(self, seconds: float, precision: Mapping[str, float]) -> float:
+        """The largest half-width per that asked for, of any parameter on any surface: at most 1 is good enough."""
+        widths = self.worst(seconds)
+        return max(widths[name] / asked for name, asked in precision.items())

@@ -1,25 +1,189 @@
-"""Problem of an excitation: goals, surfaces, limits, sensors and loop."""
+"""Problem of an excitation: goals, surfaces, limits, loop, and the information of the sensors by frequency."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from math import hypot, inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Complex
 from palpate.errors import InputError, unknown
-from palpate.excitation.budget import Budget
-from palpate.excitation.force_loops import ForceLoop, HybridLoop, contact_force
-from palpate.excitation.prediction import ALL
-from palpate.excitation.sensors import Sensors
-from palpate.excitation.spectra import CRITERIA, covariance
-from palpate.excitation.surfaces import Surface, SurfaceRange
+from palpate.excitation.force_loops import ALL, ForceLoop, HybridLoop, Surface, SurfaceRange, contact_force
+from palpate.excitation.spectra import CRITERIA, ForceChain, covariance, phase_std
 from palpate.identifiers.octave_system import SEEN
 
-Complex = NDArray[np.complexfloating[Any, Any]]
+LAG_UNIT = 1e-4
+"""The lag is counted in tenths of a millisecond, so that it is of the size of the relative parameters."""
+_SURE = 1e-8  # s; a lag known better is known as well as exactly
+
+
+def bench_chain() -> ForceChain:
+    """The force sensor of the bench, logged at 1 kHz."""
+    return ForceChain(phase_std=phase_std(480, 1000))
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Sensors of force and position, and their log.
+
+    Args:
+        force: the force sensor's chain.
+        position_step: of the position's quantisation [m].
+        rate: positions a second [Hz].
+        lag_std: how well the lag between force and position is calibrated [s].
+    """
+
+    force: ForceChain = field(default_factory=bench_chain)
+    position_step: float = 1.6e-6
+    rate: float = 1000.0
+    lag_std: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, low in (("position_step", 0.0), ("lag_std", 0.0), ("rate", 1e-9)):
+            if not low <= getattr(self, name) < np.inf:
+                raise InputError(f"{name} of the sensors must be {low:g} or above, got {getattr(self, name)}")
+
+    def information(
+        self, surface: Surface, omega: Array, force: Complex, rounding: Array | float | None = None
+    ) -> Array:
+        """Fisher information about (ln K, ln B, ln M, lag) of a second at each frequency, shape (F, 4, 4).
+
+        Noise of the position acts like a force of |Z H| times its size. The offset is known from the mean alone, and
+        the mean says nothing else as long as the touch is not known exactly.
+
+        Args:
+            surface: the touched surface.
+            omega: angular frequencies [rad/s], shape (F,).
+            force: phasors of the force on the surface [N], shape (F,).
+            rounding: power of the position's error at them [m^2/Hz], shape (F,); None for white noise of step^2/12.
+        """
+        Z = surface.impedance(omega)
+        density = self.density(surface, omega, rounding)
+        return self.moments(surface, omega, force / Z) / density[:, None, None]
+
+    def density(self, surface: Surface, omega: Array, rounding: Array | float | None = None) -> Array:
+        """Noise of both sensors as a force, as `information` has it, shape (F,) [N^2/Hz], of both signs."""
+        if rounding is None:
+            rounding = self.position_step**2 / (12 * self.rate)
+        gain = np.abs(surface.impedance(omega) * self.force.low_pass.at(omega)) ** 2
+        return np.asarray(self.force.noise**2 / self.force.sampling + gain * rounding)
+
+    def columns(self, surface: Surface, omega: Array, motion: Complex) -> Complex:
+        """The regressors of (ln K, ln B, ln M, lag) under a motion, phasors of shape (F, 4) [N].
+
+        Args:
+            surface: the touched surface.
+            omega: angular frequencies [rad/s], shape (F,).
+            motion: phasors of the position [m], shape (F,).
+        """
+        s, Z = 1j * omega, surface.impedance(omega)
+        K, B, M = surface.values
+        columns = np.stack([K + 0 * s, B * s, M * s**2, -s * Z * LAG_UNIT], axis=-1)
+        return np.asarray(columns * (self.force.low_pass.at(omega) * motion)[:, None])
+
+    def moments(self, surface: Surface, omega: Array, motion: Complex) -> Array:
+        """Mean products of the regressors under a motion, shape (F, 4, 4) [N^2]; see `columns`."""
+        columns = self.columns(surface, omega, motion)
+        found: Array = np.real(columns[:, :, None] * np.conj(columns[:, None, :])) / 2
+        return found
+
+    def prior(self) -> Array:
+        """Information about the same four before anything has moved: that of the lag, shape (4, 4)."""
+        known = np.zeros((4, 4))
+        known[3, 3] = (LAG_UNIT / max(self.lag_error, _SURE)) ** 2
+        return known
+
+    @property
+    def lag_error(self) -> float:
+        """Uncertainty of the lag, the phase of the samples included: a standard deviation [s]."""
+        return hypot(self.lag_std, self.force.phase_std)
+
+
+_ROUNDS = 40
+_CAUTION = 0.7  # the power of each correction: a whole one would overshoot where friction gives way
+_CLOSE = 1e-3
+"""To the budget, as a share of it."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Limits of the desired force, and of the force that the surface will feel.
+
+    Args:
+        mean: about which the force varies [N].
+        peak: highest force [N].
+        least: lowest force, so that contact is kept [N].
+        lowest, highest: frequencies in use [Hz].
+        rate: fastest change of the desired force [N/s].
+        drive: largest departure of the desired force from its mean [N]; as for the force on the surface when None.
+            A loop that is slow lets little of the desired force through, so more may be asked for than shall arrive.
+
+    Raises:
+        InputError: limits that leave nothing.
+    """
+
+    mean: float
+    peak: float
+    least: float = 2.0
+    lowest: float = 0.5
+    highest: float = 40.0
+    rate: float = inf
+    drive: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.least < self.mean < self.peak < inf:
+            raise InputError(
+                f"the force must obey 0 <= least < mean < peak, got least {self.least:g} N, mean {self.mean:g} N, "
+                f"peak {self.peak:g} N"
+            )
+        if not 0 < self.lowest < self.highest < inf:
+            raise InputError(
+                f"the frequencies must obey 0 < lowest < highest, got {self.lowest:g} and {self.highest:g} Hz"
+            )
+        if self.drive is not None and not 0 < self.drive < inf:
+            raise InputError(
+                f"the desired force must depart from its mean by more than 0 N, got {self.drive:g}"
+            )
+        if not self.rate > 0:
+            raise InputError(f"the force's rate of change must be above 0 N/s, got {self.rate:g}")
+
+    @property
+    def swing(self) -> float:
+        """How far the force on the surface may depart from its mean [N]."""
+        return min(self.peak - self.mean, self.mean - self.least)
+
+    @property
+    def desired_swing(self) -> float:
+        """How far the desired force may depart from its mean [N]."""
+        return self.swing if self.drive is None else self.drive
+
+    def share(self, peak: float, slope: float) -> float:
+        """Factor of a desired force that uses up its budget.
+
+        Args:
+            peak: how far it departs from its mean [N].
+            slope: its fastest change [N/s].
+        """
+        return min(self.desired_swing / peak, self.rate / slope)
+
+
+def used_up(share: Callable[[float], float], strength: float) -> float:
+    """The strength at which an excitation uses up its budget.
+
+    Args:
+        share: of the budget over what a strength takes of it; friction makes that grow faster than the strength.
+        strength: to start from.
+    """
+    for _ in range(_ROUNDS):
+        left = share(strength)
+        strength *= left**_CAUTION
+        if abs(left - 1) < _CLOSE:
+            break
+    return strength
+
 
 KINDS = ("multisine", "chirp")
 _FINEST = 1e-6

@@ -35,7 +35,7 @@ class Quantity:
         return f"{self.value:.6g} {self.unit} ({self.origin}{interval})"
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The contact as plain values."""
         return {
             "value": self.value,
             "unit": self.unit,

@@ -3,6 +3,11 @@
 Point contact of two geometries in Drake (documentation of MultibodyPlant, Compliant Point Contact): stiffness
 k = k1 k2 / (k1 + k2), and with the SAP approximation of a discrete plant f = k (x + tau v), tau = tau1 + tau2. So the
 surface has k = K and tau = B / K, what presses on it a k without an end and no tau.
+
+Newton's contact: two shapes share the mean of their ke and kd, so both get K and B.
+
+The law of SolverSemiImplicit and SolverFeatherstone (newton 1.8): f = ke d + kd max(d', 0), d the penetration: the
+damper works going in only. SolverMuJoCo takes ke and kd for a constraint of its own, and wants the rule of MuJoCo.
 """
 
 from __future__ import annotations
@@ -52,7 +57,7 @@ class Collision:
 
 
 @dataclass(frozen=True)
-class Scene:
+class DrakeScene:
     """An SDF or URDF file.
 
     Args:
@@ -92,7 +97,7 @@ class Scene:
         return found[0]
 
 
-def load_scene(path: Path) -> Scene:
+def load_scene(path: Path) -> DrakeScene:
     """Read a file.
 
     Raises:
@@ -111,7 +116,7 @@ def load_scene(path: Path) -> Scene:
         raise InputError(f"{path}: no XML: {error}; give an SDF or URDF file") from None
     if reader.root not in {"sdf", "robot"}:
         raise InputError(f"{path}: begins with <{reader.root}>; Drake's contact goes into SDF or URDF")
-    return Scene(path, text, reader.root == "robot", tuple(reader.found))
+    return DrakeScene(path, text, reader.root == "robot", tuple(reader.found))
 
 
 class _Reader:
@@ -170,7 +175,7 @@ def _no_entities(*_: Any) -> None:
     raise expat.ExpatError("it declares entities, which are not read")
 
 
-def probe_of(scene: Scene, surface: Collision, name: str | None) -> Collision | None:
+def probe_of(scene: DrakeScene, surface: Collision, name: str | None) -> Collision | None:
     """The probe: of that name, or the only other collision; None if there is no other.
 
     Raises:
@@ -203,7 +208,7 @@ def notes(probe: bool) -> tuple[str, ...]:
     return (_PLANT, other)
 
 
-def edit(scene: Scene, surface: Collision, probe: Collision | None, contact: Contact) -> bytes:
+def edit(scene: DrakeScene, surface: Collision, probe: Collision | None, contact: Contact) -> bytes:
     """The file with the contact in it."""
     numbers = {surface.path: (contact.stiffness.value, contact.relaxation_time)}
     if probe is not None:
@@ -259,3 +264,32 @@ def plate(contact: Contact, name: str) -> str:
   </model>
 </sdf>
 """
+
+
+_SOLVERS = (
+    "for SolverSemiImplicit and SolverFeatherstone; SolverMuJoCo takes the same numbers for another contact: export a"
+    " scene of MuJoCo for it"
+)
+NOTES = (
+    _SOLVERS,
+    "the damper acts in loading only: in unloading, Newton's force is K x",
+    "both shapes must have these numbers: Newton takes the mean of the two",
+)
+
+_TEXT = '''"""Contact of a surface for Newton: call apply(builder, surface, probe) before builder.finalize()."""
+
+KE = {stiffness:.17g}  # N/m
+KD = {damping:.17g}  # N s/m, in loading only
+
+
+def apply(builder, *shapes):
+    """Give shapes of a newton.ModelBuilder this contact; Newton takes the mean of the two that touch."""
+    for shape in shapes:
+        builder.shape_material_ke[shape] = KE
+        builder.shape_material_kd[shape] = KD
+'''
+
+
+def python(contact: Contact) -> str:
+    """A module that gives shapes the contact."""
+    return _TEXT.format(stiffness=contact.stiffness.value, damping=contact.damping.value)

@@ -1,4 +1,8 @@
-"""One contact in one simulator: the file, its assumptions, and the result of a press."""
+"""One contact in one simulator: the file, its assumptions, and the result of a press.
+
+Without a scene it is a plate on a slide joint with a spring and a damper, in MJCF: exact of the plate's own
+displacement.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 from palpate.errors import InputError, unknown
 from palpate.export.contact import Contact
-from palpate.export.rig import Pressed, press, touch
+from palpate.export.rig import MuJoCoRig, RigPress, press, touch
+from palpate.robots.serial.loading import mujoco, refusals
 from palpate.text import printable
 
 TARGETS = ("mujoco", "drake", "newton", "mjcf-spring")
@@ -55,7 +61,7 @@ class Request:
 
     @property
     def name(self) -> str:
-        """Of the surface."""
+        """Name of the surface's geometry."""
         return self.surface or "surface"
 
     def default_place(self) -> Path:
@@ -80,14 +86,14 @@ class Checked:
     """
 
     probe: str
-    pressed: Pressed | None
+    pressed: RigPress | None
     error_K: float | None
     error_B: float | None
     note: str = ""
     reached: bool = True
 
     @property
-    def passed(self) -> bool | None:
+    def within_tolerance(self) -> bool | None:
         """Whether both errors are within `TOLERANCE`; None if it could not be pressed for want of reach."""
         if not self.reached:
             return None
@@ -95,11 +101,11 @@ class Checked:
         return all(error is not None and error <= TOLERANCE for error in errors)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The result as plain values."""
         measured = self.pressed.to_json() if self.pressed else None
         return {
             "probe": self.probe, "measured": measured, "error_K": self.error_K, "error_B": self.error_B,
-            "tolerance": TOLERANCE, "passed": self.passed, "note": self.note,
+            "tolerance": TOLERANCE, "passed": self.within_tolerance, "note": self.note,
         }  # fmt: skip
 
 
@@ -125,7 +131,7 @@ class Exported:
     validate: Callable[[Path], object] = field(default=lambda _path: None, repr=False)
     check: Callable[[Path], list[Checked]] = field(default=lambda _path: [], repr=False)
 
-    def commented(self, mark: str) -> str:
+    def with_comment(self, mark: str) -> str:
         """The text with a comment about its origin.
 
         Args:
@@ -154,7 +160,7 @@ class Exported:
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The result as plain values."""
         own = self.contact
         quantities = {"K": own.stiffness, "B": own.damping, "M": own.mass}
         return {
@@ -192,7 +198,7 @@ def check(exported: Exported, path: Path) -> list[Checked]:
     return exported.check(path)
 
 
-def _judge(probe: str, pressed: Pressed | None, contact: Contact, note: str = "") -> Checked:
+def _judge(probe: str, pressed: RigPress | None, contact: Contact, note: str = "") -> Checked:
     if pressed is None:
         return Checked(
             probe,
@@ -230,11 +236,11 @@ def _mujoco(contact: Contact, request: Request, out: Path) -> Exported:
     numbers = {pair.probe: _pair_numbers(pair, contact) for pair in found}
 
     def pressed(path: Path) -> list[Checked]:
-        return [_pressed_pair(scenes.compiled(path), scene, pair, contact) for pair in found]
+        return [_pressed_pair(scenes.compile_scene(path), scene, pair, contact) for pair in found]
 
     return Exported(
         contact, request.target, scenes.xml(scene, found, contact, out.parent),
-        (*notes, *scenes.NOTES), {"pairs": numbers}, validate=scenes.compiled, check=pressed,
+        (*notes, *scenes.NOTES), {"pairs": numbers}, validate=scenes.compile_scene, check=pressed,
     )  # fmt: skip
 
 
@@ -249,11 +255,11 @@ def _pair_numbers(pair: Any, contact: Contact) -> dict[str, Any]:
 
 
 def _pressed_pair(model: Any, scene: Any, pair: Any, contact: Contact) -> Checked:
-    from palpate.export.mujoco_rig import MuJoCoRig
-    from palpate.export.mujoco_scene import touched
+    from palpate.export.mujoco_scene import bring_to_touch
+    from palpate.export.rig import MuJoCoRig
 
     rig = MuJoCoRig(model, scene.geom(scene.surface), scene.geom(pair.probe))
-    if touched(rig) is None:
+    if bring_to_touch(rig) is None:
         return _out_of_reach(pair.probe)
     return _judge(pair.probe, press(rig, contact.stiffness.value, _force(contact)), contact)
 
@@ -276,7 +282,7 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
         named = other.path[-1] if other else "palpate's sphere"
 
     def pressed(path: Path) -> list[Checked]:
-        from palpate.export.drake_rig import DrakeRig
+        from palpate.export.other_rigs import DrakeRig
 
         rig = DrakeRig(path, surface, probe, scenes.RIGID)
         if touch(rig) is None:
@@ -289,10 +295,10 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
 
 
 def _newton(contact: Contact, request: Request, _out: Path) -> Exported:
-    from palpate.export import newton_shapes as shapes
+    from palpate.export import drake_scene as shapes
 
     def pressed(path: Path) -> list[Checked]:
-        from palpate.export.newton_rig import NewtonRig
+        from palpate.export.other_rigs import NewtonRig
 
         rig = NewtonRig(path)
         touch(rig)
@@ -304,14 +310,83 @@ def _newton(contact: Contact, request: Request, _out: Path) -> Exported:
 
 
 def _spring(contact: Contact, request: Request, _out: Path) -> Exported:
-    from palpate.export import spring
 
-    spring.check_mass(contact, contact.source)
-    text = spring.xml(contact, request.name)
+    check_mass(contact, contact.source)
+    text = xml(contact, request.name)
 
     def pressed(_path: Path) -> list[Checked]:
-        found = spring.press_plate(text, contact, request.name, _force(contact))
+        found = press_plate(text, contact, request.name, _force(contact))
         return [_judge("palpate's sphere", found, contact, "of the plate's own displacement")]
 
     numbers = {"stiffness": contact.stiffness.value, "damping": contact.damping.value}
-    return Exported(contact, request.target, text, spring.NOTES, numbers, check=pressed)
+    return Exported(contact, request.target, text, NOTES, numbers, check=pressed)
+
+
+_HALF = (0.05, 0.05, 0.005)
+"""Of the plate [m]."""
+_PROBE = 1.0
+"""Mass of the sphere that presses on it in a check [kg]."""
+
+_OWN = (
+    "K and B are those of the plate's own displacement, the joint's; a probe sinks into the plate besides, as the"
+    " scene's contact has it"
+)
+NOTES = (
+    _OWN,
+    "unpressed, the plate's upper side is at z = 0 and its joint at 0; it goes down as it is pressed",
+)
+
+
+def check_mass(contact: Contact, source: str) -> None:
+    """Refuse a contact without a mass: a plate has one.
+
+    Raises:
+        InputError: none was identified or given.
+    """
+    if contact.mass is None:
+        raise InputError(
+            f"{source}: a plate on a spring has a mass, and none is identified; give a small one with --mass (kg),"
+            " far below that of the probe"
+        )
+
+
+def xml(contact: Contact, name: str) -> str:
+    """The plate, as a model of its own that can be compiled, attached or included.
+
+    Args:
+        contact: with a mass.
+        name: of body, joint and geom.
+    """
+    assert contact.mass is not None
+    own = quoteattr(name)
+    K, B, M = contact.stiffness.value, contact.damping.value, contact.mass.value
+    size = " ".join(f"{half:g}" for half in _HALF)
+    return f"""<mujoco model={own}>
+  <worldbody>
+    <body name={own}>
+      <joint name={own} type="slide" axis="0 0 -1" stiffness="{K:.17g}" damping="{B:.17g}"/>
+      <geom name={own} type="box" size="{size}" pos="0 0 {-_HALF[2]:g}" mass="{M:.17g}"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def press_plate(text: str, contact: Contact, name: str, force: float) -> RigPress | None:
+    """Press the plate with a sphere, and read K and B of the plate's displacement."""
+    probe = (
+        '<body name="palpate-probe" pos="0 0 0.1"><joint type="slide" axis="0 0 1"/>'
+        f'<geom name="palpate-probe" type="sphere" size="0.02" mass="{_PROBE:g}"/></body>'
+    )
+    pair = f'<contact><pair geom1={quoteattr(name)} geom2="palpate-probe"/></contact>'
+    whole = text.replace("</worldbody>", f"{probe}</worldbody>{pair}")
+    with refusals("the plate"):
+        model = mujoco().MjModel.from_xml_string(whole)
+    rig = MuJoCoRig(model, _geom(model, name), _geom(model, "palpate-probe"), plate=0)
+    if touch(rig) is None:
+        return None
+    return press(rig, contact.stiffness.value, force)
+
+
+def _geom(model: Any, name: str) -> int:
+    return int(mujoco().mj_name2id(model, mujoco().mjtObj.mjOBJ_GEOM, name))

@@ -21,11 +21,9 @@ import numpy as np
 
 from palpate.errors import InputError, unknown
 from palpate.export.contact import Contact
-from palpate.export.mujoco_rig import MuJoCoRig
-from palpate.export.rig import touch
+from palpate.export.rig import MuJoCoRig, touch
 from palpate.files import open_file
-from palpate.robots.serial._extra import mujoco, refusals
-from palpate.robots.serial._loading import load_mjcf
+from palpate.robots.serial.loading import load_mjcf, mujoco, refusals
 
 IMPEDANCE = 1e-4
 """d, the least that MuJoCo takes (mjMINIMP)."""
@@ -52,7 +50,7 @@ NOTES = (_BEGIN, _SLIDE)
 
 
 @dataclass(frozen=True)
-class Pair:
+class GeomPair:
     """The contact of the surface with one geom.
 
     Args:
@@ -88,7 +86,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Scene:
+class MuJoCoScene:
     """A scene as MuJoCo compiles it.
 
     Args:
@@ -102,11 +100,11 @@ class Scene:
     surface: str
 
     def geom(self, name: str) -> int:
-        """A geom's number."""
+        """The number of a geom by its name."""
         return int(mujoco().mj_name2id(self.model, mujoco().mjtObj.mjOBJ_GEOM, name))
 
 
-def load_scene(path: Path, surface: str) -> Scene:
+def load_scene(path: Path, surface: str) -> MuJoCoScene:
     """Compile a scene.
 
     Raises:
@@ -117,7 +115,7 @@ def load_scene(path: Path, surface: str) -> Scene:
     names = [model.geom(i).name for i in range(model.ngeom)]
     if surface not in names:
         raise _no_geom(path, surface, names, model)
-    return Scene(path, model, surface)
+    return MuJoCoScene(path, model, surface)
 
 
 def _compile(path: Path) -> Any:
@@ -144,7 +142,7 @@ def _no_geom(path: Path, name: str, names: list[str], model: Any) -> InputError:
     return InputError(f"{path}: {unknown('geom', name, named)}{rest}")
 
 
-def pairs(scene: Scene, probe: str | None) -> tuple[list[Pair], list[str]]:
+def pairs(scene: MuJoCoScene, probe: str | None) -> tuple[list[GeomPair], list[str]]:
     """The contacts of the surface with all that can touch it, or with one geom, and notes on them.
 
     Raises:
@@ -162,7 +160,7 @@ def pairs(scene: Scene, probe: str | None) -> tuple[list[Pair], list[str]]:
     return found, notes + [note for pair in found for note in _notes(pair, _round(scene, pair.probe))]
 
 
-def _notes(pair: Pair, round_one: bool) -> Iterator[str]:
+def _notes(pair: GeomPair, round_one: bool) -> Iterator[str]:
     if pair.points is None:
         yield (
             f"{pair.probe!r} could not be brought to the surface by its joints: one point of contact is assumed for it"
@@ -173,12 +171,12 @@ def _notes(pair: Pair, round_one: bool) -> Iterator[str]:
         yield f"{pair.probe!r} touched with one point, which has all of K and B: each more would add as much"
 
 
-def _round(scene: Scene, name: str) -> bool:
+def _round(scene: MuJoCoScene, name: str) -> bool:
     kinds = [int(getattr(mujoco().mjtGeom, kind)) for kind in _ROUND]
     return int(scene.model.geom_type[scene.geom(name)]) in kinds
 
 
-def _check_pairs(scene: Scene) -> None:
+def _check_pairs(scene: MuJoCoScene) -> None:
     own, model = scene.geom(scene.surface), scene.model
     for i in range(model.npair):
         ends = int(model.pair_geom1[i]), int(model.pair_geom2[i])
@@ -189,7 +187,7 @@ def _check_pairs(scene: Scene) -> None:
             )
 
 
-def _reach(scene: Scene, probe: str | None) -> tuple[dict[str, tuple[int, tuple[float, ...]]], int]:
+def _reach(scene: MuJoCoScene, probe: str | None) -> tuple[dict[str, tuple[int, tuple[float, ...]]], int]:
     """Dimensions and friction of the contact with each geom that can touch the surface; and how many have no name.
 
     Measured in MuJoCo, with a surface as large as the scene.
@@ -225,10 +223,10 @@ def _reach(scene: Scene, probe: str | None) -> tuple[dict[str, tuple[int, tuple[
     return {probe: found[probe]}, 0
 
 
-def _measure_pair(rough: Any, scene: Scene, probe: str, own: tuple[int, tuple[float, ...]]) -> Pair:
+def _measure_pair(rough: Any, scene: MuJoCoScene, probe: str, own: tuple[int, tuple[float, ...]]) -> GeomPair:
     """A pair with its R, read off the engine with the contact made: at the touch, or else from afar."""
     rig = MuJoCoRig(rough, scene.geom(scene.surface), scene.geom(probe))
-    mass = touched(rig)
+    mass = bring_to_touch(rig)
     near = copy.copy(rig.model)
     margin = _CLOSE if mass is not None else _WIDE * (1.0 + float(near.stat.extent))
     near.pair_margin[near.pair_margin >= 0.0] = margin
@@ -241,11 +239,11 @@ def _measure_pair(rough: Any, scene: Scene, probe: str, own: tuple[int, tuple[fl
         )
     inverse = sum(_inverse(rig, i) for i in held)
     if mass is None:
-        return Pair(probe, len(held) / inverse, *own)
-    return Pair(probe, 1.0 / inverse, *own, len(held), mass)
+        return GeomPair(probe, len(held) / inverse, *own)
+    return GeomPair(probe, 1.0 / inverse, *own, len(held), mass)
 
 
-def touched(rig: MuJoCoRig) -> float | None:
+def bring_to_touch(rig: MuJoCoRig) -> float | None:
     """Bring a rig to the touch from the model's own pose, or else from one of its keyframes; the mass that is felt."""
     rig.start()
     mass = touch(rig)
@@ -268,7 +266,7 @@ def _inverse(rig: MuJoCoRig, contact: int) -> float:
     return float(np.sum(1.0 / rig.data.efc_R[first : first + rows]))
 
 
-def _rough(scene: Scene, reach: Mapping[str, tuple[int, tuple[float, ...]]]) -> Any:
+def _rough(scene: MuJoCoScene, reach: Mapping[str, tuple[int, tuple[float, ...]]]) -> Any:
     """The scene with pairs of the right softness, and any stiffness."""
     with refusals(str(scene.path)):
         spec = mujoco().MjSpec.from_file(str(scene.path))
@@ -280,7 +278,7 @@ def _rough(scene: Scene, reach: Mapping[str, tuple[int, tuple[float, ...]]]) -> 
         return spec.compile()
 
 
-def xml(scene: Scene, found: list[Pair], contact: Contact, folder: Path) -> str:
+def xml(scene: MuJoCoScene, found: list[GeomPair], contact: Contact, folder: Path) -> str:
     """The scene with the pairs, for a file in a folder."""
     path = scene.path.absolute()
     named = os.path.relpath(path, folder.absolute())
@@ -300,7 +298,7 @@ def xml(scene: Scene, found: list[Pair], contact: Contact, folder: Path) -> str:
     )
 
 
-def _pair(surface: str, pair: Pair, contact: Contact, ratio: float | None) -> str:
+def _pair(surface: str, pair: GeomPair, contact: Contact, ratio: float | None) -> str:
     own: Mapping[str, object] = {
         "geom1": surface,
         "geom2": pair.probe,
@@ -318,7 +316,7 @@ def _pair(surface: str, pair: Pair, contact: Contact, ratio: float | None) -> st
     return "    <pair " + " ".join(f"{name}={quoteattr(str(value))}" for name, value in own.items()) + "/>"
 
 
-def compiled(path: Path) -> Any:
+def compile_scene(path: Path) -> Any:
     """The model of a file that includes the scene.
 
     Raises:

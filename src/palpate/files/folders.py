@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from palpate.errors import InputError
-from palpate.files.locks import HIDDEN, hidden, locking
+from palpate.files.locks import HIDDEN, draft_path, locking
 from palpate.files.ownership import ours
 
 RECORD = "record.parquet"
@@ -35,14 +35,14 @@ def fresh_folder(path: Path, *, replace: bool) -> Iterator[Path]:
     """
     path = path.absolute()
     path.parent.mkdir(parents=True, exist_ok=True)
-    draft = hidden(path)
+    draft = draft_path(path)
     draft.mkdir(exist_ok=True)
     with locking(draft) as handle:
         if handle is None:
-            raise _taken(path)
+            raise _busy(path)
         try:
-            _recovered(path)
-            _emptied(draft)
+            _recover(path)
+            _empty(draft)
             _check_fresh(path, replace)
             yield draft
             _check_fresh(path, replace)
@@ -72,14 +72,14 @@ def kept_folder(path: Path, begun: str, *, replace: bool) -> Iterator[None]:
     path.mkdir(parents=True, exist_ok=True)
     with locking(path) as handle:
         if handle is None:
-            raise _taken(path)
+            raise _busy(path)
         for left in path.rglob(f".*{HIDDEN}"):
             if left.is_file() and not left.is_symlink():
                 left.unlink()
         check_kept_folder(path, begun, replace=replace)
         if replace:
             (path / begun).unlink(missing_ok=True)  # first: what is left after a kill is then no results
-            _emptied(path)
+            _empty(path)
         yield
 
 
@@ -131,9 +131,9 @@ def _check_fresh(path: Path, replace: bool) -> None:
     check_all_ours(path)
 
 
-def _recovered(path: Path) -> None:
+def _recover(path: Path) -> None:
     """Puts back the results of a process that was killed between taking them away and putting new ones there."""
-    old = hidden(path, _OLD)
+    old = draft_path(path, _OLD)
     if not old.is_dir() or old.is_symlink():
         return
     if path.exists():
@@ -146,7 +146,7 @@ def _take_place(draft: Path, path: Path) -> None:
     if not path.exists():
         draft.rename(path)
         return
-    old = hidden(path, _OLD)
+    old = draft_path(path, _OLD)
     path.rename(old)
     try:
         draft.rename(path)
@@ -156,7 +156,7 @@ def _take_place(draft: Path, path: Path) -> None:
     shutil.rmtree(old)
 
 
-def _emptied(folder: Path) -> None:
+def _empty(folder: Path) -> None:
     for inner in folder.iterdir():
         if inner.is_dir() and not inner.is_symlink():
             shutil.rmtree(inner)
@@ -164,5 +164,5 @@ def _emptied(folder: Path) -> None:
             inner.unlink()
 
 
-def _taken(path: Path) -> InputError:
+def _busy(path: Path) -> InputError:
     return InputError(f"another palpate is at work in {path}; wait for it, or choose another --out")

@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 class Journal:
-    """A journal open for writing, by this process alone: of `opened`."""
+    """A journal open for writing, by this process alone: of `open_end`."""
 
     def __init__(self, path: Path, file: FileIO):
         self.path = path
@@ -69,7 +69,7 @@ def begin(path: Path, head: Any) -> None:
 
 
 @contextmanager
-def opened(path: Path, end: int) -> Iterator[FileIO]:
+def open_end(path: Path, end: int) -> Iterator[FileIO]:
     """The file of a journal, to be appended to behind its last whole line; the folder is this process's alone."""
     check_place(path)
     _cut(path, end)
@@ -81,7 +81,7 @@ def head_of(path: Path, kind: type[T]) -> T | None:
     """The head of a journal; None where there is none, or a spoiled one."""
     try:
         with path.open("rb") as file:
-            return _decoded(file.readline(), kind)
+            return _decode(file.readline(), kind)
     except OSError:
         return None
 
@@ -92,7 +92,7 @@ def entries(path: Path, kind: type[T]) -> Iterator[tuple[T, int]]:
         end = len(file.readline())
         for line in file:
             end += len(line)
-            value = _decoded(line, kind)
+            value = _decode(line, kind)
             if value is not None:
                 yield value, end
 
@@ -110,7 +110,7 @@ def _line_of(value: Any) -> bytes:
     return b"%08x %s\n" % (zlib.crc32(text), text)
 
 
-def _decoded(line: bytes, kind: type[T]) -> T | None:
+def _decode(line: bytes, kind: type[T]) -> T | None:
     """Content of a line; None if it is truncated or its checksum differs."""
     import msgspec
 

@@ -11,7 +11,7 @@ HIDDEN = ".palpate-part"
 """Ends the name of what is being written."""
 
 
-def hidden(path: Path, ending: str = HIDDEN) -> Path:
+def draft_path(path: Path, ending: str = HIDDEN) -> Path:
     """Where a file or a folder stands until it is whole."""
     return path.with_name(f".{path.name}{ending}")
 

@@ -1,4 +1,4 @@
-"""Files written atomically."""
+"""Files are written atomically: whole, or not at all."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import InputError
-from palpate.files.locks import hidden, locking
+from palpate.files.locks import draft_path, locking
 from palpate.files.ownership import SIGNATURE, WRITTEN, check_place, ours
 from palpate.text import printable
 
@@ -25,7 +25,7 @@ def whole(path: Path) -> Iterator[Path]:
         InputError: palpate may not write there (`check_place`), or another process of palpate is doing so.
     """
     check_place(path)
-    draft = hidden(path)
+    draft = draft_path(path)
     with locking(draft, os.O_RDWR | os.O_CREAT) as handle:
         if handle is None:
             raise InputError(f"another palpate is writing {path}; wait for it, or choose another place")

@@ -18,8 +18,7 @@ from palpate.identification.sampling import Channels, thinned
 from palpate.identification.strokes import Stroke, strokes_of
 from palpate.identification.tangents import SteadyPress, steady_press
 from palpate.identification.warning_codes import Code, Warn
-from palpate.signals.runs import runs
-from palpate.signals.spectral import detrend
+from palpate.signals.samples import detrend, runs
 
 ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.state_variable import block_means, white_noise
 from palpate.identification.least_squares import Noise, noise_of, quantile
-from palpate.signals.runs import runs
+from palpate.signals.samples import runs
 
 Rows = Mask
 

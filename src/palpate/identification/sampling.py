@@ -12,7 +12,7 @@ from palpate.identification.filters.state_variable import block_means
 from palpate.identification.saturation import at_limit
 from palpate.identification.warning_codes import Code, Warn, from_word
 from palpate.records import Record
-from palpate.signals.held import fresh_rows
+from palpate.signals.samples import fresh_rows
 
 _FEWEST = 20
 _LARGEST = 1e30

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.signals.runs import runs
+from palpate.signals.samples import runs
 
 Rows = Mask
 

@@ -172,13 +172,15 @@ def _contradicted(
 
 
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
-    """Of a press at constant speed K is its tangent; what else a model rejects, such a motion does not show."""
+    """Of a press at constant speed K is its tangent, unless a model alone knows it; such a motion shows no more."""
     shown = {
         name: replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=_STEADY)
         for name, p in parameters.items()
         if p.verdict is Verdict.REJECTED
     }
-    return parameters | shown | {"K": point.stiffness}
+    K, tangent = parameters["K"], point.stiffness
+    kept = K.verdict is Verdict.IDENTIFIED and tangent.verdict is not Verdict.IDENTIFIED
+    return parameters | shown | {"K": K if kept else tangent}
 
 
 _STEADY = "the log does not show it: the probe moves at constant speed"

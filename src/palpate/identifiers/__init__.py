@@ -15,13 +15,10 @@ and the verdict that each parameter deserves. Whoever has a position and a force
 """
 
 from palpate.identifiers.contact_identifier import ContactIdentifier
-from palpate.identifiers.forgetting import Directional, Exponential, SIFt
-from palpate.identifiers.identifier_table import IdentifierTable
+from palpate.identifiers.estimator import Directional, Exponential, IdentifierTable, SIFt
 from palpate.identifiers.kalman_filter import KalmanFilter, KalmanIdentifier
-from palpate.identifiers.neural_probe import NeuralProbe, Probed
-from palpate.identifiers.neural_settings import Setting
+from palpate.identifiers.neural_probe import NeuralProbe, Probed, Setting, watch
 from palpate.identifiers.recursive_least_squares import LeastSquaresIdentifier, RecursiveLeastSquares
-from palpate.identifiers.replay import watch
 from palpate.identifiers.restarting import RestartingIdentifier, RestartingLeastSquares
 from palpate.signals.types import Estimate
 

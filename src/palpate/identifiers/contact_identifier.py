@@ -16,14 +16,13 @@ from palpate._jit import kernel
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identifiers.estimator import entry
-from palpate.identifiers.kernels import contact_state, contact_stream, octave_sums, positions, sample_clock
-from palpate.identifiers.kernels.contact_stream import ticked
-from palpate.identifiers.line_noise import LineNoise
+from palpate.identifiers.kernels import contact_state, contact_stream, octave_sums
+from palpate.identifiers.kernels.contact_stream import take_tick
+from palpate.identifiers.kernels.octave_sums import LineNoise
 from palpate.identifiers.octave_fit import octave_fit
 from palpate.identifiers.octave_system import OctaveData
 from palpate.results import Readable
-from palpate.signals.low_pass import LowPass
-from palpate.signals.taps import FRACTIONS, taps
+from palpate.signals.low_pass import FRACTIONS, LowPass, taps
 from palpate.signals.types import Estimate
 
 NAMES = ("M", "B", "K", "offset")
@@ -36,7 +35,7 @@ _VAGUE = np.array([10.0, 1e4, 1e6, 1e3])
 
 FARTHEST, STRONGEST = 1e3, 1e6
 """Largest position [m] and force [N] that are readings of a sensor."""
-FASTEST = positions.FASTEST
+FASTEST = contact_stream.FASTEST
 
 _RANGE = 10.0
 """Deviations of the prior within which a contact's parameters are."""
@@ -49,7 +48,7 @@ class Estimator(Protocol):
         """Take one sample in."""
 
     def estimate(self) -> Estimate:
-        """The present estimate."""
+        """The estimate of the samples so far."""
 
 
 class ContactIdentifier(Readable):
@@ -174,7 +173,7 @@ class ContactIdentifier(Readable):
             self._sums,
             self._lines,
             max(float(c[contact_state.POWER]), float(c[contact_state.QUANTUM]) ** 2 / 12),
-            positions.step_in(track),
+            contact_stream.step_in(track),
             _VAGUE,
             self._lag_error,
             float(self.contacts),
@@ -187,7 +186,7 @@ class ContactIdentifier(Readable):
         else:
             theta, covariance = own.theta, own.covariance
             if fit is not None:
-                theta, opened = fit.compensated(own.theta, _VAGUE)
+                theta, opened = fit.without_position_noise(own.theta, _VAGUE)
                 covariance = covariance + fit.open + opened
             worth = own.samples
         refused = self._refusal(theta) or (fit.rejected if fit is not None else "")
@@ -199,7 +198,7 @@ class ContactIdentifier(Readable):
         s, clock = self._state, self._state[contact_stream.AT_CLOCK : contact_stream.AT_POSITIONS]
         if not s[contact_stream.PERIOD]:
             return self.lag_std
-        between = min(clock[sample_clock.HIGH] - clock[sample_clock.LOW], 1.0)
+        between = min(clock[contact_stream.HIGH] - clock[contact_stream.LOW], 1.0)
         return float(np.hypot(self.lag_std, between / self.rate / np.sqrt(12)))
 
     def _refusal(self, theta: Array) -> str:
@@ -263,10 +262,10 @@ def _state(settings: Array) -> Array:
     """The state before the first tick."""
     s = contact_stream
     room, queue = int(settings[s.ROOM]), int(settings[s.QUEUE])
-    own, clock, track = np.zeros(s.OWN), np.array(sample_clock.UNSET), np.zeros(positions.NUMBERS)
+    own, clock, track = np.zeros(s.OWN), np.array(contact_stream.UNSET), np.zeros(contact_stream.NUMBERS)
     own[[s.ORIGIN, s.FORCE]], own[s.FRESH] = np.nan, -2.0
-    track[[positions.ROW, positions.RESOLVED, positions.GOOD, positions.OPEN]] = -1.0
-    track[positions.LAST_SIXTH] = np.nan
+    track[[contact_stream.ROW, contact_stream.RESOLVED, contact_stream.GOOD, contact_stream.OPEN]] = -1.0
+    track[contact_stream.LAST_SIXTH] = np.nan
     contact = np.zeros(contact_state.FIELDS)
     for at in (contact_state.KNOWN, contact_state.CERTAIN):
         contact[at + 4 : at + 20] = np.diag(_VAGUE).ravel()
@@ -277,7 +276,7 @@ def _state(settings: Array) -> Array:
 
 @kernel
 def _one(state, weights, x, force, out):
-    return ticked(state, weights, x, force, out)
+    return take_tick(state, weights, x, force, out)
 
 
 def _check(

@@ -1,20 +1,25 @@
-"""Base of the estimators on a stream: a flat state, one compiled update, and the input checks."""
+"""Base of the estimators on a stream: a flat state, one compiled update, and the input checks.
 
-from __future__ import annotations
+Forgetting policies are parts that stretch a root of the covariance before each sample: `forget(S, phi, floor)`
+returns S stretched, and whether the sample counts at all; `floor` is the inverse of the initial variances. `keep` is
+the weight that those before a sample keep after it. By an identifier's table an experiment asks for one that watches
+its run.
+"""
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import Kernel, kernel, law
+from palpate._jit import Kernel, kernel, law, part
+from palpate._vector import solve
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identifiers.kernels.dimension import size_of
-from palpate.identifiers.kernels.state_layout import length
+from palpate.identifiers.kernels.least_squares import length, stretch, stretch_of
 from palpate.results import Readable
-from palpate.signals.types import Estimate
+from palpate.signals.types import Estimate, Table, coerce_fields, require
 
 LARGEST = 1e30
 """No measurement in SI units is larger: the range of a log's columns."""
@@ -171,7 +176,7 @@ def entry(kernel: Kernel, *example: Any) -> Any:
     return kernel.compiled.overloads[tuple(map(numba.typeof, example))].entry_point
 
 
-def checked(theta: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
+def check_start(theta: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
     """Copies of theta, shape (n,), and of its covariance, shape (n, n), symmetric to the last bit.
 
     Raises:
@@ -188,3 +193,109 @@ def checked(theta: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
     if not np.allclose(P, P.T, rtol=1e-12, atol=0.0) or np.linalg.eigvalsh(P)[0] <= 0.0:
         raise InputError("covariance must be symmetric and positive definite, for example 1e6 * identity")
     return start, 0.5 * (P + P.T)
+
+
+@runtime_checkable
+class Forgetting(Protocol):
+    """A policy, of this file or one's own; a part."""
+
+    @property
+    def keep(self) -> float:
+        """Weight of the earlier samples after one more, relative."""
+
+    def forget(self, S: Any, phi: Any, floor: Any) -> tuple[Any, bool]:
+        """S stretched, and whether the sample counts."""
+
+
+def _factor(policy: Any) -> None:
+    require(0.0 < policy.keep <= 1.0, "forgetting", "in (0, 1]", policy.keep)
+
+
+@part
+@coerce_fields(_factor)
+class Exponential(NamedTuple):
+    """Everything is forgotten alike, whether the sample speaks of it or not.
+
+    When to use it: motion that always excites all parameters. What is not excited is forgotten until the initial
+    covariance is back, so that after a long rest an estimator is as ready as at its start, and knows as little.
+
+    Args:
+        keep: the forgetting factor, in (0, 1]; memory of 1 / (1 - keep) samples. 1 forgets nothing.
+    """
+
+    keep: float
+
+    def forget(self, S, phi, floor):
+        """S with all of it stretched; every sample counts."""
+        return stretch_of(self.keep) * S, True
+
+
+@part
+@coerce_fields(_factor)
+class Directional(NamedTuple):
+    """Only what the sample speaks of is forgotten: the force that is predicted for it (Kulhavy and Karny, 1984).
+
+    When to use it: excitation that comes and goes and is never faint. Independent of units; but a faint sample,
+    mere noise, makes it forget as much as a strong one.
+
+    Args:
+        keep: the forgetting factor, in (0, 1]. Each sample forgets in one direction of n only: where all are excited
+            alike, each remembers n / (1 - keep) samples.
+    """
+
+    keep: float
+
+    def forget(self, S, phi, floor):
+        """S stretched along what the sample sees of it; every sample counts."""
+        return stretch(S, S.T @ phi, stretch_of(self.keep)), True
+
+
+def _subspace(policy: "SIFt") -> None:
+    _factor(policy)
+    require(policy.least >= 0.0, "least", "0 or more", policy.least)
+
+
+@part
+@coerce_fields(_subspace)
+class SIFt(NamedTuple):
+    """Information is forgotten only in the subspace that new information arrives in, and only where some does.
+
+    Subspace of information forgetting (Lai and Bernstein, 2024), for one force at a time: information has a lower
+    and an upper bound without persistent excitation. Directions are compared in units of the initial standard
+    deviations, so that the result does not depend on whether stiffness is in N/m or in kN/m.
+
+    When to use it: as `Directional`, and for years of rest with noisy sensors.
+
+    Args:
+        keep: the forgetting factor, in (0, 1]; memory as of `Directional`.
+        least: a sample whose force the initial covariance would predict with less than this variance [N^2] says
+            nothing; it is left out.
+    """
+
+    keep: float
+    least: float = 1e-6
+
+    def forget(self, S, phi, floor):
+        """S stretched where the sample has information, and whether that is any at all."""
+        d = phi / floor
+        if not phi @ d > self.least:
+            return S, False
+        return stretch(S, solve(S, d), stretch_of(self.keep)), True
+
+
+def policy_of(forgetting: float | Forgetting) -> Forgetting:
+    """A policy as it is; a number is the factor of exponential forgetting."""
+    return forgetting if isinstance(forgetting, Forgetting) else Exponential(forgetting)
+
+
+class IdentifierTable(Table, tag_field="kind"):
+    """The [identifier] table of an experiment. Derive from it beside the estimator, with its `kind` as tag."""
+
+    def build(self, tick: float) -> Any:
+        """The estimator of (M, B, K) at its start, for a time between samples [s]."""
+        raise NotImplementedError
+
+
+VAGUE = (10.0, 1e4, 1e6)
+"""Standard deviation of M [kg], B [N s/m] and K [N/m] before anything is known."""
+NAMES = ("M", "B", "K")

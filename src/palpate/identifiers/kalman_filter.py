@@ -11,22 +11,29 @@ from palpate._jit import law, part
 from palpate._vector import sqrt
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identifiers.estimator import Streaming, as_estimate, checked, is_sample
-from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
+from palpate.identifiers.estimator import (
+    NAMES,
+    VAGUE,
+    IdentifierTable,
+    Streaming,
+    as_estimate,
+    check_start,
+    is_sample,
+)
 from palpate.identifiers.kernels.dimension import AnyNumber
-from palpate.identifiers.kernels.error_covariance import carried
-from palpate.identifiers.kernels.square_root import drifted, measured
-from palpate.identifiers.kernels.state_layout import (
-    bounded,
+from palpate.identifiers.kernels.least_squares import (
     covariance_in,
+    drift_axis,
     error_covariance_in,
     known_first,
     length,
+    limit_root,
+    measure,
+    propagate_covariance,
     put,
     statistics_at,
 )
-from palpate.signals.tables import NotNegativeTriple
-from palpate.signals.types import Estimate
+from palpate.signals.types import Estimate, NotNegativeTriple
 
 MEMORY = 10_000.0
 """Samples that the noise is estimated from, at most; at the start, the newer half of those there are."""
@@ -36,7 +43,7 @@ _GUESS = 30.0
 
 
 @part
-class Noise(NamedTuple):
+class KalmanUpdate(NamedTuple):
     """Noise of the force: its variance [N^2], or 0 where it is to be estimated."""
 
     variance: float
@@ -49,16 +56,16 @@ class Noise(NamedTuple):
         n = size.n
         k = length(n)
         S, doubt, steps = size.matrix(state, n), error_covariance_in(state, size), k + 2 * n * n
-        S = bounded(S, size.vector(state, k - 2 * n), size.vector(state, k - n), size)
+        S = limit_root(S, size.vector(state, k - 2 * n), size.vector(state, k - n), size)
         for i in range(n):
-            S = drifted(S, size.axis(i), state[steps + i])
+            S = drift_axis(S, size.axis(i), state[steps + i])
         r = _variance(doubt, self.variance, n)
-        theta, S, gain, e, a = measured(size.vector(state, 0), S, p, y, r)
+        theta, S, gain, e, a = measure(size.vector(state, 0), S, p, y, r)
         # A sample takes from the older ones as much as it adds, shared among the parameters.
         keep, memory = 1.0 - (1.0 - r / a) / n, 1.0 - 1.0 / min(MEMORY, 2.0 * doubt.weight)
         put(state, size, theta, S, doubt.after(p, gain, e * sqrt(r / a), keep, memory, size))
         walked = size.matrix(state, k) + size.matrix(state, k + n * n)
-        size.put_matrix(state, k, carried(walked, p, gain, 0.0))
+        size.put_matrix(state, k, propagate_covariance(walked, p, gain, 0.0))
         return True
 
 
@@ -92,7 +99,7 @@ class KalmanFilter(Streaming):
         noise: float | None = None,
         names: tuple[str, ...] | None = None,
     ):
-        start, P = checked(theta, covariance)
+        start, P = check_start(theta, covariance)
         pace = np.array(drift, dtype=np.float64)
         if pace.shape != start.shape or not (np.isfinite(pace).all() and (pace >= 0.0).all()):
             raise InputError(
@@ -103,7 +110,7 @@ class KalmanFilter(Streaming):
         if noise is not None and not (noise > 0.0 and np.isfinite(noise)):
             raise InputError(f"noise must be above 0 N, or None to have it estimated, got {noise}")
         self.drift, self.period = pace, float(period)
-        known = Noise(0.0 if noise is None else float(noise) ** 2)
+        known = KalmanUpdate(0.0 if noise is None else float(noise) ** 2)
         state = _first(start, P, pace * np.sqrt(period), 1.0 if noise is None else float(noise))
         super().__init__(state, len(start), known, names)
 
@@ -149,6 +156,6 @@ class KalmanIdentifier(IdentifierTable, tag="kalman-filter"):
     drift: NotNegativeTriple = (0.0, 0.0, 0.0)
     """Of M [kg], B [N s/m] and K [N/m] per root second."""
 
-    def made(self, tick: float) -> KalmanFilter:
+    def build(self, tick: float) -> KalmanFilter:
         """The estimator at its start."""
         return KalmanFilter(np.zeros(3), np.diag(np.square(VAGUE)), self.drift, tick, names=NAMES)

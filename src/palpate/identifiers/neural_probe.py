@@ -1,9 +1,14 @@
-"""A network beside the surface that learns its force, and is asked for K, B and M (thesis, sec. 5.2 and 6.2)."""
+"""A network beside the surface that learns its force, and is asked for K, B and M (thesis, sec. 5.2 and 6.2).
+
+It only watches, so a record is all that it needs to be replayed beside a run, after the fact; the scales and probes of
+the thesis are those of sec. 6.2, by surface.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,11 +16,30 @@ from numpy.typing import ArrayLike
 from palpate._jit import kernel, law
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.identifiers.neural_settings import SETTINGS, Setting
 from palpate.networks import Network, layers_of, network, random_layers
 from palpate.networks.backpropagation import backward, descend, forward
+from palpate.records import Record
 from palpate.results import Readable
 from palpate.signals.types import Estimate
+
+
+class Setting(NamedTuple):
+    """For one surface, in the order displacement, velocity, acceleration.
+
+    Args:
+        scale: factors before the network.
+        values: where it is asked [m, m/s, m/s^2].
+    """
+
+    scale: tuple[float, float, float]
+    values: tuple[float, float, float]
+
+
+SETTINGS = {
+    "foam": Setting((1e3, 1e2, 1.0), (2e-3, 1e-2, 1.0)),
+    "rubber": Setting((1e4, 1e2, 1.0), (2e-4, 1e-2, 0.5)),
+}
+
 
 CHANNELS = ("displacement", "velocity", "acceleration")
 UNITS = ("m", "m/s", "m/s^2")
@@ -162,7 +186,7 @@ class NeuralProbe(Readable):
         return layers_of(self._net.sizes, self._memory.weights.copy())
 
     @property
-    def learned(self) -> Array:
+    def range_learned(self) -> Array:
         """Smallest and largest displacement, velocity and acceleration seen, shape (2, 3)."""
         return np.stack([self._low, self._high])
 
@@ -292,3 +316,34 @@ def _follow(
             out[i, 0], out[i, 1], out[i, 2] = ask(sizes, weights, amplitude, signals, scale, values)
             out[i, 3] = error
     return len(y)
+
+
+SIGNALS = ("displacement", "vx_raw", "ax_measured", "force_measured")
+"""Of a bench's record: what the thesis' identifiers are given (sec. 6)."""
+
+
+def watch(record: Record, probe: NeuralProbe, signals: tuple[str, str, str, str] = SIGNALS) -> Record:
+    """Lets the network learn from a run's time in contact, and asks it after every sample.
+
+    Args:
+        record: of a bench, or with a column "phase" that is 1 in contact; without one, all of it is contact.
+        probe: learns on; its answers are the record's.
+        signals: columns of displacement [m], velocity, acceleration and force [N].
+
+    Returns:
+        A record with "t" from the first sample in contact, "K", "B", "M" of the probe after each sample, and
+        "force_error", what the network's answer lacked before it learned from the sample.
+
+    Raises:
+        InputError: no contact in the record, a column that it does not have, samples that are not finite.
+    """
+    pressing = record["phase"] == 1.0 if "phase" in record.columns else np.ones(len(record), dtype=bool)
+    if not pressing.any():
+        raise InputError("the record has no contact: nothing to learn from")
+    x, v, a, force = (record[name][pressing] for name in signals)
+    answers = probe.trajectory(np.column_stack([x, v, a]), force)
+    t = record["t"][pressing]
+    columns = {"t": t - t[0], **dict(zip(("K", "B", "M", "force_error"), answers.T.copy(), strict=True))}
+    units = {"t": "s", "K": "N/m", "B": "N s/m", "M": "kg", "force_error": "N"}
+    warnings = [list(w) for w in probe.probe().warnings]
+    return Record(columns, units, {**record.meta, "warnings": warnings})

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.identifiers.kernels import octave_sums as sums
-from palpate.identifiers.line_noise import LineNoise, PositionNoise
+from palpate.identifiers.kernels.octave_sums import LineNoise, OctavePositionNoise
 
 SEEN = 10.0
 """Power of a column over that of the position's noise in it, below which an octave is left out: its parameter would be
@@ -30,6 +31,18 @@ OWN, SIZE = 3, 8
 OTHERS = ((3, 4), (5, 6), (7,))
 """Places of each other force: relaxation, depth, friction."""
 _COLUMNS = [sums.A, sums.V, sums.X, sums.FAST, sums.SLOW, sums.SQUARE, sums.CROSS, sums.RUB]
+
+_SIZES = (0.003, 0.03, 0.3)
+"""Deviations of the prior of another force's size, over that of the whole force: hardly there, or of some order."""
+_MASSES = (0.01, 0.1, 1.0)
+"""The same of the mass, over the largest that the caller gives."""
+_IN_BAND = 0.3
+"""Relative error of the position noise's power within the band, told from above it."""
+_DROWNED = 0.9
+"""Share of the information that is noise of the position, at most; beyond, a direction is as good as unknown."""
+_BORROWED = 1.0
+"""Lines that the level of an octave takes from the next higher one."""
+_STEPS = 8
 
 
 @dataclass(frozen=True)
@@ -62,7 +75,7 @@ class OctaveData:
 
 
 @dataclass(frozen=True)
-class System:
+class OctaveSystem:
     """Normal equations by stretch and octave.
 
     Args:
@@ -100,7 +113,7 @@ class System:
         """Samples that it rests on."""
         return float(self.plain[3, 3])
 
-    def only(self, use: NDArray[np.bool_]) -> System:
+    def only(self, use: NDArray[np.bool_]) -> OctaveSystem:
         """The same with some octaves, shape (octaves,)."""
         return replace(
             self,
@@ -111,12 +124,12 @@ class System:
             frequency=self.frequency[use],
         )
 
-    def weighted(self, noise: Array) -> Array:
+    def weighted_products(self, noise: Array) -> Array:
         """Products over all octaves, each over its noise, shape (9, 9)."""
         return np.asarray(np.tensordot(1 / noise, self.total, axes=1))
 
 
-def system_of(data: OctaveData, first: int, end: int) -> System | None:
+def system_of(data: OctaveData, first: int, end: int) -> OctaveSystem | None:
     """The normal equations of the stretches from first to before end; None where they are too few, or drowned."""
     kept = data.groups[first:end]
     kept = kept[kept[:, sums.WEIGHT] > 0]
@@ -138,7 +151,7 @@ def system_of(data: OctaveData, first: int, end: int) -> System | None:
     turn = _turn(float(means[2]))
     noisy = np.zeros((len(frequency), SIZE, SIZE))
     noisy[:, :OWN, :OWN] = position * count.sum(axis=0)[:, None, None]
-    found = System(
+    found = OctaveSystem(
         np.einsum("pi,goij,qj->gopq", turn, products, turn),
         noisy,
         count,
@@ -148,11 +161,11 @@ def system_of(data: OctaveData, first: int, end: int) -> System | None:
         _symmetric(plain[sums.MEANS :]),
         plain[3] * data.lines.in_samples(noise),
     )
-    use = _used(found, data)
+    use = _usable_octaves(found, data)
     return found.only(use) if use.any() else None
 
 
-def _used(system: System, data: OctaveData) -> NDArray[np.bool_]:
+def _usable_octaves(system: OctaveSystem, data: OctaveData) -> NDArray[np.bool_]:
     """Octaves that count, shape (octaves,): with more motion than noise, and no slower than a contact lasts.
 
     A line slower than its contacts would be made of their edges.
@@ -184,11 +197,11 @@ def _products(groups: Array, size: float) -> tuple[Array, Array]:
     return products * share[:, None, None], sums.LINES * share * blocks
 
 
-def _position_noise(groups: Array, step: float) -> PositionNoise:
+def _position_noise(groups: Array, step: float) -> OctavePositionNoise:
     power, product, number = groups[:, [sums.NOISE_POWER, sums.NOISE_PRODUCT, sums.NOISE_COUNT]].sum(axis=0)
     if not number > 0:
-        return PositionNoise(0.0, 0.0, 0.0)
-    return PositionNoise.of(float(power / number), float(product / number), step)
+        return OctavePositionNoise(0.0, 0.0, 0.0)
+    return OctavePositionNoise.of(float(power / number), float(product / number), step)
 
 
 def _whole(state: Array) -> tuple[Array, float, int, float] | None:
@@ -227,3 +240,108 @@ def _symmetric(upper: Array) -> Array:
     found = np.zeros((4, 4))
     found[np.triu_indices(4)] = upper
     return found + np.triu(found, 1).T
+
+
+def _prior_weights() -> Array:
+    """Factors of the prior's weights for each combination of sizes, shape (members, 8), the largest sizes first."""
+    found = []
+    for mass, *others in product(_MASSES[::-1], *(_SIZES[::-1] for _ in OTHERS)):
+        weight = np.ones(SIZE)
+        weight[0] = mass**-2
+        for places, size in zip(OTHERS, others, strict=True):
+            weight[list(places)] = size**-2
+        found.append(weight)
+    return np.array(found)
+
+
+_WEIGHTS = _prior_weights()
+
+
+def prior_of(system: OctaveSystem, deviations: Array) -> Array:
+    """Weights of the priors, each supposing a size of the mass and of every other force, shape (members, 8).
+
+    The first supposes the largest of all.
+    """
+    power = np.einsum("oii->i", system.total)
+    own = deviations[:OWN] ** -2.0
+    return np.concatenate([own, power[OWN:SIZE] / max(float(power[SIZE]), 1e-300)]) * _WEIGHTS
+
+
+def scale_columns(normal: Array) -> tuple[Array, Array]:
+    """A matrix scaled to a unit diagonal, and the sizes of its columns; shapes (..., n, n), (..., n)."""
+    size = np.sqrt(np.maximum(np.einsum("...ii->...i", normal), 1e-300))
+    return normal / (size[..., :, None] * size[..., None, :]) + 1e-12 * np.eye(normal.shape[-1]), size
+
+
+def solve(normal: Array, right: Array) -> Array:
+    """normal^-1 right, right of shape (..., n)."""
+    scaled, size = scale_columns(normal)
+    return np.asarray(np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size)
+
+
+def inverse(normal: Array) -> Array:
+    """normal^-1, of shape (..., n, n)."""
+    scaled, size = scale_columns(normal)
+    return np.asarray(np.linalg.inv(scaled) / (size[..., :, None] * size[..., None, :]))
+
+
+def noise_levels(system: OctaveSystem, deviations: Array) -> tuple[Array, Array]:
+    """Variance of a line in each octave by the residual there, shape (octaves,), and the fit with it.
+
+    Degrees of freedom are taken off. Stretches count by the power of their force: the residual of a tip at rest says
+    nothing of that of one that moves.
+    """
+    total, count = system.total, system.count
+    prior = prior_of(system, deviations)[0]
+    force = np.where(system.lines > 0, np.maximum(system.products[:, :, -1, -1], 0.0), 0.0)
+    share = force / np.maximum(force.sum(axis=0), 1e-300)
+    rests = 1 / np.maximum(np.sum(share**2 / np.maximum(system.lines, 1.0), axis=0), 1e-300)
+    rests = np.where(force.sum(axis=0) > 0, rests, count)
+    mean = float(total[:, -1, -1].sum() / count.sum())
+    noise = np.full(len(count), 1e-3 * mean + 1e-280)
+    theta = np.zeros(SIZE)
+    for _ in range(_STEPS):
+        whole = np.tensordot(1 / noise, total, axes=1)
+        normal = whole[:-1, :-1] + np.diag(prior)
+        noisy = np.tensordot(1 / noise, system.noisy, axes=1)
+        theta = compensate(whole[:-1, :-1], whole[:-1, -1], noisy, prior)[0]
+        full = np.append(-theta, 1.0)
+        left = np.maximum(np.einsum("i,goij,j->go", full, system.products, full), 0.0)
+        left = (share * left / np.maximum(system.lines, 1.0)).sum(axis=0)
+        used = np.einsum("oij,ij->o", total[:, :-1, :-1], inverse(normal)) / noise
+        free = np.maximum(rests - used, 0.0)
+        above, noise = 0.0, noise.copy()
+        for o in np.argsort(-system.frequency):
+            borrowed = _BORROWED if above else 0.0
+            above = (left[o] * rests[o] + borrowed * above) / max(free[o] + borrowed, 1.0)
+            noise[o] = above = max(above, float(system.sensor[o]), 1e-12 * mean + 1e-280)
+    return noise, theta
+
+
+def compensate(known: Array, right: Array, noisy: Array, prior: Array) -> tuple[Array, Array, Array]:
+    """theta with the noise of the position taken out, its covariance, and that of what the noise leaves open.
+
+    In each direction of the parameters with its own share of noise: least squares give 1 - share of what is true. In a
+    direction that is nearly all noise nothing is taken out, and the prior alone says how far it may reach.
+
+    Args:
+        known: normal equations of the data, shape (8, 8).
+        right: their right-hand side, shape (8,).
+        noisy: part of them that is noise of the position, shape (8, 8).
+        prior: weights of the prior, shape (..., 8).
+    """
+    scaled, size = scale_columns(known + prior[..., None] * np.eye(len(right)))
+    root = np.linalg.cholesky(scaled)
+    inner = np.linalg.solve(root, noisy / (size[..., :, None] * size[..., None, :]))
+    inner = np.linalg.solve(root, np.swapaxes(inner, -1, -2))
+    share, ways = np.linalg.eigh((inner + np.swapaxes(inner, -1, -2)) / 2)
+    seen = (1 + _IN_BAND) * share < _DROWNED
+    share = np.clip(np.where(seen, share, 0.0), 0.0, None)
+    back = np.linalg.solve(np.swapaxes(root, -1, -2), ways) / size[..., :, None]
+    pull = np.einsum("...ij,i->...j", back, right)
+    kept = 1 - share
+    further = pull * (1 / (1 - (1 + _IN_BAND) * share) - 1 / kept)
+    further = np.where(seen, further, np.einsum("...ij,...i->...j", back**2, prior) ** -0.5)
+    turned = np.swapaxes(back, -1, -2)
+    theta = np.einsum("...ij,...j->...i", back, pull / kept)
+    return theta, (back / kept[..., None, :] ** 2) @ turned, (back * further[..., None, :] ** 2) @ turned

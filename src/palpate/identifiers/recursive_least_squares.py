@@ -11,17 +11,28 @@ from numpy.typing import ArrayLike
 
 from palpate._jit import law, part
 from palpate.arrays import Array
-from palpate.identifiers.estimator import Streaming, as_estimate, checked, is_sample
-from palpate.identifiers.forgetting import Directional, Exponential, Forgetting, SIFt, policy_of
-from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
+from palpate.identifiers.estimator import (
+    NAMES,
+    VAGUE,
+    Directional,
+    Exponential,
+    Forgetting,
+    IdentifierTable,
+    SIFt,
+    Streaming,
+    as_estimate,
+    check_start,
+    is_sample,
+    policy_of,
+)
 from palpate.identifiers.kernels.dimension import AnyNumber
-from palpate.identifiers.kernels.least_squares import learned
-from palpate.identifiers.kernels.state_layout import (
-    bounded,
+from palpate.identifiers.kernels.least_squares import (
     covariance_in,
     error_covariance_in,
     known_first,
+    learn_sample,
     length,
+    limit_root,
     put,
 )
 from palpate.signals.types import Estimate
@@ -58,7 +69,7 @@ class Recursion(NamedTuple):
 
     def absorb(self, state, phi, y, size):
         """Takes a sample in; False where it is none."""
-        return absorbed(state, phi, y, self.forgetting, size)[1] > 0.0
+        return absorb(state, phi, y, self.forgetting, size)[1] > 0.0
 
 
 class RecursiveLeastSquares(LeastSquaresEstimator):
@@ -86,7 +97,7 @@ class RecursiveLeastSquares(LeastSquaresEstimator):
         forgetting: float | Forgetting = 1.0,
         names: tuple[str, ...] | None = None,
     ):
-        start, P = checked(theta, covariance)
+        start, P = check_start(theta, covariance)
         self.forgetting = policy_of(forgetting)
         super().__init__(known_first(start, P), len(start), Recursion(self.forgetting), names)
 
@@ -95,7 +106,7 @@ class RecursiveLeastSquares(LeastSquaresEstimator):
 
 
 @law
-def absorbed(state, phi, y, forgetting, size):
+def absorb(state, phi, y, forgetting, size):
     """One sample, in place: its innovation, scaled to the noise, and the variance that it had; (0, 0) if it is none."""
     p = size.vector(phi, 0)
     if not is_sample(p, y):
@@ -103,12 +114,12 @@ def absorbed(state, phi, y, forgetting, size):
     n = size.n
     ends = length(n) - 2 * n
     floor = size.vector(state, ends)
-    S = bounded(size.matrix(state, n), floor, size.vector(state, ends + n), size)
+    S = limit_root(size.matrix(state, n), floor, size.vector(state, ends + n), size)
     S, counts = forgetting.forget(S, p, floor)
     if not counts:
         return 0.0, 1.0
     theta, doubt = size.vector(state, 0), error_covariance_in(state, size)
-    theta, S, doubt, e, a = learned(theta, S, doubt, p, y, forgetting.keep, size)
+    theta, S, doubt, e, a = learn_sample(theta, S, doubt, p, y, forgetting.keep, size)
     put(state, size, theta, S, doubt)
     return e, a
 
@@ -120,7 +131,7 @@ class LeastSquaresIdentifier(IdentifierTable, tag="least-squares"):
     """Forgetting factor; 1 forgets nothing."""
     forgetting: Literal["exponential", "directional", "sift"] = "exponential"
 
-    def made(self, tick: float) -> RecursiveLeastSquares:
+    def build(self, tick: float) -> RecursiveLeastSquares:
         """The estimator at its start."""
         policy = {"exponential": Exponential, "directional": Directional, "sift": SIFt}[self.forgetting]
         forgetting: Any = policy(self.keep) if self.keep < 1.0 else 1.0

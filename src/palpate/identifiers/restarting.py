@@ -10,17 +10,15 @@ from numpy.typing import ArrayLike
 
 from palpate._jit import part
 from palpate.errors import InputError
-from palpate.identifiers.estimator import checked
-from palpate.identifiers.forgetting import Forgetting, policy_of
-from palpate.identifiers.identifier_table import NAMES, VAGUE, IdentifierTable
-from palpate.identifiers.kernels.change_detection import COUNTERS, EXTRA, counters, looked_back, noticed
-from palpate.identifiers.kernels.state_layout import known_first, length, statistics_at
-from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorbed
-from palpate.signals.tables import Positive
+from palpate.identifiers.estimator import NAMES, VAGUE, Forgetting, IdentifierTable, check_start, policy_of
+from palpate.identifiers.kernels.change_detection import COUNTERS, EXTRA, counters, looked_back, notice
+from palpate.identifiers.kernels.least_squares import known_first, length, statistics_at
+from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorb
+from palpate.signals.types import Positive
 
 
 @part
-class Watch(NamedTuple):
+class RestartingUpdate(NamedTuple):
     """The update of `RestartingLeastSquares`.
 
     Args:
@@ -38,10 +36,10 @@ class Watch(NamedTuple):
         n = size.n
         s = statistics_at(n)
         before = (state[s], state[s + 1], state[s + 2])
-        e, a = absorbed(state[: length(n)], phi, y, self.forgetting, size)
+        e, a = absorb(state[: length(n)], phi, y, self.forgetting, size)
         if not a > 0.0:
             return False
-        noise = noticed(state, n, phi, y, e, a, before, self.rows)
+        noise = notice(state, n, phi, y, e, a, before, self.rows)
         if noise > 0.0:
             looked_back(state, self, noise, size)
         return True
@@ -77,7 +75,7 @@ class RestartingLeastSquares(LeastSquaresEstimator):
         evidence: float = 20.0,
         names: tuple[str, ...] | None = None,
     ):
-        start, P = checked(theta, covariance)
+        start, P = check_start(theta, covariance)
         n = len(start)
         if memory != int(memory) or not memory > n:
             raise InputError(f"memory must be a whole number of samples above {n}, got {memory}")
@@ -86,7 +84,7 @@ class RestartingLeastSquares(LeastSquaresEstimator):
         self.forgetting = policy_of(forgetting)
         initial = [start, np.linalg.cholesky(P).ravel(), np.zeros(COUNTERS + int(memory) * (n + EXTRA))]
         state = np.concatenate([known_first(start, P), *initial])
-        super().__init__(state, n, Watch(self.forgetting, float(memory), float(evidence)), names)
+        super().__init__(state, n, RestartingUpdate(self.forgetting, float(memory), float(evidence)), names)
 
     def _worth(self, weight: float) -> float:
         return min(weight, float(self.since))
@@ -110,7 +108,7 @@ class RestartingIdentifier(IdentifierTable, tag="restarting-least-squares"):
     evidence: Positive = 20.0
     """Log-likelihood ratio from which the surface has changed."""
 
-    def made(self, tick: float) -> RestartingLeastSquares:
+    def build(self, tick: float) -> RestartingLeastSquares:
         """The estimator at its start."""
         P = np.diag(np.square(VAGUE))
         return RestartingLeastSquares(np.zeros(3), P, 1.0, self.memory, self.evidence, NAMES)

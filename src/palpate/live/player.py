@@ -1,4 +1,9 @@
-"""A source at real time, in a thread of its own; readers ask it to pause, to step, to go back."""
+"""A source at real time, in a thread of its own, and the page that shows it.
+
+Readers ask it to pause, to step, to go back. They take new rows from a feed of the last seconds, and a slow reader
+loses rows, so that memory stays bounded. All that the page needs lies in its text, and its policy lets nothing else run
+or be asked.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +12,94 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from importlib import resources
 from typing import Any
 
 import msgspec
+import numpy as np
 
+from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.live.feed import Feed
-from palpate.live.view import STRIDE, Source
+from palpate.live.view import COLUMNS, STRIDE, RowSource, View
+from palpate.report.look.assets import ARM, ARM_IN_SPACE, CHARTS, data, policy, scripts
+from palpate.report.page import render
+from palpate.text import printable
+
+SECONDS = 12.0
+"""That are kept [s]."""
+
+
+class Feed:
+    """A ring of rows, written by one thread and read by any.
+
+    Args:
+        rows: that are kept.
+    """
+
+    def __init__(self, rows: int = round(SECONDS / STRIDE)):
+        self._ring = np.full((rows, len(COLUMNS)), np.nan)
+        self._count = 0
+        self._epoch = 0
+        self._lock = threading.Lock()
+        self._listeners: list[Callable[[], None]] = []
+
+    def put(self, rows: Array) -> None:
+        """Adds rows, shape (n, len(COLUMNS))."""
+        if not len(rows):
+            return
+        with self._lock:
+            kept = rows[-len(self._ring) :]
+            skipped = len(rows) - len(kept)
+            at = (self._count + skipped + np.arange(len(kept))) % len(self._ring)
+            self._ring[at] = kept
+            self._count += len(rows)
+        self.tell()
+
+    def clear(self) -> None:
+        """Forgets all rows: what comes is from another time."""
+        with self._lock:
+            self._epoch += 1
+            self._count = 0
+        self.tell()
+
+    def since(self, epoch: int, count: int) -> tuple[int, int, Array, int]:
+        """The rows that a reader has not received yet.
+
+        Args:
+            epoch: of its last row.
+            count: of the rows that it has had since.
+
+        Returns:
+            Epoch and count to ask with next time, the rows, and how many were lost before them. Where the epoch is
+            another, what the reader had is from another time.
+        """
+        with self._lock:
+            had = count if epoch == self._epoch else 0
+            oldest = max(0, self._count - len(self._ring))
+            first = max(had, oldest)
+            rows = self._ring[np.arange(first, self._count) % len(self._ring)]
+            lost = first - had if epoch == self._epoch else 0
+            return self._epoch, self._count, rows, lost
+
+    def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Has a function called, from whichever thread, when there is something new; returns what ends that."""
+        with self._lock:
+            self._listeners.append(listener)
+
+        def end() -> None:
+            with self._lock:
+                self._listeners.remove(listener)
+
+        return end
+
+    def tell(self) -> None:
+        """Calls the listeners of the feed."""
+        with self._lock:
+            listeners = list(self._listeners)
+        for listener in listeners:
+            listener()
+
 
 PERIOD = 0.01
 """Between two looks at the clock [s]."""
@@ -45,7 +130,7 @@ class Reset(msgspec.Struct, tag="reset", tag_field="do", forbid_unknown_fields=T
 
 
 class Set(msgspec.Struct, tag="set", tag_field="do", forbid_unknown_fields=True):
-    """Move a slider."""
+    """Command that moves a slider."""
 
     key: str
     value: float
@@ -92,7 +177,7 @@ class Player:
 
     def __init__(
         self,
-        source: Source,
+        source: RowSource,
         feed: Feed,
         changed: Callable[[], None] = lambda: None,
         stability: Callable[[], dict[str, Any] | None] = lambda: None,
@@ -105,7 +190,7 @@ class Player:
         self._watched = threading.Event()
         self._stop = threading.Event()
         self._requests: queue.Queue[Request] = queue.Queue(WAITING)
-        self._thread = threading.Thread(target=self._guarded, name="live", daemon=True)
+        self._thread = threading.Thread(target=self._run_guarded, name="live", daemon=True)
 
     def __enter__(self) -> Player:
         self._thread.start()
@@ -143,7 +228,7 @@ class Player:
         self.version += 1
         self.feed.tell()
 
-    def described(self) -> dict[str, Any]:
+    def description(self) -> dict[str, Any]:
         """How it stands, as the page takes it."""
         state = self.source.state
         return {
@@ -159,7 +244,7 @@ class Player:
             "stability": self._stability(),
         }
 
-    def _guarded(self) -> None:
+    def _run_guarded(self) -> None:
         try:
             self._run()
         except BaseException as error:  # noqa: BLE001 - raised again by whoever started it
@@ -234,3 +319,42 @@ class Player:
         self.source.reset(seed)
         self.feed.clear()
         self._playing = True
+
+
+PAGE_HEADERS = {
+    "Content-Type": "text/html; charset=utf-8",
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+def page(view: View) -> str:
+    """The page of a source as HTML."""
+    drawing = ARM if view.scene is None else ARM_IN_SPACE
+    codes = (*scripts(*CHARTS, *drawing), _own("strip.js"), _own("live.js"))
+    shown_view = replace(
+        view,
+        title=printable(view.title),
+        about=printable(view.about),
+        notes=tuple(map(printable, view.notes)),
+        units={name: printable(unit) for name, unit in view.units.items()},
+    )
+    return render(
+        "live.html",
+        "palpate.live",
+        view=shown_view,
+        data=data(shown_view.to_json()),
+        title=f"{shown_view.title} – palpate live",
+        command="",
+        own_styles=_own("live.css"),
+        scripts=codes,
+        policy=policy(codes, "connect-src 'self' ws://127.0.0.1:* ws://localhost:*"),
+    )
+
+
+def _own(name: str) -> str:
+    return (resources.files("palpate.live") / name).read_text(encoding="utf-8")

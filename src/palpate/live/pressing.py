@@ -9,8 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from palpate.arrays import Array
-from palpate.bench.ending import DIVERGED
-from palpate.bench.sequence import CONTACT, LOST
+from palpate.bench.sequence import CONTACT, DIVERGED, LOST
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.gains import Gains
@@ -24,10 +23,10 @@ from palpate.live.view import (
     OVER,
     STRIDE,
     Happened,
-    Scene,
     Slider,
     State,
     View,
+    ViewScene,
     check_ahead,
 )
 from palpate.press.loops import series_of
@@ -36,6 +35,7 @@ from palpate.press.prepare import Question, prepared
 from palpate.press.pressing import JOINT_LIMIT
 from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.signals.types import NORMAL
 from palpate.text import printable
 
 FORCE, STIFFNESS, DAMPING = 20.0, 5000.0, 50.0
@@ -44,8 +44,6 @@ _PATCH = 0.12
 """Half the side of the surface that is drawn [m]."""
 _LOOKS = 20.0
 """Of the estimator, a second of simulated time."""
-_SURE = 1.96
-"""Standard deviations of a 95 % interval."""
 
 
 class PressingArm:
@@ -190,7 +188,7 @@ class PressingArm:
         found = self._identifier.estimate()
         if found.rejected:
             return np.full(4, np.nan)
-        half = _SURE * np.sqrt(np.diag(found.covariance))
+        half = NORMAL * np.sqrt(np.diag(found.covariance))
         K, B = float(found.theta[2]), float(found.theta[1])
         # Encoders before a spring see the surface through it: k = K/(1 + K/s), and b = B (k/K)^2 while B w << s.
         own = 1.0 if self._series is None else 1.0 / (1.0 - K / self._series)
@@ -261,12 +259,12 @@ def _sliders(gains: Gains) -> tuple[Slider, ...]:
     )
 
 
-def _scene(asked: Any) -> Scene:
+def _scene(asked: Any) -> ViewScene:
     """The arm's joints and the surface around the tip, as the page draws them."""
     chain, place = asked.arm.chain, asked.place
     centre = place.pose[:3, 3] + (place.place - place.normal @ place.pose[:3, 3]) * place.normal
     u, v = _PATCH * place.axes[1], _PATCH * place.axes[2]
-    return Scene(
+    return ViewScene(
         at=_tuples(chain.at),
         turn=tuple(_tuples(one) for one in chain.turn),
         slide=tuple(bool(one) for one in chain.slide),

@@ -7,19 +7,20 @@ import errno
 import logging
 import re
 import secrets
+import socket
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import AsyncExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from http import HTTPStatus
+from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from palpate.errors import InputError
-from palpate.live.page import PAGE_HEADERS, page
-from palpate.live.player import Player, Request
+from palpate.live.player import PAGE_HEADERS, Player, Request, page
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -58,7 +59,7 @@ class Address:
 
 
 @contextmanager
-def served(player: Player, port: int = 0, host: str = HOST) -> Iterator[Address]:
+def serve(player: Player, port: int = 0, host: str = HOST) -> Iterator[Address]:
     """Serves a player's page within the block, by a thread of its own.
 
     Args:
@@ -126,7 +127,7 @@ class GuardedServer(ABC):
         self._thread.join()
 
     def _address(self) -> Address:
-        """Once it listens."""
+        """Address of the server once it listens."""
         self._ready.wait(_STARTING)
         if self._refused is not None:
             remedy = f"name another with {self._option}; 0 takes a free one"
@@ -142,7 +143,7 @@ class GuardedServer(ABC):
 
         self._loop, self._ending = asyncio.get_running_loop(), asyncio.Event()
         options: dict[str, Any] = {
-            "process_request": self._asked,
+            "process_request": self._refuse_or_answer,
             "subprotocols": self.subprotocols,
             "compression": None,
             "max_size": _LARGEST,
@@ -175,7 +176,7 @@ class GuardedServer(ABC):
         for reader in self._readers:
             reader.set()
 
-    def _asked(self, connection: ServerConnection, asked: Asked) -> Response | None:
+    def _refuse_or_answer(self, connection: ServerConnection, asked: Asked) -> Response | None:
         """Refuses requests without the token, by another host name, or of another page; answers what is no stream."""
         hosts = asked.headers.get_all("Host")
         if len(hosts) != 1 or not (_OWN_HOST.match(hosts[0]) or hosts[0] == f"{self.host}:{self._port}"):
@@ -291,7 +292,7 @@ class _PageServer(GuardedServer):
                 await connection.send(_text("clear"))
             if lost:
                 await connection.send(_text("lost", rows=lost))
-            told = self._player.described()
+            told = self._player.description()
             if told["version"] != version:
                 version = told["version"]
                 await connection.send(_text("state", **told))
@@ -302,3 +303,43 @@ class _PageServer(GuardedServer):
 
 def _text(kind: str, **more: Any) -> str:
     return msgspec.json.encode({"kind": kind, **more}).decode()
+
+
+_ANYWHERE = ("192.0.2.1", 9)
+"""An address of documentation (RFC 5737): asking for the way there sends nothing."""
+WARNING = (
+    "shared: everybody on this network who has the address can watch, and nothing is encrypted; the first page that "
+    "opens it steers, all others only watch"
+)
+
+
+def network_address() -> str:
+    """This machine's own address on its network.
+
+    Raises:
+        InputError: it is on none.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(_ANYWHERE)
+            found = str(probe.getsockname()[0])
+        except OSError:
+            found = ""
+    if not found or found.startswith("127.") or found == "0.0.0.0":  # noqa: S104 - compared, not listened on
+        raise InputError("--share: this machine is on no network; connect it, or leave --share out")
+    return found
+
+
+def qr_code(text: str) -> str:
+    """A text as a QR code of half-height blocks, for a terminal.
+
+    Raises:
+        InputError: segno is not installed.
+    """
+    try:
+        import segno
+    except ImportError:
+        raise InputError('--share draws a QR code, which needs segno: pip install "palpate[live]"') from None
+    drawn = StringIO()
+    segno.make(text, error="l").terminal(drawn, compact=True)
+    return drawn.getvalue()

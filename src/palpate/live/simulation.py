@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.bench.any_experiment import check_parts
 from palpate.bench.build import build
-from palpate.bench.ending import StopCondition
-from palpate.bench.experiments.tables import Experiment, changed
 from palpate.bench.given_motion import rest_for
-from palpate.bench.part_check import check_parts
-from palpate.bench.row import COLUMNS as ROW
-from palpate.bench.sequence import CONTACT, LOST
+from palpate.bench.sequence import COLUMNS as ROW
+from palpate.bench.sequence import CONTACT, LOST, StopCondition
+from palpate.bench.tables import Experiment, changed
 from palpate.environments import SurfaceState
 from palpate.live.stability import OfBench
 from palpate.live.view import (
@@ -31,6 +30,7 @@ from palpate.live.view import (
     check_ahead,
     planar_bones,
 )
+from palpate.signals.types import NORMAL
 from palpate.text import printable
 
 _FROM = {name: i for i, name in enumerate(ROW)}
@@ -117,7 +117,7 @@ class Simulation:
             self.state.note(Happened(float(out[-1, 0]) if len(out) else 0.0, ending.end, "fail"))
         elif self._run.ticks >= LONGEST * self._rate:
             self.state.ended = OVER
-        return self._shown(out)
+        return self._rows_shown(out)
 
     def set(self, key: str, value: float) -> None:
         """Moves a slider; a surface that is pressed gets the rest length that leaves the force as it is.
@@ -160,7 +160,7 @@ class Simulation:
         return OfBench(self._experiment)
 
     def bones(self, row: Array) -> Array:
-        """See `Source`."""
+        """Positions of the joints, see `Source`."""
         return planar_bones(self.view.links, row)
 
     def _begin(self) -> None:
@@ -215,7 +215,7 @@ class Simulation:
                 self.state.note(Happened(float(out[i, 0]), "contact lost", "fail"))
         self._phase = float(phases[-1])
 
-    def _shown(self, out: Array) -> Array:
+    def _rows_shown(self, out: Array) -> Array:
         """Each stride's last row; of the measured force its least and its largest value by turns."""
         whole = len(out) // self._stride * self._stride
         if not whole:
@@ -230,7 +230,7 @@ class Simulation:
         rows[:, AT["depth"]] *= 1e3
         rows[:, AT["wall"]] = blocks[:, -1, _FROM["x"]] - blocks[:, -1, _FROM["penetration"]]
         for name, column in (("K", "K_matched_std"), ("B", "B_matched_std")):
-            half = 1.96 * blocks[:, -1, _FROM[column]]
+            half = NORMAL * blocks[:, -1, _FROM[column]]
             value = rows[:, AT[name]]
             # As wide as itself, or before there was force control: nothing is known yet.
             unknown = ~(half < np.abs(value)) | (self._contacts == 0)

@@ -18,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from palpate.bench.experiments.tables import Experiment
+from palpate.bench.tables import Experiment
 from palpate.controllers import CautiousController
 from palpate.errors import InputError, PalpateError
 from palpate.force.claims import Claim
@@ -151,12 +151,12 @@ def _of_arm(asked: OfArm) -> Iterator[Answer]:
     said = f"On the stiffest surface {_margins(own.gain, own.phase, own.delay)}."
     nothing: Answer = {"stiffness": None, "proved": False, "label": ""}
     yield nothing | {"text": f"Proving on which surfaces it is stable … {said}", "more": True}
-    held = next((claim for claim in _proof(_encoded(gains), False) if claim.kind == "held"), None)
+    held = next((claim for claim in _proof(_encode(gains), False) if claim.kind == "held"), None)
     if held is None:
         yield nothing | {"text": f"Nothing could be proved. {said}"}
         return
     covered = _covers(held, gains, asked.stiffness, asked.damping)
-    told = f"Proved stable with a fixed gain: K + B/θ from {_span(held, gains)}, {_damped(held)}."
+    told = f"Proved stable with a fixed gain: K + B/θ from {_span(held, gains)}, {_damping_range(held)}."
     if not covered:
         told += " The proof does not cover the present surface."
     answer: Answer = {
@@ -165,14 +165,14 @@ def _of_arm(asked: OfArm) -> Iterator[Answer]:
         "label": "proved stable" if covered else "proved stable for others",
     }
     yield answer | {"text": f"{told} {said}", "more": True}
-    adapting = [claim for claim in _proof(_encoded(gains), True) if claim.kind == "adapting"]
+    adapting = [claim for claim in _proof(_encode(gains), True) if claim.kind == "adapting"]
     if adapting:
         every = (
             "every constant K"
             if gains.arm.kind == "position"
             else f"every constant K from {_span(adapting[0], gains)}"
         )
-        told += f" Proved while it adapts: {every}, {_damped(adapting[0])}."
+        told += f" Proved while it adapts: {every}, {_damping_range(adapting[0])}."
     yield answer | {"text": f"{told} {said}"}
 
 
@@ -185,7 +185,7 @@ def _proof(encoded: bytes, adapting: bool) -> tuple[Claim, ...]:
     return certificate.claims if certificate.check().holds else ()
 
 
-def _encoded(gains: Gains) -> bytes:
+def _encode(gains: Gains) -> bytes:
     return msgspec.json.encode(gains)
 
 
@@ -201,7 +201,7 @@ def _span(claim: Claim, gains: Gains) -> str:
     return f"{quantity(low, 'N/m', digits=3)} to {quantity(high, 'N/m', digits=3)}"
 
 
-def _damped(claim: Claim) -> str:
+def _damping_range(claim: Claim) -> str:
     return "without damping" if claim.most == 0.0 else f"B/K up to {quantity(claim.most, 's', digits=2)}"
 
 

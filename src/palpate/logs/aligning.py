@@ -11,7 +11,7 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.logs.stamps import Timed
-from palpate.signals.held import fresh_rows
+from palpate.signals.samples import fresh_rows
 
 _FEWEST = 20
 """Readings of a stream: with fewer, a spline's ends are most of it, and identification refuses the log as well."""
@@ -52,7 +52,7 @@ def align(streams: Sequence[Timed], missing: Sequence[float] = (), held: str | N
         InputError: a stream has too few readings where all have some.
     """
     notes: list[dict[str, Any]] = []
-    cleaned = [_fresh(_sorted(stream, missing, notes), notes) for stream in streams]
+    cleaned = [_fresh(_sort(stream, missing, notes), notes) for stream in streams]
     rates = [_rate(stream) for stream in cleaned]
     fastest = int(np.argmax(rates))
     begin, end = max(s.time[0] for s in cleaned), min(s.time[-1] for s in cleaned)
@@ -65,9 +65,9 @@ def align(streams: Sequence[Timed], missing: Sequence[float] = (), held: str | N
         if number == fastest:
             table.values.append(stream.values[inside])
         elif stream.topic == held:
-            table.values.append(_held(stream, time))
+            table.values.append(_place_readings(stream, time))
         else:
-            table.values.append(_moved(stream, time, all_rows=rate > _SIMILAR * rates[fastest]))
+            table.values.append(_interpolate(stream, time, all_rows=rate > _SIMILAR * rates[fastest]))
         if rate <= _SIMILAR * rates[fastest]:
             text = f"{stream.topic} has {rate:.4g} readings a second, {cleaned[fastest].topic} {rates[fastest]:.4g}"
             notes.append(
@@ -76,7 +76,7 @@ def align(streams: Sequence[Timed], missing: Sequence[float] = (), held: str | N
     return table
 
 
-def _sorted(stream: Timed, missing: Sequence[float], notes: list[dict[str, Any]]) -> Timed:
+def _sort(stream: Timed, missing: Sequence[float], notes: list[dict[str, Any]]) -> Timed:
     """In the order of time, one row a time, without rows that hold no reading."""
     values = np.where(np.isin(stream.values, missing), np.nan, stream.values)
     time, rows = np.unique(stream.time, return_index=True)
@@ -110,7 +110,7 @@ def _rate(stream: Timed) -> float:
     return float(1 / np.median(np.diff(stream.time)))
 
 
-def _held(stream: Timed, time: Array) -> Array:
+def _place_readings(stream: Timed, time: Array) -> Array:
     """Each reading in the first row that is not before it."""
     rows = np.searchsorted(time, stream.time)
     there = rows < len(time)
@@ -119,7 +119,7 @@ def _held(stream: Timed, time: Array) -> Array:
     return values
 
 
-def _moved(stream: Timed, time: Array, all_rows: bool) -> Array:
+def _interpolate(stream: Timed, time: Array, all_rows: bool) -> Array:
     """The stream's values at some rows; NaN in gaps and, unless all are asked for, far from its readings."""
     from scipy.interpolate import CubicSpline
 

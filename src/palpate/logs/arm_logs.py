@@ -120,7 +120,7 @@ def _only(what: str, bag: Bag | None, path: Path) -> str:
 def _columns(
     what: str, spec: str, path: Path, kind: Kind, bag: Bag | None, rotation: str = "quaternion"
 ) -> dict[str, str]:
-    """Columns by role."""
+    """The columns of the wrench and the pose, by role."""
     roles, counts = _COUNTS[what]
     names = spec.split(",")
     if len(names) == 1:

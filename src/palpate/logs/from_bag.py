@@ -79,7 +79,7 @@ def _field(role: str, spec: str, bag: Bag) -> tuple[str, str]:
 
 def _steady(stream: Stream, roles: Sequence[str]) -> None:
     """A quaternion and its negative are one rotation; between messages they must not change places."""
-    from palpate.signals.quaternions import continuous
+    from palpate.signals.samples import continuous
 
     places = [roles.index(role) for role in _TURN if role in roles]
     if len(places) == len(_TURN):

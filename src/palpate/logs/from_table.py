@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.logs.missing import find_sentinel
+from palpate.logs.columns import find_sentinel
 from palpate.logs.plausibility import epoch_unit
 from palpate.logs.roles import Loaded, check_apart, check_quantity, family, quantity, si_unit
 from palpate.logs.tables import Sheet, Stated
@@ -91,7 +91,7 @@ def _symbol(
         return "s"
     if symbol is not None:
         check_quantity(role, name, symbol)
-        _contradicted(name, symbol, own, role, stated, notes)
+        _note_contradiction(name, symbol, own, role, stated, notes)
         return symbol
     if stated.unit is not None:
         check_quantity(role, name, stated.unit)
@@ -113,7 +113,7 @@ def _symbol(
     return si_unit(role)
 
 
-def _contradicted(
+def _note_contradiction(
     name: str, symbol: str, own: str, role: str, stated: Stated, notes: list[dict[str, Any]]
 ) -> None:
     """Note that a unit is another than the column's name carries, or the file states."""

@@ -47,7 +47,7 @@ def sheets_as_logs(paths: Sequence[Path], names: Sequence[str], limits: Limits) 
     return tuple(found)
 
 
-def gathered(paths: Sequence[Path]) -> tuple[Path, ...]:
+def gather_logs(paths: Sequence[Path]) -> tuple[Path, ...]:
     """The logs that paths name: a file as it is, a folder by its files, in the order of their names and numbers.
 
     Raises:
@@ -84,6 +84,6 @@ def _of_folder(folder: Path) -> list[Path]:
 
 
 def _by_number(path: Path) -> list[tuple[int, str]]:
-    """`press_40` before `press_250`."""
+    """A key that sorts `press_40` before `press_250`."""
     parts = re.split(r"(\d+)", path.name)
     return [(int(part), "") if i % 2 else (0, part) for i, part in enumerate(parts)]

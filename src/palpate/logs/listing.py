@@ -13,10 +13,11 @@ from palpate.files.limits import Limits
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag
 from palpate.logs.bags.fields import leaves
+from palpate.logs.columns import ColumnStatistics
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.own_runs import is_run
 from palpate.logs.plausibility import epoch_unit
-from palpate.logs.proposal import Proposal, Seen, clock_of, for_a_run, from_columns, from_topics
+from palpate.logs.proposal import Proposal, clock_of, from_columns, from_topics
 from palpate.logs.tables import Sheet, Stated, equal_sheets, open_table
 from palpate.text import shorten
 from palpate.units import unit, unit_in_name
@@ -46,7 +47,7 @@ class Entry:
     fields: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
-        """As plain values."""
+        """The listing as plain JSON values."""
         return asdict(self)
 
 
@@ -86,24 +87,24 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
             entries = [_of_topic(bag, name, fields[name]) for name in bag.topics]
             return Listing(entries, bag.troubles, from_topics(bag, fields))
     table = open_table(path, kind, delimiter, limits)
-    seen, unread = _seen(table)
-    clock = clock_of(table, seen)
-    entries = [_of_column(own, clock) for own in seen]
+    columns, unread = _read_columns(table)
+    clock = clock_of(table, columns)
+    entries = [_of_column(column, clock) for column in columns]
     entries += [Entry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
-    proposal = for_a_run() if is_run(path) else from_columns(table, seen, delimiter)
+    proposal = Proposal({}) if is_run(path) else from_columns(table, columns, delimiter)
     repeats = equal_sheets(path, limits or Limits()) if kind is Kind.SHEETS and path.is_file() else []
     if repeats:
-        one = list_log(repeats[0], limits=limits).proposal
+        first = list_log(repeats[0], limits=limits).proposal
         text = f"{len(repeats)} sheets have the same columns and are pooled, as repeats of one test: "
         named = shorten(", ".join(sheet.name for sheet in repeats), 120)
-        proposal = replace(one, guesses=(*one.guesses, text + named))
+        proposal = replace(first, guesses=(*first.guesses, text + named))
     facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
     return Listing(entries, unread + [note["text"] for note in table.notes], proposal, facts)
 
 
 def propose(table: Sheet) -> Proposal:
     """Options that identify a table of columns."""
-    return from_columns(table, _seen(table)[0])
+    return from_columns(table, _read_columns(table)[0])
 
 
 def _fields(bag: Bag, name: str) -> tuple[str, ...]:
@@ -135,7 +136,7 @@ def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
     return " ".join(uses) + (f" (in {topic.parent})" if topic.parent else "")
 
 
-def _seen(table: Sheet) -> tuple[list[Seen], list[str]]:
+def _read_columns(table: Sheet) -> tuple[list[ColumnStatistics], list[str]]:
     """Every column's values and unit; and why there are no values, where they cannot be read."""
     places = list(range(len(table.names)))
     unread = []
@@ -143,32 +144,32 @@ def _seen(table: Sheet) -> tuple[list[Seen], list[str]]:
         columns = table.glance(places)
     except InputError as error:
         columns, unread = [np.empty(0) for _ in places], [str(error)]
-    found = []
+    statistics = []
     for place, values in zip(places, columns, strict=True):
         name = table.names[place]
         stated = table.stated.get(name, Stated(None))
         scaled = (values + stated.offset) * stated.scale
-        found.append(Seen(place, name, scaled, stated.unit, name in table.clocks))
-    return found, unread
+        statistics.append(ColumnStatistics(place, name, scaled, stated.unit, name in table.clocks))
+    return statistics, unread
 
 
-def _of_column(own: Seen, clock: Seen | None) -> Entry:
-    there = np.isfinite(own.values)
+def _of_column(column: ColumnStatistics, clock: ColumnStatistics | None) -> Entry:
+    there = np.isfinite(column.values)
     count = int(there.sum())
     if not count:
-        return Entry(own.name, "text", 0, None, None, None, "not numbers")
-    kind = "date" if own.clock else "number"
-    about = f"{own.values[there].min():.6g} to {own.values[there].max():.6g}"
-    about += f" {own.unit}" if own.unit not in {None, "1"} else ""
-    if clock is None or count < 2 or len(clock.values) != len(own.values):
-        return Entry(own.name, kind, count, None, None, None, about)
+        return Entry(column.name, "text", 0, None, None, None, "not numbers")
+    kind = "date" if column.clock else "number"
+    about = f"{column.values[there].min():.6g} to {column.values[there].max():.6g}"
+    about += f" {column.unit}" if column.unit not in {None, "1"} else ""
+    if clock is None or count < 2 or len(clock.values) != len(column.values):
+        return Entry(column.name, kind, count, None, None, None, about)
     time = clock.values[there] * _factor(clock)
     rate = (count - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else None
-    about += " (time?)" if own is clock else ""
-    return Entry(own.name, kind, count, rate, float(time[0]), float(time[-1]), about)
+    about += " (time?)" if column is clock else ""
+    return Entry(column.name, kind, count, rate, float(time[0]), float(time[-1]), about)
 
 
-def _factor(clock: Seen) -> float:
+def _factor(clock: ColumnStatistics) -> float:
     """From a time's own unit to seconds."""
     if clock.clock:
         return 1.0

@@ -6,29 +6,18 @@ import re
 import shlex
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from palpate.arrays import Array
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag, Topic
-from palpate.logs.missing import find_sentinel
+from palpate.logs.columns import NAMES, ColumnStatistics
 from palpate.logs.plausibility import epoch_unit, usual_unit
 from palpate.logs.presets import preset, presets
 from palpate.logs.tables import Sheet
 from palpate.units import known_unit, unit, unit_in_name
 
-_NAMES = {
-    "time": r"^t$|time|stamp|zeit|temps|tiempo|tout|^x_value|^sec|clock",
-    "position": (
-        r"pos|disp|dist|depth|indent|height|travel|stroke|exten|length|weg|hub|path|probe|tip|lvdt"
-        r"|^[xyz]$|^x_|_[xyz]$"
-    ),
-    "force": r"forc|^f$|^f[nxyz]$|[_.]f[nxyz]?$|^f_|load|kraft|fuerza|weight|scale|effort|torque|newton|press",
-}
-"""Usual names of columns in laboratories."""
 _SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}
 """Largest plausible range in SI units, and the assumed unit above it."""
 _COUNTS = 20
@@ -79,111 +68,30 @@ class Proposal:
         return " ".join(["palpate identify", *map(shlex.quote, (place, *words))])
 
 
-@dataclass(frozen=True)
-class Seen:
-    """Properties of a column before its role is known.
-
-    Args:
-        place: from 0.
-        name: as the file has it.
-        values: in its own unit, shape (n,); NaN where there is none.
-        unit: that the file states.
-        clock: it holds dates and times.
-    """
-
-    place: int
-    name: str
-    values: Array
-    unit: str | None
-    clock: bool
-
-    @cached_property
-    def readings(self) -> Array:
-        """The values, shape (n,); NaN too where a number stands for no reading."""
-        mark = find_sentinel(self.values)
-        return self.values if mark is None else np.where(self.values == mark, np.nan, self.values)
-
-    @cached_property
-    def step(self) -> float:
-        """From value to value, the typical one."""
-        step = np.diff(self.values)
-        return float(np.median(step)) if len(step) and np.isfinite(step).any() else 0.0
-
-    @cached_property
-    def is_time(self) -> bool:
-        """Whether it grows in even steps, as a time does."""
-        step = np.diff(self.values)
-        return len(step) > 2 and bool((step > 0).all() and np.median(step) > 0.5 * np.mean(step))
-
-    @cached_property
-    def counts_rows(self) -> bool:
-        """Whether it counts 0, 1, 2, ... or 1, 2, 3, ..."""
-        return len(self.values) > 2 and self.values[0] in {0, 1} and bool((np.diff(self.values) == 1).all())
-
-    @property
-    def named_time(self) -> bool:
-        """Whether its name, its unit or its kind is that of a time."""
-        return self.clock or self.score("time", "time") > 0
-
-    @cached_property
-    def changes(self) -> bool:
-        """Whether it holds more than two different numbers."""
-        return self.counts > 1
-
-    @cached_property
-    def counts(self) -> float:
-        """Its range in steps of its own resolution."""
-        there = self.values[np.isfinite(self.values)][:100_000]
-        return float(np.ptp(there) / self.resolution) if self.resolution else 0.0
-
-    @cached_property
-    def resolution(self) -> float:
-        """The smallest difference of two of its numbers; 0 where it holds one only."""
-        steps = np.diff(np.unique(self.values[np.isfinite(self.values)][:100_000]))
-        return float(steps.min()) if len(steps) else 0.0
-
-    @cached_property
-    def span(self) -> float:
-        """From its least to its largest, without a rare outlier on either side."""
-        low, high = np.nanpercentile(self.values, [1, 99])
-        return float(high - low)
-
-    def score(self, role: str, quantity: str) -> int:
-        """Evidence for a role: its unit, then its name."""
-        own = self.unit or unit_in_name(self.name, quantity)
-        fits = own is not None and known_unit(own) and unit(own).quantity == quantity
-        contradicts = bool(self.unit) and not fits and self.unit != "1"
-        return 2 * fits + bool(re.search(_NAMES[role], self.name, re.I)) - 3 * contradicts
-
-
-def for_a_run() -> Proposal:
-    """A record that palpate wrote says everything itself."""
-    return Proposal({})
-
-
-def from_columns(table: Sheet, seen: Sequence[Seen], delimiter: str | None = None) -> Proposal:
+def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: str | None = None) -> Proposal:
     """The command for a log of columns: a preset whose columns are all there, a wrench and a pose, or two columns."""
     guesses: list[str] = []
-    length = max((len(own.values) for own in seen), default=0)
-    own = [column for column in seen if len(column.values) == length]
+    length = max((len(column.values) for column in columns), default=0)
+    rows = [column for column in columns if len(column.values) == length]
     options = {} if delimiter is None else {"delimiter": delimiter}
-    timing, clock = _timing(table, own, guesses)
-    by_member = {_member(column.name): replace(column, name=_member(column.name)) for column in own}
+    timing, clock = _timing(table, rows, guesses)
+    by_member = {_member(column.name): replace(column, name=_member(column.name)) for column in rows}
     name = _preset_of(by_member)
     if name is not None:
         facts = _motion(name, list(by_member.values()))
         if "time" in preset(name):
             return Proposal({**options, "preset": name}, (), facts)
         timing, guesses = _state_time(clock) if clock else (timing, guesses)
-        names = {_member(column.name): column.name for column in own}
+        names = {_member(column.name): column.name for column in rows}
         given = {
-            key: ",".join(names[one] for one in value.split(",")) for key, value in _columns_of(name).items()
+            key: ",".join(names[member] for member in value.split(","))
+            for key, value in _columns_of(name).items()
         }
         changed = {} if given == _columns_of(name) else given
         return Proposal({**options, "preset": name, **timing, **changed}, tuple(guesses), facts)
     if all(f"{part}[{i}]" in by_member for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
         return Proposal(None, (_JOINTS_ONLY,))
-    others = [column for column in own if column is not clock and column.changes and not column.counts_rows]
+    others = [column for column in rows if column is not clock and column.changes and not column.counts_rows]
     space = _in_space(table, others, guesses)
     if space:
         return Proposal({**options, **timing, **space}, tuple(guesses))
@@ -191,7 +99,7 @@ def from_columns(table: Sheet, seen: Sequence[Seen], delimiter: str | None = Non
     if pair is None:
         return Proposal(None, (_NO_PAIR,))
     position, force = pair
-    place, load = (_with_unit(table, *one, guesses) for one in ((position, "length"), (force, "force")))
+    place, load = (_with_unit(table, *column, guesses) for column in ((position, "length"), (force, "force")))
     return Proposal({**options, **timing, "position": place, "force": load}, tuple(guesses))
 
 
@@ -207,7 +115,7 @@ def _columns_of(name: str) -> dict[str, str]:
     return {key: preset(name)[key] for key in ("wrench", "pose")}
 
 
-def _state_time(clock: Seen) -> tuple[dict[str, str], list[str]]:
+def _state_time(clock: ColumnStatistics) -> tuple[dict[str, str], list[str]]:
     """The time of a driver's states: no controller gives them faster than `_STATES`, which leaves one unit."""
     symbol = next((s for s in ("us", "ms") if clock.step * unit(s).factor * _STATES > 0.5), "s")
     return {"time": clock.name if symbol == "s" else f"{clock.name}:{symbol}"}, []
@@ -218,41 +126,46 @@ def _preset_of(names: Container[str]) -> str | None:
     for name in presets():
         options = preset(name)
         needed = [
-            one for key in ("time", "wrench", "pose") for one in str(options.get(key, "")).split(",") if one
+            column
+            for key in ("time", "wrench", "pose")
+            for column in str(options.get(key, "")).split(",")
+            if column
         ]
-        if all(one in names for one in needed):
+        if all(column in names for column in needed):
             return name
     return None
 
 
-def _motion(name: str, seen: Sequence[Seen]) -> tuple[str, ...]:
+def _motion(name: str, columns: Sequence[ColumnStatistics]) -> tuple[str, ...]:
     """How far the tool moves in a log of a preset's columns, and with which force."""
-    options, by_name = preset(name), {own.name: own for own in seen}
-    columns = [by_name[one] for key in ("wrench", "pose") for one in options[key].split(",")]
-    count = f"all {len(columns) + ('time' in options)} columns of the preset {name} are there"
-    forces, places = columns[:3], columns[6:]
+    options, by_name = preset(name), {column.name: column for column in columns}
+    used = [by_name[column] for key in ("wrench", "pose") for column in options[key].split(",")]
+    count = f"all {len(used) + ('time' in options)} columns of the preset {name} are there"
+    forces, places = used[:3], used[6:]
     if options["rotation"].startswith("matrix"):
         places = [
             places[i] for i in ((12, 13, 14) if options["rotation"] == "matrix-by-columns" else (3, 7, 11))
         ]
-    axis = int(np.argmax([own.span for own in places[:3]]))
+    axis = int(np.argmax([place.span for place in places[:3]]))
     moved, force = 1e3 * places[axis].span, forces[axis].span
     return (f"{count}; the tool moves {moved:.3g} mm along {'xyz'[axis]}, with a force of {force:.3g} N",)
 
 
-def clock_of(table: Sheet, seen: Sequence[Seen]) -> Seen | None:
+def clock_of(table: Sheet, columns: Sequence[ColumnStatistics]) -> ColumnStatistics | None:
     """The column of the time: one with even steps, preferably with the name or the unit of a time.
 
     One that counts rows is none, unless it is called a time; where the file states its rate, it must be called so too.
     """
-    times = [own for own in seen if own.is_time and (own.named_time or not own.counts_rows)]
-    best = max(times, key=lambda own: (own.clock, own.score("time", "time")), default=None)
+    times = [column for column in columns if column.is_time and (column.named_time or not column.counts_rows)]
+    best = max(times, key=lambda column: (column.clock, column.score("time", "time")), default=None)
     return None if best and table.rate is not None and not best.named_time else best
 
 
-def _timing(table: Sheet, seen: Sequence[Seen], guesses: list[str]) -> tuple[dict[str, str], Seen | None]:
+def _timing(
+    table: Sheet, columns: Sequence[ColumnStatistics], guesses: list[str]
+) -> tuple[dict[str, str], ColumnStatistics | None]:
     """The option for the time, and its column."""
-    clock = clock_of(table, seen)
+    clock = clock_of(table, columns)
     if clock is None and table.rate is not None:
         return {}, None
     if clock is None:
@@ -272,17 +185,20 @@ def _timing(table: Sheet, seen: Sequence[Seen], guesses: list[str]) -> tuple[dic
     return {"time": call if symbol in {None, "s"} else f"{call}:{symbol}"}, clock
 
 
-def _pair(seen: Sequence[Seen], guesses: list[str]) -> tuple[Seen, Seen] | None:
+def _pair(
+    columns: Sequence[ColumnStatistics], guesses: list[str]
+) -> tuple[ColumnStatistics, ColumnStatistics] | None:
     """Position and force: by units and names, or else the two columns that move together most.
 
     A column that hardly moves is no position, and one that does not follow it is no force.
     """
-    moving = [own for own in seen if own.counts >= _COUNTS]
-    forces = _best(seen, lambda own: own.score("force", "force"))
+    moving = [column for column in columns if column.counts >= _COUNTS]
+    forces = _best(columns, lambda column: column.score("force", "force"))
     places = _best(
-        [own for own in moving if own not in forces[:1]], lambda own: own.score("position", "length")
+        [column for column in moving if column not in forces[:1]],
+        lambda column: column.score("position", "length"),
     )
-    pairs = [(a, b) for a in places or moving for b in forces or seen if a is not b]
+    pairs = [(a, b) for a in places or moving for b in forces or columns if a is not b]
     by_name = bool(places and forces)
     if not (places or forces):
         pairs = [(a, b) for i, a in enumerate(moving[:40]) for b in moving[i + 1 : 40]]
@@ -290,7 +206,7 @@ def _pair(seen: Sequence[Seen], guesses: list[str]) -> tuple[Seen, Seen] | None:
     if not pairs:
         return None
     position, force = max(pairs, key=lambda pair: _together(*pair))
-    left = dict.fromkeys(own.name for pair in pairs for own in pair if own not in (position, force))
+    left = dict.fromkeys(column.name for pair in pairs for column in pair if column not in (position, force))
     if by_name and left:
         more = ", ".join([*left][:8])
         guesses.append(f"{position.name!r} and {force.name!r} are used; the names of {more} fit too")
@@ -306,17 +222,19 @@ def _pair(seen: Sequence[Seen], guesses: list[str]) -> tuple[Seen, Seen] | None:
     return position, force
 
 
-def _best(seen: Sequence[Seen], score: Callable[[Seen], int]) -> list[Seen]:
+def _best(
+    columns: Sequence[ColumnStatistics], score: Callable[[ColumnStatistics], int]
+) -> list[ColumnStatistics]:
     """The columns of the highest score, if one is above 0."""
-    most = max(map(score, seen), default=0)
-    return [own for own in seen if score(own) == most] if most > 0 else []
+    most = max(map(score, columns), default=0)
+    return [column for column in columns if score(column) == most] if most > 0 else []
 
 
-def _together(one: Seen, other: Seen) -> float:
+def _together(first: ColumnStatistics, second: ColumnStatistics) -> float:
     """How closely the ranks of two columns agree, from 0 to 1."""
     from scipy.stats import spearmanr
 
-    a, b = one.readings, other.readings
+    a, b = first.readings, second.readings
     there = np.isfinite(a) & np.isfinite(b)
     rows = np.flatnonzero(there)[:: max(1, int(there.sum()) // 5000)]
     if len(rows) < 4 or np.ptp(a[rows]) == 0 or np.ptp(b[rows]) == 0:
@@ -324,7 +242,7 @@ def _together(one: Seen, other: Seen) -> float:
     return abs(float(spearmanr(a[rows], b[rows]).statistic))
 
 
-def _one_reading(position: Seen, force: Seen) -> bool:
+def _one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:
     """Whether two columns are one reading in two units, as a sensor beside its own volts: exactly a line.
 
     A position and a force by their units are none, as a simulated spring is a line too.
@@ -338,66 +256,74 @@ def _one_reading(position: Seen, force: Seen) -> bool:
     return bool(np.max(apart) <= force.resolution + abs(slope) * position.resolution)
 
 
-def _roughness(own: Seen) -> float:
+def _roughness(column: ColumnStatistics) -> float:
     """The typical bend from row to row, as a share of the span."""
-    values = own.values[np.isfinite(own.values)]
+    values = column.values[np.isfinite(column.values)]
     return (
-        float(np.mean(np.abs(np.diff(values, 2)))) / own.span if own.span > 0 and len(values) > 2 else np.inf
+        float(np.mean(np.abs(np.diff(values, 2)))) / column.span
+        if column.span > 0 and len(values) > 2
+        else np.inf
     )
 
 
-def _with_unit(table: Sheet, own: Seen, quantity: str, guesses: list[str]) -> str:
+def _with_unit(table: Sheet, column: ColumnStatistics, quantity: str, guesses: list[str]) -> str:
     """A column's name and unit; an unstated unit is guessed from the size of its values."""
-    call = _call(table, own)
-    symbol = own.unit or unit_in_name(own.name, quantity)
+    call = _call(table, column)
+    symbol = column.unit or unit_in_name(column.name, quantity)
     if symbol:
         return f"{call}:{symbol}"
-    tail = re.search(r"(?:[_\[(]\s*)([A-Za-z]{1,3})\s*[\])]?$", own.name)
+    tail = re.search(r"(?:[_\[(]\s*)([A-Za-z]{1,3})\s*[\])]?$", column.name)
     if tail and not known_unit(tail[1]) and tail[1][0].isupper():
-        guesses.append(f"{own.name!r} is taken as plain numbers, as {tail[1]} is no unit of {quantity}")
+        guesses.append(f"{column.name!r} is taken as plain numbers, as {tail[1]} is no unit of {quantity}")
         return f"{call}:1"
     limit, small, large = _SIZES[quantity]
-    symbol = large if own.span > limit else small
-    guesses.append(f"no unit is given for {own.name!r}, which goes over {own.span:.3g}: {symbol} is a guess")
+    symbol = large if column.span > limit else small
+    guesses.append(
+        f"no unit is given for {column.name!r}, which goes over {column.span:.3g}: {symbol} is a guess"
+    )
     return f"{call}:{symbol}"
 
 
-def _call(table: Sheet, own: Seen) -> str:
+def _call(table: Sheet, column: ColumnStatistics) -> str:
     """Identifier of a column: its name, or its number if the name would be misread."""
-    plain = re.fullmatch(r"[^\W\d-][^\x00-\x1f\x7f-\x9f,:]*", own.name) is not None
-    return own.name if plain and table.names.count(own.name) == 1 else str(own.place)
+    plain = re.fullmatch(r"[^\W\d-][^\x00-\x1f\x7f-\x9f,:]*", column.name) is not None
+    return column.name if plain and table.names.count(column.name) == 1 else str(column.place)
 
 
-def _in_space(table: Sheet, seen: Sequence[Seen], guesses: list[str]) -> dict[str, str]:
+def _in_space(table: Sheet, columns: Sequence[ColumnStatistics], guesses: list[str]) -> dict[str, str]:
     """The options for a wrench and a pose in three dimensions, where six columns or more are named so."""
-    force = _triple(seen, r"(?:f|force)[_. ]?{}")
-    place = _triple(seen, r"(?:(?:pos|position|p|x|tcp|tip)[_. ]?)?{}")
-    if not (force and place and max(own.counts for own in place) >= _COUNTS):
+    force = _triple(columns, r"(?:f|force)[_. ]?{}")
+    place = _triple(columns, r"(?:(?:pos|position|p|x|tcp|tip)[_. ]?)?{}")
+    if not (force and place and max(column.counts for column in place) >= _COUNTS):
         return {}
     torque, turn = (
-        _triple(seen, r"(?:t|m|torque|moment)[_. ]?{}"),
-        _triple(seen, r"(?:q|quaternion|orientation)[_. ]?{}", "xyzw"),
+        _triple(columns, r"(?:t|m|torque|moment)[_. ]?{}"),
+        _triple(columns, r"(?:q|quaternion|orientation)[_. ]?{}", "xyzw"),
     )
     guesses.append(
         "the wrench's axes are taken for the base's: say --wrench-frame tool if they are the tool's"
     )
-    wrench = [_with_unit(table, own, "force", guesses) for own in force] + [
-        _call(table, own) for own in torque
+    wrench = [_with_unit(table, column, "force", guesses) for column in force] + [
+        _call(table, column) for column in torque
     ]
-    pose = [_with_unit(table, own, "length", guesses) for own in place] + [_call(table, own) for own in turn]
+    pose = [_with_unit(table, column, "length", guesses) for column in place] + [
+        _call(table, column) for column in turn
+    ]
     return {"wrench": ",".join(wrench), "pose": ",".join(pose), "wrench_frame": "base"}
 
 
-def _triple(seen: Sequence[Seen], pattern: str, axes: str = "xyz") -> list[Seen]:
+def _triple(columns: Sequence[ColumnStatistics], pattern: str, axes: str = "xyz") -> list[ColumnStatistics]:
     """The columns of all axes whose names end as a pattern does, before a unit; none if one is missing."""
-    found = []
+    triple = []
     for axis in axes:
         ends = re.compile(rf"(?:^|.*[_. ]){pattern.format(axis)}(?:[_ ]*[\[(]?[A-Za-z]{{1,3}}[\])]?)?", re.I)
-        own = next((column for column in seen if ends.fullmatch(column.name) and column not in found), None)
-        if own is None:
+        match = next(
+            (column for column in columns if ends.fullmatch(column.name) and column not in triple), None
+        )
+        if match is None:
             return []
-        found.append(own)
-    return found
+        triple.append(match)
+    return triple
 
 
 def from_topics(bag: Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
@@ -417,12 +343,10 @@ def from_topics(bag: Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
                 "the wrench's axes are taken for the tool's: say --wrench-frame base if they are the base's"
             )
         return Proposal(options, tuple(guesses))
-    found = _joint(bag, fields, guesses) or _fields_by_name(fields, guesses)
-    return (
-        Proposal(found, tuple(guesses))
-        if found
-        else Proposal(None, ("no two topics are a position and a force",))
-    )
+    pair = _joint(bag, fields, guesses) or _fields_by_name(fields, guesses)
+    if not pair:
+        return Proposal(None, ("no two topics are a position and a force",))
+    return Proposal(pair, tuple(guesses))
 
 
 def _topic(topics: Sequence[Topic], what: str, guesses: list[str]) -> Topic | None:
@@ -460,14 +384,14 @@ def _joint(bag: Bag, fields: Mapping[str, Sequence[str]], guesses: list[str]) ->
 
 def _fields_by_name(fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
     """Two fields that are called as a force and a position are."""
-    paths = [f"{name}.{path}" for name, own in fields.items() for path in own]
-    found = []
+    paths = [f"{name}.{path}" for name, inner in fields.items() for path in inner]
+    pair = []
     for role in ("position", "force"):
-        named, left = re.compile(_NAMES[role], re.I), [path for path in paths if path not in found]
+        named, left = re.compile(NAMES[role], re.I), [path for path in paths if path not in pair]
         fits = [path for path in left if named.search(path.rpartition(".")[2])]  # z and fz of one topic
         fits = fits or [path for path in left if named.search(path)]
         if not fits:
             return None
-        found += [next((path for path in fits if path.endswith("z")), fits[0])]
+        pair += [next((path for path in fits if path.endswith("z")), fits[0])]
     guesses.append("the two fields are taken by their names")
-    return {"position": f"{found[0]}:m", "force": f"{found[1]}:N"}
+    return {"position": f"{pair[0]}:m", "force": f"{pair[1]}:N"}

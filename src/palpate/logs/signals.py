@@ -102,10 +102,10 @@ class Signals:
         if bag and (proposal.options is None or guesses):
             return self, {}  # a bag's only wrench and pose need no names
         if proposal.options is None or guesses:
-            raise InputError(_undecided(path, proposal))
+            raise InputError(_list_guesses(path, proposal))
         options: dict[str, Any] = dict(proposal.options)
         if "preset" in options:
-            options = _underscored(preset(options.pop("preset"))) | options
+            options = _with_underscores(preset(options.pop("preset"))) | options
         own = {name: value for name, value in options.items() if name in Signals.__dataclass_fields__}
         others = {name: value for name, value in options.items() if name not in own}
         return replace(self, **own), others | {"read_as": shlex.join(proposal.words or ())}
@@ -236,11 +236,11 @@ def _is_record(names: list[str]) -> bool:
     return {"force", "position"} <= there or {*WRENCH[:3], *POSE[:3]} <= there
 
 
-def _underscored(options: dict[str, Any]) -> dict[str, Any]:
+def _with_underscores(options: dict[str, Any]) -> dict[str, Any]:
     return {name.replace("-", "_"): value for name, value in options.items()}
 
 
-def _undecided(path: Path, proposal: Proposal) -> str:
+def _list_guesses(path: Path, proposal: Proposal) -> str:
     """The guesses of a log whose signals nobody named, and the command that would be tried."""
     guesses = "; ".join(proposal.guesses)
     if proposal.options is None:

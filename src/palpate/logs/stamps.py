@@ -58,17 +58,17 @@ def on_one_clock(streams: Sequence[Stream]) -> Clocks:
     bare = [stream.topic for stream in streams if not _stamped(stream)]
     if bare:
         said = f"timed by the receipt at the recorder ({', '.join(bare)} has no stamps)"
-        return _overlapping(Clocks([_timed(s, s.received) for s in streams], said))
+        return _overlapping(Clocks([_at_times(s, s.received) for s in streams], said))
     lines = [_delay(stream) for stream in streams]
     warning, astray = _disagreement(streams, lines)
     if astray:
         times = [s.stamped + line.at(s.stamped) for s, line in zip(streams, lines, strict=True)]
         said = "timed by their own stamps, moved to the recorder's clock"
         return _overlapping(
-            Clocks([_timed(s, t) for s, t in zip(streams, times, strict=True)], said, warning)
+            Clocks([_at_times(s, t) for s, t in zip(streams, times, strict=True)], said, warning)
         )
     said = "timed by the stamps in their headers"
-    return _overlapping(Clocks([_timed(s, s.stamped) for s in streams], said, warning))
+    return _overlapping(Clocks([_at_times(s, s.stamped) for s in streams], said, warning))
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _disagreement(streams: Sequence[Stream], delays: Sequence[_Delay]) -> tuple[
     return f"{found}: a clock error, or slow transport to the recorder; the stamps are used unchanged", False
 
 
-def _timed(stream: Stream, time: Array) -> Timed:
+def _at_times(stream: Stream, time: Array) -> Timed:
     return Timed(stream.topic, time, stream.values)
 
 

@@ -13,10 +13,10 @@ from palpate.force.gains import Gains
 from palpate.force.guard import QUIET, TROUBLES, GuardedState, safe_step
 from palpate.identifiers import ContactIdentifier, RecursiveLeastSquares
 from palpate.identifiers.kernels import contact_state, contact_stream
-from palpate.identifiers.kernels.contact_stream import ticked
+from palpate.identifiers.kernels.contact_stream import take_tick
 from palpate.identifiers.kernels.dimension import Four, Three
-from palpate.identifiers.kernels.state_layout import error_covariance_in
-from palpate.identifiers.recursive_least_squares import absorbed
+from palpate.identifiers.kernels.least_squares import error_covariance_in
+from palpate.identifiers.recursive_least_squares import absorb
 from palpate.native.module import Argument, Entry, Module
 
 FORCE, IDENTIFIER, SQUARES = "force-loop", "contact-identifier", "recursive-least-squares"
@@ -85,7 +85,7 @@ class SquaresNumbers(NamedTuple):
 @law
 def squares_update(gains, state, regressor, force):
     """Takes a sample in; false where it is none, and nothing changes."""
-    _, variance = absorbed(state, regressor, force, gains.forgetting, gains.size)
+    _, variance = absorb(state, regressor, force, gains.forgetting, gains.size)
     return variance > 0.0
 
 
@@ -139,7 +139,7 @@ class IdentifierNumbers(NamedTuple):
 @law
 def identifier_update(gains, state, position, force, samples):
     """Takes a tick in, and counts the samples that came through."""
-    return ticked(state, gains.weights, position, force, samples)
+    return take_tick(state, gains.weights, position, force, samples)
 
 
 @law

@@ -13,8 +13,7 @@ from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
 from palpate.robots.serial.chain import Chain, Room, axis_of, chain_motion, room_for
-from palpate.robots.serial.linear import backward, factorise, forward_both, product
-from palpate.robots.serial.spatial import Wrench, cross
+from palpate.robots.serial.linear import Wrench, backward, cross, factorise, forward_both, product
 
 
 @part

@@ -52,8 +52,8 @@ class ByMuJoCo:
     """
 
     def __init__(self, arm: SerialArm, cell: Cell, q: Array):
-        from palpate.robots.serial._extra import mujoco
-        from palpate.robots.serial.to_mujoco import scene_of
+        from palpate.robots.serial.loading import mujoco
+        from palpate.robots.serial.serial_arm import scene_of
 
         self._engine, self._step = mujoco(), Bound(compiled_foreign)
         scene = scene_of(arm)
@@ -72,7 +72,7 @@ class ByMuJoCo:
 
     def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
         """See `Engine`."""
-        from palpate.robots.serial._extra import refusals
+        from palpate.robots.serial.loading import refusals
 
         touch = touch._replace(mean=0.0)
         data, dofs = self._data, self._dofs

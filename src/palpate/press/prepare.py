@@ -212,7 +212,7 @@ def _check_words(question: Question) -> None:
     if question.controller not in CONTROLLERS:
         raise unknown("controller", question.controller, CONTROLLERS)
     if question.physics == "mujoco":
-        from palpate.robots.serial._extra import mujoco
+        from palpate.robots.serial.loading import mujoco
 
         mujoco()
 

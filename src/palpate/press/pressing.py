@@ -9,8 +9,17 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.ending import DIVERGED, DONE, INTERRUPTED, LOST_CONTACT, NO_CONTACT, Ending
-from palpate.bench.sequence import APPROACH, CONTACT, LOST
+from palpate.bench.sequence import (
+    APPROACH,
+    CONTACT,
+    DIVERGED,
+    DONE,
+    INTERRUPTED,
+    LOST,
+    LOST_CONTACT,
+    NO_CONTACT,
+    Ending,
+)
 from palpate.press.pilots import Acted, Pilot
 from palpate.press.plan import Plan
 from palpate.press.setting import Place

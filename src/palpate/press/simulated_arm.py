@@ -21,10 +21,9 @@ from palpate.press.protocol import Command, Sense
 from palpate.press.setting import Place
 from palpate.press.tare import TARE
 from palpate.press.tip_control import Spring, compiled_tip_torque
-from palpate.robots.serial.described import compiled_description, found_for
 from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm
-from palpate.robots.serial.task import task_room_for
+from palpate.robots.serial.task import arm_state_for, compiled_description, task_room_for
 from palpate.signals.types import Task
 
 ENCODER = 1e-7
@@ -225,7 +224,7 @@ class _TipLoop:
         self._chain, self._axes = arm.chain, place.axes
         self._rows, self._held = _matrix(place.axes), _matrix(place.pose[:3, :3])
         n = arm.joints
-        self._found, self._room = found_for(n), task_room_for(n)
+        self._found, self._room = arm_state_for(n), task_room_for(n)
         self._states: dict[type, Any] = {}
         self._laws: dict[type, Bound] = {}
         self._n = n

@@ -5,8 +5,7 @@ from typing import NamedTuple
 from palpate._jit import kernel, law
 from palpate._vector import Vec3, Vec6
 from palpate.controllers.controller import controller
-from palpate.robots.serial.described import tip_of
-from palpate.robots.serial.task import into, joint_torque, task_model
+from palpate.robots.serial.task import into, joint_torque, task_model, tip_of
 from palpate.signals.types import Sense
 
 

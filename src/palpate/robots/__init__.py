@@ -1,4 +1,4 @@
-"""Robots: what moves."""
+"""Robots: arms with their kinematics and dynamics."""
 
 from palpate.robots.arm3 import MOTOR_TORQUE, Arm3, ArmModel
 from palpate.robots.planar3r import Planar3R

@@ -8,7 +8,7 @@ import math
 from typing import Any, NamedTuple
 
 from palpate._jit import law, part
-from palpate.signals.parameters import coerced, require
+from palpate.signals.types import coerce_fields, require
 
 
 class BiquadState(NamedTuple):
@@ -19,7 +19,7 @@ class BiquadState(NamedTuple):
 
 
 @part
-@coerced()
+@coerce_fields()
 class Biquad(NamedTuple):
     """y_k = b0 u_k + b1 u_(k-1) + b2 u_(k-2) - a1 y_(k-1) - a2 y_(k-2), signs as scipy.signal's.
 
@@ -136,7 +136,7 @@ class StateVariableState(NamedTuple):
 
 
 @part
-@coerced()
+@coerce_fields()
 class StateVariable(NamedTuple):
     """Low-pass F(s) = w^2/(s^2 + w s/quality + w^2) whose one step gives F u, s F u and s^2 F u.
 
@@ -196,7 +196,9 @@ class History(NamedTuple):
 
 
 @part
-@coerced(lambda self: require(0 <= self.samples <= 9, "samples of delay", "between 0 and 9", self.samples))
+@coerce_fields(
+    lambda self: require(0 <= self.samples <= 9, "samples of delay", "between 0 and 9", self.samples)
+)
 class Delay(NamedTuple):
     """A delay of 0 to 9 samples, whole or not: linear interpolation between two samples.
 
@@ -221,7 +223,7 @@ class Delay(NamedTuple):
 
     @property
     def lag(self):
-        """Seconds."""
+        """Lag of the filter at zero frequency [s]."""
         return self.samples / self.rate
 
 

@@ -1,17 +1,22 @@
-"""The values that pass between a bench, its controller and its identifiers.
+"""The values that pass between a bench, its controller and its identifiers, and the tables that parts are read from.
 
-Fields that are marked `Vec3` are those for the planar arm, and NumPy arrays for any other.
+Fields that are marked `Vec3` are those for the planar arm, and NumPy arrays for any other. Parts take floats: an
+integer would be another type to the compiler, and a new compilation.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar, Union
 
+import msgspec
 import numpy as np
+from msgspec import Meta, Struct
 
 from palpate._jit import part
 from palpate._vector import Vec3
 from palpate.arrays import Array
-from palpate.results import Compared
+from palpate.errors import InputError
+from palpate.results import Compared, Readable
 
 NORMAL = 1.96
 """Standard deviations of a 95 % half-width."""
@@ -81,3 +86,90 @@ def verdict(value: float, std: float, tolerance: float = 0.25) -> str:
 def passive_verdict(value: float, std: float, tolerance: float = 0.25) -> str:
     """The same for a mass, damping or stiffness, which no passive surface has below zero: then "rejected"."""
     return "rejected" if value + NORMAL * std < 0.0 else verdict(value, std, tolerance)
+
+
+C = TypeVar("C", bound=type)
+
+
+def coerce_fields(check: Callable[[Any], None] | None = None) -> Callable[[C], C]:
+    """Decorates a NamedTuple of parameters: numbers become what their fields say, then `check` judges them.
+
+    A field marked `Any` takes a number or a `Vec3`. Put it under `@part`. `_make` and `_replace` build the
+    tuple directly: they skip both.
+    """
+
+    def decorate(cls: C) -> C:
+        plain_new = cls.__new__
+        makers: dict[Any, Callable[[Any], Any]] = {float: float, int: int, Any: _floats}
+        kinds = [makers.get(kind, _as_it_is) for kind in cls.__annotations__.values()]
+
+        def new(cls: Any, *args: Any, **kwargs: Any) -> Any:
+            raw = plain_new(cls, *args, **kwargs)
+            self = tuple.__new__(cls, (kind(v) for kind, v in zip(kinds, raw, strict=True)))
+            if check is not None:
+                check(self)
+            return self
+
+        cls.__new__ = new  # type: ignore[method-assign,assignment]
+        return cls
+
+    return decorate
+
+
+def require(ok: bool, name: str, limit: str, value: Any) -> None:
+    """Raises the error of a parameter outside its limit: what, the limit, what was given."""
+    if not ok:
+        raise InputError(f"{name} must be {limit}, got {value!r}")
+
+
+def components(value: Any) -> tuple[float, ...]:
+    """The numbers in a number or in a `Vec3`."""
+    return tuple(value) if isinstance(value, Vec3) else (value,)
+
+
+def alike(value: float) -> Vec3:
+    """The same number three times."""
+    return triple((value, value, value))
+
+
+def triple(values: Iterable[float]) -> Vec3:
+    """Three numbers as a `Vec3`."""
+    return Vec3(*map(float, values))
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+def _floats(value: Any) -> Any:
+    return triple(value) if isinstance(value, Vec3) else float(value)
+
+
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+Triple = tuple[float, float, float]
+PositiveTriple = tuple[Positive, Positive, Positive]
+NotNegativeTriple = tuple[NotNegative, NotNegative, NotNegative]
+Size = Annotated[int, Meta(ge=1, le=1000)]
+
+T = TypeVar("T", bound=Struct)
+
+
+class Table(Readable, Struct, frozen=True, forbid_unknown_fields=True):
+    """A table of the file; keys that it does not know are refused."""
+
+
+def kinds(base: type[T]) -> list[type[T]]:
+    """Every table that was derived from this one, in the order of the words that name them."""
+    return sorted(base.__subclasses__(), key=lambda kind: str(kind.__struct_config__.tag))
+
+
+def any_of(base: type[Table]) -> Any:
+    """The type of a table that may be of any of these kinds."""
+    return Union[tuple(kinds(base))]  # noqa: UP007 - of a list that is not known before
+
+
+def example(kind: type[T]) -> T:
+    """A table of this kind: its defaults, and 1 for each number that has none."""
+    wanted = {field.encode_name: 1.0 for field in msgspec.structs.fields(kind) if field.required}
+    return kind(**wanted)

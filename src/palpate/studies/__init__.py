@@ -7,7 +7,7 @@ frame = run(text_of_a_study, "runs/mine")
 from __future__ import annotations
 
 from palpate.bench.metrics import METRICS, Look, Metric
-from palpate.studies.running.local import Local
-from palpate.studies.running.run_study import run
+from palpate.studies.run_one import Local
+from palpate.studies.run_study import run
 
 __all__ = ["METRICS", "Local", "Look", "Metric", "run"]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from palpate.contact_frame import Payload
-from palpate.contact_frame.free_motion.inertia import wrong_sign, wrong_sign_of
+from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
 from palpate.wires.at_rest import AtRest
 from palpate.wires.turns import turned
 
@@ -23,9 +23,9 @@ def notes_on(tool: Payload, rest: AtRest) -> list[str]:
         rest: what the arm shows at rest.
     """
     shown = unlike(tool, rest) or "the sensor shows the tool as it was weighed"
-    if tool.followed is None or not wrong_sign(tool.followed):
+    if tool.inertia_followed is None or not wrong_sign(tool.inertia_followed):
         return [shown]
-    return [shown, f"when it was weighed: {wrong_sign_of(tool.followed)}"]
+    return [shown, f"when it was weighed: {wrong_sign_of(tool.inertia_followed)}"]
 
 
 def unlike(tool: Payload, rest: AtRest) -> str | None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.robots import SerialArm
-from palpate.robots.serial.to_mujoco import scene_of
+from palpate.robots.serial.serial_arm import scene_of
 
 NAMES = ("ur5e", "panda", "fr3", "iiwa14")
 URDF = Path(__file__).with_name("gantry.urdf")

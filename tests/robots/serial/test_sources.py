@@ -8,7 +8,7 @@ import pytest
 from palpate.errors import InputError
 from palpate.robots import SerialArm
 from palpate.robots.serial.from_toml import parse
-from palpate.robots.serial.to_mujoco import scene_of
+from palpate.robots.serial.serial_arm import scene_of
 from robots.serial.oracles import URDF, ByMuJoCo, states
 
 JOINT = '[[joint]]\nname = "one"\nat = [0, 0, 0.3]\nmass = 2\ncom = [0, 0.1, 0]\n'

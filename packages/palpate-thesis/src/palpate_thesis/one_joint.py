@@ -9,9 +9,8 @@ import numpy as np
 
 from palpate._jit import kernel, law, part
 from palpate._vector import clip
-from palpate.bench.experiments.tables import ForceSensor
-from palpate.bench.force_input import ForceInput, ForceInputState
-from palpate.bench.force_reading import force_input
+from palpate.bench.force_input import ForceInput, ForceInputState, force_input
+from palpate.bench.tables import ForceSensor
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
 from palpate.environments.surface import Surface
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
@@ -138,7 +137,7 @@ def start_loop(loop):
 @law
 def tick(loop, state, k, noise, out):
     """The k-th tick: the new state; its row is written into `out`. `noise`: one standard normal number."""
-    sampled = loop.force.sampled(state.force)
+    sampled = loop.force.reading(state.force)
     measured, filtered = loop.filter.step(state.filter, sampled)
     desired = loop.schedule.force(k * loop.tick)
     wanted, controller = loop.controller.step(state.controller, desired, measured)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from palpate.bench.metrics.contact import CONTACT_METRICS
-from palpate.bench.metrics.following import FOLLOWING
-from palpate.bench.metrics.own import own_metric
-from palpate.bench.metrics.surface import SURFACE
-from palpate.bench.metrics.verdicts import CLAIMS
+from palpate.bench.metrics.following import CONTACT_METRICS, FOLLOWING, SURFACE
+from palpate.bench.metrics.verdicts import CLAIMS, own_metric
 from palpate.bench.metrics.window import Look, Metric, Value
 from palpate.errors import unknown
 from palpate.plugins import is_plugin

@@ -1,4 +1,4 @@
-"""Metrics of force tracking."""
+"""Metrics of force tracking, of contact and motors, and of the final estimates against the truth."""
 
 from __future__ import annotations
 
@@ -7,8 +7,98 @@ from typing import Literal
 
 import numpy as np
 
-from palpate.bench.metrics.summary import BAND
-from palpate.bench.metrics.window import SETTLE, Look, Metric, Value, rms
+from palpate.bench.metrics.window import (
+    BAND,
+    FRONT_ENDS,
+    IDENTIFIER,
+    PARAMETERS,
+    SETTLE,
+    Look,
+    Metric,
+    Value,
+    losses,
+    rms,
+)
+from palpate.bench.sequence import LOST
+
+JOINTS = (1, 2, 3)
+
+
+def time_to_loss(look: Look) -> Value:
+    """From the first contact to its first loss, or to where numbers are none [s]; None if it is kept."""
+    if not look.touched:
+        return None
+    lost = np.flatnonzero((look.record["phase"] == LOST) & (look.since > 0.0))
+    if len(lost):
+        return float(look.since[lost[0]])
+    return float(look.since[-1]) if look.ended else None
+
+
+def _time_in_contact(look: Look) -> Value:
+    """As `time_to_loss`, or to the end of the run."""
+    if not look.touched:
+        return 0.0
+    lost = time_to_loss(look)
+    return float(look.since[-1]) if lost is None else lost
+
+
+def _saturation(*joints: int) -> Callable[[Look], Value]:
+    def of(look: Look) -> Value:
+        if not len(look.error):
+            return None
+        return max(float(np.mean(look[f"saturated{joint}"])) for joint in joints)
+
+    return of
+
+
+def _off(column: str, scale: float) -> Callable[[Look], Value]:
+    def of(look: Look) -> Value:
+        if not len(look.error):
+            return None
+        return scale * float(np.mean(look[column] - look[f"{column}_desired"]))
+
+    return of
+
+
+CONTACT_METRICS = (
+    Metric("contact_at", "s", "time of the first contact", lambda look: look.summary["contact_at_s"]),
+    Metric(
+        "contacts_lost",
+        "1",
+        "number of losses of contact",
+        lambda look: float(losses(look.record)),
+        better="least",
+    ),
+    Metric("time_to_loss", "s", "from the first contact to its first loss; none if it is kept", time_to_loss),
+    Metric(
+        "time_in_contact",
+        "s",
+        "from the first contact to its first loss, or to the end",
+        _time_in_contact,
+        better="most",
+    ),
+    Metric(
+        "saturation",
+        "1",
+        "share of the time that a motor is at its limit, the worst one",
+        _saturation(*JOINTS),
+        better="least",
+    ),
+    *(
+        Metric(f"saturation{j}", "1", f"share of the time that motor {j} is at its limit", _saturation(j))
+        for j in JOINTS
+    ),
+    Metric("y_error", "m", "mean of the tip's y less the desired one", _off("y", 1.0), signed=True),
+    Metric("phi_error", "rad", "mean of the tip's angle less the desired one", _off("phi", 1.0), signed=True),
+    Metric(
+        "hidden_weights",
+        "1",
+        "norm of a neural controller's weights into the first hidden layer, at the end",
+        lambda look: float(look.record["adapted1"][-1]) if look.touched else None,
+    ),
+)
+"""Metrics of contact, motors and pose."""
+
 
 LIMIT = 1.5
 """Largest RMS error of a force that follows [N]: 10 % of 15 N, which is what is asked for on average."""
@@ -145,3 +235,60 @@ FOLLOWING = (
     ),
 )
 """Metrics of the force in contact."""
+
+
+QUOTIENT = "force_over_displacement"
+TOLD = {
+    "thesis": "recursive least squares on the thesis' signals",
+    "raw": "recursive least squares on raw signals",
+    "matched": "recursive least squares on channels of equal lag",
+    IDENTIFIER: "the experiment's [identifier]",
+    QUOTIENT: "force over displacement",
+}
+
+
+def estimate(front: str, parameter: str) -> Callable[[Look], Value]:
+    """An estimate at the end of a run, in SI units; None without contact."""
+
+    def of(look: Look) -> Value:
+        found = look.summary["identified"]
+        return None if found is None else found.get(front, {}).get(parameter)
+
+    return of
+
+
+def error(front: str, parameter: str) -> Callable[[Look], Value]:
+    """The estimate over the truth, less one; None where the surface has no such parameter."""
+    estimated = estimate(front, parameter)
+
+    def of(look: Look) -> Value:
+        truth, found = look.summary["truth"].get(parameter), estimated(look)
+        return None if truth is None or found is None or not truth["value"] else found / truth["value"] - 1.0
+
+    return of
+
+
+def _pair(front: str, parameter: str, unit: str) -> tuple[Metric, Metric]:
+    name = "quotient" if front == QUOTIENT else front
+    return (
+        Metric(f"{parameter}_{name}", unit, f"{parameter} by {TOLD[front]}", estimate(front, parameter)),
+        Metric(
+            f"{parameter}_error_{name}",
+            "1",
+            "its error, as a share of the truth",
+            error(front, parameter),
+            signed=True,
+        ),
+    )
+
+
+SURFACE = (
+    *(
+        m
+        for front in (*FRONT_ENDS, IDENTIFIER)
+        for parameter, unit in PARAMETERS.items()
+        for m in _pair(front, parameter, unit)
+    ),
+    *_pair(QUOTIENT, "K", PARAMETERS["K"]),
+)
+"""Metrics of the estimators."""

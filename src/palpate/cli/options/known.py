@@ -16,7 +16,7 @@ from palpate.errors import InputError
 from palpate.text import printable
 
 if TYPE_CHECKING:
-    from palpate.bench.experiments.toml_files import TomlFiles
+    from palpate.bench.toml_parts import TomlFiles
 
 
 @Parameter(name="*", group=Group("Known names", sort_key=2))

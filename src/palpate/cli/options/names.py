@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     Study = str
 else:
     Controller = _known("cautious", "hybrid", "proportional-integral", "impedance")
-    Experiment = _shipped("bench/experiments", "bench/one_direction")
+    Experiment = _shipped("bench/experiments", "bench/presses")
     LoopArm = _shipped("force/arms")
     Model = _known(*MODELS)
     Mode = _known("torque", "position")

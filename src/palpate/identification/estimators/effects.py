@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.models import Model, Motion
-from palpate.signals.spectral import detrend, quadrature
+from palpate.signals.samples import detrend, quadrature
 
 FRICTION = "Fc"
 TOUCH = "touch"

@@ -10,7 +10,7 @@ from palpate.arrays import Array, Mask
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.filters.state_variable import ORDER, Chain
 from palpate.identification.problem import Problem
-from palpate.signals.runs import runs
+from palpate.signals.samples import runs
 
 _MET = 0.15
 """Share of the force above which its bend over the depth is looked for: the lowest that a slope is taken of."""

@@ -11,7 +11,7 @@ from palpate.identification.evidence.slope import Slope
 from palpate.identification.least_squares import noise_of
 from palpate.identification.problem import Problem
 from palpate.identification.result import Relaxation
-from palpate.signals.runs import runs
+from palpate.signals.samples import runs
 
 
 def relaxation(

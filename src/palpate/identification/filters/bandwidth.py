@@ -8,7 +8,7 @@ from palpate.arrays import Array
 from palpate.identification.filters.position_noise import position_noise
 from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.models import Motion
-from palpate.signals.spectral import periodogram
+from palpate.signals.samples import periodogram
 
 FASTEST = 1 / 8
 """Highest cut-off as a share of the readings per second: above it sampling, not filtering, sets the error."""

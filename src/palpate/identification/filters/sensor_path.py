@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.identification.filters.position_noise import PositionNoise
-from palpate.signals.low_pass import LowPass
-from palpate.signals.taps import Taps, read, taps
+from palpate.signals.low_pass import LowPass, Taps, read, taps
 
 DERIVATIVES = 5
 _NEAR = 0.25

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.identification.filters.position_noise import PositionNoise
-from palpate.signals.spectral import convolve
+from palpate.signals.samples import convolve
 
 ORDER = 5
 _LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak

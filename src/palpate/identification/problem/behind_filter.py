@@ -16,7 +16,7 @@ from palpate.identification.options import Options
 from palpate.identification.prior import lag_prior
 from palpate.identification.problem.seen import FREE_ROWS, Rows, Seen, ends, numbered
 from palpate.identification.sampling import Channels
-from palpate.signals.runs import runs
+from palpate.signals.samples import runs
 
 _LONG = 0.05
 """Share of a contact that waiting until a filter has forgotten all may cost."""

@@ -16,7 +16,7 @@ from palpate.identification.problem.seen import FREE_ROWS, Rows, Seen, ends, num
 from palpate.identification.sample_clock import SampleClock, sample_clock_of
 from palpate.identification.sampling import Channels
 from palpate.signals.low_pass import LowPass
-from palpate.signals.runs import runs
+from palpate.signals.samples import runs
 
 _COARSEST = 4.0
 """Readings in a period of a sensor's cut-off below which its own path is not used: the position would not show it."""

@@ -10,9 +10,14 @@ from __future__ import annotations
 from math import inf, log
 
 from palpate._jit import law
-from palpate.identifiers.kernels.error_covariance import long_run_variance, unsure
-from palpate.identifiers.kernels.least_squares import learned
-from palpate.identifiers.kernels.state_layout import length, put, statistics_at
+from palpate.identifiers.kernels.least_squares import (
+    learn_sample,
+    length,
+    long_run_variance,
+    put,
+    statistics_at,
+    unsure,
+)
 
 COUNTERS = 5
 """Behind the initial estimate and its root: the alarm, the next row, rows written, changes, samples since the last."""
@@ -40,7 +45,7 @@ def counters(n):
 
 
 @law
-def alarmed(alarm, e, noise):
+def alarm_sum(alarm, e, noise):
     """The cumulative sum after an innovation: is its variance likelier `_LOUDER` times the noise's, or once?"""
     if not noise > 0.0:
         return 0.0
@@ -64,7 +69,7 @@ def noise_at(state, n, at):
 
 
 @law
-def noticed(state, n, phi, y, e, a, before, rows):
+def notice(state, n, phi, y, e, a, before, rows):
     """Writes a sample into the memory, and brings the alarm up to date: the noise to look back with, or 0.
 
     A row: regressor, force, what the old estimate paid for it (its squared innovation and the logarithm of that
@@ -81,12 +86,12 @@ def noticed(state, n, phi, y, e, a, before, rows):
     state[c + 2] = min(state[c + 2] + 1.0, rows)
     state[c + 4] += 1.0
     noise = noise_at(state, n, row_at(state, n, rows, min(state[c + 2], _SUSPECTED)))
-    state[c] = alarmed(state[c], e, noise)
+    state[c] = alarm_sum(state[c], e, noise)
     return noise if state[c] > _ALARM else 0.0
 
 
 @law
-def walked(state, rows, noise, until, size):
+def walk_back(state, rows, noise, until, size):
     """A new fit from the last sample backwards, until its log-likelihood ratio against the old one is reached.
 
     (theta, root, doubt), the largest ratio, and how many samples were taken.
@@ -98,7 +103,7 @@ def walked(state, rows, noise, until, size):
         taken += 1
         at = row_at(state, n, rows, taken)
         k = at + n
-        theta, S, doubt, e, a = learned(theta, S, doubt, size.vector(state, at), state[k], 1.0, size)
+        theta, S, doubt, e, a = learn_sample(theta, S, doubt, size.vector(state, at), state[k], 1.0, size)
         ratio += 0.5 * ((state[k + 1] - e * e) / noise + state[k + 2] - log(a))
         best = max(best, ratio)
     return (theta, S, doubt), best, taken
@@ -109,9 +114,9 @@ def looked_back(state, watch, noise, size):
     """Starts again from where the surface changed, if it did and enough of the new one was seen."""
     c, n = counters(size.n), size.n
     state[c] = 0.0
-    _, best, _ = walked(state, watch.rows, noise, inf, size)
+    _, best, _ = walk_back(state, watch.rows, noise, inf, size)
     if best > watch.evidence:
-        (theta, S, doubt), _, taken = walked(state, watch.rows, noise, best - _MARGIN, size)
+        (theta, S, doubt), _, taken = walk_back(state, watch.rows, noise, best - _MARGIN, size)
         if taken < _ENOUGH * n:
             state[c] = 0.5 * _ALARM
         else:

@@ -10,10 +10,8 @@ change in distribution, 1971), for noise that is normal, white and known.
 from palpate._jit import law
 from palpate._jit.elementary import log
 from palpate._vector import Vec3
-from palpate.identifiers.kernels.dimension import Four
-from palpate.identifiers.kernels.error_covariance import long_run_variance
-from palpate.identifiers.kernels.four import Vec4
-from palpate.identifiers.kernels.square_root import measured
+from palpate.identifiers.kernels.dimension import Four, Vec4
+from palpate.identifiers.kernels.least_squares import long_run_variance, measure
 
 ALARM = log(1e6)
 """Once in a million samples: at 480 Hz, in 35 minutes."""
@@ -67,31 +65,31 @@ def decide_contact(contact, queue, capacity, read, settling, touch, averaged):
     elif contact[TOUCHING] > 0.0 and total < 0.5 * touch * averaged:
         contact[TOUCHING] = 0.0
         contact[LOST] += 1.0
-        _marked(queue, capacity, read, -1.0, 0.0)
+        _mark(queue, capacity, read, -1.0, 0.0)
     if contact[TOUCHING] > 0.0 and queue[k] >= contact[SINCE] + settling:
         queue[k + 5] = contact[CONTACTS]
 
 
 @law
-def found(contact, queue, capacity, read, settling):
+def find_contact(contact, queue, capacity, read, settling):
     """By the two tests; samples on their way are taken back, or after all, as far as the tests point back."""
     k = int((read - 1.0) % capacity) * SAMPLE
     instant, force = queue[k], queue[k + 1]
     if contact[TOUCHING] > 0.0:
         phi = Vec4(Vec3(queue[k + 2], queue[k + 3], queue[k + 4]), 1.0)
-        if _left(contact, phi, force, instant):
+        if _detect_loss(contact, phi, force, instant):
             contact[TOUCHING] = 0.0
             contact[LOST] += 1.0
             for i in range(CERTAIN - KNOWN):
                 contact[KNOWN + i] = contact[CERTAIN + i]
-            _marked(queue, capacity, read, contact[START], 0.0)
+            _mark(queue, capacity, read, contact[START], 0.0)
         elif instant >= contact[SINCE] + settling:
             queue[k + 5] = contact[CONTACTS]
-    elif _touched(contact, force, instant):
+    elif _detect_touch(contact, force, instant):
         contact[TOUCHING], contact[SINCE] = 1.0, contact[START]
         contact[CONTACTS] += 1.0
         contact[SUM] = contact[LEVELS] = 0.0
-        _marked(queue, capacity, read, contact[START] + settling, contact[CONTACTS])
+        _mark(queue, capacity, read, contact[START] + settling, contact[CONTACTS])
 
 
 @law
@@ -101,7 +99,7 @@ def pending(contact, instant):
 
 
 @law
-def _marked(queue, capacity, read, since, number):
+def _mark(queue, capacity, read, since, number):
     """Gives the samples on their way from an instant on to a contact, those of them that have a regressor."""
     for i in range(int(min(capacity, read))):
         k = int((read - 1.0 - i) % capacity) * SAMPLE
@@ -136,7 +134,7 @@ def _noise(contact):
 
 
 @law
-def _touched(contact, force, instant):
+def _detect_touch(contact, force, instant):
     """Whether the force has left its level, one sample further on."""
     n, e = contact[LEVELS], force - contact[LEVEL]
     if n >= _FEWEST:
@@ -153,7 +151,7 @@ def _touched(contact, force, instant):
 
 
 @law
-def _left(contact, phi, force, instant):
+def _detect_loss(contact, phi, force, instant):
     """Whether the force has stopped following the position, one sample further on; the fit learns the sample.
 
     The surface never pulls: once the fit knows better than the noise, only a foretold force below the measured one
@@ -161,7 +159,7 @@ def _left(contact, phi, force, instant):
     not even as a surface of `SOFTEST` would; until that is told, the samples wait.
     """
     theta, S = _SIZE.vector(contact, KNOWN), _SIZE.matrix(contact, KNOWN + 4)
-    after, S, _, e, a = measured(theta, S, phi, force, 1.0)
+    after, S, _, e, a = measure(theta, S, phi, force, 1.0)
     noise, n = _noise(contact), contact[LEVELS]
     if n > 0.0:
         from_level = force - contact[LEVEL]
@@ -170,7 +168,7 @@ def _left(contact, phi, force, instant):
         if a < 2.0 and e < 0.0:
             said = min(said, 0.0)
         contact[SUM] = max(contact[SUM] + max(min(said, MOST), -MOST), 0.0)
-    _counted(contact, phi.v.z, force, instant)
+    _count(contact, phi.v.z, force, instant)
     if contact[SUM] > ALARM:
         slope = _follows(contact, noise)
         if slope < 0.0:
@@ -192,7 +190,7 @@ def _left(contact, phi, force, instant):
 
 
 @law
-def _counted(contact, x, force, instant):
+def _count(contact, x, force, instant):
     """Adds a sample to the level under test, or begins it anew."""
     if contact[SUM] == 0.0:
         contact[LEVEL], contact[LEVELS], contact[START] = force, 1.0, instant
@@ -221,17 +219,17 @@ def _follows(contact, noise):
 
 
 @law
-def learned(contact, a, v, x, force):
+def learn_in_contact(contact, a, v, x, force):
     """Takes a sample that came through into the fit of such."""
     phi = Vec4(Vec3(a, v, x), 1.0)
     theta, S = _SIZE.vector(contact, CERTAIN), _SIZE.matrix(contact, CERTAIN + 4)
-    theta, S, _, _, _ = measured(theta, S, phi, force, 1.0)
+    theta, S, _, _, _ = measure(theta, S, phi, force, 1.0)
     _SIZE.put_vector(contact, CERTAIN, theta)
     _SIZE.put_matrix(contact, CERTAIN + 4, S)
 
 
 @law
-def limited(contact, force, x):
+def follow_saturation(contact, force, x):
     """Follows a force that stands at its highest reading while the tip moves on.
 
     By chance so many equal readings in a row come less than once in a thousand logs, were equal neighbours as rare

@@ -1,7 +1,11 @@
 """How many parameters there are: a part for each way to hold them, which reads and writes them in flat arrays.
 
 Kernels are handed one of these and are compiled for it: three and four parameters by value, which makes no arrays,
-other numbers of them as arrays.
+other numbers of them as arrays. Four are a `Vec3` and one more, and the `Mat3` with a border that maps them: a
+surface with mass, damping, stiffness and an offset has four. Vectors and matrices of any size have the operators of
+`Vec3` and `Mat3`: NumPy's own do the same where laws run as they stand, but compiled, each expression of theirs costs
+half a second to compile, and several arrays each time it runs; one of these makes one array, and all of them compile
+in the time of three of those.
 """
 
 from __future__ import annotations
@@ -10,10 +14,211 @@ from typing import NamedTuple
 
 import numpy as np
 
-from palpate._jit import part
-from palpate._vector import Mat3, Vec3
-from palpate.identifiers.kernels.any_size import Matrix, Vector
-from palpate.identifiers.kernels.four import Mat4, Vec4
+from palpate._jit import law, part
+from palpate._vector import Mat3, Vec3, outer
+from palpate.arrays import Array
+
+
+@law
+def eliminate(A, b):
+    """x with A x = b, in b, by Gauss' elimination with pivots; A is used up. LAPACK costs more to call than it does."""
+    n = len(b)
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
+        for j in range(n):
+            A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
+        b[k], b[pivot] = b[pivot], b[k]
+        for i in range(k + 1, n):
+            factor = A[i, k] / A[k, k]
+            b[i] -= factor * b[k]
+            for j in range(k + 1, n):
+                A[i, j] -= factor * A[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            b[k] -= A[k, j] * b[j]
+        b[k] /= A[k, k]
+    return b
+
+
+@part
+class Vector(NamedTuple):
+    """n components; `+` and `/` work element by element, `@` is the dot product."""
+
+    of: Array
+
+    def __add__(a, b):
+        out = np.empty(len(a.of))
+        for i in range(len(out)):
+            out[i] = a.of[i] + b.of[i]
+        return Vector(out)
+
+    def __rmul__(a, k):
+        out = np.empty(len(a.of))
+        for i in range(len(out)):
+            out[i] = k * a.of[i]
+        return Vector(out)
+
+    def __truediv__(a, b):
+        out = np.empty(len(a.of))
+        for i in range(len(out)):
+            out[i] = a.of[i] / b.of[i]
+        return Vector(out)
+
+    def __matmul__(a, b):
+        total = 0.0
+        for i in range(len(a.of)):
+            total += a.of[i] * b.of[i]
+        return total
+
+    def map_left(b, A):
+        """The matrix product from the left."""
+        out = np.zeros(len(b.of))
+        for i in range(len(out)):
+            for j in range(len(out)):
+                out[i] += A.of[i, j] * b.of[j]
+        return Vector(out)
+
+    def map_outer(a, b):
+        """The outer product a b^T."""
+        out = np.empty((len(a.of), len(a.of)))
+        for i in range(len(out)):
+            for j in range(len(out)):
+                out[i, j] = a.of[i] * b.of[j]
+        return Matrix(out)
+
+
+@part
+class Matrix(NamedTuple):
+    """n rows of n; `+ -` work element by element, `@` takes a `Vector` or a `Matrix`."""
+
+    of: Array
+
+    def __add__(A, B):
+        out = np.empty(A.of.shape)
+        for i in range(len(out)):
+            for j in range(len(out)):
+                out[i, j] = A.of[i, j] + B.of[i, j]
+        return Matrix(out)
+
+    def __sub__(A, B):
+        out = np.empty(A.of.shape)
+        for i in range(len(out)):
+            for j in range(len(out)):
+                out[i, j] = A.of[i, j] - B.of[i, j]
+        return Matrix(out)
+
+    def __rmul__(A, k):
+        out = np.empty(A.of.shape)
+        for i in range(len(out)):
+            for j in range(len(out)):
+                out[i, j] = k * A.of[i, j]
+        return Matrix(out)
+
+    def __matmul__(A, b):
+        return b.map_left(A)
+
+    def map_left(B, A):
+        """The matrix product from the left."""
+        out = np.zeros(A.of.shape)
+        for i in range(len(out)):
+            for j in range(len(out)):
+                for k in range(len(out)):
+                    out[i, j] += A.of[i, k] * B.of[k, j]
+        return Matrix(out)
+
+    @property
+    def T(A):
+        """The transpose, where it is."""
+        return Matrix(A.of.T)
+
+    def map_solve(A, b):
+        """x with A x = b."""
+        return Vector(eliminate(A.of.copy(), b.of.copy()))
+
+
+Vector.__array_ufunc__ = Matrix.__array_ufunc__ = None  # type: ignore[attr-defined]  # NumPy leaves the operators alone
+
+
+@part
+class Vec4(NamedTuple):
+    """Four components; `+` and `/` work element by element, `@` is the dot product."""
+
+    v: Vec3
+    w: float
+
+    def __add__(a, b):
+        return Vec4(a.v + b.v, a.w + b.w)
+
+    def __rmul__(a, k):
+        return Vec4(k * a.v, k * a.w)
+
+    def __truediv__(a, b):
+        return Vec4(a.v / b.v, a.w / b.w)
+
+    def __matmul__(a, b):
+        return a.v @ b.v + a.w * b.w
+
+    def map_left(b, A):
+        """The matrix product from the left."""
+        return Vec4(A.inner @ b.v + b.w * A.column, A.row @ b.v + A.corner * b.w)
+
+    def map_outer(a, b):
+        """The outer product a b^T."""
+        return Mat4(outer(a.v, b.v), b.w * a.v, a.w * b.v, a.w * b.w)
+
+
+@part
+class Mat4(NamedTuple):
+    """Four rows: [[inner, column], [row, corner]]; `+ -` work element by element, `@` takes a `Vec4` or a `Mat4`."""
+
+    inner: Mat3
+    column: Vec3
+    row: Vec3
+    corner: float
+
+    def __add__(A, B):
+        return Mat4(A.inner + B.inner, A.column + B.column, A.row + B.row, A.corner + B.corner)
+
+    def __sub__(A, B):
+        return Mat4(A.inner - B.inner, A.column - B.column, A.row - B.row, A.corner - B.corner)
+
+    def __rmul__(A, k):
+        return Mat4(k * A.inner, k * A.column, k * A.row, k * A.corner)
+
+    def __matmul__(A, b):
+        return b.map_left(A)
+
+    def map_left(B, A):
+        """The matrix product from the left."""
+        return Mat4(
+            A.inner @ B.inner + outer(A.column, B.row),
+            A.inner @ B.column + B.corner * A.column,
+            B.inner.T @ A.row + A.corner * B.row,
+            A.row @ B.column + A.corner * B.corner,
+        )
+
+    @property
+    def T(A):
+        """The transpose of the matrix."""
+        return Mat4(A.inner.T, A.row, A.column, A.corner)
+
+    def map_solve(A, b):
+        """x with A x = b."""
+        numbers, right = np.empty((4, 4)), np.empty(4)
+        for i in range(3):
+            numbers[i, 3], numbers[3, i], right[i] = A.column[i], A.row[i], b.v[i]
+            for j in range(3):
+                numbers[i, j] = A.inner[i][j]
+        numbers[3, 3], right[3] = A.corner, b.w
+        x = eliminate(numbers, right)
+        return Vec4(Vec3(x[0], x[1], x[2]), x[3])
+
+
+Vec4.__array_ufunc__ = Mat4.__array_ufunc__ = None  # type: ignore[attr-defined]  # NumPy leaves the operators alone
+
 
 _AXES = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 _NONE = Vec3(0.0, 0.0, 0.0)
@@ -53,7 +258,7 @@ class Three(NamedTuple):
         return _AXES[i]
 
     def identity(self):
-        """The unit matrix."""
+        """The unit matrix of this size."""
         return _AXES
 
     def variances(self, S):
@@ -98,7 +303,7 @@ class Four(NamedTuple):
         return Vec4(_AXES[i], 0.0) if i < 3 else Vec4(_NONE, 1.0)
 
     def identity(self):
-        """The unit matrix."""
+        """The unit matrix of this size."""
         return Mat4(_AXES, _NONE, _NONE, 1.0)
 
     def variances(self, S):
@@ -140,7 +345,7 @@ class AnyNumber(NamedTuple):
         return Vector(out)
 
     def identity(self):
-        """The unit matrix."""
+        """The unit matrix of this size."""
         return Matrix(np.eye(self.n))
 
     def variances(self, S):

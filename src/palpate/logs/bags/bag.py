@@ -69,7 +69,7 @@ class Bag:
                 path, kind, Budget(path, limits or Limits()), self._unpacked
             )
             self._types = _types([channel for file in self._files for channel in file.channels.values()])
-            self.topics = {topic.name: topic for topic in self._found()}
+            self.topics = {topic.name: topic for topic in self._list_topics()}
             self._add_frames()
         except ImportError:
             self.close()
@@ -93,7 +93,7 @@ class Bag:
         """Let the file go."""
         self._unpacked.cleanup()
 
-    def _found(self) -> Iterator[Topic]:
+    def _list_topics(self) -> Iterator[Topic]:
         own = [(file, channel) for file in self._files for channel in file.channels.values()]
         for name in sorted({channel.topic for _, channel in own}):
             channels = [(file, channel) for file, channel in own if channel.topic == name]
@@ -219,7 +219,7 @@ class _Rows:
     frame: str | None = None
 
     def add(self, received: int, header: Any) -> None:
-        """One more message."""
+        """Keep one more message of the topic."""
         self.received.append(received)
         stamp = 0 if header is None else int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
         self.stamped.append(stamp)

@@ -15,8 +15,7 @@ from palpate.files.limits import Budget
 from palpate.logs.bags.scan_bag1 import scan_bag1
 from palpate.logs.bags.scan_mcap import scan_mcap
 from palpate.logs.bags.scan_sqlite import scan_sqlite
-from palpate.logs.bags.scanning import Channel, End, Raw
-from palpate.logs.bags.unpacking import ZSTD, unpack_file, unpack_message
+from palpate.logs.bags.scanning import ZSTD, Channel, End, Raw, unpack_file, unpack_message
 from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
 
 _SCANS = {Kind.BAG1: scan_bag1, Kind.MCAP: scan_mcap, Kind.SQLITE: scan_sqlite}
@@ -72,11 +71,11 @@ class Storage:
         try:
             for item in self._items():
                 if isinstance(item, Raw) and self.channels[item.channel].topic in topics:
-                    yield self.channels[item.channel], item.received, self._unpacked(item)
+                    yield self.channels[item.channel], item.received, self._unpack(item)
         except _DamageError:
             return
 
-    def _unpacked(self, item: Raw) -> bytes:
+    def _unpack(self, item: Raw) -> bytes:
         """A message; one that its bag's metadata calls packed may be plain, as recorders pack what gains by it."""
         if not (self._packed and item.data.startswith(ZSTD)):
             return item.data
@@ -152,7 +151,7 @@ def open_files(
     troubles += [f"{path}: {name} is missing, which its metadata.yaml names" for name in sorted(missing)]
     files = []
     for place in places:
-        file = _unpacked(place, budget, unpacked) if place.suffix == PACKED else place
+        file = _unpack_whole(place, budget, unpacked) if place.suffix == PACKED else place
         found = kind_of(file)
         if found not in _SCANS:
             raise InputError(f"{place} is no storage of a bag; record or copy it again")
@@ -188,7 +187,7 @@ def _is_storage(path: Path) -> bool:
     return path.suffix in STORAGES or (path.suffix == PACKED and path.with_suffix("").suffix in STORAGES)
 
 
-def _unpacked(path: Path, budget: Budget, to: TemporaryDirectory[str]) -> Path:
+def _unpack_whole(path: Path, budget: Budget, to: TemporaryDirectory[str]) -> Path:
     """A file that was packed as a whole, unpacked."""
     kind_of(path)
     place = Path(to.name) / path.stem

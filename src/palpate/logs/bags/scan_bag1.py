@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from palpate.errors import InputError
 from palpate.files.limits import Budget, LimitError
-from palpate.logs.bags.scanning import Channel, End, Raw
-from palpate.logs.bags.unpacking import unpacked
+from palpate.logs.bags.scanning import Channel, End, Raw, unpack_chunk
 
 if TYPE_CHECKING:
     from rosbags.rosbag1.reader import Header
@@ -62,7 +61,7 @@ def _records(file: BinaryIO, budget: Budget, *, packed: bool = False) -> Iterato
                 packing = header.get_string("compression")
                 if len(data) < size and packing != "none":
                     return
-                inside = unpacked(data, packing, header.get_uint32("size"), budget)
+                inside = unpack_chunk(data, packing, header.get_uint32("size"), budget)
                 for own, content, _ in _records(BytesIO(inside), budget, packed=True):
                     yield own, content, file.tell()
             elif len(data) == size:

@@ -10,8 +10,7 @@ from struct import unpack_from
 from typing import BinaryIO
 
 from palpate.files.limits import Budget, LimitError
-from palpate.logs.bags.scanning import Channel, End, Raw
-from palpate.logs.bags.unpacking import unpacked
+from palpate.logs.bags.scanning import Channel, End, Raw, unpack_chunk
 
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 _MAGIC = 8
@@ -79,7 +78,7 @@ def _records(file: BinaryIO, budget: Budget, *, packed: bool = False) -> Iterato
 def _inside(data: bytes, packing: str, size: int, crc: int, budget: Budget) -> bytes | None:
     """Content of a chunk; None if it is damaged."""
     try:
-        inside = unpacked(data, packing, size, budget)
+        inside = unpack_chunk(data, packing, size, budget)
     except LimitError:
         raise
     except Exception:  # noqa: BLE001 - a damaged chunk fails in as many ways as there are bytes

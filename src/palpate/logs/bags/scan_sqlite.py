@@ -33,7 +33,7 @@ _STEPS = 100_000
 
 def scan_sqlite(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
     """Topics and messages of a ROS 2 bag in SQLite as far as its pages are there."""
-    with closing(_opened(path, budget)) as database:
+    with closing(_open_database(path, budget)) as database:
         types = {kind: (encoding, text) for kind, encoding, text in _rows(database, _TYPES)}
         for number, topic, kind in _rows(database, _TOPICS):
             yield Channel(number, topic, kind, *types.get(kind, ("", "")))
@@ -50,11 +50,11 @@ def scan_sqlite(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
             if budget.seconds_left <= 0:
                 raise budget.too_long() from None
             hurt = True
-    share = _lost(path)
+    share = _missing_pages(path)
     yield End(finished=not (hurt or share), share=share)
 
 
-def _opened(path: Path, budget: Budget) -> sqlite3.Connection:
+def _open_database(path: Path, budget: Budget) -> sqlite3.Connection:
     """The database, to be read only, and no longer than the log may take."""
     database = sqlite3.connect(f"file:{quote(str(path))}?mode=ro&immutable=1", uri=True)
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(path.stat().st_size + 1_000_000, 2**31 - 1))
@@ -80,7 +80,7 @@ def _rows(database: sqlite3.Connection, question: str) -> list[tuple[Any, ...]]:
         return []
 
 
-def _lost(path: Path) -> float | None:
+def _missing_pages(path: Path) -> float | None:
     """The share of the file's pages that are not there; None if all are."""
     with path.open("rb") as file:
         head = file.read(32)

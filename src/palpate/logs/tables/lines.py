@@ -1,15 +1,21 @@
-"""The lines of a text log: its first lines, their delimiter, and the kinds of cells."""
+"""The lines of a text log: its first lines, their delimiter, the kinds of cells, dates and times as seconds."""
 
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.logs.tables.clock import seconds_of_text
+
+if TYPE_CHECKING:
+    import polars
 
 LOOK = 4_000_000
 """Bytes at the beginning of a file that are looked at."""
@@ -127,7 +133,7 @@ def first_lines(path: Path) -> tuple[list[Line], bool]:
         begin, newline, _ = begin.rpartition(b"\n")
         if not newline:
             raise InputError(f"the first line of {path} has over {LOOK:,} bytes; a table has a line a row")
-    return lines_of(path, _decoded(begin)), b"\r" in begin and b"\n" not in begin
+    return lines_of(path, _decode(begin)), b"\r" in begin and b"\n" not in begin
 
 
 def lines_of(path: Path, text: str) -> list[Line]:
@@ -154,7 +160,7 @@ def lines_of(path: Path, text: str) -> list[Line]:
     return lines
 
 
-def _decoded(begin: bytes) -> str:
+def _decode(begin: bytes) -> str:
     """Text in UTF-8, or else in the code of an old Windows, where a micro or a degree is one byte."""
     try:
         return begin.decode("utf-8-sig")
@@ -162,3 +168,31 @@ def _decoded(begin: bytes) -> str:
         if len(begin) - error.start < 4 and error.reason == "unexpected end of data":
             return begin[: error.start].decode("utf-8-sig")
         return begin.decode("cp1252", errors="replace")
+
+
+def seconds_of_text(text: str | None) -> float | None:
+    """A date and time of ISO 8601 in seconds since 1970, a time of day since midnight; None if it is neither.
+
+    Without a zone it counts as UTC. No text at all is no reading: NaN.
+    """
+    if not text:
+        return math.nan
+    if len(text) < len("12:00:00") or not text[:2].isdigit():
+        return None
+    try:
+        moment = datetime.fromisoformat(text if text[2] != ":" else f"1970-01-01T{text}")
+    except ValueError:
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def seconds_of_cells(cells: polars.Series) -> Array:
+    """A column of dates, times or durations in seconds, NaN where there is none."""
+    import polars
+
+    if cells.dtype == polars.Date:
+        cells = cells.cast(polars.Datetime("ns"))
+    if cells.dtype != polars.Time:  # which counts nanoseconds as it stands
+        cells = cells.dt.cast_time_unit("ns")
+    seconds: Array = cells.to_physical().cast(polars.Float64).to_numpy() / 1e9
+    return seconds

@@ -79,7 +79,7 @@ def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, NDAr
     """
     from scipy.io import loadmat, matlab
 
-    if any(unpacked > size for unpacked in _unpacked(path)):
+    if any(unpacked > size for unpacked in _unpacked_sizes(path)):
         raise MemoryError
     try:
         variables = loadmat(path, simplify_cells=True)
@@ -104,7 +104,7 @@ def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, NDAr
     return columns, {"objects": objects, "images": images}
 
 
-def _unpacked(path: Path) -> Iterator[int]:
+def _unpacked_sizes(path: Path) -> Iterator[int]:
     """How much the compressed variables of a file of v7 unpack to, as it grows [bytes]."""
     total = 0
     with path.open("rb") as file:

@@ -16,8 +16,7 @@ from palpate.errors import InputError
 from palpate.files import SIGNATURE
 from palpate.files.confined import read_confined
 from palpate.files.limits import Budget, Limits
-from palpate.logs.tables.clock import seconds_of_cells
-from palpate.logs.tables.lines import NO_READING
+from palpate.logs.tables.lines import NO_READING, seconds_of_cells
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, as_counts
 
 if TYPE_CHECKING:
@@ -74,15 +73,15 @@ def read_parquet(path: Path, budget: Budget) -> Sheet:
     lists = dict.fromkeys(found.lists, "a column of lists; give a column of numbers")
     return Sheet(
         path, found.names, lambda places, missing: (_read(path, budget, places, missing), []),
-        lambda place: _counted(path, budget, place), stated, left_out=lists,
+        lambda place: _read_counts(path, budget, place), stated, left_out=lists,
     )  # fmt: skip
 
 
 def _read(path: Path, budget: Budget, places: Sequence[int], missing: Sequence[str]) -> list[Cells]:
-    own = _opened(path, budget.limits)[1]
+    own = _open(path, budget.limits)[1]
     if own is not None and np.isfinite(own[list(places)]).all():
         return [Cells(own[i]) for i in places]
-    columns, also = _asked(path, budget, places, missing)
+    columns, also = _query(path, budget, places, missing)
     wrong = {i: (f"row {row + 1}", text) for i, row, text in also["wrong"]}
     cells = []
     for i, column in enumerate(columns["numbers"]):
@@ -91,8 +90,8 @@ def _read(path: Path, budget: Budget, places: Sequence[int], missing: Sequence[s
     return cells
 
 
-def _counted(path: Path, budget: Budget, place: int) -> NDArray[np.int64] | None:
-    found = _asked(path, budget, [place], exact=True)[0]
+def _read_counts(path: Path, budget: Budget, place: int) -> NDArray[np.int64] | None:
+    found = _query(path, budget, [place], exact=True)[0]
     return as_counts(found["counts"]) if found else None
 
 
@@ -102,12 +101,12 @@ def read_columns(path: Path, budget: Budget) -> dict[str, Array]:
     Raises:
         InputError: it cannot be read.
     """
-    found, own = _opened(path, budget.limits)
-    numbers = own if own is not None else _asked(path, budget, range(len(found.names)))[0]["numbers"]
+    found, own = _open(path, budget.limits)
+    numbers = own if own is not None else _query(path, budget, range(len(found.names)))[0]["numbers"]
     return {name: np.array(column) for name, column in zip(found.names, numbers, strict=True)}
 
 
-def _asked(
+def _query(
     path: Path, budget: Budget, places: Sequence[int], missing: Sequence[str] = (), *, exact: bool = False
 ) -> tuple[dict[str, NDArray[Any]], Any]:
     budget.check(_BYTES * head(path, budget.limits).rows * len(places))
@@ -136,10 +135,10 @@ def head(path: Path, limits: Limits | None = None) -> Head:
     Raises:
         InputError: there is no such file, or it cannot be read as Parquet.
     """
-    return _opened(path, limits)[0]
+    return _open(path, limits)[0]
 
 
-def _opened(path: Path, limits: Limits | None) -> tuple[Head, Array | None]:
+def _open(path: Path, limits: Limits | None) -> tuple[Head, Array | None]:
     """The head; and all columns, shape (columns, rows), of a small record of palpate's own."""
     try:
         state = path.stat()

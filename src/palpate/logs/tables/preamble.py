@@ -47,7 +47,7 @@ def read_preamble(lines: Sequence[str], names: Sequence[str]) -> Preamble:
     columns = (
         _labview(rows, names) if _LAST_HEADER.lower() in {line.strip().lower() for line in lines} else {}
     )
-    return Preamble(rate, columns or _scaled(rows, lines, names))
+    return Preamble(rate, columns or _volt_scales(rows, lines, names))
 
 
 def _rate(line: str) -> float | None:
@@ -87,7 +87,7 @@ def _labview(rows: dict[str, list[str]], names: Sequence[str]) -> dict[str, Stat
     return found
 
 
-def _scaled(rows: dict[str, list[str]], lines: Sequence[str], names: Sequence[str]) -> dict[str, Stated]:
+def _volt_scales(rows: dict[str, list[str]], lines: Sequence[str], names: Sequence[str]) -> dict[str, Stated]:
     """Channels recorded in volts, with their scales."""
     labels = {label.split()[0].strip(":"): cells for label, cells in rows.items() if label.split()}
     if not {"channel", "units", "scale"} <= set(labels):

@@ -38,10 +38,10 @@ def read_book(path: Path, budget: Budget) -> Sheet:
         if path.name not in sheets:
             raise InputError(f"{path.parent}: {unknown('sheet with rows of numbers', path.name, sheets)}")
         return sheets[path.name]
-    return _joined(path, sheets, left_out)
+    return _join_sheets(path, sheets, left_out)
 
 
-def _joined(path: Path, sheets: dict[str, Sheet], left_out: dict[str, str]) -> Sheet:
+def _join_sheets(path: Path, sheets: dict[str, Sheet], left_out: dict[str, str]) -> Sheet:
     """The columns of all sheets as one table; a name that only one sheet has is enough."""
     owners = [(title, place) for title, sheet in sheets.items() for place in range(len(sheet.names))]
     plain = [sheets[title].names[place] for title, place in owners]

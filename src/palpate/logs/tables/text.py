@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.files.limits import Budget
-from palpate.logs.tables.clock import seconds_of_text
 from palpate.logs.tables.layout import Layout, find_layout
 from palpate.logs.tables.lines import (
     COMMENTS,
@@ -25,6 +24,7 @@ from palpate.logs.tables.lines import (
     Parting,
     first_lines,
     lines_of,
+    seconds_of_text,
 )  # fmt: skip
 from palpate.logs.tables.preamble import read_preamble
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, is_finite
@@ -107,7 +107,7 @@ class _Rows:
     def read(self, places: Sequence[int], missing: Sequence[str]) -> tuple[list[Cells], list[dict[str, Any]]]:
         """Columns of the whole rows; a note says once which lines are none."""
         frame = self._frame(places)
-        notes = self._skipped(frame)
+        notes = self._note_skipped(frame)
         whole = frame.filter("whole")
         return [self._column(whole, place, missing) for place in places], notes
 
@@ -149,7 +149,7 @@ class _Rows:
         counts = self._cells(place).get_column(str(place)).cast(polars.Int64, strict=False)
         return None if counts.null_count() else counts.to_numpy()
 
-    def _skipped(self, frame: polars.DataFrame) -> list[dict[str, Any]]:
+    def _note_skipped(self, frame: polars.DataFrame) -> list[dict[str, Any]]:
         lost = frame.filter(~frame["whole"]).get_column("line")
         if len(lost) == len(frame):
             raise InputError(f"{self.path} holds a header and no rows; give a log with a row for each sample")
@@ -165,20 +165,20 @@ class _Rows:
         """Line, whether it is whole, and the numbers at some places, by place."""
         import polars
 
-        count = int(self._collected(self._rows.select(polars.len())).item())
+        count = int(self._collect(self._rows.select(polars.len())).item())
         self.budget.check(_BYTES * count * len(places))
         if len(places) > _MANY:
             return self._wide_frame(places)
         numbers = [self._number(_cell(i)).alias(str(i)) for i in set(places)]
-        return self._collected(
-            self._rows.with_columns(self._parted(max(places))).select("line", "whole", *numbers)
+        return self._collect(
+            self._rows.with_columns(self._cells_up_to(max(places))).select("line", "whole", *numbers)
         )
 
     def _wide_frame(self, places: Sequence[int]) -> polars.DataFrame:
         """The same for many places, which polars would else look for one after the other in every line."""
         import polars
 
-        lists = self._collected(self._rows.with_columns(polars.col("text").str.split(self._delimiter)))
+        lists = self._collect(self._rows.with_columns(polars.col("text").str.split(self._delimiter)))
         cells = lists.get_column("text").list
         names = dict.fromkeys(map(str, places))
         frame = polars.DataFrame(
@@ -188,16 +188,16 @@ class _Rows:
 
     def _cells(self, place: int) -> polars.DataFrame:
         """One column's cells as text, of the whole rows, and their lines."""
-        rows = self._rows.with_columns(self._parted(place)).filter("whole")
-        return self._collected(rows.select("line", _cell(place).alias(str(place))))
+        rows = self._rows.with_columns(self._cells_up_to(place)).filter("whole")
+        return self._collect(rows.select("line", _cell(place).alias(str(place))))
 
     @cached_property
     def _first(self) -> list[str]:
         """The cells of the first whole row."""
-        top = self._collected(self._rows.filter("whole").head(1)).get_column("text").first()
+        top = self._collect(self._rows.filter("whole").head(1)).get_column("text").first()
         return str(top or "").split(self._delimiter)
 
-    def _collected(self, rows: polars.LazyFrame) -> polars.DataFrame:
+    def _collect(self, rows: polars.LazyFrame) -> polars.DataFrame:
         import polars
 
         self.budget.take(0)
@@ -238,7 +238,7 @@ class _Rows:
             .select("line", whole.alias("whole"), line.alias("text"))
         )
 
-    def _parted(self, last: int) -> polars.Expr:
+    def _cells_up_to(self, last: int) -> polars.Expr:
         """The cells of a line up to a last one."""
         import polars
 
@@ -283,7 +283,7 @@ class _Rows:
     def _source(self) -> Any:
         """The file where polars can open it: by a name in UTF-8, and cells without quotes; else its content."""
         if self.layout.quoted:
-            return io.BytesIO(self._unquoted())
+            return io.BytesIO(self._remove_quotes())
         if self.content is not None:
             return io.BytesIO(self.content.encode())
         try:
@@ -292,7 +292,7 @@ class _Rows:
             return io.BytesIO(self.path.read_bytes())
         return self.path
 
-    def _unquoted(self) -> bytes:
+    def _remove_quotes(self) -> bytes:
         """The text without the quotes around its cells."""
         if self.content is not None:
             return self._parted_lines(self.content.splitlines())

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.excitation import Design
-from palpate.references.waves import Multisine
+from palpate.references import Multisine
 from palpate.report import style
 
 if TYPE_CHECKING:

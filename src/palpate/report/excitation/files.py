@@ -11,7 +11,7 @@ from palpate.excitation import Design, HybridLoop, Remedy
 from palpate.files import FORCE, MADE, write_text
 from palpate.logs import write_record
 from palpate.records import Record
-from palpate.references.waves import Multisine
+from palpate.references import Multisine
 
 _APPROACH = 30.0  # s that an experiment may take beyond its press
 

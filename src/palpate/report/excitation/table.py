@@ -9,9 +9,9 @@ from rich.table import Table
 from rich.text import Text
 
 from palpate.excitation import Design, Remedy
-from palpate.excitation.prediction import Prediction
+from palpate.excitation.force_loops import Prediction
 from palpate.excitation.problem import LONGEST
-from palpate.references.waves import Multisine
+from palpate.references import Multisine
 from palpate.report.terminal import bare_table
 
 

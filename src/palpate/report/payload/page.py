@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.contact_frame import Weighed
-from palpate.contact_frame.weighing.estimate import Estimated
+from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
 from palpate.report.page import Table, embedded, render
 from palpate.report.svg import svg

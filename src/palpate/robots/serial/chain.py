@@ -12,7 +12,7 @@ from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, cos, sin
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.robots.serial.spatial import (
+from palpate.robots.serial.linear import (
     UNIT3,
     Inertia,
     Twist,

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.robots.serial._extra import mujoco, refusals
-from palpate.robots.serial._loading import load_mjcf
 from palpate.robots.serial.chain import Chain, spread_of
+from palpate.robots.serial.loading import load_mjcf, mujoco, refusals
 from palpate.robots.serial.serial_arm import Scene, SerialArm
 
 
 def from_mujoco(model: Any, site: str | None = None) -> SerialArm:
-    """See `SerialArm.from_mujoco`."""
+    """The arm of a MuJoCo model, see `SerialArm.from_mujoco`."""
     if isinstance(model, str | PathLike):
         path = Path(model)
         loaded, notes = load_mjcf(path)

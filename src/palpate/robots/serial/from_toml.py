@@ -1,11 +1,16 @@
-"""Serial arms from TOML files: those that come with palpate, and a user's own."""
+"""Serial arms from TOML files, those that come with palpate and a user's own, and from URDF read by MuJoCo.
+
+Meshes of URDF are left out: they say nothing of how an arm moves.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib.resources import files
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from xml.etree import ElementTree
 
 import msgspec
 import numpy as np
@@ -13,9 +18,10 @@ from msgspec import Meta
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.files import read_table, read_text
+from palpate.files import read_bytes, read_table, read_text
 from palpate.robots.serial.chain import Chain, spread_of
-from palpate.robots.serial.inertias import check_inertia
+from palpate.robots.serial.from_mujoco import arm_of
+from palpate.robots.serial.loading import check_inertia, load_mjcf
 from palpate.robots.serial.serial_arm import SerialArm
 
 Triple = tuple[float, float, float]
@@ -24,7 +30,7 @@ Positive = Annotated[float, Meta(gt=0)]
 GRAVITY = 9.81
 
 
-class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class JointTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A joint and the link that it moves."""
 
     name: str
@@ -49,7 +55,7 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class ArmFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An arm's file."""
+    """Content of an arm's TOML file."""
 
     title: str
     home: list[float]
@@ -60,7 +66,7 @@ class ArmFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Roll, pitch, yaw [deg]."""
     gravity: Triple = (0.0, 0.0, -GRAVITY)
     """In the base's axes [m/s^2]."""
-    joint: list[Joint]
+    joint: list[JointTable]
 
 
 def names() -> list[str]:
@@ -175,3 +181,58 @@ def _column(values: Any) -> Array:
 def _check_finite(what: str, values: Any) -> None:
     if not all(np.isfinite(v) for v in values):
         raise InputError(f"{what}: every number must be finite, got {list(values)}")
+
+
+_LARGEST = 1 << 24
+"""Bytes of a file."""
+_SEEN = ("visual", "collision")
+
+
+def from_urdf(path: Path, link: str) -> SerialArm:
+    """The arm of a URDF file, see `SerialArm.from_urdf`."""
+    root = _robot(path)
+    links = [one.get("name", "") for one in root.iter("link")]
+    if link not in links:
+        raise unknown(f"link in {path}", link, links)
+    for part in root.iter("link"):
+        for seen in [child for child in part if child.tag in _SEEN]:
+            part.remove(seen)
+    for own in root.findall("mujoco"):
+        root.remove(own)
+    options = ElementTree.SubElement(root, "mujoco")
+    ElementTree.SubElement(options, "compiler", fusestatic="false", discardvisual="false")
+    model, notes = load_mjcf(path, ElementTree.tostring(root, encoding="unicode"))
+    arm = arm_of(model, link, str(path), notes)
+    speeds = _speeds(root)
+    return replace(
+        arm,
+        title=root.get("name") or arm.title,
+        speed=np.array([speeds.get(name, np.inf) for name in arm.names]),
+    )
+
+
+def _robot(path: Path) -> ElementTree.Element:
+    data = read_bytes(path, _LARGEST, "an arm")
+    try:
+        root = ElementTree.fromstring(data)  # noqa: S314 - Python's expat bounds what entities may grow to
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise InputError(f"{path}: not XML: {error}") from None
+    if root.tag != "robot":
+        raise InputError(
+            f"{path}: not URDF, its first element is <{root.tag}>; MJCF is read by its ending .xml"
+        )
+    return root
+
+
+def _speeds(root: ElementTree.Element) -> dict[str, float]:
+    """Limits of the joints' rates, which MuJoCo does not keep; 0 and what is no number are none."""
+    found = {}
+    for joint in root.iter("joint"):
+        limit = joint.find("limit")
+        try:
+            value = float(limit.get("velocity", "0")) if limit is not None else 0.0
+        except ValueError:
+            value = 0.0
+        if value > 0.0:
+            found[joint.get("name", "")] = value
+    return found

@@ -24,7 +24,7 @@ _TURN = 2.0 * np.pi
 
 
 def inverse_kinematics(arm: SerialArm, pose: ArrayLike, near: Array) -> Array:
-    """See `SerialArm.inverse_kinematics`."""
+    """Joint positions of a pose, see `SerialArm.inverse_kinematics`."""
     goal = checked_pose(pose)
     best, off = near, np.full(6, np.inf)
     for start in _starts(arm, near):

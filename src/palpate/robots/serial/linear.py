@@ -1,9 +1,16 @@
 """Positive definite systems of any small size, in place: no array is made inside a loop, and no root is taken.
 
 A = L D L^T with ones on L's diagonal. One array holds L below its diagonal, 1/D on it, and D L^T above it.
+
+Motion, wrench and inertia of rigid bodies, all about the world's origin and in the world's axes.
+
+There twists, wrenches and inertias of all bodies simply add (Featherstone, 2008, ch. 2).
 """
 
-from palpate._jit import law
+from typing import NamedTuple
+
+from palpate._jit import law, part
+from palpate._vector import Mat3, Vec3
 
 
 @law
@@ -63,3 +70,102 @@ def backward(L, b):
         i = n - 1 - back
         for k in range(i):
             b[k] -= L[i, k] * b[i]
+
+
+UNIT3 = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
+
+
+@law
+def cross(a, b):
+    """The cross product a x b."""
+    return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+
+
+@law
+def squares(k, a, b):
+    """k 1 + a a^T + b b^T, symmetric to the last bit."""
+    xy, xz, yz = a.x * a.y + b.x * b.y, a.x * a.z + b.x * b.z, a.y * a.z + b.y * b.z
+    xx, yy, zz = a.x * a.x + b.x * b.x, a.y * a.y + b.y * b.y, a.z * a.z + b.z * b.z
+    return Mat3(Vec3(k + xx, xy, xz), Vec3(xy, k + yy, yz), Vec3(xz, yz, k + zz))
+
+
+@law
+def turned_about_z(R, c, s):
+    """R Rz, of the angle's cosine and sine."""
+    columns = R.T
+    return Mat3(c * columns.r1 + s * columns.r2, c * columns.r2 - s * columns.r1, columns.r3).T
+
+
+@part
+class Twist(NamedTuple):
+    """Turning [rad/s] of a body, and velocity [m/s] of its point at the origin; or the rates of both."""
+
+    w: Vec3
+    v: Vec3
+
+    def __add__(a, b):
+        return Twist(a.w + b.w, a.v + b.v)
+
+    def __rmul__(a, k):
+        return Twist(k * a.w, k * a.v)
+
+    def carries(a, b):
+        """The rate of b, which a body carries along whose twist is a."""
+        return Twist(cross(a.w, b.w), cross(a.w, b.v) + cross(a.v, b.w))
+
+    def at(a, p):
+        """Velocity of the body's point p."""
+        return a.v + cross(a.w, p)
+
+
+@part
+class Wrench(NamedTuple):
+    """Moment about the origin [N m], and force [N]."""
+
+    m: Vec3
+    f: Vec3
+
+    def __add__(a, b):
+        return Wrench(a.m + b.m, a.f + b.f)
+
+    def power(a, s):
+        """Power on the twist s."""
+        return a.m @ s.w + a.f @ s.v
+
+
+@law
+def load_at(mass, centre, moment, V, A):
+    """Wrench that moves a body (Newton and Euler), from its inertia about its centre of mass, twist and rate."""
+    w, dw = V.w, A.w
+    f = mass * (A.at(centre) + cross(w, V.at(centre)))
+    return Wrench(moment @ dw + cross(w, moment @ w) + cross(centre, f), f)
+
+
+@part
+class Inertia(NamedTuple):
+    """Mass [kg], mass times its centre [kg m], second moment about the origin [kg m^2]."""
+
+    mass: float
+    first: Vec3
+    second: Mat3
+
+    def __add__(a, b):
+        return Inertia(a.mass + b.mass, a.first + b.first, a.second + b.second)
+
+    def momentum(a, s):
+        """Of the twist s; or the wrench that gives the acceleration s."""
+        return Wrench(a.second @ s.w + cross(a.first, s.v), a.mass * s.v - cross(a.first, s.w))
+
+
+@law
+def inertia_at(mass, centre, moment):
+    """A body's inertia from that about its centre of mass, in the world's axes."""
+    c, first = centre, mass * centre
+    xx, yy, zz = first.x * c.x, first.y * c.y, first.z * c.z
+    xy, xz, yz = first.x * c.y, first.x * c.z, first.y * c.z
+    spread = Mat3(Vec3(yy + zz, -xy, -xz), Vec3(-xy, xx + zz, -yz), Vec3(-xz, -yz, xx + yy))
+    return Inertia(mass, first, moment + spread)
+
+
+for _cls in (Twist, Wrench, Inertia):
+    _cls.__array_ufunc__ = None  # type: ignore[union-attr]  # NumPy leaves the operators to these classes

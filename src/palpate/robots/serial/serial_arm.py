@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +14,8 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.results import Readable
 from palpate.robots.serial.chain import Chain, chain_model, room_for
-from palpate.robots.serial.described import Found, compiled_description, found_for
+from palpate.robots.serial.loading import compile_model, mujoco, refusals
+from palpate.robots.serial.task import ArmState, arm_state_for, compiled_description
 
 
 @dataclass(frozen=True)
@@ -138,23 +140,23 @@ class SerialArm(Readable):
         Raises:
             InputError: what MuJoCo refuses, in its words; no such link.
         """
-        from palpate.robots.serial.from_urdf import from_urdf
+        from palpate.robots.serial.from_toml import from_urdf
 
         return from_urdf(Path(path), link)
 
     @property
     def joints(self) -> int:
-        """n."""
+        """Number of the joints, n."""
         return len(self.names)
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
         """Pose of the tip, shape (4, 4)."""
-        return self._found(q).pose
+        return self._state_at(q).pose
 
     def joint_places(self, q: ArrayLike) -> Array:
         """Origin of the base, of each joint's frame, and of the tip [m], shape (n + 2, 3)."""
         c, p, R, places = self.chain, np.zeros(3), np.eye(3), [np.zeros(3)]
-        for i, value in enumerate(self._checked(q, "q")):
+        for i, value in enumerate(self._check(q, "q")):
             p, R = p + R @ c.at[i], R @ c.turn[i]
             if c.slide[i]:
                 p = p + value * R[:, 2]
@@ -176,46 +178,46 @@ class SerialArm(Readable):
         """
         from palpate.robots.serial.inverse import inverse_kinematics
 
-        return inverse_kinematics(self, pose, self.home if near is None else self._checked(near, "near"))
+        return inverse_kinematics(self, pose, self.home if near is None else self._check(near, "near"))
 
     def jacobian(self, q: ArrayLike) -> Array:
         """J, velocity of the tip [m/s] above its turning [rad/s] by joint rates, shape (6, n)."""
-        return self._found(q).room.J
+        return self._state_at(q).room.J
 
     def jacobian_dot(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """dJ/dt, shape (6, n)."""
-        return self._found(q, qd).Jdot
+        return self._state_at(q, qd).Jdot
 
     def jacobian_dot_qd(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """dJ/dt qd: acceleration of the tip at rest of the joints' accelerations, shape (6,)."""
-        return self._found(q, qd).Jdqd
+        return self._state_at(q, qd).Jdqd
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q) [kg m^2], rotors included, shape (n, n)."""
-        return self._found(q).room.M
+        return self._state_at(q).room.M
 
     def bias_torque(self, q: ArrayLike, qd: ArrayLike) -> Array:
         """h(q, qd): centrifugal, Coriolis and gravity torque [N m], shape (n,)."""
-        return self._found(q, qd).room.h
+        return self._state_at(q, qd).room.h
 
     def gravity_torque(self, q: ArrayLike) -> Array:
         """Torque that holds the arm at rest [N m], shape (n,)."""
-        return self._found(q).room.h
+        return self._state_at(q).room.h
 
     def inverse_dynamics(
         self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, tip_wrench: ArrayLike | None = None
     ) -> Array:
         """Joint torques M qdd + h + J^T w [N m], shape (n,)."""
-        found = self._found(q, qd)
-        torque = found.room.M @ self._checked(qdd, "qdd") + found.room.h
+        found = self._state_at(q, qd)
+        torque = found.room.M @ self._check(qdd, "qdd") + found.room.h
         return torque if tip_wrench is None else torque + found.room.J.T @ _wrench(tip_wrench)
 
     def forward_dynamics(
         self, q: ArrayLike, qd: ArrayLike, torque: ArrayLike, tip_wrench: ArrayLike | None = None
     ) -> Array:
         """Joint accelerations, the qdd of torque = M qdd + h + J^T w, shape (n,)."""
-        found = self._found(q, qd)
-        push = self._checked(torque, "torque") - found.room.h
+        found = self._state_at(q, qd)
+        push = self._check(torque, "torque") - found.room.h
         if tip_wrench is not None:
             push = push - found.room.J.T @ _wrench(tip_wrench)
         return np.asarray(np.linalg.solve(found.room.M, push))
@@ -224,7 +226,7 @@ class SerialArm(Readable):
         """Of J, largest first, shape (min(6, n),): the last is 0 in a singular pose."""
         return np.asarray(np.linalg.svd(self.jacobian(q), compute_uv=False))
 
-    def _checked(self, values: ArrayLike, name: str) -> Array:
+    def _check(self, values: ArrayLike, name: str) -> Array:
         array = np.array(values, dtype=np.float64)
         if array.shape != (self.joints,) or not np.isfinite(array).all():
             raise InputError(
@@ -234,10 +236,10 @@ class SerialArm(Readable):
             )
         return array
 
-    def _found(self, q: ArrayLike, qd: ArrayLike | None = None) -> Found:
-        rates = np.zeros(self.joints) if qd is None else self._checked(qd, "qd")
-        found = found_for(self.joints)
-        compiled_description(self.chain, self._checked(q, "q"), rates, found)
+    def _state_at(self, q: ArrayLike, qd: ArrayLike | None = None) -> ArmState:
+        rates = np.zeros(self.joints) if qd is None else self._check(qd, "qd")
+        found = arm_state_for(self.joints)
+        compiled_description(self.chain, self._check(q, "q"), rates, found)
         return found
 
 
@@ -276,3 +278,63 @@ def _check_moves(arm: SerialArm) -> None:
             f"{arm.title}: the mass matrix at home is not positive definite (smallest eigenvalue {least:.3g}); a joint "
             "moves nothing: give its link a mass and an inertia, or the joint a rotor inertia"
         )
+
+
+def scene_of(arm: SerialArm) -> Scene:
+    """The model in which the arm stands; needs the extra `arms`.
+
+    Raises:
+        InputError: MuJoCo is not installed, or refuses the arm's numbers.
+    """
+    return arm.scene or _make_scene(arm)
+
+
+def _make_scene(arm: SerialArm) -> Scene:
+    with refusals(arm.title):
+        model, _ = compile_model(mujoco().MjSpec.from_string(mjcf(arm)))
+    n = np.arange(arm.joints)
+    return Scene(model, 0, int(model.site_bodyid[0]), n, n)
+
+
+def mjcf(arm: SerialArm) -> str:
+    """The arm as MJCF: no shapes, no motors, a site `tip`."""
+    root = ElementTree.Element("mujoco", model=arm.title)
+    ElementTree.SubElement(root, "compiler", angle="radian", autolimits="false")
+    ElementTree.SubElement(root, "option", gravity=_text(arm.chain.gravity))
+    body = ElementTree.SubElement(root, "worldbody")
+    for i, name in enumerate(arm.names):
+        body = _link(arm, i, name, body)
+    ElementTree.SubElement(
+        body, "site", name="tip", pos=_text(arm.chain.tip), quat=_text(_quaternion(arm.chain.tip_turn))
+    )
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _link(arm: SerialArm, i: int, name: str, parent: ElementTree.Element) -> ElementTree.Element:
+    c = arm.chain
+    body = ElementTree.SubElement(
+        parent, "body", name=f"link{i + 1}", pos=_text(c.at[i]), quat=_text(_quaternion(c.turn[i]))
+    )
+    kind = "slide" if c.slide[i] else "hinge"
+    ElementTree.SubElement(
+        body, "joint", name=name, type=kind, axis="0 0 1", armature=repr(float(c.rotor[i]))
+    )
+    moment = c.inertia[i]
+    ElementTree.SubElement(
+        body,
+        "inertial",
+        pos=_text(c.com[i]),
+        mass=repr(float(c.mass[i])),
+        fullinertia=_text(moment[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]),
+    )
+    return body
+
+
+def _quaternion(turn: Array) -> Array:
+    quat = np.zeros(4)
+    mujoco().mju_mat2Quat(quat, np.ascontiguousarray(turn).ravel())
+    return quat
+
+
+def _text(numbers: Any) -> str:
+    return " ".join(repr(float(v)) for v in numbers)

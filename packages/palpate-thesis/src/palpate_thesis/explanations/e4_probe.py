@@ -295,7 +295,7 @@ def _truths(
     def work(case: tuple[int, Press]) -> tuple[tuple[float, bool], float]:
         start, press = case
         probe, _ = network.learn(press, Choice(), start)
-        far = 2.0 * float(probe.learned[1, 0])
+        far = 2.0 * float(probe.range_learned[1, 0])
         at_far, at_probe = (probe.force((d, 0.0, 0.0)) / (switch + stiffness * d) for d in (far, x))
         return (at_far, bool(probe.probe(displacement=far).warnings)), at_probe
 

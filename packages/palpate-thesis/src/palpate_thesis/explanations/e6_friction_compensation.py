@@ -11,7 +11,7 @@ import numpy as np
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.following import SHARE
-from palpate.bench.metrics.summary import losses
+from palpate.bench.metrics.window import losses
 from palpate.bench.sequence import CONTACT, LOST
 from palpate.instruments import Encoder
 from palpate.records import Record

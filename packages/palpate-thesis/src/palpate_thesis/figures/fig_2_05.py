@@ -25,14 +25,7 @@ from palpate_thesis.conditions import (
 )
 from palpate_thesis.force_control.disturbances import Disturbance, other_surface, run_with
 from palpate_thesis.force_control.panels import dots_panel, force_panel, panels
-from palpate_thesis.force_control.tracking import (
-    FOLLOWS,
-    Tracking,
-    describe,
-    following,
-    slot,
-    tracking,
-)
+from palpate_thesis.force_control.tracking import FOLLOWS, Tracking, describe, following, slot, tracking
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 

@@ -12,7 +12,7 @@ from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics.following import SHARE
-from palpate.bench.metrics.summary import losses
+from palpate.bench.metrics.window import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import Claim, claim, often, texts

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment
-from palpate.identifiers.neural_settings import SETTINGS
+from palpate.identifiers.neural_probe import SETTINGS
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import Claim, Numbered

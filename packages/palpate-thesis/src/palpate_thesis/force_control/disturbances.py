@@ -10,8 +10,7 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, build
-from palpate.bench.ending import DIVERGED, DONE
-from palpate.bench.row import COLUMNS
+from palpate.bench.sequence import COLUMNS, DIVERGED, DONE
 from palpate.bench.tick import Loop, LoopState
 from palpate.environments import KelvinVoigt, join
 from palpate.records import Record

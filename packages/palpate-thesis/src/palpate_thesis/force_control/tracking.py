@@ -12,8 +12,7 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.metrics import Look
 from palpate.bench.metrics.following import LIMIT, SHARE, interval_error
-from palpate.bench.metrics.summary import losses
-from palpate.bench.metrics.window import SETTLE, rms
+from palpate.bench.metrics.window import SETTLE, losses, rms
 from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 from palpate_thesis.claims import often, spread

@@ -9,8 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, build
-from palpate.bench.row import COLUMNS
-from palpate.bench.sequence import CONTACT, LOST
+from palpate.bench.sequence import COLUMNS, CONTACT, LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
 

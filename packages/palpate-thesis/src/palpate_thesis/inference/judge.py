@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.studies.running.local import unordered
+from palpate.studies.run_one import map_unordered
 from palpate_thesis.inference.contradictions import Table
 from palpate_thesis.inference.sentences import Sentence, sentences, verdicts
 from palpate_thesis.inference.trial import Trial
@@ -106,7 +106,9 @@ def judge_laboratory(
 ) -> Judged:
     """Every sentence in a laboratory; `told` after each seed."""
     held = dict.fromkeys((s.id for s in sentences()), 0)
-    for found in unordered(lambda seed: verdicts(Trial(laboratory, seed, FINE), sentences()), seeds, threads):
+    for found in map_unordered(
+        lambda seed: verdicts(Trial(laboratory, seed, FINE), sentences()), seeds, threads
+    ):
         for sentence, holds in zip(sentences(), found, strict=True):
             held[sentence.id] += holds
         told()

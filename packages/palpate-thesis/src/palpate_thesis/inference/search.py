@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate._jit import sources_stamp
 from palpate.arrays import Array
-from palpate.studies.running.local import unordered
+from palpate.studies.run_one import map_unordered
 from palpate_thesis.inference import archive, sampler
 from palpate_thesis.inference.archive import Archive, Head, Tried
 from palpate_thesis.inference.sampler import Sample, Settings
@@ -25,7 +25,7 @@ from palpate_thesis.laboratory.laboratory import laboratory_at
 from palpate_thesis.laboratory.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
-    from palpate.studies.running.cluster import Cluster
+    from palpate.studies.cluster import Cluster
 
 Progress = Callable[[float, int, int], None]
 MOST_WRONG = 0.5
@@ -64,7 +64,7 @@ class Threads:
         """As they are done; who stops asking stops the runs that are under way."""
         stop = threading.Event()
         try:
-            yield from unordered(lambda job: attempt(job, ids, stop.is_set), jobs, self._threads)
+            yield from map_unordered(lambda job: attempt(job, ids, stop.is_set), jobs, self._threads)
         finally:
             stop.set()
 

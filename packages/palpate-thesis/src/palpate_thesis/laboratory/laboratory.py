@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from palpate.bench import Experiment, changed
-from palpate.bench.experiments.toml_files import TomlFiles
+from palpate.bench.toml_parts import TomlFiles
 from palpate.controllers.neural import NeuralController
 from palpate.environments import KelvinVoigtSurface
 from palpate.errors import InputError, unknown

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identifiers.neural_settings import SETTINGS
+from palpate.identifiers.neural_probe import SETTINGS
 from palpate_thesis.claims import ENOUGH, Claim, claim, spread
 from palpate_thesis.neural_identifier.network import GONE, Answer, Choice
 

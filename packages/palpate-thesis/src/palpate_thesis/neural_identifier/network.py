@@ -10,8 +10,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
-from palpate.identifiers.neural_probe import NeuralProbe
-from palpate.identifiers.neural_settings import SETTINGS
+from palpate.identifiers.neural_probe import SETTINGS, NeuralProbe
 from palpate.records import Record
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.runs import Runs

@@ -1,0 +1,317 @@
+"""From a log of free motion to a payload, or to the missing orientations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.arrays import Array, Mask
+from palpate.contact_frame.free_motion import BLOCKS, free_inertia
+from palpate.contact_frame.load import Payload
+from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, signals_of
+from palpate.contact_frame.vectors import FEWEST, Vector, read_rows
+from palpate.contact_frame.weighing import (
+    Estimated,
+    PoseFit,
+    Poses,
+    WeighingFit,
+    fit_centre,
+    fit_force,
+    groups_of,
+    poses_of,
+)
+from palpate.contact_frame.weighing_checks import noise_of, notes_against
+from palpate.errors import InputError
+from palpate.records import Record
+from palpate.results import Result
+
+_FEWEST = 3
+"""Orientations of three axes each: weight, bias and drift are nine numbers."""
+_UPRIGHT = 0.5**0.5
+"""Cosine of the angle to the vertical at which a base is as near to one on a wall as to one that stands or hangs."""
+_ROUNDS = 3
+"""After a round the residual of the tool's acceleration is the relative error of its mass: of ten per cent
+three rounds leave a thousandth."""
+_SMOOTH = 0.1
+"""Of the window by which an acceleration is read off the positions [s]: what is slower than some 6 Hz passes, and no
+arm turns its tool faster."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Weighed(Result, shown_by="palpate.report.payload.in_python"):
+    """A tool's payload, estimated from a log.
+
+    Args:
+        payload: None if the poses do not determine it.
+        parameters: by name, with intervals; those that are not told have an infinite one.
+        lacking: the undetermined parts and the motion to add, a sentence each.
+        notes: doubts about the log, as in a record's meta.
+        poses: how many orientations there are.
+        residual: root mean square of the model's residual, of an axis and the mean of an orientation [N].
+        shown: measured and modelled force of each orientation, in the tool's axes [N], shape (g, 2, 3).
+    """
+
+    payload: Payload | None
+    parameters: dict[str, Estimated]
+    lacking: list[str]
+    notes: list[dict[str, Any]]
+    poses: int
+    residual: float
+    shown: Array = field(repr=False)
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain JSON values."""
+        import msgspec
+
+        told = {
+            name: {
+                "value": one.value.tolist(),
+                "std": one.std.tolist(),
+                "ci95": [(one.value - one.half).tolist(), (one.value + one.half).tolist()],
+                "unit": one.unit,
+            }
+            for name, one in self.parameters.items()
+        }
+        return {
+            "payload": None if self.payload is None else msgspec.to_builtins(self.payload),
+            "parameters": told,
+            "lacking": self.lacking,
+            "warnings": self.notes,
+            "orientations": self.poses,
+            "residual_N": self.residual,
+        }
+
+
+def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weighed:
+    """Find a tool's mass and centre, and the sensor's bias and drift, by a log of free motion.
+
+    Args:
+        record: wrench and pose, as `palpate.logs.read_wrench_and_pose` gives them.
+        frame: how they stand to each other; its normal and its lever arm to the tip are not used.
+        tolerance: largest half-width of the mass' 95 % interval, as a share of its value.
+
+    Raises:
+        InputError: the record has no orientation, or too few readings.
+    """
+    signals = signals_of(record, replace(frame, tcp=(0.0, 0.0, 0.0)))
+    if not signals.turned:
+        raise InputError(
+            "a tool is weighed by turning it, and this pose has no orientation; log one with it (--pose, --rotation)"
+        )
+    there = read_rows(signals.force)
+    if there.sum() < FEWEST:
+        raise InputError(f"only {int(there.sum())} rows hold a force; at least {FEWEST} are needed")
+    still = signals
+    for _ in range(_ROUNDS):  # what the tool's own acceleration does is taken off as far as it is known
+        fit = _fit(still, there, tolerance)
+        parameters = fit.parameters | _inertia(signals, fit, frame)
+        still = _at_rest(signals, fit.fitted, parameters, frame)
+        if still is signals:
+            break
+    poses, fitted = fit.poses, fit.fitted
+    lacking = _lacking(poses, fitted, tolerance)
+    notes: list[dict[str, Any]] = []
+    if np.isfinite(fitted.left_out).all():
+        notes = notes_against(record, frame, signals, there, replace(fit, parameters=parameters))
+    return Weighed(
+        None if lacking else _payload(parameters, signals, frame, signals.force[there], poses.first),
+        parameters,
+        lacking,
+        notes,
+        len(poses.count),
+        float(np.sqrt(np.average((fit.means**2).mean(axis=1), weights=poses.count))),
+        np.stack([poses.signal, poses.signal - fit.means], axis=1),
+    )
+
+
+def _fit(signals: BaseSignals, there: Mask, tolerance: float) -> PoseFit:
+    time = signals.time[there] - signals.time[there].mean()
+    turns, force = signals.rotations[there], signals.force[there]
+    poses = poses_of(time, turns, force, groups_of(turns))
+    fitted = _fit_with_drift(poses, tolerance)
+    parameters = {"mass": fitted.mass, "weight": fitted.weight, "bias": fitted.bias}
+    if fitted.drift is not None:
+        parameters["drift"] = fitted.drift
+    if np.isfinite(fitted.whole).all():
+        parameters |= _centre(signals, there, time, poses, fitted)
+    left = force - _model_force(time, turns, fitted)
+    means = np.add.reduceat(left, poses.first, axis=0) / poses.count[:, None]
+    return PoseFit(poses, fitted, parameters, means)
+
+
+def _at_rest(
+    signals: BaseSignals, fitted: WeighingFit, parameters: dict[str, Estimated], frame: ContactFrame
+) -> BaseSignals:
+    """Force and torque without the tool's inertia; unchanged if it is not determined."""
+    from scipy.signal import savgol_filter
+
+    side, inertia = side_of(fitted.whole[:3]), parameters.get("inertia")
+    dt = float(np.median(np.diff(signals.time)))
+    if side is None or inertia is None or not abs(inertia.value) > inertia.half or not dt > 0.0:
+        return signals
+    rows = max(round(_SMOOTH / dt) | 1, 5)
+    place = _centre_of(signals, parameters, frame)
+    if len(place) < rows or not np.isfinite(place).all():
+        return signals
+    acceleration = savgol_filter(place, rows, 3, deriv=2, delta=dt, axis=0)
+    added = side * float(inertia.value) * np.einsum("nji,nj->ni", signals.rotations, acceleration)
+    torque = signals.torque
+    if torque is not None and "centre" in parameters:
+        torque = torque + np.cross(parameters["centre"].value, added)
+    return replace(signals, force=signals.force + added, torque=torque)
+
+
+def _centre_of(signals: BaseSignals, parameters: dict[str, Estimated], frame: ContactFrame) -> Array:
+    """Where the centre of mass is, in the base [m], shape (n, 3); the sensor if it is not determined."""
+    at = np.array(frame.wrench_at) + (parameters["centre"].value if "centre" in parameters else 0.0)
+    place: Array = signals.place + signals.rotations @ at
+    return place
+
+
+def _fit_with_drift(poses: Poses, tolerance: float) -> WeighingFit:
+    """With a drift if the poses determine it beside the weight, without one otherwise."""
+    if len(poses.count) < _FEWEST:
+        return fit_force(poses, drift=False)
+    with_drift, without = fit_force(poses, drift=True), fit_force(poses, drift=False)
+    return (
+        with_drift if _determines(with_drift, tolerance) or not _determines(without, tolerance) else without
+    )
+
+
+def _determines(fitted: WeighingFit, tolerance: float) -> bool:
+    mass = fitted.mass
+    return bool(np.isfinite(mass.half) and float(mass.half) <= max(tolerance * float(mass.value), 1e-3))
+
+
+def _model_force(time: Array, turns: Array, fitted: WeighingFit) -> Array:
+    whole = np.where(np.isfinite(fitted.whole), fitted.whole, 0.0)
+    force: Array = np.einsum("nji,j->ni", turns, whole[:3]) + whole[3:6]
+    return force + time[:, None] * whole[6:] if len(whole) > 6 else force
+
+
+def _lacking(poses: Poses, fitted: WeighingFit, tolerance: float) -> list[str]:
+    """The undetermined direction, and the motion to add."""
+    if _determines(fitted, tolerance) and poses.effective > 2.0:
+        return []
+    angles = np.degrees(np.sqrt(np.minimum(fitted.information, 1.0)))
+    listed = f"{len(poses.count)} orientations (worth {poses.effective:.2g} of one length)"
+    weak = [(angle, axis) for angle, axis in zip(angles, fitted.axes.T, strict=True) if angle < 15.0]
+    if len(weak) == 3:
+        text = (
+            f"{listed}: the tool hardly turns ({angles[-1]:.2g} deg at most), so its weight cannot be told from the"
+            " bias; rest in six orientations or more, 30 deg and more from each other, about two axes at least"
+        )
+        return [text]
+    if weak:
+        axis = weak[0][1]
+        across = fitted.axes[:, -1]
+        text = (
+            f"{listed}: the weight along {_list_axes(axis)} of the base cannot be told from the bias, because the tool"
+            f" turns it by {weak[0][0]:.2g} deg only; turn the tool by 30 deg and more about {_list_axes(across)} too"
+        )
+        return [text]
+    share = float(fitted.mass.half / fitted.mass.value) if np.isfinite(fitted.mass.half) else np.inf
+    wide = f"{share:.0%} of it" if np.isfinite(share) else "without bound"
+    text = (
+        f"{listed}: leaving one out moves the mass by too much (95 %: {wide}); add orientations, six or more of a"
+        " second each, and come back to the first at the end, which tells the drift"
+    )
+    return [text]
+
+
+def _centre(
+    signals: BaseSignals, there: Mask, time: Array, poses: Poses, fitted: WeighingFit
+) -> dict[str, Estimated]:
+    """Centre of mass and bias of the torque, if there is one."""
+    if (
+        signals.torque is None
+        or not read_rows(signals.torque[there]).all()
+        or not np.ptp(signals.torque[there])
+    ):
+        return {}
+    own = poses_of(time, signals.rotations[there], signals.torque[there], poses.first)
+    found = fit_centre(own, fitted.whole[:3], drift=fitted.drift is not None)
+    centre = found.jackknife(found.left_out[:, :3], found.whole[:3], "m")
+    if not np.isfinite(centre.half).all():
+        return {}
+    # The centre is c = torque over weight, so the weight's own share of error is the centre's too.
+    scale = float(fitted.mass.std / fitted.mass.value)
+    std = np.hypot(centre.std, scale * np.abs(centre.value))
+    half = np.hypot(centre.half, float(fitted.mass.half / fitted.mass.value) * np.abs(centre.value))
+    bias = found.jackknife(found.left_out[:, 3:6], found.whole[3:6], "N m")
+    return {"centre": Estimated(centre.value, std, half, "m"), "torque_bias": bias}
+
+
+def _inertia(signals: BaseSignals, fit: PoseFit, frame: ContactFrame) -> dict[str, Estimated]:
+    """The mass by which the force follows the acceleration, if the tool is shaken."""
+    from scipy.special import stdtrit
+
+    side = side_of(fit.fitted.whole[:3])
+    if side is None:
+        return {}
+    time = signals.time - signals.time[read_rows(signals.force)].mean()
+    left = signals.force - _model_force(time, signals.rotations, fit.fitted)
+    exerted = side * np.einsum("nij,nj->ni", signals.rotations, left)
+    place = _centre_of(signals, fit.parameters, frame)
+    found = free_inertia(signals.time, exerted, place, np.ones(len(time), bool))
+    if found is None:
+        return {}
+    value, std = found
+    return {
+        "inertia": Estimated(
+            np.array(value), np.array(std), np.array(float(stdtrit(BLOCKS - 1, 0.975)) * std), "kg"
+        )
+    }
+
+
+def side_of(weight: Array) -> float | None:
+    """1 where a sensor shows what the tool exerts on it, so that its weight points down; -1 for the opposite.
+
+    None where the weight lies across the base's z: the base may hang on a wall.
+    """
+    size = float(np.linalg.norm(weight))
+    if not (0.0 < size < np.inf) or abs(weight[2]) < _UPRIGHT * size:
+        return None
+    return 1.0 if weight[2] < 0 else -1.0
+
+
+def _payload(
+    parameters: dict[str, Estimated],
+    signals: BaseSignals,
+    frame: ContactFrame,
+    force: Array,
+    first: NDArray[np.intp],
+) -> Payload:
+    def vector(name: str) -> Vector | None:
+        return _three(parameters[name].value) if name in parameters else None
+
+    def worst(name: str) -> float:
+        return float(parameters[name].std.max())
+
+    return Payload(
+        mass=float(parameters["mass"].value),
+        mass_std=float(parameters["mass"].std),
+        weight=_three(parameters["weight"].value),
+        weight_std=worst("weight"),
+        bias=_three(parameters["bias"].value),
+        bias_std=worst("bias"),
+        noise=noise_of(force, first),
+        wrench_frame=signals.wrench_frame,
+        sensor_rpy=frame.sensor_rpy,
+        drift=vector("drift"),
+        centre=vector("centre"),
+        centre_std=worst("centre") if "centre" in parameters else None,
+        inertia=float(parameters["inertia"].value) if "inertia" in parameters else None,
+        inertia_std=float(parameters["inertia"].std) if "inertia" in parameters else None,
+    )
+
+
+def _three(values: Array) -> Vector:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def _list_axes(vector: Array) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.2g}" for value in np.round(vector, 2)) + ")"

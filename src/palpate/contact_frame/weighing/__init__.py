@@ -1,1 +1,0 @@
-"""A tool weighed by a log of free motion."""

@@ -1,0 +1,162 @@
+"""Sampled signals: slowly refreshed channels, unbroken runs, rounding, quaternions, detrending and spectra.
+
+`scipy.signal` has the last ones too, but its import takes longer than the identification of a log; so `scipy.fft`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate._jit import law
+from palpate.arrays import Array, Mask
+
+_LONG_JUMP = 4.0
+"""Times the sensor's own resolution from which a step is a jump."""
+_HELD_SHARE = 0.3
+"""Pairs of jumps between which a reading may move all the same."""
+
+
+def fresh_rows(values: Array) -> Mask | None:
+    """Rows in which a channel, shape (n,), was refreshed; None if every row is.
+
+    A value that repeats is no proof: a coarse or resting sensor repeats too. Held samples show in jumps that are many
+    times the sensor's own resolution with exact repetitions right between them.
+    """
+    step = np.diff(values)
+    moved = step != 0
+    if moved.all() or moved.sum() < 10:
+        return None
+    sizes = np.abs(step[moved])
+    resolution = float(np.percentile(sizes, 2))
+    jumps = np.flatnonzero(np.abs(step) > max(_LONG_JUMP * resolution, float(np.median(sizes)) * 0.5))
+    if len(jumps) < 10:
+        return None
+    apart = np.diff(jumps)
+    usual = float(np.median(apart))
+    if usual < 2 or not _quiet_between(moved, jumps, usual):
+        return None
+    fresh = np.r_[True, moved]
+    return _refill(fresh, round(usual))
+
+
+def _quiet_between(moved: Mask, jumps: NDArray[np.intp], usual: float) -> bool:
+    """Whether nothing at all moves between neighbouring jumps."""
+    total = np.r_[0, np.cumsum(moved)]
+    near = np.flatnonzero(np.diff(jumps) <= 2 * usual)
+    if len(near) < 8:
+        return False
+    begin, end = jumps[near] + 1, jumps[near + 1]
+    still = (total[end] - total[begin]) == 0
+    return bool(still.mean() > 1 - _HELD_SHARE)
+
+
+def _refill(fresh: Mask, every: int) -> Mask:
+    """Count a long stretch without change as fresh once per period: the channel may simply rest."""
+    fresh = fresh.copy()
+    marks = np.flatnonzero(fresh)
+    for begin, end in zip(marks, np.r_[marks[1:], len(fresh)], strict=True):
+        if end - begin >= 2 * every:
+            fresh[begin:end:every] = True
+    return fresh
+
+
+def runs(inside: Mask) -> list[tuple[int, int]]:
+    """First and past-the-last sample of each unbroken run within, in their order.
+
+    Args:
+        inside: shape (n,).
+    """
+    edges = np.diff(np.r_[0, np.asarray(inside).astype(np.int8), 0])
+    return list(zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True))
+
+
+# Adding this to a double leaves no bits below one: the sum is rounded to a whole number, ties to even. It
+# works on numbers, vectors and arrays alike, up to 2^51 steps.
+_WHOLE = 1.5 * 2.0**52
+
+
+@law
+def whole(u):
+    """u to the nearest whole number."""
+    return u + _WHOLE - _WHOLE
+
+
+@law
+def quantise(u, step):
+    """u to the nearest multiple of step (mid-tread: zero is a level)."""
+    return whole(u / step) * step
+
+
+def continuous(quaternions: Array) -> Array:
+    """Quaternions, shape (n, 4), each with the sign that is nearer to the one before.
+
+    q and -q are the same rotation, and drivers change between them at will; what lies between them is none.
+    """
+    together = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
+    signs = np.cumprod(np.r_[1.0, np.where(together < 0, -1.0, 1.0)])
+    steady: Array = quaternions * signs[:, None]
+    return steady
+
+
+_SHORT = 256
+"""Taps below which a direct convolution is the faster one."""
+
+
+def detrend(values: Array) -> Array:
+    """Values less their straight line of least squares, shape (n,)."""
+    u = np.arange(len(values)) - (len(values) - 1) / 2
+    mean = float(np.mean(values))
+    return values - mean - u * float(u @ values) / max(float(u @ u), 1.0)
+
+
+def convolve(signal: Array, taps: Array) -> Array:
+    """The full convolution, shape (n + m - 1,)."""
+    if len(taps) <= _SHORT:
+        return np.convolve(signal, taps)
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    count = len(signal) + len(taps) - 1
+    size = next_fast_len(count, real=True)
+    found: Array = irfft(rfft(signal, size) * rfft(taps, size), size)[:count]
+    return found
+
+
+def quadrature(values: Array) -> Array:
+    """Values a quarter of a period later at every frequency (Hilbert transform), zeros beyond the ends, shape (n,)."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    size = next_fast_len(2 * len(values))
+    lines = -1j * rfft(values, size)
+    lines[0] = 0.0
+    if size % 2 == 0:
+        lines[-1] = 0.0
+    found: Array = irfft(lines, size)[: len(values)]
+    return found
+
+
+def periodogram(values: Array, taper: float) -> tuple[Array, Array]:
+    """Frequency [1/sample] and one-sided power density [1/(1/sample)] of a signal less its mean, shape (l,) each.
+
+    Args:
+        values: shape (n,).
+        taper: share of the signal in the cosine ends of the window (Tukey, 1967).
+    """
+    from scipy.fft import next_fast_len, rfft
+
+    n = len(values)
+    window = _tukey(n + 1, taper)[:n]  # of one period
+    size = next_fast_len(n, real=True)
+    power = np.abs(rfft((values - values.mean()) * window, size)) ** 2 / float(window @ window)
+    power[1 : len(power) - (size % 2 == 0)] *= 2
+    return np.arange(len(power)) / size, power
+
+
+def _tukey(n: int, taper: float) -> Array:
+    """A window whose ends rise as half a cosine."""
+    width = int(taper * (n - 1) / 2)
+    window = np.ones(n)
+    rise = 0.5 * (1 - np.cos(2 * np.pi * np.arange(width + 1) / (taper * (n - 1))))
+    window[: width + 1] = rise
+    window[n - width - 1 :] = rise[::-1]
+    return window

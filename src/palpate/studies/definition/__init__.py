@@ -1,1 +1,0 @@
-"""Definition of a study: its file, its parameters, and the plan of its runs."""

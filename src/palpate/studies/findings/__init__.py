@@ -1,1 +1,0 @@
-"""Findings of a study: its best settings, its comparisons, its figures and its page."""
