@@ -25,7 +25,7 @@ def test_examples_are_numbered_without_gaps():
         assert re.fullmatch(rf"{number:02d}_[a-z0-9_]+\.py", path.name), path.name
 
 
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1900)
 @pytest.mark.parametrize(
     "path",
     [pytest.param(p, marks=() if p.stem[:2] in SHORT else pytest.mark.long, id=p.stem) for p in EXAMPLES],
@@ -42,7 +42,7 @@ def test_the_example_runs(path, tmp_path):
             env={**os.environ, "MPLBACKEND": "Agg"},
             capture_output=True,
             text=True,
-            timeout=280,
+            timeout=600,
             check=False,
         )
         late = LATE.search(ran.stdout + ran.stderr)
