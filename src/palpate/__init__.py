@@ -17,6 +17,7 @@ The rooms, each `palpate.ROOM`:
     identifiers     the same on line, sample by sample: RecursiveLeastSquares, ContactIdentifier, ...
     logs            files in and out: text, Parquet, MATLAB, ROS bags, MCAP
     contact_frame   an arm's wrench and pose along the contact's normal; weighing a tool
+    maps            a surface's stiffness from presses at places, and where to press next
     excitation      design of a desired force that identifies a surface
     force           a force loop for any arm: tune, certify, ForceLoop
     wires           force loops on real arms: UR, Franka, ROS 2
@@ -72,6 +73,7 @@ _ROOMS = (
     "identifiers",
     "instruments",
     "logs",
+    "maps",
     "press",
     "report",
     "robots",

@@ -215,7 +215,9 @@ def test_help_tells_the_rooms_and_the_first_lines(root, tmp_path, monkeypatch, c
     exec("\n".join(first), {})
     assert capsys.readouterr().out == "<Parameter: 5242 ± 63 N/m, identified>\n"
     rooms = re.findall(r"^    ([a-z_]+)  +\S", told, re.MULTILINE)
-    assert sorted(rooms) == [name for name in dir(palpate) if (root / "src" / "palpate" / name).is_dir()]
+    package = root / "src" / "palpate"
+    assert sorted(rooms) == [name for name in dir(palpate) if name not in palpate.__all__ and name[0] != "_"]
+    assert all((package / name).is_dir() or (package / f"{name}.py").is_file() for name in rooms)
 
 
 def test_an_unknown_name_is_told():

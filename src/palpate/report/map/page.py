@@ -245,8 +245,8 @@ def draw_interval(result: MapResult) -> Figure:
         figure.colorbar(image, ax=axis, location="top", shrink=0.7, label="half-width, 95 % [%]")
         coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
         for k, (x, y) in enumerate(coordinates):
-            box = {"boxstyle": "circle,pad=0.25", "fc": "white", "ec": style.INK, "lw": 0.9}
-            axis.text(x, y, str(k + 1), ha="center", va="center", fontsize=8, bbox=box, color="#14171a")
+            box = {"boxstyle": "circle,pad=0.25", "fc": style.CARD, "ec": style.INK, "lw": 0.9}
+            axis.text(x, y, str(k + 1), ha="center", va="center", fontsize=8, bbox=box, color=style.INK)
         _square(axis, result)
     return figure
 
