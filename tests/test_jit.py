@@ -125,6 +125,16 @@ def test_a_user_kernel_depends_on_what_is_registered_outside_and_on_what_that_im
     assert stamp_with(own_parts.__name__) != known
 
 
+def test_a_kernel_of_files_that_changed_since_they_were_imported_is_not_kept(monkeypatch):
+    """Its code in memory is the old one, and its files are new: an upgrade under a running process."""
+    monkeypatch.setattr(stamp, "parts", {})
+    monkeypatch.setattr(stamp, "foreign_laws", [])
+    monkeypatch.setattr(stamp, "foreign_files", set())
+    assert stamp_of(adding.plain, ()) is not None
+    monkeypatch.setattr(stamp, "STARTED", 0.0)
+    assert stamp_of(adding.plain, ()) is None
+
+
 CALLEE = """
 from palpate._jit import law
 

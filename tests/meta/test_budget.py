@@ -33,9 +33,9 @@ TWICE = frozenset(
         "Claim", "Command", "Compensation", "Course", "Curve", "Data", "Entry", "FirstSeconds", "Fit",
         "ForceLoop", "ForceSensor", "Found", "Head", "Identification", "Inside", "Kernel", "Limits", "Line",
         "Look", "Margins", "OneDirection", "Outcome", "OutputOptions", "Pair", "Parameter", "Part", "Payload",
-        "Plan", "Prediction", "Press", "Pressed", "Problem", "Raw", "Result", "Robot", "Search", "Seen",
+        "Plan", "Prediction", "Press", "Pressed", "Problem", "Raw", "Result", "Robot", "Search",
         "Sense", "Server", "Setting", "Simulation", "Spectrum", "Stage", "State", "Step", "Study", "Surface",
-        "SurfaceOptions", "Table", "Task", "Touch", "Verdict", "Wire", "World", "Written", "_Asked", 
+        "SurfaceOptions", "Table", "Task", "Touch", "Verdict", "Wire", "World", "Written", "_Asked",
         "_Rows",
     }
 )  # fmt: skip

@@ -4,12 +4,15 @@ import functools
 import hashlib
 import re
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from palpate._jit.registry import PACKAGE, foreign_files, foreign_laws, parts
 
+STARTED = time.time()
+"""When this process imported the package; a file that changed later is not the one whose code runs here [s]."""
 _IMPORT = re.compile(r"^\s*(?:from|import) (palpate[\w.]*)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE)
 
 
@@ -18,6 +21,14 @@ def sources_stamp(*files: Path) -> str:
 
     A kernel is stale when any file that it may call has changed, which Numba, left alone, does not see.
     """
+    digest = hashlib.sha256()
+    for file, source in sorted(_sources(files).items()):
+        digest.update(str(file).encode() + b"\0" + source)
+    return digest.hexdigest()
+
+
+def _sources(files: Iterable[Path]) -> dict[Path, bytes]:
+    """The text of these files and of all that they import, by their places."""
     reached: dict[Path, bytes] = {}
     waiting = [f.resolve() for f in files]
     while waiting:
@@ -26,10 +37,7 @@ def sources_stamp(*files: Path) -> str:
             reached[file] = file.read_bytes()
             text = reached[file].decode("utf-8", "replace")
             waiting.extend(p for root in {PACKAGE.parent, _root_of(file)} for p in _imported(text, root))
-    digest = hashlib.sha256()
-    for file in sorted(reached):
-        digest.update(str(file).encode() + b"\0" + reached[file])
-    return digest.hexdigest()
+    return reached
 
 
 def _root_of(file: Path) -> Path:
@@ -55,7 +63,8 @@ def stamp_of(function: Callable[..., Any], types_of_arguments: tuple[Any, ...]) 
     A kernel of the package that is given only the package's parts depends on its own file, theirs, and what those
     import. With something of the user's among them it may call any law and part registered from outside. Without a
     file there is nothing to ask; and a class of a script is another class the next time that the script runs. The
-    package's own files count where those import them, whatever else this process has imported so far.
+    package's own files count where those import them, whatever else this process has imported so far. After an upgrade
+    under a running process the old code in its memory would be kept as that of the new files: it keeps none.
     """
     classes = set(parts_among(types_of_arguments))
     if any(cls.__module__ == "__main__" for cls in classes):
@@ -66,7 +75,10 @@ def stamp_of(function: Callable[..., Any], types_of_arguments: tuple[Any, ...]) 
         things |= {x for x in (*foreign_laws, *parts) if _foreign(x)}
         beside = foreign_files
     files = {home_of(x) for x in things} | beside
-    return sources_stamp(*files) if all(f.is_file() for f in files) else None
+    if not all(f.is_file() for f in files):
+        return None
+    own = (f for f in _sources(files) if PACKAGE in f.parents)
+    return None if any(f.stat().st_ctime > STARTED for f in own) else sources_stamp(*files)
 
 
 def _foreign(thing: Any) -> bool:
