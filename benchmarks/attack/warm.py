@@ -87,9 +87,8 @@ class Warm:
 
     def close(self) -> None:
         """End the process."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._process.wait()
+        with self._process:  # closes both pipes, at which the process ends, and waits for it
+            pass
 
 
 def _serve(said: Path) -> None:

@@ -377,7 +377,7 @@ def test_a_tuned_loop_is_certified_for_the_inner_loop_that_a_log_shows(capsys, e
     words = ("certify", "gains.toml", "--held-only", "--loop-from", "loop.csv", *LOOP)
     assert main([*words, "--out", "proof.json"]) == 0
     assert main(["certify", "gains.toml", "--check", "proof.json"]) == 0
-    assert "with loss of contact" in capsys.readouterr().out
+    assert "over gaps of up to" in capsys.readouterr().out  # contact may be lost in between
 
 
 @pytest.mark.parametrize(

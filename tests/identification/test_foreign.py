@@ -201,4 +201,4 @@ def test_no_answer_is_wrong_on_these_logs_again(cell):
     found = score(Cell(*cell.split("/")), 906)
     assert found.outcome == "answered"
     assert found.working
-    assert [answer.name for answer in found.answers if not answer.holds] == []
+    assert [answer.name for answer in found.answers if answer.wrong] == []

@@ -135,9 +135,11 @@ def _slope_in(dense: Dense, force: Array, edges: NDArray[np.intp], low: float, h
     deepest = float(np.ptp(dense.depth[dense.contact])) if dense.contact.any() else 0.0
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         x, f = dense.depth[begin:end], force[begin:end]
+        if np.ptp(x) < 0.5 * deepest:
+            continue
         top = int(np.argmax(f >= high * f.max())) + 1
         x, f = x[:top], f[:top]
-        if len(x) < 5 or np.ptp(x) < 0.5 * deepest:
+        if len(x) < 5:
             continue
         below = np.flatnonzero(f < low / high * f.max())
         first = int(below[-1]) + 1 if len(below) else 0

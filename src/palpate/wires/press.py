@@ -105,7 +105,8 @@ class _Press:
     def _retreat(self) -> None:
         """Go back from the surface."""
         back = self._depth - self._order.task.retreat
-        speed = min(self._order.limits.speed, 10.0 * self._loop.gains.approach)
+        # At half the limit: a pose that a network delays shows the way of two or three ticks as that of one.
+        speed = min(0.5 * self._order.limits.speed, 10.0 * self._loop.gains.approach)
         while self._order.task.retreat and self._depth > back:
             self._move(self._read(), -speed)
 
