@@ -64,7 +64,7 @@ def test_the_next_press_takes_most_off_what_is_asked():
     after = [
         weights @ np.diag(covariance - np.outer(c, c) / (c[k] + noise)) for k, c in enumerate(covariance.T)
     ]
-    (best,), left = choose(covariance, weights, noise, 1)
+    best, left = next(choose(covariance, weights, noise))
     assert best == np.argmin(after)
     assert weights @ left == pytest.approx(min(after))
 

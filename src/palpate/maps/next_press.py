@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -61,30 +62,29 @@ def importance(goal: Goal, mean: Array, variance: Array, threshold: float | None
 
 
 def choose(
-    covariance: Array, weights: Array, noise: float, count: int, cost: Array | None = None
-) -> tuple[list[int], Array]:
+    covariance: Array, weights: Array, noise: float, cost: Array | None = None
+) -> Iterator[tuple[int, Array]]:
     """Choose places one after the other, each by what it takes off the weighted variance given those before.
 
     Args:
         covariance: of the field at the candidates (m, m).
         weights: of the candidates' variances (m,).
         noise: variance of one press.
-        count: places to choose.
         cost: of going from a candidate to another (m, m), relative to that of a press; the last row is from where the
             robot stands.
 
-    Returns:
-        The chosen candidates, and the variance at each candidate after all presses (m,).
+    Yields:
+        The next candidate, and the variance at each candidate after a press there (m,).
     """
-    left, chosen = covariance.copy(), list[int]()
-    for _ in range(count):
+    left, last = covariance.copy(), -1
+    while True:
         gain = weights @ (left * left) / (np.diag(left) + noise)
         if cost is not None:
-            gain = gain / (1.0 + cost[chosen[-1] if chosen else -1])
-        chosen.append(int(np.argmax(gain)))
-        column = left[:, chosen[-1]].copy()
-        left -= np.outer(column, column) / (column[chosen[-1]] + noise)
-    return chosen, np.maximum(np.diag(left), 0.0)
+            gain = gain / (1.0 + cost[last])
+        last = int(np.argmax(gain))
+        column = left[:, last].copy()
+        left -= np.outer(column, column) / (column[last] + noise)
+        yield last, np.maximum(np.diag(left), 0.0)
 
 
 def travel(candidates: Array, start: Array | None, speed: float) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, islice, pairwise
 from typing import Any
 
 import numpy as np
@@ -181,7 +181,8 @@ class StiffnessMap:
         weights = importance(goal, mean, variance, None if stiffer_than is None else np.log(stiffer_than))
         cost = None if np.isinf(way) else travel(among, None if start is None else np.asarray(start), way)
         covariance = self.process.likeliest.covariance(among)
-        chosen, left = choose(covariance, weights, self._noise, count, cost)
+        steps = list(islice(choose(covariance, weights, self._noise, cost), count))
+        chosen, left = [place for place, _ in steps], steps[-1][1]
         std = np.sqrt(
             left[chosen] + np.maximum(variance - np.diag(covariance), 0.0)[chosen] + self._common**2
         )
@@ -200,15 +201,10 @@ class StiffnessMap:
             raise InputError(f"the half-width must be above 0, got {half:g}")
         asked = (np.log1p(half) / Z95) ** 2 - self._common**2
         covariance, noise = self.process.likeliest.covariance(self._candidates()), self._noise
-        weights = np.ones(len(covariance))
-        for pressed in range(MOST_PRESSES + 1):
-            if np.quantile(np.diag(covariance), 0.95) <= asked:
-                return pressed
-            gain = weights @ (covariance * covariance) / (np.diag(covariance) + noise)
-            best = int(np.argmax(gain))
-            column = covariance[:, best].copy()
-            covariance -= np.outer(column, column) / (column[best] + noise)
-        return None
+        presses = choose(covariance, np.ones(len(covariance)), noise)
+        variances = chain([np.diag(covariance)], (variance for _, variance in presses))
+        reached = (np.quantile(variance, 0.95) <= asked for variance in islice(variances, MOST_PRESSES + 1))
+        return next((count for count, enough in enumerate(reached) if enough), None)
 
     def disagreeing(self) -> list[int]:
         """Presses that their neighbours contradict: of such a deviation n presses have one in 20 maps by chance."""
