@@ -2,7 +2,8 @@
 
     python benchmarks/force/figures.py [--only NAME ...] [--pages-only] [--out docs/force-figures.md]
 
-Each study's output is kept under runs/figures by the law's name, so that a run that was stopped goes on with the next.
+Each study's output is kept under runs/figures by the law's name, so that a run that was stopped goes on with the next;
+what the page has of this form of the law is not made again.
 """
 
 from __future__ import annotations
@@ -51,11 +52,24 @@ def main() -> None:
     parser.add_argument("--pages-only", action="store_true")
     parser.add_argument("--out", type=Path, default=Path("docs/force-figures.md"))
     told = parser.parse_args()
+    recall(told.out)
     missing = [name for name in told.only if not kept(name).exists()]
     for name in track([] if told.pages_only else missing, "figures", transient=True):
         make(name)
     sections = [section(name) for name in FIGURES if kept(name).exists()]
     told.out.write_text("\n\n".join([ABOUT.format(law=LAW), *sections]) + "\n", encoding="utf-8")
+
+
+def recall(page: Path) -> None:
+    """Keeps the outputs that a page has of this form of the law and of the same command."""
+    text = page.read_text(encoding="utf-8") if page.exists() else ""
+    if f"Of `{LAW}`." not in text:
+        return
+    for name, command in FIGURES.items():
+        _, found, rest = text.partition(f"## {name}\n\n`python benchmarks/force/{command}`\n\n```text\n")
+        if found and not kept(name).exists():
+            kept(name).parent.mkdir(parents=True, exist_ok=True)
+            kept(name).write_text(rest.partition("\n```")[0], encoding="utf-8")
 
 
 def kept(name: str) -> Path:
