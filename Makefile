@@ -5,6 +5,7 @@
 BIN := .venv/bin
 OUT := runs/foam-hybrid
 THESIS := packages/palpate-thesis
+REFERENCES := packages/palpate-references
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PIP_INSTALL := $(PIP) install --only-binary :all: --no-warn-script-location
 # Bytecode is kept whatever the environment says: tests start many processes, which would compile the sources each.
@@ -115,9 +116,9 @@ clean: ## remove the environment and everything that is made
 	$(PYTHON) -m venv --clear .venv
 	@touch $@
 
-.venv/run.stamp: requirements/run.txt pyproject.toml $(THESIS)/pyproject.toml .venv/python.stamp
+.venv/run.stamp: requirements/run.txt pyproject.toml $(THESIS)/pyproject.toml $(REFERENCES)/pyproject.toml .venv/python.stamp
 	$(PIP_INSTALL) --require-hashes -r requirements/run.txt
-	$(PIP) install --no-deps --no-build-isolation --editable . --editable $(THESIS)
+	$(PIP) install --no-deps --no-build-isolation --editable . --editable $(THESIS) --editable $(REFERENCES)
 	@touch $@
 
 .venv/dev.stamp: requirements/dev.txt .venv/run.stamp

@@ -42,9 +42,10 @@ CASES = {
     "run": ["run mine.toml --seed 3 --out ran"],
     "study": ["study small.toml --out studied"],
     "checks": ["checks my_parts:Push"],
+    "references": ["references check"],
     "speed": ["speed"],
 }
-LONG = {"certify", "checks", "press", "run", "speed", "study", "tune"}
+LONG = {"certify", "checks", "press", "references", "run", "speed", "study", "tune"}
 
 
 @pytest.fixture(scope="module")

@@ -22,6 +22,7 @@ ROOM = 1.01
 LARGEST = {
     "src/palpate": Weight(files=490, lines=73230, tokens=488153),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=67, lines=10575, tokens=80801),
+    "packages/palpate-references/src/palpate_references": Weight(files=6, lines=762, tokens=6205),
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""

@@ -18,6 +18,7 @@ PAGES = [
     "README.md",
     "CONTRIBUTING.md",
     "packages/palpate-thesis/README.md",
+    "packages/palpate-references/README.md",
     *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")),
 ]
 TYPED = ("README.md", "docs/tutorial.md")

@@ -48,12 +48,12 @@ GROUPS = {
     Group("From a log", sort_key=1): ("identify", "topics", "payload", "excite", "map"),
     Group("Force loop", sort_key=2): ("tune", "certify", "press"),
     Group("Simulate", sort_key=3): ("run", "live", "study", "export", "checks"),
-    Group("Thesis", sort_key=4): ("thesis", "laboratory"),
+    Group("Thesis and references", sort_key=4): ("thesis", "laboratory", "references"),
 }
 """Commands by what a user begins with."""
 _PROGRAM = Group("The program itself", sort_key=5)
 # Commands of other distributions, by the distribution that has them.
-COMPANIONS = {"thesis": "palpate-thesis", "laboratory": "palpate-thesis"}
+COMPANIONS = {"thesis": "palpate-thesis", "laboratory": "palpate-thesis", "references": "palpate-references"}
 ENTRY_POINTS = "palpate.commands"
 """The group of entry points by which a distribution adds a command: its name, and module:function."""
 

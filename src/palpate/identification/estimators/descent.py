@@ -18,6 +18,8 @@ _ROUNDS = 30
 _CONVERGED = 1e-6
 _ROUNDING = 1e-9
 """Steps at most; relative gains of the cost below which the search ends, and which are rounding."""
+_UNDAMPED = 1e-9
+"""Damping from which a step is whole in every direction: a damped one gains little where parameters are confounded."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +100,8 @@ class Descent:
             trial = self.at(*_moved(point, outer, step[len(point.theta) :]))
             gain = 1 - trial.cost / point.cost if point.cost else 0.0
             if gain > -_ROUNDING:
-                point, damping = (trial if gain > 0 else point), max(damping / 10, 1e-9)
-                if gain < _CONVERGED:
+                point, damping = (trial if gain > 0 else point), max(damping / 10, _UNDAMPED)
+                if gain < _CONVERGED and damping <= _UNDAMPED:
                     break
             else:
                 damping *= 10
@@ -138,9 +140,9 @@ class Descent:
                 continue
             value = point.nonlinear[parameter.name]
             step = parameter.step * value if parameter.logarithmic else parameter.step
-            beside = {**point.nonlinear, parameter.name: value + step}
-            moved = np.column_stack(self.model.columns(self.motion, beside, point.lag))
-            found.append((moved - point.columns) @ point.theta / parameter.step)
+            beside = ({**point.nonlinear, parameter.name: at} for at in (value + step, value - step))
+            up, down = (np.column_stack(self.model.columns(self.motion, b, point.lag)) for b in beside)
+            found.append((up - down) @ point.theta / (2 * parameter.step))
         return np.column_stack(found)
 
 

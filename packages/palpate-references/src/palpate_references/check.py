@@ -1,0 +1,189 @@
+"""Checks solvers against the certified logs: the digits in which each parameter and its deviation agree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import inf, log10
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.identification.estimators.descent import Descent
+from palpate.identification.least_squares import solve
+from palpate.identification.models import Model, NonlinearParameter
+from palpate_references.models import FLOATS
+from palpate_references.problem import Problem, motion_and_force
+
+MOST = 11.0
+"""Certified digits."""
+ENOUGH = 8.0
+"""Digits that a solver of double precision is asked for, as by NIST's StRD for easy problems."""
+_ROUNDS = 40
+_STEP = 1e-5
+"""Of a nonlinear parameter, over its value, for its derivative."""
+
+
+class SolverResult(NamedTuple):
+    """Parameters by name, and their standard deviations; none of a solver that gives none."""
+
+    values: dict[str, float]
+    std: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Digits of one solver on one log from one start.
+
+    Args:
+        problem: which log.
+        solver: which.
+        start: 0 or 1.
+        digits: log relative error of the worst parameter, from 0 to 11.
+        digits_std: that of the worst standard deviation; None of a solver that gives none.
+    """
+
+    problem: Problem
+    solver: str
+    start: int
+    digits: float
+    digits_std: float | None
+
+
+def digits_of(value: float, certified: float) -> float:
+    """Log relative error -log10(|value - certified|/|certified|), between 0 and 11 (McCullough, 1998)."""
+    if not np.isfinite(value):
+        return 0.0
+    error = abs(value - certified) / abs(certified)
+    return min(max(-log10(error) if error > 0.0 else inf, 0.0), MOST)
+
+
+def palpate_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
+    """The search of `palpate identify`, without its filters and its priors, until the sum of squares stands."""
+    path, force = motion_and_force(problem)
+    law = problem.law
+
+    def columns(_motion: Any, nonlinear: dict[str, float], _lag: float) -> list[Array]:
+        return law.columns(path, {name.strip(): value for name, value in nonlinear.items()}, FLOATS)
+
+    # A blank before each name: the search has a meaning of its own for `lag`.
+    outer = tuple(
+        NonlinearParameter(f" {name}", (value,), *_range(problem, name), _STEP * _size(problem, name))
+        for name, value in start.items()
+    )
+    search = Descent(Model(problem.model, law.linear, columns, outer), None, force)  # type: ignore[arg-type]
+    point = search.at({f" {name}": value for name, value in start.items()}, 0.0)
+    for _ in range(_ROUNDS):
+        before, point = point, search.from_point(point, None)
+        if before.nonlinear == point.nonlinear:
+            break
+    found = {name.strip(): value for name, value in point.nonlinear.items()}
+    values = dict(zip(law.linear, point.theta.tolist(), strict=True)) | found
+    return SolverResult(values, _deviations(problem, values))
+
+
+def scipy_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
+    """`scipy.optimize.least_squares`, method "lm", tolerances of 1e-15, all parameters at once."""
+    from scipy.optimize import least_squares
+
+    path, force = motion_and_force(problem)
+    law, names = problem.law, [*problem.law.linear, *problem.law.nonlinear]
+    theta = solve(np.column_stack(law.columns(path, start, FLOATS)), force)
+    first = np.array([*theta, *start.values()])
+
+    def residual(p: Array) -> Array:
+        at = dict(zip(names, p.tolist(), strict=True))
+        parts = zip(law.linear, law.columns(path, at, FLOATS), strict=True)
+        return sum((at[k] * c for k, c in parts), -force)
+
+    with np.errstate(all="ignore"):  # a step out of the model's domain has no digits
+        done = least_squares(residual, first, method="lm", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        values = dict(zip(names, done.x.tolist(), strict=True))
+        return SolverResult(values, _deviations(problem, values))
+
+
+def lstsq_solver(problem: Problem, start: dict[str, float]) -> SolverResult | None:
+    """`numpy.linalg.lstsq`; None of a model that is not linear."""
+    if start:
+        return None
+    path, force = motion_and_force(problem)
+    law = problem.law
+    theta = np.linalg.lstsq(np.column_stack(law.columns(path, {}, FLOATS)), force, rcond=None)[0]
+    values = dict(zip(law.linear, theta.tolist(), strict=True))
+    return SolverResult(values, _deviations(problem, values))
+
+
+def recursive_solver(problem: Problem, start: dict[str, float]) -> SolverResult | None:
+    """`palpate.identifiers.RecursiveLeastSquares`, a row at a time, from zero; None of a model that is not linear."""
+    from palpate.identifiers import RecursiveLeastSquares
+
+    if start:
+        return None
+    path, force = motion_and_force(problem)
+    law = problem.law
+    columns = np.column_stack(law.columns(path, {}, FLOATS))
+    size = np.sqrt((columns**2).mean(axis=0))
+    p = len(law.linear)
+    estimator = RecursiveLeastSquares(np.zeros(p), 1e16 * np.eye(p))
+    for row, value in zip(columns / size, force, strict=True):
+        estimator.update(row, value)
+    values = dict(zip(law.linear, (estimator.theta / size).tolist(), strict=True))
+    return SolverResult(values, {})
+
+
+Solver = Callable[[Problem, dict[str, float]], SolverResult | None]
+SOLVERS: dict[str, Solver] = {
+    "palpate": palpate_solver,
+    "scipy least_squares": scipy_solver,
+    "numpy lstsq": lstsq_solver,
+    "palpate recursive": recursive_solver,
+}
+
+
+def scores(problem: Problem, solver: str) -> Iterator[Score]:
+    """Digits of a solver from each start; none where it does not take the model."""
+    for number in range(2 if problem.starts else 1):
+        start = {name: float(both[number]) for name, both in problem.starts.items()}
+        solution = SOLVERS[solver](problem, start)
+        if solution is None:
+            return
+        certified = problem.certified
+        worst = min(digits_of(solution.values[k], float(c.value)) for k, c in certified.items())
+        std = [digits_of(v, float(certified[k].std)) for k, v in solution.std.items()]
+        yield Score(problem, solver, number, worst, min(std) if std else None)
+
+
+def _size(problem: Problem, name: str) -> float:
+    """Order of a nonlinear parameter: the larger of its starts."""
+    return max(abs(float(text)) for text in problem.starts[name])
+
+
+def _range(problem: Problem, name: str) -> tuple[float, float]:
+    """Where a nonlinear parameter is looked for: between its starts, and as far beyond either."""
+    low, high = (float(text) for text in problem.starts[name])
+    return 2.0 * low - high, 2.0 * high - low
+
+
+def _deviations(problem: Problem, values: dict[str, float]) -> dict[str, float]:
+    """Standard deviations by the Jacobian, of central differences in the nonlinear parameters."""
+    path, force = motion_and_force(problem)
+    law = problem.law
+    columns = law.columns(path, values, FLOATS)
+
+    def predict(at: dict[str, float]) -> Array:
+        return sum(
+            (at[k] * c for k, c in zip(law.linear, law.columns(path, at, FLOATS), strict=True)), 0.0 * force
+        )
+
+    for name in law.nonlinear:
+        h = 1e-5 * _size(problem, name)
+        up, down = (predict({**values, name: values[name] + s * h}) for s in (1.0, -1.0))
+        columns.append((up - down) / (2.0 * h))
+    jacobian = np.column_stack(columns)
+    size = np.sqrt((jacobian**2).sum(axis=0))
+    residual = force - predict(values)
+    variance = float(residual @ residual) / (len(force) - jacobian.shape[1])
+    R = np.linalg.qr(jacobian / size, mode="r")
+    spread = np.sqrt((np.linalg.inv(R) ** 2).sum(axis=1) * variance) / size
+    return dict(zip([*law.linear, *law.nonlinear], spread.tolist(), strict=True))
