@@ -17,7 +17,7 @@ from palpate.force.claims import Claim
 from palpate.force.cover import Cell
 from palpate.force.gains import Gains
 
-FORM: Literal["palpate force certificate 1"] = "palpate force certificate 1"
+FORM: Literal["palpate force certificate 2"] = "palpate force certificate 2"
 _LARGEST = 1 << 26
 
 
@@ -51,7 +51,7 @@ class Certificate(Table):
         written_by: the mark of the file.
     """
 
-    form: Literal["palpate force certificate 1"]
+    form: Literal["palpate force certificate 2"]
     gains: Gains
     claims: tuple[Claim, ...]
     measured: PositionLoop | None = None
@@ -109,6 +109,9 @@ class Certificate(Table):
         if not self.claims:
             return Verdict(False, np.inf, 0.0, 0, "it claims nothing")
         for claim in self.claims:
+            fault = claim.fault(self.proved_gains)
+            if fault:
+                return Verdict(False, np.inf, 0.0, count, f"{fault}, in its {claim.kind} claim")
             prover = claim.prover(self.proved_gains)
             if not all(claim.tiled(box) for box in claim.boxes(self.proved_gains)):
                 return Verdict(False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap")
