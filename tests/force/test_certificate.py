@@ -136,8 +136,7 @@ def test_a_gain_that_goes_anywhere_inside_makes_nothing_grow(proof):
     losses = range(claim.ages[1] - claim.ages[0] + 1)
     unit = gains.alpha / gains.theta / gains.arm.series
     corners = [
-        [loop.phi(gains.arm.series, 0.0, Law(s * unit), loss) for loss in losses]
-        for s in claim.shares
+        [loop.phi(gains.arm.series, 0.0, Law(s * unit), loss) for loss in losses] for s in claim.shares
     ]
     for _ in range(20):
         x = rng.normal(size=loop.size)
