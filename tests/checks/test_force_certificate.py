@@ -22,7 +22,7 @@ from palpate.checks.force_certificate import (
     ONE,
     Ball,
     Claims,
-    Loop,
+    ExactLoop,
     RefusedError,
     check,
     exponential,
@@ -86,7 +86,7 @@ def test_both_have_the_same_matrices(name):
         prover = wanted.prover(gains)
         asked = msgspec.structs.replace(wanted, state=prover.loop.state, units=prover.loop.units)
         own = Claims(
-            Loop(json.loads(msgspec.json.encode(gains)), None), json.loads(msgspec.json.encode(asked))
+            ExactLoop(json.loads(msgspec.json.encode(gains)), None), json.loads(msgspec.json.encode(asked))
         )
         (box,) = asked.boxes(gains)
         here = (*map(Fraction, (box.low, box.high, box.least, box.most)), 0, 0)

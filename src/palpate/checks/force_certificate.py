@@ -17,7 +17,7 @@ from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise, product
 from math import ceil, floor, isqrt
-from operator import mul
+from operator import add, mul
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ FASTEST = 1000
 Real = Fraction
 Box = tuple[Real, Real, Real, Real, int, int]
 Surface = tuple[Real, Real]
+Rows = list[list[Real]]
 
 
 class RefusedError(Exception):
@@ -45,7 +46,7 @@ class Ball:
     error: int
 
     @classmethod
-    def of(cls, rows: list[list[Real]], error: int = 1) -> Ball:
+    def of(cls, rows: Rows, error: int = 1) -> Ball:
         """Fractions, rounded to it."""
         return cls(tuple(tuple(round(v * ONE) for v in row) for row in rows), error)
 
@@ -55,8 +56,8 @@ class Ball:
         return max(max(map(abs, row)) for row in self.rows) + self.error
 
     @property
-    def turned(self) -> Ball:
-        """Its transpose."""
+    def transpose(self) -> Ball:
+        """The matrix with rows for columns."""
         return Ball(tuple(zip(*self.rows, strict=True)), self.error)
 
     def __matmul__(self, other: Ball) -> Ball:
@@ -69,26 +70,16 @@ class Ball:
         error = n * (self.largest * other.error + other.largest * self.error >> BITS) + n + 1
         return Ball(rows, error)
 
-    def __add__(self, other: Ball) -> Ball:
-        rows = (
-            tuple(a + b for a, b in zip(x, y, strict=True))
-            for x, y in zip(self.rows, other.rows, strict=True)
-        )
-        return Ball(tuple(rows), self.error + other.error)
-
-    def over(self, factor: int) -> Ball:
-        """Divided by a whole number."""
-        return Ball(tuple(tuple(v // factor for v in row) for row in self.rows), self.error // factor + 2)
-
     def times(self, factor: Real) -> Ball:
-        """Of every element, by a positive number."""
+        """Of every element, by a number."""
         n, d = factor.numerator, factor.denominator
-        return Ball(tuple(tuple(v * n // d for v in row) for row in self.rows), self.error * n // d + 2)
+        return Ball(tuple(tuple(v * n // d for v in row) for row in self.rows), self.error * abs(n) // d + 2)
 
 
-def unit(n: int) -> Ball:
-    """The matrix that changes nothing."""
-    return Ball(tuple(tuple(ONE * (i == j) for j in range(n)) for i in range(n)), 0)
+def total(A: Ball, B: Ball) -> Ball:
+    """Sum of two matrices, with their errors."""
+    both = zip(A.rows, B.rows, strict=True)
+    return Ball(tuple(tuple(map(add, x, y)) for x, y in both), A.error + B.error)
 
 
 def exponential(A: Ball) -> Ball:
@@ -97,17 +88,18 @@ def exponential(A: Ball) -> Ball:
     size = max(sum(map(abs, row)) for row in A.rows) + n * A.error
     if size > FASTEST * ONE:
         raise RefusedError("its loop moves too far within a tick")
-    halvings = max((2 * size // ONE).bit_length(), 0)
-    small = A.over(1 << halvings)
-    total, term, k = unit(n), unit(n), 0
+    halvings = (2 * size // ONE).bit_length()
+    small = A.times(Fraction(1, 1 << halvings))
+    term = whole = Ball(tuple(tuple(ONE * (i == j) for j in range(n)) for i in range(n)), 0)
+    k = 0
     while term.largest > n + 8 and k < 400:
         k += 1
-        term = (term @ small).over(k)
-        total = total + term
-    total = Ball(total.rows, total.error + 2 * n * term.largest)
+        term = (term @ small).times(Fraction(1, k))
+        whole = total(whole, term)
+    whole = Ball(whole.rows, whole.error + 2 * n * term.largest)
     for _ in range(halvings):
-        total = total @ total
-    return total
+        whole = whole @ whole
+    return whole
 
 
 def is_positive(Q: Ball) -> bool:
@@ -159,7 +151,7 @@ def exact(value: Any) -> Real:
     return Fraction(value)
 
 
-class Loop:
+class ExactLoop:
     """Arm, sensor and law of a file, in exact numbers; the names are those of the page on force."""
 
     def __init__(self, gains: dict[str, Any], inner: dict[str, Any] | None):
@@ -175,30 +167,19 @@ class Loop:
         felt = self.compliance * self.cap
         lag = self.theta * (1 - relief * (felt + Fraction(1, 2)) / (felt + 1))
         self.gain = self.alpha / lag * (self.compliance + 1 / self.cap)
-        self.delay, self.unsure = self._delays(own, exact(arm["rate"]))
-        self.period = ceil(exact(arm["rate"]) / exact(sensor["sampling"]) - Fraction(1, 10**9))
-        self.period = max(self.period, 1)
+        own_rate, small = exact(arm["rate"]), Fraction(1, 10**9)
+        low, high = own.get("delay_interval") or (own["delay"],) * 2
+        most = ceil(exact(high) * own_rate - small)
+        self.unsure = most - floor(exact(low) * own_rate + small) if own.get("delay_interval") else 0
+        self.delay = most - self.unsure
+        self.period = max(ceil(own_rate / exact(sensor["sampling"]) - small), 1)
         if self.torque:
             self.mass, self.damping = exact(own["mass"]), exact(own["damping"])
         else:
-            self.ends = self._inner(own)
+            f = [2 * pi() * exact(v) for v in own.get("bandwidth_interval") or (own["bandwidth"],) * 2]
+            z = [exact(v) for v in own.get("damping_interval") or (own["damping"],) * 2]
+            self.ends = [(f[0] ** 2, f[1] ** 2), (2 * z[0] * f[0], 2 * z[1] * f[1])]
         self.filter = polynomial(sensor.get("low_pass", "none"))
-
-    @staticmethod
-    def _delays(own: dict[str, Any], rate: Real) -> tuple[int, int]:
-        low, high = own.get("delay_interval") or (own["delay"],) * 2
-        small = Fraction(1, 10**9)
-        most = ceil(exact(high) * rate - small)
-        unsure = most - floor(exact(low) * rate + small) if own.get("delay_interval") else 0
-        return most - unsure, unsure
-
-    @staticmethod
-    def _inner(own: dict[str, Any]) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
-        """Ranges of w^2 and 2 z w."""
-        f = [exact(v) for v in own.get("bandwidth_interval") or (own["bandwidth"],) * 2]
-        z = [exact(v) for v in own.get("damping_interval") or (own["damping"],) * 2]
-        w = [2 * pi() * v for v in f]
-        return (w[0] ** 2, w[1] ** 2), (2 * z[0] * w[0], 2 * z[1] * w[1])
 
     @property
     def known(self) -> bool:
@@ -227,7 +208,7 @@ def polynomial(low_pass: str) -> list[Real]:
 class Tick:
     """The matrix of a tick for one claim: the state's order and units are the file's."""
 
-    def __init__(self, loop: Loop, claim: dict[str, Any]):
+    def __init__(self, loop: ExactLoop, claim: dict[str, Any]):
         self.loop, units = loop, claim["units"]
         self.w0, self.k0, self.wf = (exact(units[name]) for name in ("w0", "k0", "wf"))
         if not min(self.w0, self.k0, self.wf) > 0:
@@ -245,7 +226,7 @@ class Tick:
             raise RefusedError("its state is in another order")
         self._moved: dict[tuple[Surface, Surface | None], Ball] = {}
 
-    def rates(self, surface: Surface, inner: Surface | None) -> list[list[Real]]:
+    def rates(self, surface: Surface, inner: Surface | None) -> Rows:
         """d/dt of x, v, f... and of the held input, which is the last."""
         (K, B), loop, p = surface, self.loop, self.p
         A = [[Fraction(0)] * (p + 1) for _ in range(p + 1)]
@@ -274,50 +255,26 @@ class Tick:
             self._moved[key] = Ball(whole.rows[: self.p], whole.error)
         return self._moved[key]
 
-    def reading(self, surface: Surface) -> list[Real]:
-        """The sensor's reading of x, v, f..., in k0."""
-        own = [Fraction(0)] * self.p
-        if self.order:
-            own[2] = Fraction(1)
-        else:
-            own[0], own[1] = surface[0] / self.k0, surface[1] * self.w0 / self.k0
-        return own
-
-    def rest(self, surface: Surface, gain: Real, age: int) -> list[list[Real]]:
+    def rest(self, surface: Surface, gain: Real, age: int) -> Rows:
         """All rows but the first p, and with them the row of the input that is held in this tick, which is the last."""
-        n, p, loop = len(self.state), self.p, self.loop
-        rows = [[Fraction(0)] * n for _ in range(n - p + 1)]
-        reading = self.reading(surface) + [Fraction(0)] * (n - p)
-        place = {name: i for i, name in enumerate(self.state)}
-        rows[0] = reading
-        for i in range(2, self.readings + 1):
-            rows[place[f"r{i}"] - p][place[f"r{i - 1}"]] = Fraction(1)
-        filtered = rows[place["u"] - p]
-        for i, v in enumerate(reading if age == 0 else [Fraction(j == place[f"r{age}"]) for j in range(n)]):
-            filtered[i] = -gain * self.k0 * v
-        command = rows[place["c0"] - p]
-        command[:] = [loop.tick * v for v in filtered]
-        command[place["c0"]] += 1
-        held = rows[-1]
-        if not loop.torque:
-            for i in range(1, max(loop.delay, 1)):
-                rows[place[f"c{i}"] - p][place[f"c{i - 1}"]] = Fraction(1)
-            if loop.delay:
-                held[place[f"c{loop.delay - 1}"]] = Fraction(1)
-            else:
-                held[:] = command
-            return rows
-        torque = [loop.series / self.k0 * v for v in command]
-        torque[0] -= loop.series / self.k0
-        torque[1] -= loop.damping * self.w0 / self.k0
-        if not loop.delay:
-            held[:] = torque
-            return rows
-        rows[place["t1"] - p] = torque
-        for i in range(2, loop.delay + 1):
-            rows[place[f"t{i}"] - p][place[f"t{i - 1}"]] = Fraction(1)
-        held[place[f"t{loop.delay}"]] = Fraction(1)
-        return rows
+        loop, one, first = self.loop, Fraction(1), self.state[: self.p]
+        direct = {"x": surface[0] / self.k0, "v": surface[1] * self.w0 / self.k0}
+        rows = {"r1": {"f1": one} if self.order else direct}
+        rows |= {f"r{i}": {f"r{i - 1}": one} for i in range(2, self.readings + 1)}
+        used = rows["r1"] if age == 0 else {f"r{age}": one}
+        rows["u"] = {k: -gain * self.k0 * v for k, v in used.items()}
+        rows["c0"] = {"c0": one} | {k: loop.tick * v for k, v in rows["u"].items()}
+        name, late = "t" if loop.torque else "c", range(2 if loop.torque else 1, len(self.state))
+        rows |= {f"{name}{i}": {f"{name}{i - 1}": one} for i in late}
+        if loop.torque:
+            stiff, rate = loop.series / self.k0, loop.damping * self.w0 / self.k0
+            torque = {k: stiff * v for k, v in rows["c0"].items()}
+            rows["t1"] = torque | {"x": torque.get("x", 0) - stiff, "v": torque.get("v", 0) - rate}
+            held = {f"t{loop.delay}": one} if loop.delay else rows["t1"]
+        else:
+            held = {f"c{loop.delay - 1}": one} if loop.delay else rows["c0"]
+        wanted = [rows[name] for name in self.state[len(first) :]]
+        return [[Fraction(row.get(name, 0)) for name in self.state] for row in [*wanted, held]]
 
     def phi(self, surface: Surface, inner: Surface | None, gain: Real, age: int) -> tuple[Ball, Ball]:
         """The matrix of the tick, and the map from the state to x, v, f... and the held input, shape (p + 1, n)."""
@@ -329,7 +286,7 @@ class Tick:
         return Ball(top.rows + rows.rows[:-1], max(top.error, rows.error)), fed
 
 
-def majorant(rates: list[list[list[Real]]], steps: list[list[list[Real]]], tick: Real) -> list[list[Real]]:
+def majorant(rates: list[Rows], steps: list[Rows], tick: Real) -> Rows:
     """Elements of the distance of exp(T A) from the multilinear function through its corners, at most.
 
     A is affine in each of its parameters alone; the distance is at most the sum of h^2/8 |E''|. With c so large that
@@ -337,29 +294,26 @@ def majorant(rates: list[list[list[Real]]], steps: list[list[list[Real]]], tick:
     second derivative of exp(T (M + s D)) for |dA/ds| <= D: twice the last block of an exponential of 3 x 3 blocks.
     """
     n = len(rates[0])
+    each = list(product(range(n), range(n)))
     c = Fraction(float(max(Fraction(0), *(-A[i][i] for A in rates for i in range(n)))) * (1.0 + 1e-9))
-    M = [[max(abs(A[i][j] + c * (i == j)) for A in rates) for j in range(n)] for i in range(n)]
-    shift = exponential(Ball.of([[-c * tick]]))
-    fade = Fraction(shift.rows[0][0] + shift.error, ONE)
-    total = [[Fraction(0)] * n for _ in range(n)]
+    fade = exponential(Ball.of([[-c * tick]])).largest
+    found = [[Fraction(0)] * n for _ in range(n)]
     for D in steps:
         whole = [[Fraction(0)] * (3 * n) for _ in range(3 * n)]
-        for b, i, j in product(range(3), range(n), range(n)):
-            whole[b * n + i][b * n + j] = M[i][j] * tick
+        for b, (i, j) in product(range(3), each):
+            whole[b * n + i][b * n + j] = max(abs(A[i][j] + c * (i == j)) for A in rates) * tick
             if b < 2:
                 whole[b * n + i][(b + 1) * n + j] = D[i][j] * tick
         made = exponential(Ball.of(whole))
-        for i, j in product(range(n), range(n)):
-            total[i][j] += fade / 4 * Fraction(abs(made.rows[i][2 * n + j]) + made.error, ONE)
-            if all(not any(row) for row in D):
-                total[i][j] = Fraction(0)
-    return total
+        for i, j in each if any(map(any, D)) else ():
+            found[i][j] += Fraction(fade * (abs(made.rows[i][2 * n + j]) + made.error), 4 * ONE * ONE)
+    return found
 
 
 class Claims:
     """Check of one claim."""
 
-    def __init__(self, loop: Loop, claim: dict[str, Any]):
+    def __init__(self, loop: ExactLoop, claim: dict[str, Any]):
         self.loop, self.claim, self.kind = loop, claim, claim["kind"]
         self.low, self.high, self.least, self.most = (
             exact(claim[k]) for k in ("low", "high", "least", "most")
@@ -426,7 +380,7 @@ class Claims:
         return K, time * K
 
     def surfaces(self, box: Box) -> list[Surface]:
-        """Of the corners."""
+        """K and B of the corners of a cell."""
         low, high, least, most = box[:4]
         if self.fades:
             return [(high, t * high) for t in dict.fromkeys((least, most))]
@@ -454,7 +408,7 @@ class Claims:
             ends.append([a + (b - a) * Fraction(i, self.parts) for i in (place, place + 1)])
         return [(w, z) for w in dict.fromkeys(ends[0]) for z in dict.fromkeys(ends[1])]
 
-    def bent(self, box: Box) -> list[list[Real]] | None:
+    def curvature(self, box: Box) -> Rows | None:
         """The distance of [E e] from the hull of its corners; None where there is none."""
         if self.loop.known:
             return None
@@ -463,31 +417,23 @@ class Claims:
             self._from_rest(tick.rates(surface, inner)) for surface in self.surfaces(box) for inner in inners
         ]
         low, high, least, most = box[:4]
-        n = tick.p + 1
-        zero = [[Fraction(0)] * n for _ in range(n)]
         if not self.loop.torque:
             (w1, w2), (z1, z2) = ([min(v), max(v)] for v in zip(*(i for i in inners if i), strict=True))
-            first, second = [list(row) for row in zero], [list(row) for row in zero]
-            first[1][0], second[1][1] = (w2 - w1) / tick.w0, z2 - z1
-            return majorant(counted, [first, second], self.loop.tick)
-        none = tick.rates((Fraction(0), Fraction(0)), None)
-        of_K = difference(tick.rates((Fraction(1), Fraction(0)), None), none)
-        of_B = difference(tick.rates((Fraction(0), Fraction(1)), None), none)
+            steps = [[[Fraction(0)] * (tick.p + 1) for _ in range(tick.p + 1)] for _ in range(2)]
+            steps[0][1][0], steps[1][1][1] = (w2 - w1) / tick.w0, z2 - z1
+            return majorant(counted, steps, self.loop.tick)
+        none, one, zero = (tick.rates((Fraction(a), Fraction(b)), None) for a, b in ((0, 0), (1, 0), (0, 1)))
+        of_K = [[abs(a - b) for a, b in zip(x, y, strict=True)] for x, y in zip(one, none, strict=True)]
+        of_B = [[abs(a - b) for a, b in zip(x, y, strict=True)] for x, y in zip(zero, none, strict=True)]
+        each = [list(zip(x, y, strict=True)) for x, y in zip(of_K, of_B, strict=True)]
         share = [1 / (1 + t / theta) for t in (most, least)]
         along = [
-            [
-                (high - low) * max(s * k + theta * (1 - s) * b for s in share)
-                for k, b in zip(x, y, strict=True)
-            ]
-            for x, y in zip(of_K, of_B, strict=True)
+            [(high - low) * max(s * k + theta * (1 - s) * b for s in share) for k, b in row] for row in each
         ]
-        across = [
-            [(share[1] - share[0]) * high * (k + theta * b) for k, b in zip(x, y, strict=True)]
-            for x, y in zip(of_K, of_B, strict=True)
-        ]
+        across = [[(share[1] - share[0]) * high * (k + theta * b) for k, b in row] for row in each]
         return majorant(counted, [along, across], self.loop.tick)
 
-    def _from_rest(self, A: list[list[Real]]) -> list[list[Real]]:
+    def _from_rest(self, A: Rows) -> Rows:
         """For a position arm, x counted from the held input: at rest nothing is left of both."""
         if not self.loop.torque:
             for row in A[:-1]:
@@ -504,11 +450,11 @@ class Claims:
         if not size > 0:
             raise RefusedError(f"a cell of its {self.kind} claim does not contract")
         root_ = Ball.of([[v / size for v in row] for row in L], 0)
-        P = root_ @ root_.turned
+        P = root_ @ root_.transpose
         P = Ball(P.rows, 0)  # this very matrix is the norm
-        bent = self.bent(box)
+        curvature = self.curvature(box)
         contracts = is_positive(P) and all(
-            self._contracts(P, root_, box, bent, surface, inner, gain, age)
+            self._contracts(P, root_, box, curvature, surface, inner, gain, age)
             for surface in self.surfaces(box)
             for inner in self.inner(box[4])
             for gain, age in self.laws(box)
@@ -517,21 +463,21 @@ class Claims:
             raise RefusedError(f"a cell of its {self.kind} claim does not contract")
 
     def _contracts(
-        self, P: Ball, L: Ball, box: Box, bent: list[list[Real]] | None, surface: Surface,
+        self, P: Ball, L: Ball, box: Box, curvature: Rows | None, surface: Surface,
         inner: Surface | None, gain: Real, age: int,
     ) -> bool:  # fmt: skip
         """Whether |Phi x| + |D x| < |x| in the norm P, D the distance of the exponential from its corners."""
         Phi, fed = self.tick.phi(surface, inner, gain, age)
-        after = (P @ Phi).turned @ Phi
-        if bent is None:
+        after = (P @ Phi).transpose @ Phi
+        if curvature is None:
             return is_positive(minus(P, after))
-        W = self._weights(P, bent)
+        W = self._weights(P, curvature)
         if not self.loop.torque:
             fed = Ball(
                 (tuple(a - b for a, b in zip(fed.rows[0], fed.rows[-1], strict=True)), *fed.rows[1:]),
                 2 * fed.error,
             )
-        beside = (W @ fed).turned @ fed
+        beside = (W @ fed).transpose @ fed
         for halves in sorted(range(-60, 1), key=lambda i: abs(i - self._last)):
             h = Fraction(2.0 ** (0.5 * halves))  # any will do: (a + b)^2 <= (1 + h) a^2 + (1 + 1/h) b^2
             if is_positive(minus(minus(P, after.times(1 + h)), beside.times(1 + 1 / h))):
@@ -539,12 +485,14 @@ class Claims:
                 return True
         return False
 
-    def _weights(self, P: Ball, bent: list[list[Real]]) -> Ball:
+    def _weights(self, P: Ball, curvature: Rows) -> Ball:
         """W with |D y|^2 <= y^T W y in the norm P: by columns of D's bound, by the inequality of Cauchy and Schwarz."""
         p = self.tick.p
         sizes = [
             sum(
-                Fraction(abs(P.rows[a][b]), ONE) * bent[a][j] * bent[b][j] for a in range(p) for b in range(p)
+                Fraction(abs(P.rows[a][b]), ONE) * curvature[a][j] * curvature[b][j]
+                for a in range(p)
+                for b in range(p)
             )
             for j in range(p + 1)
         ]
@@ -553,11 +501,6 @@ class Claims:
         shares = [many * (1 + Fraction(1, 1 << 40)) if v > tiny else Fraction(1 << 60) for v in sizes]
         W = [[sizes[i] * shares[i] * (i == j) for j in range(p + 1)] for i in range(p + 1)]
         return Ball.of(W)
-
-
-def difference(A: list[list[Real]], B: list[list[Real]]) -> list[list[Real]]:
-    """Sizes of the elements of A - B."""
-    return [[abs(a - b) for a, b in zip(x, y, strict=True)] for x, y in zip(A, B, strict=True)]
 
 
 def minus(A: Ball, B: Ball) -> Ball:
@@ -576,20 +519,18 @@ def spans(edges: list[Real], low: Real, high: Real) -> list[tuple[Real, Real]]:
     return list(pairwise(inside))
 
 
-def statement(loop: Loop, claim: dict[str, Any]) -> str:
+def statement(loop: ExactLoop, claim: dict[str, Any]) -> str:
     """A claim in words."""
-    low, high, most = (float(claim[k]) for k in ("low", "high", "most"))
-    (young, old), (lowest, highest) = claim["ages"], map(float, claim["shares"])
-    if claim["kind"] == "adapting":
-        surfaces = f"{low:.4g} to {high:.4g}" if loop.torque else "any"
-        gain = f"{lowest:g} to {highest:g} alpha/(theta K_eff), redrawn every tick"
-    else:
-        surfaces = f"{low:.4g} to {high:.4g}"
-        gain = f"{lowest:g} to {highest:g} times {float(loop.gain):.4g} m/(s N)"
-    lost = ", contact lost and found" if claim["kind"] == "one-sided" else ""
+    kind, (young, old), (lowest, highest) = claim["kind"], claim["ages"], map(float, claim["shares"])
+    any_ = kind == "adapting" and not loop.torque
+    surfaces = "any" if any_ else f"{float(claim['low']):.4g} to {float(claim['high']):.4g}"
+    unit = (
+        f"{float(loop.gain):.4g} m/(s N)" if kind != "adapting" else "alpha/(theta K_eff), redrawn every tick"
+    )
+    lost = ", contact lost and found" if kind == "one-sided" else ""
     return (
-        f"{claim['kind']}: K + B/theta {surfaces} N/m, B/K {float(claim['least']):g} to {most:.4g} s, gain {gain}, "
-        f"readings {young} to {old} ticks old{lost}"
+        f"{kind}: K + B/theta {surfaces} N/m, B/K {float(claim['least']):g} to {float(claim['most']):.4g} s, "
+        f"gain {lowest:g} to {highest:g} times {unit}, readings {young} to {old} ticks old{lost}"
     )
 
 
@@ -617,7 +558,7 @@ def _check(file: dict[str, Any]) -> list[str]:
         raise RefusedError(f"it is not of the form {FORM!r} and the law {LAW!r}")
     if not file["claims"]:
         raise RefusedError("it claims nothing")
-    loop, found = Loop(file["gains"], file.get("measured")), []
+    loop, found = ExactLoop(file["gains"], file.get("measured")), []
     for claim in file["claims"]:
         own = Claims(loop, claim)
         own.check_tiles()

@@ -155,12 +155,12 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     if gains is not None:
         certificate.check_of(load_gains(gains))
     with console(stderr=True).status("checking"):
-        verdict = confirmed(path, certificate.check())
+        verdict = confirm(path, certificate.check())
     _print(certificate, verdict, output)
     return 0 if verdict.holds else 1
 
 
-def confirmed(path: Path, verdict: Verdict) -> Verdict:
+def confirm(path: Path, verdict: Verdict) -> Verdict:
     """The verdict, if the independent check has the same."""
     from palpate.checks.force_certificate import RefusedError, check
 
