@@ -52,7 +52,11 @@ def bumps(places: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     field = np.zeros(len(places))
     for _ in range(rng.integers(4, 15)):
         width = 0.004 * (1.0 + rng.pareto(2.5))
-        field += 0.2 * rng.pareto(2.0) * np.exp(-0.5 * (cdist(places, rng.uniform(0.0, SIDE, (1, 2)))[:, 0] / width) ** 2)
+        field += (
+            0.2
+            * rng.pareto(2.0)
+            * np.exp(-0.5 * (cdist(places, rng.uniform(0.0, SIDE, (1, 2)))[:, 0] / width) ** 2)
+        )
     return np.minimum(field, 3.0)
 
 
@@ -143,7 +147,9 @@ def graded(count: int, group: np.ndarray, rng: np.random.Generator) -> tuple[np.
 def shared(count: int, group: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Errors of which half the variance is common to a group."""
     std = rng.uniform(0.02, 0.06)
-    return std * np.sqrt(0.5) * (rng.normal(size=count) + rng.normal(size=group[-1] + 1)[group]), np.full(count, 0.5 * std)
+    return std * np.sqrt(0.5) * (rng.normal(size=count) + rng.normal(size=group[-1] + 1)[group]), np.full(
+        count, 0.5 * std
+    )
 
 
 KINDS = {

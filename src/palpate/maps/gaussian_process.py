@@ -161,12 +161,13 @@ def prior_of(distance: Array, values: Array, noise: Array) -> LogPrior:
     """A prior from the scales of the data: a factor of e or more either way about what the presses themselves show.
 
     The field varies as the values do; the long scale is half the region, the short one twice the spacing of presses;
-    presses repeat as they say.
+    presses repeat as they say or, where they say nothing, to a fifth of the values' spread.
     """
     spread = max(float(np.std(values)), float(np.median(noise)), 1e-9 * float(np.abs(values).max()), 1e-300)
     nearest = np.where(distance > 0.0, distance, np.inf).min(axis=1)
     region, spacing = float(distance.max()), float(np.median(nearest))
-    middle = (spread, region / 2.0, spread / 2.0, min(2.0 * spacing, region / 2.0), float(np.median(noise)))
+    repeat = float(np.median(noise)) or spread / 5.0
+    middle = (spread, region / 2.0, spread / 2.0, min(2.0 * spacing, region / 2.0), repeat)
     return LogPrior(np.log(middle), np.array([1.0, 0.7, 1.0, 0.7, 1.5]))
 
 
@@ -213,9 +214,7 @@ class GaussianProcess:
         return float(np.sqrt(self.weights @ [node.parameters.repeat**2 for node in self.nodes]))
 
     def predict(self, places: Array) -> tuple[Array, Array]:
-        """Mean (m,) and variance (m,) of the field at places (m, d): the moments of the mixture.
-
-        """
+        """Mean (m,) and variance (m,) of the field at places (m, d): the moments of the mixture."""
 
         def moments(part: Array) -> Array:
             distance = cdist(self.likeliest.places, part)
@@ -244,8 +243,8 @@ def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
         noise: standard deviation that each value states of itself (n,).
     """
     distance = cdist(places, places)
-    noise = np.maximum(noise, 1e-4 * np.std(values))  # else rounding decides between presses at one place
     prior = prior_of(distance, values, noise)
+    noise = np.maximum(noise, 1e-4 * np.std(values))  # else rounding decides between presses at one place
     order = np.random.default_rng(0).permutation(len(values))
     blocks = np.array_split(order, -(-len(values) // BLOCK))
 

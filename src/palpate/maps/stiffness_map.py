@@ -174,7 +174,9 @@ class FieldMap:
         """The field at places (n, d) [m], and that of a next press whose own interval is the presses' median."""
         at = np.atleast_2d(np.asarray(places, dtype=float))
         if len(self) and (at.ndim != 2 or at.shape[1] != self._places.shape[1]):
-            raise InputError(f"the map has places of {self._places.shape[1]} coordinates, got shape {at.shape}")
+            raise InputError(
+                f"the map has places of {self._places.shape[1]} coordinates, got shape {at.shape}"
+            )
         mean, variance = self.process.predict(at)
         next_std = np.sqrt(variance + self._noise)
         return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic)
@@ -275,9 +277,8 @@ class FieldMap:
             if abs(value[i] - value[j]) > Z95 * np.hypot(std[i], std[j]) + 2.0 * np.ptp(others):
                 where = ", ".join(f"{1e3 * c:.6g}" for c in places[i])
                 raise InputError(
-                    f"presses {i + 1} and {j + 1} are at one place ({where} mm) with {values[i]:.4g} and "
-                    f"{values[j]:.4g}{' N/m' if self.logarithmic else ''}, further apart than their intervals and than the map; leave the wrong one "
-                    "out"
+                    f"presses {i + 1} and {j + 1} are at one place ({where} mm) with a {self.name} of {values[i]:.4g} "
+                    f"and {values[j]:.4g}, further apart than their intervals and than the map; leave the wrong one out"
                 )
 
 

@@ -143,7 +143,8 @@ def page(result: MapResult, title: str, command: str) -> str:
                 {
                     "source": embedded(svg(draw_field(result, name)), "image/svg+xml"),
                     "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
-                    f"{quantity(float(np.median(np.diff(field.ci95)) / 2.0), result.presses.units[name])}.",
+                    f"{plain(_shown(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
+                    f"{_shown(result, name)[1]}.",
                 }
                 for name, field in result.fields.items()
             ),
@@ -220,6 +221,12 @@ def _title(name: str) -> str:
     return name.replace("_", " ").capitalize()
 
 
+def _shown(result: MapResult, name: str) -> tuple[float, str]:
+    """Factor and symbol of the unit in which a field is shown."""
+    unit = result.presses.units[name]
+    return {"m": (1e3, "mm"), "1": (100.0, "%")}.get(unit, (1.0, unit))
+
+
 def draw_map(result: MapResult) -> Figure:
     """The stiffness over the surface, the presses, the contour of the threshold and its band."""
     from matplotlib.colors import LogNorm
@@ -227,7 +234,6 @@ def draw_map(result: MapResult) -> Figure:
     seen, grid, threshold = result.prediction, result.grid, result.request.stiffer_than
     with style.inked(9.0):
         figure, axis, bar = _picture(result, seen.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm())
-        bar.formatter = "{x:g}"
         bar.ax.xaxis.set_minor_formatter("{x:g}")
         if threshold is not None:
             probability = np.where(grid.inside, seen.exceeds(threshold), np.nan).reshape(grid.shape)
@@ -254,8 +260,7 @@ def draw_interval(result: MapResult) -> Figure:
 
 def draw_field(result: MapResult, name: str) -> Figure:
     """A further field over the surface, and the presses that show it."""
-    unit, known = result.presses.units[name], np.isfinite(result.presses.fields[name])
-    factor, symbol = {"m": (1e3, "mm"), "1": (100.0, "%")}.get(unit, (1.0, unit))
+    (factor, symbol), known = _shown(result, name), np.isfinite(result.presses.fields[name])
     with style.inked(9.0):
         label = f"{_title(name).lower()} [{symbol}]"
         figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
@@ -271,10 +276,8 @@ def _picture(
     grid = result.grid
     figure, (axis,) = style.grid((5.0, 4.4))
     shown = np.where(grid.inside, values, np.nan).reshape(grid.shape)
-    image = axis.pcolormesh(
-        1e3 * grid.across, 1e3 * grid.along, shown, cmap=colours, rasterized=True, **norm
-    )
-    bar = figure.colorbar(image, ax=axis, location="top", shrink=0.7, label=label)
+    image = axis.pcolormesh(1e3 * grid.across, 1e3 * grid.along, shown, cmap=colours, rasterized=True, **norm)
+    bar = figure.colorbar(image, ax=axis, location="top", shrink=0.7, label=label, format="{x:g}")
     axis.grid(visible=False)
     axis.set_aspect("equal")
     names = ("along the first axis", "along the second axis") if result.map.surface.is_curved else ("x", "y")
