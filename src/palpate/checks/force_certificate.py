@@ -1,4 +1,4 @@
-"""An independent check of a certificate of palpate certify, in exact arithmetic, of Python's own library alone.
+"""An independent check of a certificate of palpate certify, in exact arithmetic.
 
     python -m palpate.checks.force_certificate certificate.json
 
@@ -12,14 +12,14 @@ from __future__ import annotations
 import json
 import re
 import sys
-from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, reduce
 from itertools import pairwise, product
 from math import ceil, floor, isqrt
-from operator import add, mul
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 FORM, LAW = "palpate force certificate 2", "cautious adaptive control 7"
 BITS = 160
@@ -28,107 +28,77 @@ SPARE = 1 << 40
 """Of 2^-160, left for rounding: 1e-36, of numbers near 1."""
 FASTEST = 1000
 """Largest rate within a tick that is computed."""
-Real = Fraction
-Box = tuple[Real, Real, Real, Real, int, int]
-Surface = tuple[Real, Real]
-Rows = list[list[Real]]
+SMALL = Fraction(1, 10**9)
+Exact = Any
+"""A fraction, or an array of them."""
 
 
 class RefusedError(Exception):
     """Why a certificate does not hold, in a line."""
 
 
-@dataclass(frozen=True)
-class Ball:
+class Ball(NamedTuple):
     """A matrix of integers over 2^160, no element further than `error` from the true one."""
 
-    rows: tuple[tuple[int, ...], ...]
+    middle: Any
     error: int
 
     @classmethod
-    def of(cls, rows: Rows, error: int = 1) -> Ball:
+    def of(cls, exact: Exact, error: int = 1) -> Ball:
         """Fractions, rounded to it."""
-        return cls(tuple(tuple(round(v * ONE) for v in row) for row in rows), error)
+        return cls(np.array([[round(v * ONE) for v in row] for row in exact], object), error)
 
     @property
     def largest(self) -> int:
         """Size of the largest element, with its error."""
-        return max(max(map(abs, row)) for row in self.rows) + self.error
-
-    @property
-    def transpose(self) -> Ball:
-        """The matrix with rows for columns."""
-        return Ball(tuple(zip(*self.rows, strict=True)), self.error)
+        return int(abs(self.middle).max()) + self.error
 
     def __matmul__(self, other: Ball) -> Ball:
-        n, columns = len(other.rows), []
-        for column in zip(*other.rows, strict=True):
-            used = [i for i, v in enumerate(column) if v] or [0]  # most are sparse
-            values = [column[i] for i in used]
-            columns.append([sum(map(mul, [row[i] for i in used], values)) >> BITS for row in self.rows])
-        rows = tuple(zip(*columns, strict=True))
-        error = n * (self.largest * other.error + other.largest * self.error >> BITS) + n + 1
-        return Ball(rows, error)
+        n = len(other.middle)
+        error = (n * (self.largest * other.error + other.largest * self.error) >> BITS) + n + 2
+        return Ball((self.middle @ other.middle) >> BITS, error)
 
-    def times(self, factor: Real) -> Ball:
-        """Of every element, by a number."""
+    def times(self, factor: Fraction) -> Ball:
+        """Of every element, by a positive number."""
         n, d = factor.numerator, factor.denominator
-        return Ball(tuple(tuple(v * n // d for v in row) for row in self.rows), self.error * abs(n) // d + 2)
-
-
-def total(A: Ball, B: Ball) -> Ball:
-    """Sum of two matrices, with their errors."""
-    both = zip(A.rows, B.rows, strict=True)
-    return Ball(tuple(tuple(map(add, x, y)) for x, y in both), A.error + B.error)
+        return Ball(self.middle * n // d, self.error * n // d + 2)
 
 
 def exponential(A: Ball) -> Ball:
     """exp(A): a Taylor series of A/2^s, squared s times; the rest of the series is below its last term."""
-    n = len(A.rows)
-    size = max(sum(map(abs, row)) for row in A.rows) + n * A.error
+    n = len(A.middle)
+    size = int(abs(A.middle).sum(axis=1).max()) + n * A.error
     if size > FASTEST * ONE:
         raise RefusedError("its loop moves too far within a tick")
     halvings = (2 * size // ONE).bit_length()
-    small = A.times(Fraction(1, 1 << halvings))
-    term = whole = Ball(tuple(tuple(ONE * (i == j) for j in range(n)) for i in range(n)), 0)
-    k = 0
+    small, k = A.times(Fraction(1, 1 << halvings)), 0
+    term = whole = Ball(np.diag([ONE] * n).astype(object), 0)
     while term.largest > n + 8 and k < 400:
         k += 1
         term = (term @ small).times(Fraction(1, k))
-        whole = total(whole, term)
-    whole = Ball(whole.rows, whole.error + 2 * n * term.largest)
-    for _ in range(halvings):
-        whole = whole @ whole
-    return whole
+        whole = Ball(whole.middle + term.middle, whole.error + term.error)
+    whole = Ball(whole.middle, whole.error + 2 * n * term.largest)
+    return reduce(lambda E, _: E @ E, range(halvings), whole)
 
 
 def is_positive(Q: Ball) -> bool:
     """Whether every symmetric matrix within the ball is positive definite."""
-    n, A = len(Q.rows), Q.rows
-    lift = n * Q.error + SPARE
-    R: list[list[int]] = []
-    for i in range(n):
-        row: list[int] = []
-        for j in range(i):
-            row.append(((A[i][j] << BITS) - sum(map(mul, row, R[j]))) // R[j][j])
-        rest = (A[i][i] - lift << BITS) - sum(v * v for v in row)
-        if rest <= SPARE * SPARE:
+    n = len(Q.middle)
+    A = Q.middle - np.diag([n * Q.error + SPARE] * n)
+    R = np.zeros((n, n), object)
+    for j in range(n):
+        rest = (A[j:, j] << BITS) - (R[j:, : j + 1] @ R[j, : j + 1])
+        if rest[0] <= SPARE * SPARE:
             return False
-        row.append(isqrt(rest))
-        R.append(row)
-    for i in range(n):
-        for j in range(i + 1):
-            aim = A[i][j] - (lift if i == j else 0) << BITS
-            if n * abs(aim - sum(map(mul, R[i], R[j]))) >= SPARE << BITS:
-                return False
-    return True
+        R[j:, j] = rest // isqrt(rest[0])
+    return bool(n * abs((A << BITS) - R @ R.T).max() < SPARE << BITS)
 
 
 @lru_cache
-def pi() -> Real:
+def pi() -> Fraction:
     """To 2^-200, by Machin's formula."""
 
-    def arctan(inverse: int) -> Real:
+    def arctan(inverse: int) -> Fraction:
         one = 1 << 220
         total, power, k = 0, one // inverse, 0
         while power:
@@ -139,397 +109,276 @@ def pi() -> Real:
     return 16 * arctan(5) - 4 * arctan(239)
 
 
-def root(value: Real) -> Real:
-    """Square root, to 2^-200 of a number near one."""
-    return Fraction(isqrt(int(value * (1 << 400))), 1 << 200)
-
-
-def exact(value: Any) -> Real:
+def exact(value: Any) -> Fraction:
     """A number of the file."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise RefusedError(f"{value!r} is no number")
     return Fraction(value)
 
 
-class ExactLoop:
-    """Arm, sensor and law of a file, in exact numbers; the names are those of the page on force."""
-
-    def __init__(self, gains: dict[str, Any], inner: dict[str, Any] | None):
-        arm = gains["arm"]
-        own, sensor = inner or arm["inner"], arm["sensor"]
-        self.tick = 1 / exact(arm["rate"])
-        self.torque = own["kind"] == "torque"
-        self.series = exact(own["stiffness"])
-        self.theta, self.alpha = exact(gains["theta"]), exact(gains.get("alpha", 0.42))
-        cap, relief = exact(gains["cap"]), exact(gains.get("relief", 0.0))
-        self.compliance = 1 / self.series if self.torque else Fraction(0)
-        self.cap = cap if self.torque else cap / (1 + cap / self.series)
-        felt = self.compliance * self.cap
-        lag = self.theta * (1 - relief * (felt + Fraction(1, 2)) / (felt + 1))
-        self.gain = self.alpha / lag * (self.compliance + 1 / self.cap)
-        own_rate, small = exact(arm["rate"]), Fraction(1, 10**9)
-        low, high = own.get("delay_interval") or (own["delay"],) * 2
-        most = ceil(exact(high) * own_rate - small)
-        self.unsure = most - floor(exact(low) * own_rate + small) if own.get("delay_interval") else 0
-        self.delay = most - self.unsure
-        self.period = max(ceil(own_rate / exact(sensor["sampling"]) - small), 1)
-        if self.torque:
-            self.mass, self.damping = exact(own["mass"]), exact(own["damping"])
-        else:
-            f = [2 * pi() * exact(v) for v in own.get("bandwidth_interval") or (own["bandwidth"],) * 2]
-            z = [exact(v) for v in own.get("damping_interval") or (own["damping"],) * 2]
-            self.ends = [(f[0] ** 2, f[1] ** 2), (2 * z[0] * f[0], 2 * z[1] * f[1])]
-        self.filter = polynomial(sensor.get("low_pass", "none"))
-
-    @property
-    def known(self) -> bool:
-        """Whether the tick is affine in all that varies."""
-        return not self.torque and all(a == b for a, b in self.ends)
-
-
-def polynomial(low_pass: str) -> list[Real]:
+def polynomial(low_pass: str) -> list[Fraction]:
     """a_0 ... a_n of the sensor's low-pass a_0/(s^n + ... + a_0), s in rad/s; [1] for none."""
-    word = low_pass.strip().lower().replace(" ", "")
-    found = [Fraction(1)]
+    word, found = low_pass.strip().lower().replace(" ", ""), [Fraction(1)]
+    two = Fraction(isqrt(2 << 400), 1 << 200)
     for section in [] if word == "none" else word.split("+b"):
         match = re.fullmatch(r"b?utterworth([123]):([0-9.e+-]+)(?:hz)?", section)
         if match is None:
             raise RefusedError(f"the low-pass {low_pass!r} is none of order 1 to 3")
         n, w = int(match[1]), 2 * pi() * exact(float(match[2]))
-        middle = {1: [], 2: [root(Fraction(2))], 3: [Fraction(2)] * 2}[n]
-        own = [a * w ** (n - i) for i, a in enumerate([Fraction(1), *middle, Fraction(1)])]
-        product_ = [Fraction(0)] * (len(found) + n)
-        for (i, a), (j, b) in product(enumerate(found), enumerate(own)):
-            product_[i + j] += a * b
-        found = product_
+        inner: list[Any] = [[1, 1], [1, two, 1], [1, 2, 2, 1]][n - 1]
+        found = list(np.convolve(np.array(found, object), [a * w ** (n - i) for i, a in enumerate(inner)]))
     return found
 
 
-class Tick:
-    """The matrix of a tick for one claim: the state's order and units are the file's."""
+class ExactClaim:
+    """Arm, sensor and law of a file, with one of its claims; names are those of the page on force."""
 
-    def __init__(self, loop: ExactLoop, claim: dict[str, Any]):
-        self.loop, units = loop, claim["units"]
-        self.w0, self.k0, self.wf = (exact(units[name]) for name in ("w0", "k0", "wf"))
-        if not min(self.w0, self.k0, self.wf) > 0:
-            raise RefusedError("a unit of its state is not above 0")
-        self.order = len(loop.filter) - 1
-        self.readings = claim["ages"][1] + loop.unsure
-        sent = range(1, loop.delay + 1 if loop.torque else max(loop.delay, 1))
-        self.p = 2 + self.order
-        self.state = (
-            ["x", "v"] + [f"f{i + 1}" for i in range(self.order)]
-            + [f"r{i + 1}" for i in range(self.readings)] + ["u", "c0"]
-            + [f"{'t' if loop.torque else 'c'}{i}" for i in sent]
-        )  # fmt: skip
-        if list(claim["state"]) != self.state:
-            raise RefusedError("its state is in another order")
-        self._moved: dict[tuple[Surface, Surface | None], Ball] = {}
-
-    def rates(self, surface: Surface, inner: Surface | None) -> Rows:
-        """d/dt of x, v, f... and of the held input, which is the last."""
-        (K, B), loop, p = surface, self.loop, self.p
-        A = [[Fraction(0)] * (p + 1) for _ in range(p + 1)]
-        A[0][1] = self.w0
-        if inner is None:
-            A[1][0], A[1][1] = -K / loop.mass / self.w0, -B / loop.mass
-            A[1][p] = self.k0 / loop.mass / self.w0
+    def __init__(self, gains: dict[str, Any], inner: dict[str, Any] | None, claim: dict[str, Any]):
+        arm = gains["arm"]
+        own, rate = inner or arm["inner"], exact(arm["rate"])
+        self.claim, self.kind, self.tick = claim, claim["kind"], 1 / rate
+        self.torque, self.series = own["kind"] == "torque", exact(own["stiffness"])
+        self.theta, self.alpha = exact(gains["theta"]), exact(gains.get("alpha", 0.42))
+        cap, relief = exact(gains["cap"]), exact(gains.get("relief", 0.0))
+        self.compliance = 1 / self.series if self.torque else Fraction(0)
+        cap = cap if self.torque else cap / (1 + cap / self.series)
+        felt = self.compliance * cap
+        lag = self.theta * (1 - relief * (felt + Fraction(1, 2)) / (felt + 1))
+        self.gain = self.alpha / lag * (self.compliance + 1 / cap)
+        low, high = own.get("delay_interval") or (own["delay"],) * 2
+        most = ceil(exact(high) * rate - SMALL)
+        self.unsure = most - floor(exact(low) * rate + SMALL) if own.get("delay_interval") else 0
+        self.delay = most - self.unsure
+        self.period = max(ceil(rate / exact(arm["sensor"]["sampling"]) - SMALL), 1)
+        self.ends: list[tuple[Fraction, Fraction]] = []
+        if self.torque:
+            self.mass, self.damping = exact(own["mass"]), exact(own["damping"])
         else:
-            A[1][0], A[1][1], A[1][p] = -inner[0] / self.w0, -inner[1], inner[0] / self.w0
-        for i in range(self.order - 1):
-            A[2 + i][3 + i] = self.wf
-        if self.order:
-            last, n = A[1 + self.order], self.order
-            for i in range(n):
-                last[2 + i] = -loop.filter[i] / self.wf ** (n - 1 - i)
-            into = loop.filter[0] / self.wf ** (n - 1) / self.k0
-            last[0], last[1] = into * K, into * B * self.w0
-        return A
-
-    def within(self, surface: Surface, inner: Surface | None) -> Ball:
-        """[E e]: x, v, f... a tick later, from those of now and the held input, shape (p, p + 1)."""
-        key = surface, inner
-        if key not in self._moved:
-            A = self.rates(surface, inner)
-            whole = exponential(Ball.of([[v * self.loop.tick for v in row] for row in A]))
-            self._moved[key] = Ball(whole.rows[: self.p], whole.error)
-        return self._moved[key]
-
-    def rest(self, surface: Surface, gain: Real, age: int) -> Rows:
-        """All rows but the first p, and with them the row of the input that is held in this tick, which is the last."""
-        loop, one, first = self.loop, Fraction(1), self.state[: self.p]
-        direct = {"x": surface[0] / self.k0, "v": surface[1] * self.w0 / self.k0}
-        rows = {"r1": {"f1": one} if self.order else direct}
-        rows |= {f"r{i}": {f"r{i - 1}": one} for i in range(2, self.readings + 1)}
-        used = rows["r1"] if age == 0 else {f"r{age}": one}
-        rows["u"] = {k: -gain * self.k0 * v for k, v in used.items()}
-        rows["c0"] = {"c0": one} | {k: loop.tick * v for k, v in rows["u"].items()}
-        name, late = "t" if loop.torque else "c", range(2 if loop.torque else 1, len(self.state))
-        rows |= {f"{name}{i}": {f"{name}{i - 1}": one} for i in late}
-        if loop.torque:
-            stiff, rate = loop.series / self.k0, loop.damping * self.w0 / self.k0
-            torque = {k: stiff * v for k, v in rows["c0"].items()}
-            rows["t1"] = torque | {"x": torque.get("x", 0) - stiff, "v": torque.get("v", 0) - rate}
-            held = {f"t{loop.delay}": one} if loop.delay else rows["t1"]
-        else:
-            held = {f"c{loop.delay - 1}": one} if loop.delay else rows["c0"]
-        wanted = [rows[name] for name in self.state[len(first) :]]
-        return [[Fraction(row.get(name, 0)) for name in self.state] for row in [*wanted, held]]
-
-    def phi(self, surface: Surface, inner: Surface | None, gain: Real, age: int) -> tuple[Ball, Ball]:
-        """The matrix of the tick, and the map from the state to x, v, f... and the held input, shape (p + 1, n)."""
-        rows = Ball.of(self.rest(surface, gain, age))
-        n, p = len(self.state), self.p
-        first = tuple(tuple(ONE * (i == j) for j in range(n)) for i in range(p))
-        fed = Ball((*first, rows.rows[-1]), rows.error)
-        top = self.within(surface, inner) @ fed
-        return Ball(top.rows + rows.rows[:-1], max(top.error, rows.error)), fed
-
-
-def majorant(rates: list[Rows], steps: list[Rows], tick: Real) -> Rows:
-    """Elements of the distance of exp(T A) from the multilinear function through its corners, at most.
-
-    A is affine in each of its parameters alone; the distance is at most the sum of h^2/8 |E''|. With c so large that
-    A + c has no negative diagonal, and M the elements' largest sizes in that, |E''| is at most exp(-c T) times the
-    second derivative of exp(T (M + s D)) for |dA/ds| <= D: twice the last block of an exponential of 3 x 3 blocks.
-    """
-    n = len(rates[0])
-    each = list(product(range(n), range(n)))
-    c = Fraction(float(max(Fraction(0), *(-A[i][i] for A in rates for i in range(n)))) * (1.0 + 1e-9))
-    fade = exponential(Ball.of([[-c * tick]])).largest
-    found = [[Fraction(0)] * n for _ in range(n)]
-    for D in steps:
-        whole = [[Fraction(0)] * (3 * n) for _ in range(3 * n)]
-        for b, (i, j) in product(range(3), each):
-            whole[b * n + i][b * n + j] = max(abs(A[i][j] + c * (i == j)) for A in rates) * tick
-            if b < 2:
-                whole[b * n + i][(b + 1) * n + j] = D[i][j] * tick
-        made = exponential(Ball.of(whole))
-        for i, j in each if any(map(any, D)) else ():
-            found[i][j] += Fraction(fade * (abs(made.rows[i][2 * n + j]) + made.error), 4 * ONE * ONE)
-    return found
-
-
-class Claims:
-    """Check of one claim."""
-
-    def __init__(self, loop: ExactLoop, claim: dict[str, Any]):
-        self.loop, self.claim, self.kind = loop, claim, claim["kind"]
-        self.low, self.high, self.least, self.most = (
-            exact(claim[k]) for k in ("low", "high", "least", "most")
+            w = [2 * pi() * exact(v) for v in own.get("bandwidth_interval") or (own["bandwidth"],) * 2]
+            z = [2 * exact(v) for v in own.get("damping_interval") or (own["damping"],) * 2]
+            self.ends = [(w[0] ** 2, w[1] ** 2), (z[0] * w[0], z[1] * w[1])]
+        self.filter = polynomial(arm["sensor"].get("low_pass", "none"))
+        self.low, self.high, self.least, self.most = map(
+            exact, map(claim.get, ("low", "high", "least", "most"))
         )
-        self.shares = [exact(v) for v in claim["shares"]]
-        self.ages = list(claim["ages"])
+        self.shares, self.ages = [exact(v) for v in claim["shares"]], list(claim["ages"])
         self.parts = claim.get("parts", 1)
+        self.w0, self.k0, self.wf = (exact(claim["units"][name]) for name in ("w0", "k0", "wf"))
+        self.order, self.readings = len(self.filter) - 1, self.ages[1] + self.unsure
+        self.p, self._moved, self._last = 2 + self.order, {}, -10  # type: ignore[var-annotated]
+        names, late = "t" if self.torque else "c", self.delay + 1 if self.torque else max(self.delay, 1)
+        self.state = ["x", "v", *(f"f{i + 1}" for i in range(self.order))]
+        self.state += [*(f"r{i + 1}" for i in range(self.readings)), "u", "c0"]
+        self.state += [f"{names}{i}" for i in range(1, late)]
         self._sound()
-        self.tick = Tick(loop, claim)
-        self._last = -10
 
     def _sound(self) -> None:
         (young, old), (lowest, highest) = self.ages, self.shares
         adapting = self.kind == "adapting"
-        if self.kind not in ("held", "one-sided", "adapting") or (
-            self.kind == "one-sided" and self.loop.torque
+        for fine, why in (
+            (self.kind in ("held", "adapting") or (self.kind == "one-sided" and not self.torque), "kind"),
+            (0 < lowest <= highest if adapting else lowest == 1 <= highest, "shares of the law's gain"),
+            (type(young) is type(old) is int and 0 <= young <= old >= self.period, "ages of the sensor"),
+            ((adapting or young == old) and (young > 0 or self.order), "ages that its norms cover"),
+            (0 <= self.low <= self.high > 0 and 0 <= self.least <= self.most, "intervals"),
+            (type(self.parts) is int and 1 <= self.parts <= 100, "parts"),
+            (min(self.w0, self.k0, self.wf) > 0 and list(self.claim["state"]) == self.state, "state"),
         ):
-            raise RefusedError(f"a claim of kind {self.kind!r} is none of such an arm")
-        if not (0 < lowest <= highest if adapting else lowest == 1 <= highest):
-            raise RefusedError(f"the shares of its {self.kind} claim are not of the law's gain")
-        if not (isinstance(young, int) and isinstance(old, int) and 0 <= young <= old >= self.loop.period):
-            raise RefusedError(f"the ages of its {self.kind} claim are not those of the sensor")
-        if (not adapting and young != old) or (young == 0 and len(self.loop.filter) == 1):
-            raise RefusedError(f"the ages of its {self.kind} claim are not covered by its norms")
-        if not (
-            0 <= self.low <= self.high
-            and 0 <= self.least <= self.most
-            and self.high > 0
-            and 1 <= self.parts <= 100
-        ):
-            raise RefusedError(f"an interval of its {self.kind} claim is empty")
+            if not fine:
+                raise RefusedError(f"its {self.kind!r} claim has not the {why}")
 
-    @property
-    def fades(self) -> bool:
-        """Whether the gain of the claim goes to next to nothing: K is fixed then, since g K alone counts."""
-        return self.kind == "adapting" and not self.loop.torque and self.shares[0] < Fraction(1, 100)
+    def rates(self, K: Fraction, B: Fraction, inner: Any) -> Exact:
+        """d/dt of x, v, f... and of the held input, which is the last."""
+        p, n = self.p, self.order
+        A = np.full((p + 1, p + 1), Fraction(0), object)
+        A[0, 1] = self.w0
+        if inner is None:
+            A[1, [0, 1, p]] = -K / self.mass / self.w0, -B / self.mass, self.k0 / self.mass / self.w0
+        else:
+            A[1, [0, 1, p]] = -inner[0] / self.w0, -inner[1], inner[0] / self.w0
+        for i in range(n - 1):
+            A[2 + i, 3 + i] = self.wf
+        if n:
+            A[p - 1, 2:p] = [-a / self.wf ** (n - 1 - i) for i, a in enumerate(self.filter[:n])]
+            A[p - 1, :2] = self.filter[0] / self.wf ** (n - 1) / self.k0 * np.array([K, B * self.w0])
+        return A
 
-    def cells(self) -> list[Box]:
-        """As the file has them."""
+    def rest(self, K: Fraction, B: Fraction, gain: Fraction, age: int) -> Exact:
+        """All rows but the first p, and with them the row of the input that is held in this tick, which is the last."""
+        one = Fraction(1)
+        rows = {"r1": {"f1": one} if self.order else {"x": K / self.k0, "v": B * self.w0 / self.k0}}
+        rows |= {f"r{i}": {f"r{i - 1}": one} for i in range(2, self.readings + 1)}
+        used = {f"r{age}": one} if age else rows["r1"]
+        rows["u"] = {k: -gain * self.k0 * v for k, v in used.items()}
+        held = rows["c0"] = {"c0": one} | {k: self.tick * v for k, v in rows["u"].items()}
+        name, first = ("t", 2) if self.torque else ("c", 1)
+        rows |= {f"{name}{i}": {f"{name}{i - 1}": one} for i in range(first, len(self.state))}
+        if self.torque:
+            stiff = self.series / self.k0
+            less = {"x": stiff, "v": self.damping * self.w0 / self.k0}
+            held = {k: stiff * held.get(k, 0) - less.get(k, 0) for k in (*held, "x", "v")}
+            rows["t1"] = held
+        if self.delay:
+            held = {f"t{self.delay}" if self.torque else f"c{self.delay - 1}": one}
+        wanted = [*(rows[name] for name in self.state[self.p :]), held]
+        return [[Fraction(row.get(name, 0)) for name in self.state] for row in wanted]
+
+    def phi(self, K: Fraction, B: Fraction, inner: Any, gain: Fraction, age: int) -> tuple[Ball, Any]:
+        """The matrix of the tick, and the map from the state to x, v, f... and the held input, shape (p + 1, n)."""
+        if (K, B, inner) not in self._moved:
+            whole = exponential(Ball.of(self.rates(K, B, inner) * self.tick))
+            self._moved[K, B, inner] = Ball(whole.middle[: self.p], whole.error)
+        rows = Ball.of(self.rest(K, B, gain, age))
+        fed = Ball(
+            np.vstack([ONE * np.eye(self.p, len(self.state), dtype=object), rows.middle[-1:]]), rows.error
+        )
+        top = self._moved[K, B, inner] @ fed
+        return Ball(np.vstack([top.middle, rows.middle[:-1]]), max(top.error, rows.error)), fed
+
+    def cells(self) -> list[tuple[Any, ...]]:
+        """K + B/theta from and to, B/K from and to, part of the inner loop and loss, as the file has them."""
         names = ("low", "high", "least", "most")
-        found = []
-        for c in self.claim["cells"]:
-            a, b, s, t = (exact(c[k]) for k in names)
-            found.append((a, b, s, t, int(c.get("part", 0)), int(c.get("loss", 0))))
-        return found
+        own = self.claim["cells"]
+        return [(*(exact(c[k]) for k in names), int(c.get("part", 0)), int(c.get("loss", 0))) for c in own]
 
     def check_tiles(self) -> None:
         """That the cells cover the claim, for every part of the inner loop and every delay."""
-        cells = self.cells()
-        losses = range(self.loop.unsure + 1) if self.kind != "adapting" else range(1)
-        for part, loss in product(range(self.parts**2), losses):
-            own = [c for c in cells if c[4:] == (part, loss)]
+        losses = range(1 if self.kind == "adapting" else self.unsure + 1)
+        for place in product(range(self.parts**2), losses):
+            own = [c for c in self.cells() if c[4:] == place]
             if self.kind == "one-sided" and any(c[0] > self.low or c[1] < self.high for c in own):
-                raise RefusedError("a cell of its one-sided claim is not of all that contact may be")
+                raise RefusedError("a cell of its 'one-sided' claim is not of all that contact may be")
             bounds = spans([e for c in own for e in c[:2]], self.low, self.high)
             times = spans([e for c in own for e in c[2:4]], self.least, self.most)
             for (a, b), (s, t) in product(bounds, times):
                 if not any(c[0] <= a and b <= c[1] and c[2] <= s and t <= c[3] for c in own):
-                    raise RefusedError(f"the cells of its {self.kind} claim leave a gap")
+                    raise RefusedError(f"the cells of its {self.kind!r} claim leave a gap")
 
-    def surface(self, bound: Real, time: Real) -> Surface:
-        """K and B of K + B/theta and B/K."""
-        K = bound / (1 + time / self.loop.theta)
-        return K, time * K
+    def corners(self, box: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+        """K, B, inner loop, gain and age of all extremes of a cell."""
+        low, high, least, most, part, loss = box
+        old, theta = self.ages[1] + self.unsure, self.theta
+        fades = self.kind == "adapting" and not self.torque and self.shares[0] < Fraction(1, 100)
+        bounds, times = dict.fromkeys((low, high)), dict.fromkeys((least, most))
+        surfaces = [(b / (1 + t / theta), t * b / (1 + t / theta)) for b, t in product(bounds, times)]
+        if self.kind == "adapting":
+            ends = [
+                s * self.alpha * (self.compliance + 1 / b) / theta
+                for s, b in zip(self.shares, (high, low), strict=True)
+            ]
+            if fades:  # g K alone counts
+                surfaces = [(high, t * high) for t in times]
+                ends = [ends[0] / (1 + most / theta), ends[1] / (1 + least / theta)]
+            laws = list(product(dict.fromkeys(ends), range(self.ages[0], old + 1)))
+        else:
+            laws = [(s * self.gain, old - loss) for s in dict.fromkeys(self.shares)]
+        inners: list[Any] = [None]
+        if not self.torque:
+            parts = zip(divmod(part, self.parts), self.ends, strict=True)
+            cut = [
+                dict.fromkeys(a + (b - a) * Fraction(i + k, self.parts) for k in (0, 1))
+                for i, (a, b) in parts
+            ]
+            inners = list(product(*cut))
+        return [(*s, i, *law) for s in surfaces for i in inners for law in laws]
 
-    def surfaces(self, box: Box) -> list[Surface]:
-        """K and B of the corners of a cell."""
-        low, high, least, most = box[:4]
-        if self.fades:
-            return [(high, t * high) for t in dict.fromkeys((least, most))]
-        return [self.surface(b, t) for b in dict.fromkeys((low, high)) for t in dict.fromkeys((least, most))]
+    def curvature(self, box: tuple[Any, ...]) -> Exact:
+        """Elements of the distance of exp(T A) from the multilinear function through its corners, at most.
 
-    def laws(self, box: Box) -> list[tuple[Real, int]]:
-        """Extreme gains, and ages of the reading in use."""
-        loop, (lowest, highest), old = self.loop, self.shares, self.ages[1] + self.loop.unsure
-        if self.kind != "adapting":
-            return [(s * loop.gain, old - box[5]) for s in dict.fromkeys((lowest, highest))]
-        ends = [
-            share * loop.alpha * (loop.compliance + 1 / bound) / loop.theta
-            for share, bound in ((lowest, box[1]), (highest, box[0]))
-        ]
-        if self.fades:
-            ends = [ends[0] / (1 + box[3] / loop.theta), ends[1] / (1 + box[2] / loop.theta)]
-        return list(product(dict.fromkeys(ends), range(self.ages[0], old + 1)))
-
-    def inner(self, part: int) -> list[Surface | None]:
-        """Corners of a part of what a position arm's inner loop may be; None for a torque arm."""
-        if self.loop.torque:
-            return [None]
-        ends = []
-        for place, (a, b) in zip(divmod(part, self.parts), self.loop.ends, strict=True):
-            ends.append([a + (b - a) * Fraction(i, self.parts) for i in (place, place + 1)])
-        return [(w, z) for w in dict.fromkeys(ends[0]) for z in dict.fromkeys(ends[1])]
-
-    def curvature(self, box: Box) -> Rows | None:
-        """The distance of [E e] from the hull of its corners; None where there is none."""
-        if self.loop.known:
+        A is affine in each of its parameters alone; the distance is at most the sum of h^2/8 |E''|. With c so large
+        that A + c has no negative diagonal, and M the elements' largest sizes in that, |E''| is at most exp(-c T) times the
+        second derivative of exp(T (M + s D)) for |dA/ds| <= D: twice the last block of an exponential of 3 x 3 blocks.
+        None where A is affine in all that varies. For a position arm x is counted from the held input: at rest it is 0.
+        """
+        if not self.torque and all(a == b for a, b in self.ends):
             return None
-        tick, inners, theta = self.tick, self.inner(box[4]), self.loop.theta
-        counted = [
-            self._from_rest(tick.rates(surface, inner)) for surface in self.surfaces(box) for inner in inners
-        ]
         low, high, least, most = box[:4]
-        if not self.loop.torque:
-            (w1, w2), (z1, z2) = ([min(v), max(v)] for v in zip(*(i for i in inners if i), strict=True))
-            steps = [[[Fraction(0)] * (tick.p + 1) for _ in range(tick.p + 1)] for _ in range(2)]
-            steps[0][1][0], steps[1][1][1] = (w2 - w1) / tick.w0, z2 - z1
-            return majorant(counted, steps, self.loop.tick)
-        none, one, zero = (tick.rates((Fraction(a), Fraction(b)), None) for a, b in ((0, 0), (1, 0), (0, 1)))
-        of_K = [[abs(a - b) for a, b in zip(x, y, strict=True)] for x, y in zip(one, none, strict=True)]
-        of_B = [[abs(a - b) for a, b in zip(x, y, strict=True)] for x, y in zip(zero, none, strict=True)]
-        each = [list(zip(x, y, strict=True)) for x, y in zip(of_K, of_B, strict=True)]
-        share = [1 / (1 + t / theta) for t in (most, least)]
-        along = [
-            [(high - low) * max(s * k + theta * (1 - s) * b for s in share) for k, b in row] for row in each
-        ]
-        across = [[(share[1] - share[0]) * high * (k + theta * b) for k, b in row] for row in each]
-        return majorant(counted, [along, across], self.loop.tick)
+        inners = [c[2] for c in self.corners(box)]
+        rates = np.array([self.rates(*c[:3]) for c in self.corners(box)])
+        if self.torque:
+            none, of_K, of_B = (
+                self.rates(Fraction(a), Fraction(b), None) for a, b in ((0, 0), (1, 0), (0, 1))
+            )
+            of_K, of_B = abs(of_K - none), self.theta * abs(of_B - none)
+            share = [1 / (1 + t / self.theta) for t in (most, least)]
+            along = reduce(np.maximum, [s * of_K + (1 - s) * of_B for s in share])
+            steps = [(high - low) * along, (share[1] - share[0]) * high * (of_K + of_B)]
+        else:
+            rates[:, :-1, -1] += rates[:, :-1, 0]
+            steps = [np.full_like(rates[0], Fraction(0)) for _ in range(2)]
+            steps[0][1, 0], steps[1][1, 1] = (max(v) - min(v) for v in zip(*inners, strict=True))
+            steps[0] = steps[0] / self.w0
+        eye = np.diag([Fraction(1)] * len(rates[0]))
+        c = Fraction(float(max(0, *(-A[i, i] for A in rates for i in range(len(A))))) * (1.0 + 1e-9))
+        M, Z = abs(rates + c * eye).max(axis=0), 0 * eye
+        fade = exponential(Ball.of([[-c * self.tick]])).largest
+        found = Z
+        for D in steps:
+            made = exponential(Ball.of(np.block([[M, D, Z], [Z, M, D], [Z, Z, M]]) * self.tick))
+            block = abs(made.middle[: len(M), 2 * len(M) :]) + made.error
+            found = found + (block * fade * Fraction(1, 4 * ONE * ONE) if D.any() else 0)
+        return found[:-1]
 
-    def _from_rest(self, A: Rows) -> Rows:
-        """For a position arm, x counted from the held input: at rest nothing is left of both."""
-        if not self.loop.torque:
-            for row in A[:-1]:
-                row[-1] += row[0]
-        return A
-
-    def check_cell(self, box: Box, norm: list[list[float]]) -> None:
+    def check_cell(self, box: tuple[Any, ...], norm: list[list[float]]) -> None:
         """That every tick of it contracts in its norm."""
-        n = len(self.tick.state)
+        n = len(self.state)
         if [len(row) for row in norm] != [n] * n:
             raise RefusedError("a norm is not of the loop's size")
-        L = [[exact(v) for v in row] for row in norm]
-        size = max(abs(v) for row in L for v in row)
-        if not size > 0:
-            raise RefusedError(f"a cell of its {self.kind} claim does not contract")
-        root_ = Ball.of([[v / size for v in row] for row in L], 0)
-        P = root_ @ root_.transpose
-        P = Ball(P.rows, 0)  # this very matrix is the norm
-        curvature = self.curvature(box)
-        contracts = is_positive(P) and all(
-            self._contracts(P, root_, box, curvature, surface, inner, gain, age)
-            for surface in self.surfaces(box)
-            for inner in self.inner(box[4])
-            for gain, age in self.laws(box)
-        )
-        if not contracts:
-            raise RefusedError(f"a cell of its {self.kind} claim does not contract")
+        L = np.array([[exact(v) for v in row] for row in norm])
+        size = abs(L).max()
+        root = Ball.of(L / size if size else L, 0).middle
+        P = Ball((root @ root.T) >> BITS, 0)  # this very matrix is the norm
+        bound = self.curvature(box)
+        W = None if bound is None else self._weights(P, bound)
+        if not is_positive(P) or not all(self._contracts(P, W, *self.phi(*c)) for c in self.corners(box)):
+            raise RefusedError(f"a cell of its {self.kind!r} claim does not contract")
 
-    def _contracts(
-        self, P: Ball, L: Ball, box: Box, curvature: Rows | None, surface: Surface,
-        inner: Surface | None, gain: Real, age: int,
-    ) -> bool:  # fmt: skip
+    def _weights(self, P: Ball, bound: Exact) -> Ball:
+        """W with |D y|^2 <= y^T W y in the norm P: by columns of D's bound, by the inequality of Cauchy and Schwarz."""
+        sizes = [column @ abs(P.middle[: self.p, : self.p]) @ column / ONE for column in bound.T]
+        tiny = Fraction(1, ONE)
+        many = sum(v > tiny for v in sizes)
+        shares = [many * (1 + Fraction(1, 1 << 40)) if v > tiny else 1 << 60 for v in sizes]
+        return Ball.of(np.diag([Fraction(v * s) for v, s in zip(sizes, shares, strict=True)]))
+
+    def _contracts(self, P: Ball, W: Ball | None, Phi: Ball, fed: Ball) -> bool:
         """Whether |Phi x| + |D x| < |x| in the norm P, D the distance of the exponential from its corners."""
-        Phi, fed = self.tick.phi(surface, inner, gain, age)
-        after = (P @ Phi).transpose @ Phi
-        if curvature is None:
-            return is_positive(minus(P, after))
-        W = self._weights(P, curvature)
-        if not self.loop.torque:
-            fed = Ball(
-                (tuple(a - b for a, b in zip(fed.rows[0], fed.rows[-1], strict=True)), *fed.rows[1:]),
-                2 * fed.error,
-            )
-        beside = (W @ fed).transpose @ fed
+        after = symmetric(P, Phi)
+        if W is None:
+            return is_positive(Ball(P.middle - after.middle, after.error))
+        if not self.torque:
+            fed = Ball(np.vstack([fed.middle[:1] - fed.middle[-1:], fed.middle[1:]]), 2 * fed.error)
+        beside = symmetric(W, fed)
         for halves in sorted(range(-60, 1), key=lambda i: abs(i - self._last)):
             h = Fraction(2.0 ** (0.5 * halves))  # any will do: (a + b)^2 <= (1 + h) a^2 + (1 + 1/h) b^2
-            if is_positive(minus(minus(P, after.times(1 + h)), beside.times(1 + 1 / h))):
+            a, b = after.times(1 + h), beside.times(1 + 1 / h)
+            if is_positive(Ball(P.middle - a.middle - b.middle, a.error + b.error)):
                 self._last = halves
                 return True
         return False
 
-    def _weights(self, P: Ball, curvature: Rows) -> Ball:
-        """W with |D y|^2 <= y^T W y in the norm P: by columns of D's bound, by the inequality of Cauchy and Schwarz."""
-        p = self.tick.p
-        sizes = [
-            sum(
-                Fraction(abs(P.rows[a][b]), ONE) * curvature[a][j] * curvature[b][j]
-                for a in range(p)
-                for b in range(p)
-            )
-            for j in range(p + 1)
-        ]
-        tiny = Fraction(1, 1 << 160)
-        many = max(sum(v > tiny for v in sizes), 1)
-        shares = [many * (1 + Fraction(1, 1 << 40)) if v > tiny else Fraction(1 << 60) for v in sizes]
-        W = [[sizes[i] * shares[i] * (i == j) for j in range(p + 1)] for i in range(p + 1)]
-        return Ball.of(W)
+
+def symmetric(P: Ball, X: Ball) -> Ball:
+    """X^T P X, made symmetric."""
+    found = Ball(X.middle.T, X.error) @ (P @ X)
+    return Ball((found.middle + found.middle.T) // 2, found.error + 1)
 
 
-def minus(A: Ball, B: Ball) -> Ball:
-    """A less B, made symmetric."""
-    n = len(A.rows)
-    rows = [[A.rows[i][j] - B.rows[i][j] for j in range(n)] for i in range(n)]
-    even = tuple(tuple((rows[i][j] + rows[j][i]) // 2 for j in range(n)) for i in range(n))
-    return Ball(even, A.error + B.error + 1)
-
-
-def spans(edges: list[Real], low: Real, high: Real) -> list[tuple[Real, Real]]:
+def spans(edges: list[Fraction], low: Fraction, high: Fraction) -> list[tuple[Fraction, Fraction]]:
     """Intervals between neighbouring edges within low ... high."""
     if low == high:
         return [(low, high)]
-    inside = sorted({low, high, *(e for e in edges if low < e < high)})
-    return list(pairwise(inside))
+    return list(pairwise(sorted({low, high, *(e for e in edges if low < e < high)})))
 
 
-def statement(loop: ExactLoop, claim: dict[str, Any]) -> str:
+def statement(own: ExactClaim) -> str:
     """A claim in words."""
-    kind, (young, old), (lowest, highest) = claim["kind"], claim["ages"], map(float, claim["shares"])
-    any_ = kind == "adapting" and not loop.torque
-    surfaces = "any" if any_ else f"{float(claim['low']):.4g} to {float(claim['high']):.4g}"
-    unit = (
-        f"{float(loop.gain):.4g} m/(s N)" if kind != "adapting" else "alpha/(theta K_eff), redrawn every tick"
-    )
-    lost = ", contact lost and found" if kind == "one-sided" else ""
+    adapting, (young, old), (lowest, highest) = own.kind == "adapting", own.ages, map(float, own.shares)
+    surfaces = f"{float(own.low):.4g} to {float(own.high):.4g}" if own.torque or not adapting else "any"
+    unit = "alpha/(theta K_eff), redrawn every tick" if adapting else f"{float(own.gain):.4g} m/(s N)"
+    lost = ", contact lost and found" if own.kind == "one-sided" else ""
     return (
-        f"{kind}: K + B/theta {surfaces} N/m, B/K {float(claim['least']):g} to {float(claim['most']):.4g} s, "
+        f"{own.kind}: K + B/theta {surfaces} N/m, B/K {float(own.least):g} to {float(own.most):.4g} s, "
         f"gain {lowest:g} to {highest:g} times {unit}, readings {young} to {old} ticks old{lost}"
     )
 
@@ -544,28 +393,19 @@ def check(data: bytes | str) -> list[str]:
         RefusedError: it does not hold; its text says why.
     """
     try:
-        return _check(json.loads(data))
-    except RefusedError:
-        raise
-    except (
-        ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError, ZeroDivisionError, RecursionError,
-    ) as error:  # fmt: skip
+        file = json.loads(data)
+        if file["form"] != FORM or file["gains"].get("law", LAW) != LAW:
+            raise RefusedError(f"it is not of the form {FORM!r} and the law {LAW!r}")
+        claims = [ExactClaim(file["gains"], file.get("measured"), claim) for claim in file["claims"]]
+        for own in claims:
+            own.check_tiles()
+            for box, cell in zip(own.cells(), own.claim["cells"], strict=True):
+                own.check_cell(box, cell["norm"])
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise RefusedError(f"it is no certificate: {type(error).__name__} {error}") from None
-
-
-def _check(file: dict[str, Any]) -> list[str]:
-    if file["form"] != FORM or file["gains"].get("law", LAW) != LAW:
-        raise RefusedError(f"it is not of the form {FORM!r} and the law {LAW!r}")
-    if not file["claims"]:
+    if not claims:
         raise RefusedError("it claims nothing")
-    loop, found = ExactLoop(file["gains"], file.get("measured")), []
-    for claim in file["claims"]:
-        own = Claims(loop, claim)
-        own.check_tiles()
-        for box, cell in zip(own.cells(), claim["cells"], strict=True):
-            own.check_cell(box, cell["norm"])
-        found.append(statement(loop, claim))
-    return found
+    return [statement(own) for own in claims]
 
 
 def main(path: str) -> int:
