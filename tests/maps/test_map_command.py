@@ -72,7 +72,8 @@ def test_files_are_written_and_a_page_holds_the_numbers(table, tmp_path, capsys)
 def test_a_map_grows_to_the_whole_one(table):
     result = map_of(read_table(table), MapRequest())
     counts = [count for count, _ in result.film]
-    assert counts == sorted(set(counts)) and counts[-1] == len(result.map)
+    assert counts == sorted(set(counts))
+    assert counts[-1] == len(result.map)
     inside = result.coarse.inside
     width = [np.mean(seen.std[inside]) for _, seen in result.film]
     assert np.all(np.diff(width) <= 0.0)
