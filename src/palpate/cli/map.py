@@ -248,7 +248,7 @@ def _watch(growth: Callable[[Known], Presses], request: MapRequest, output: Outp
 def _growth(logs: Sequence[Path], places: PlaceOptions, one: OneLog, known: Known) -> Presses:
     """The presses by now; a file is read when it has rested since the last look, and once."""
     from palpate.logs.gathered import gather_logs
-    from palpate.maps.presses import joined
+    from palpate.maps.presses import merge_presses
 
     for path in [places.table] if places.table is not None else gather_logs(logs):
         state = path.stat()
@@ -266,7 +266,7 @@ def _growth(logs: Sequence[Path], places: PlaceOptions, one: OneLog, known: Know
     refused = {path.name: part for path, part in found.items() if isinstance(part, str)}
     if not parts:
         raise InputError(next(iter(refused.values()), "no press yet"))
-    presses = joined(parts)
+    presses = merge_presses(parts)
     return replace(presses, refused=presses.refused | refused)
 
 

@@ -51,7 +51,7 @@ class Presses:
     units: dict[str, str] = field(default_factory=dict)
 
 
-def joined(parts: Sequence[Presses]) -> Presses:
+def merge_presses(parts: Sequence[Presses]) -> Presses:
     """The presses of several readings; a quantity that one lacks is NaN there."""
     fields = {name: unit for part in parts for name, unit in part.units.items()}
     columns = {

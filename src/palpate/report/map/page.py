@@ -144,8 +144,8 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
                 {
                     "source": embedded(svg(draw_field(result, name)), "image/svg+xml"),
                     "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
-                    f"{plain(_shown(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
-                    f"{_shown(result, name)[1]}.",
+                    f"{plain(_display_unit(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
+                    f"{_display_unit(result, name)[1]}.",
                 }
                 for name, field in result.fields.items()
             ),
@@ -223,7 +223,7 @@ def _title(name: str) -> str:
     return name.replace("_", " ").capitalize()
 
 
-def _shown(result: MapResult, name: str) -> tuple[float, str]:
+def _display_unit(result: MapResult, name: str) -> tuple[float, str]:
     """Factor and symbol of the unit in which a field is shown."""
     unit = result.presses.units[name]
     return {"m": (1e3, "mm"), "1": (100.0, "%")}.get(unit, (1.0, unit))
@@ -262,7 +262,7 @@ def draw_interval(result: MapResult) -> Figure:
 
 def draw_field(result: MapResult, name: str) -> Figure:
     """A further field over the surface, and the presses that show it."""
-    (factor, symbol), known = _shown(result, name), np.isfinite(result.presses.fields[name])
+    (factor, symbol), known = _display_unit(result, name), np.isfinite(result.presses.fields[name])
     with style.inked(9.0):
         label = f"{_title(name).lower()} [{symbol}]"
         figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
