@@ -13,7 +13,7 @@ import json
 import re
 import sys
 from fractions import Fraction
-from functools import lru_cache, reduce
+from functools import reduce
 from itertools import pairwise, product
 from math import ceil, floor, isqrt
 from pathlib import Path
@@ -29,6 +29,7 @@ SPARE = 1 << 40
 FASTEST = 1000
 """Largest rate within a tick that is computed."""
 SMALL = Fraction(1, 10**9)
+PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803")
 Exact = Any
 """A fraction, or an array of them."""
 
@@ -94,21 +95,6 @@ def is_positive(Q: Ball) -> bool:
     return bool(n * abs((A << BITS) - R @ R.T).max() < SPARE << BITS)
 
 
-@lru_cache
-def pi() -> Fraction:
-    """To 2^-200, by Machin's formula."""
-
-    def arctan(inverse: int) -> Fraction:
-        one = 1 << 220
-        total, power, k = 0, one // inverse, 0
-        while power:
-            total += (-1) ** k * (power // (2 * k + 1))
-            power, k = power // inverse**2, k + 1
-        return Fraction(total, one)
-
-    return 16 * arctan(5) - 4 * arctan(239)
-
-
 def exact(value: Any) -> Fraction:
     """A number of the file."""
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -124,9 +110,9 @@ def polynomial(low_pass: str) -> list[Fraction]:
         match = re.fullmatch(r"b?utterworth([123]):([0-9.e+-]+)(?:hz)?", section)
         if match is None:
             raise RefusedError(f"the low-pass {low_pass!r} is none of order 1 to 3")
-        n, w = int(match[1]), 2 * pi() * exact(float(match[2]))
-        inner: list[Any] = [[1, 1], [1, two, 1], [1, 2, 2, 1]][n - 1]
-        found = list(np.convolve(np.array(found, object), [a * w ** (n - i) for i, a in enumerate(inner)]))
+        n, w = int(match[1]), 2 * PI * exact(float(match[2]))
+        own: Any = ((1, 1), (1, two, 1), (1, 2, 2, 1))[n - 1]
+        found = list(np.convolve(np.array(found, object), own * w ** np.arange(n, -1, -1, dtype=object)))
     return found
 
 
@@ -154,7 +140,7 @@ class ExactClaim:
         if self.torque:
             self.mass, self.damping = exact(own["mass"]), exact(own["damping"])
         else:
-            w = [2 * pi() * exact(v) for v in own.get("bandwidth_interval") or (own["bandwidth"],) * 2]
+            w = [2 * PI * exact(v) for v in own.get("bandwidth_interval") or (own["bandwidth"],) * 2]
             z = [2 * exact(v) for v in own.get("damping_interval") or (own["damping"],) * 2]
             self.ends = [(w[0] ** 2, w[1] ** 2), (z[0] * w[0], z[1] * w[1])]
         self.filter = polynomial(arm["sensor"].get("low_pass", "none"))
@@ -175,17 +161,17 @@ class ExactClaim:
     def _sound(self) -> None:
         (young, old), (lowest, highest) = self.ages, self.shares
         adapting = self.kind == "adapting"
-        for fine, why in (
-            (self.kind in ("held", "adapting") or (self.kind == "one-sided" and not self.torque), "kind"),
-            (0 < lowest <= highest if adapting else lowest == 1 <= highest, "shares of the law's gain"),
-            (type(young) is type(old) is int and 0 <= young <= old >= self.period, "ages of the sensor"),
-            ((adapting or young == old) and (young > 0 or self.order), "ages that its norms cover"),
-            (0 <= self.low <= self.high > 0 and 0 <= self.least <= self.most, "intervals"),
-            (type(self.parts) is int and 1 <= self.parts <= 100, "parts"),
-            (min(self.w0, self.k0, self.wf) > 0 and list(self.claim["state"]) == self.state, "state"),
-        ):
-            if not fine:
-                raise RefusedError(f"its {self.kind!r} claim has not the {why}")
+        fine = {
+            "kind": self.kind in ("held", "adapting") or (self.kind == "one-sided" and not self.torque),
+            "shares of the law's gain": 0 < lowest <= highest if adapting else lowest == 1 <= highest,
+            "ages of the sensor": isinstance(young, int) and 0 <= young <= old >= self.period,
+            "ages that its norms cover": (adapting or young == old) and (young > 0 or self.order),
+            "intervals": 0 <= self.low <= self.high > 0 and 0 <= self.least <= self.most,
+            "parts and state": 1 <= self.parts <= 100 and list(self.claim["state"]) == self.state,
+            "units": min(self.w0, self.k0, self.wf) > 0,
+        }
+        for name in (name for name, holds in fine.items() if not holds):
+            raise RefusedError(f"its {self.kind!r} claim has not the {name}")
 
     def rates(self, K: Fraction, B: Fraction, inner: Any) -> Exact:
         """d/dt of x, v, f... and of the held input, which is the last."""
@@ -286,8 +272,8 @@ class ExactClaim:
         """Elements of the distance of exp(T A) from the multilinear function through its corners, at most.
 
         A is affine in each of its parameters alone; the distance is at most the sum of h^2/8 |E''|. With c so large
-        that A + c has no negative diagonal, and M the elements' largest sizes in that, |E''| is at most exp(-c T) times the
-        second derivative of exp(T (M + s D)) for |dA/ds| <= D: twice the last block of an exponential of 3 x 3 blocks.
+        that A + c has no negative diagonal, and M the elements' largest sizes in that, |E''| is at most exp(-c T) times
+        the second derivative of exp(T (M + s D)) for |dA/ds| <= D: twice the last block of an exponential of 3 x 3 blocks.
         None where A is affine in all that varies. For a position arm x is counted from the held input: at rest it is 0.
         """
         if not self.torque and all(a == b for a, b in self.ends):
