@@ -273,7 +273,7 @@ class ExactClaim:
 
         A is affine in each of its parameters alone; the distance is at most the sum of h^2/8 |E''|. With c so large
         that A + c has no negative diagonal, and M the elements' largest sizes in that, |E''| is at most exp(-c T) times
-        the second derivative of exp(T (M + s D)) for |dA/ds| <= D: twice the last block of an exponential of 3 x 3 blocks.
+        the second derivative of exp(T (M + s D)) for |dA/ds| <= D: twice the last block of one of 3 x 3 blocks.
         None where A is affine in all that varies. For a position arm x is counted from the held input: at rest it is 0.
         """
         if not self.torque and all(a == b for a, b in self.ends):

@@ -110,9 +110,10 @@ class Certificate(Table):
             return Verdict(False, np.inf, 0.0, 0, "it claims nothing")
         for claim in self.claims:
             fault = claim.fault(self.proved_gains)
-            if fault:
-                return Verdict(False, np.inf, 0.0, count, f"{fault}, in its {claim.kind} claim")
             prover = claim.prover(self.proved_gains)
+            if fault or (claim.state, claim.units) != (prover.loop.state, prover.loop.units):
+                why = fault or "the state is another"
+                return Verdict(False, np.inf, 0.0, count, f"{why}, in its {claim.kind} claim")
             if not all(claim.tiled(box) for box in claim.boxes(self.proved_gains)):
                 return Verdict(False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap")
             for proved in claim.cells:
