@@ -38,7 +38,7 @@ REFUSED = {
 
 
 @dataclass(frozen=True)
-class Setting:
+class ControllerFile:
     """A parameter file, the delay [s], and the mass of the tip [kg]."""
 
     file: dict[str, Any]
@@ -50,7 +50,7 @@ Edits = list[tuple[Any, Any, float]]
 
 
 @dataclass(frozen=True)
-class Axis:
+class ControlledAxis:
     """One direction of one controller in a file.
 
     Args:
@@ -87,7 +87,7 @@ def certify_controller(
     if not 0.0 < delay < 10.0 or not 0.0 < stiffest < inf or not (mass is None or 0.0 < mass < inf):
         raise InputError("the delay must be above 0 and below 10 s, stiffness and mass above 0")
     file, parser = _load(path)
-    setting = Setting(file, delay, mass)
+    setting = ControllerFile(file, delay, mass)
     axes = [axis for name, own in _nodes(file) for axis in READERS[controller](name, own, setting)]
     if not axes:
         raise InputError(f"{path}: no settings of {controller}; {WANTED[controller]}")
@@ -95,7 +95,7 @@ def certify_controller(
     first = min(ends)
     high = SHARE * min(first, 1e9)
     proved = high > 0.0 and all(axis.loop.proves(LEAST * high, high) for axis in axes)
-    corrected = _corrected(axes, ends, stiffest)
+    corrected = _correction(axes, ends, stiffest)
     out = StringIO()
     parser.dump(file, out)
     answer = {
@@ -110,7 +110,7 @@ def certify_controller(
     return answer, out.getvalue()
 
 
-def _corrected(axes: list[Axis], ends: list[float], stiffest: float) -> dict[str, Any] | None:
+def _correction(axes: list[ControlledAxis], ends: list[float], stiffest: float) -> dict[str, Any] | None:
     """Numbers with which all axes are proved up to a stiffness, entered into the file; None if there are none."""
     loops, edits, changed = [], [], []
     for axis, end in zip(axes, ends, strict=True):
@@ -172,7 +172,7 @@ def _number(place: Any, key: Any, where: str, least: float = 0.0) -> float:
     return float(value)
 
 
-def _admittance(name: str, own: dict[str, Any], setting: Setting) -> Iterator[Axis]:
+def _admittance(name: str, own: dict[str, Any], setting: ControllerFile) -> Iterator[ControlledAxis]:
     own = own.get("admittance") or {}
     if not isinstance(own, dict) or "damping_ratio" not in own:
         return
@@ -190,7 +190,9 @@ def _admittance(name: str, own: dict[str, Any], setting: Setting) -> Iterator[Ax
         yield _one_admittance(f"{name}.{axis}", (own["damping_ratio"], i), (M, ratio, S), setting.delay)
 
 
-def _one_admittance(name: str, place: tuple[Any, Any], numbers: tuple[float, float, float], T: float) -> Axis:
+def _one_admittance(
+    name: str, place: tuple[Any, Any], numbers: tuple[float, float, float], T: float
+) -> ControlledAxis:
     M, ratio, S = numbers
 
     def loop(zeta: float) -> DelayedContact:
@@ -201,10 +203,10 @@ def _one_admittance(name: str, place: tuple[Any, Any], numbers: tuple[float, flo
         needed = float(f"{(half + sqrt(half**2 + K * M / ALPHA)) / (2.0 * sqrt(M * S)):.6g}")
         return loop(max(needed, ratio)), [(*place, max(needed, ratio))]
 
-    return Axis(name, loop(ratio), correct)
+    return ControlledAxis(name, loop(ratio), correct)
 
 
-def _fzi(name: str, own: dict[str, Any], setting: Setting) -> Iterator[Axis]:
+def _fzi(name: str, own: dict[str, Any], setting: ControllerFile) -> Iterator[ControlledAxis]:
     gains, kind = own.get("pd_gains"), str(own.get("type", ""))
     if not isinstance(gains, dict) or "Motion" in kind or "stiffness" in own:
         return
@@ -227,7 +229,7 @@ def _fzi(name: str, own: dict[str, Any], setting: Setting) -> Iterator[Axis]:
             yield _one_fzi(f"{name}.{axis}", place, (g * p, g * d / rate / PERIOD), setting.delay)
 
 
-def _one_fzi(name: str, place: Any, late: tuple[float, float], T: float) -> Axis:
+def _one_fzi(name: str, place: Any, late: tuple[float, float], T: float) -> ControlledAxis:
     def loop(factor: float) -> DelayedContact:
         return DelayedContact(T, (0.0, 1.0), late_surface=(factor * late[0], factor * late[1]))
 
@@ -237,10 +239,10 @@ def _one_fzi(name: str, place: Any, late: tuple[float, float], T: float) -> Axis
             (place, key, float(f"{factor * place[key]:.6g}")) for key in ("p", "d") if key in place
         ]
 
-    return Axis(name, loop(1.0), correct)
+    return ControlledAxis(name, loop(1.0), correct)
 
 
-def _impedance(name: str, own: dict[str, Any], setting: Setting) -> Iterator[Axis]:
+def _impedance(name: str, own: dict[str, Any], setting: ControllerFile) -> Iterator[ControlledAxis]:
     task: dict[str, Any] = own["task"] if isinstance(own.get("task"), dict) else own
     keys = (
         [(f"k_pos_{a}", f"d_pos_{a}") for a in AXES]
@@ -259,8 +261,8 @@ def _impedance(name: str, own: dict[str, Any], setting: Setting) -> Iterator[Axi
 
 
 def _one_impedance(
-    name: str, place: tuple[Any, str, str], gains: tuple[float, float], setting: Setting
-) -> Axis:
+    name: str, place: tuple[Any, str, str], gains: tuple[float, float], setting: ControllerFile
+) -> ControlledAxis:
     task, stiff, damp = place
 
     def loop(factor: float) -> DelayedContact:
@@ -274,10 +276,10 @@ def _one_impedance(
                 return loop(factor), [(task, key, float(f"{value:.6g}")) for key, value in new if key]
         return None, []
 
-    return Axis(name, loop(1.0), correct)
+    return ControlledAxis(name, loop(1.0), correct)
 
 
-READERS: dict[str, Callable[..., Iterator[Axis]]] = {
+READERS: dict[str, Callable[..., Iterator[ControlledAxis]]] = {
     "ros2-admittance": _admittance,
     "fzi": _fzi,
     "crisp": _impedance,
