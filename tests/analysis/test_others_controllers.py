@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import atan, cos, pi, sin
 
 import pytest
 
@@ -70,10 +70,15 @@ def test_an_integrator_with_a_delay_ends_at_half_of_pi(tmp_path):
     assert "trans_y: {p: 0.08" not in text or told["corrected"]["changed"]
 
 
-def test_an_impedance_ends_where_its_damping_is_a_quarter_turn_late(tmp_path):
-    """Lightly damped: at w T = pi/2 the damping force, d w, pushes along with the motion."""
-    told, _ = certify(tmp_path, CRISP.replace("60.0", "8.0"), "crisp", 0.002, 3.0)
-    assert told["exact"]["stiffness"][1] == pytest.approx(3.0 * (pi / 2 / 0.002) ** 2, rel=0.02)
+def test_an_impedance_ends_where_its_delayed_torque_pushes_with_the_motion(tmp_path):
+    """-k sin wT + d w cos wT = 0, and m w^2 = K + k cos wT + d w sin wT there."""
+    k, d, m, T = 500.0, 60.0, 3.0, 0.002
+    told, _ = certify(tmp_path, CRISP, "crisp", T, m)
+    w = pi / 2 / T
+    for _ in range(50):
+        w = atan(d * w / k) / T
+    K = m * w**2 - k * cos(w * T) - d * w * sin(w * T)
+    assert told["exact"]["stiffness"][1] == pytest.approx(K, rel=1e-9)
     told, _ = certify(tmp_path, CRISP.replace("60.0", "1.0"), "crisp", 0.01, 3.0)
     assert told["proved"]["stiffness"] is None  # its damping leads by d/k = 2 ms, less than the delay
     assert told["exact"]["stiffness"] == [0.0, 0.0]
