@@ -1,5 +1,6 @@
 """What the bridge to Numba promises: one meaning, one cache that is never stale, any name for any part."""
 
+import compileall
 import subprocess
 import sys
 from pathlib import Path
@@ -207,6 +208,7 @@ class Workshop:
         (self.package / "_jit").mkdir()
         for name in ("_vector.py", *(f"_jit/{file.name}" for file in (here / "_jit").glob("*.py"))):
             (self.package / name).write_text((here / name).read_text())
+        compileall.compile_dir(self.package, quiet=1)  # of these files, which stay as they are
         (self.package / "entry.py").write_text(ENTRY)
         (self.user / "main.py").write_text(MAIN)
         self.write(factor=2.0, offset=0.0, more=0.0)
