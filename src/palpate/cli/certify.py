@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -97,8 +97,9 @@ def certify(
 
     palpate certify gains.toml --check certificate.json
 
-    A check needs no solver: it takes norms of matrices. With gains given, it also refuses a certificate of another
-    arm, rate or law. Exit code 1: a part could not be proved, or the certificate does not hold.
+    A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
+    has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
+    part could not be proved, or the certificate does not hold.
 
     Parameters
     ----------
@@ -153,9 +154,21 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     certificate = Certificate.load(path)
     if gains is not None:
         certificate.check_of(load_gains(gains))
-    verdict = certificate.check()
+    with console(stderr=True).status("checking"):
+        verdict = confirm(path, certificate.check())
     _print(certificate, verdict, output)
     return 0 if verdict.holds else 1
+
+
+def confirm(path: Path, verdict: Verdict) -> Verdict:
+    """The verdict, if the independent check has the same."""
+    from palpate.checks.force_certificate import RefusedError, check
+
+    try:
+        check(path.read_bytes())
+    except RefusedError as error:
+        return replace(verdict, holds=False, why=verdict.why or f"by the independent check, {error}")
+    return verdict
 
 
 def _print(
