@@ -159,7 +159,7 @@ def command(words: list[str], folder: Path, codes: tuple[int, ...] = (0,)) -> st
 def exported(name: str, folder: Path) -> ExportedLaw:
     if name == "force":
         path = folder / "gains.toml"
-        path.write_text(gains_for(load_arm("ur5e"), 20.0).to_toml(), encoding="utf-8")
+        path.write_text(gains_for(load_arm("ur5e"), 20.0, limit=60.0).to_toml(), encoding="utf-8")
         return exported_law(LawRequest(gains=path))
     if name == "squares":
         return exported_law(LawRequest("recursive-least-squares", forgetting=0.99))

@@ -23,7 +23,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is
 @pytest.fixture(scope="module")
 def gains(tmp_path_factory):
     path = tmp_path_factory.mktemp("gains") / "gains.toml"
-    path.write_text(gains_for(load_arm("ur5e"), 20.0).to_toml())
+    path.write_text(gains_for(load_arm("ur5e"), 20.0, limit=60.0).to_toml())
     return path
 
 

@@ -22,7 +22,9 @@ def check_header(certificate: Certificate, path: Path) -> None:
     """
     notes = dict(re.findall(r"^// (law|gains): (.*?)\r?$", read_text(path, "a header"), re.MULTILINE))
     if notes.keys() != {"law", "gains"}:
-        raise InputError(f"{path}: no header of a force loop in C; give the palpate_force.h of palpate export")
+        raise InputError(
+            f"{path}: no header of a force loop in C; give the palpate_force.h of palpate export"
+        )
     own = certificate.gains
     for what, mine in (("another law", own.law), ("other gains", own.digest)):
         if notes[what.split()[1]] != mine:
