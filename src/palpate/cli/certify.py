@@ -97,6 +97,8 @@ def certify(
 
     palpate certify gains.toml --check certificate.json
 
+    palpate certify force_loop/palpate_force.h --check certificate.json
+
     A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
     has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
     part could not be proved, or the certificate does not hold.
@@ -104,7 +106,7 @@ def certify(
     Parameters
     ----------
     gains
-        The file of palpate tune.
+        The file of palpate tune; for a check also the header of its law in C.
     check
         A certificate to check.
     """
@@ -152,7 +154,11 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     from palpate.force import Certificate, load_gains
 
     certificate = Certificate.load(path)
-    if gains is not None:
+    if gains is not None and gains.suffix == ".h":
+        from palpate.native.header import check_header
+
+        check_header(certificate, gains)
+    elif gains is not None:
         certificate.check_of(load_gains(gains))
     with console(stderr=True).status("checking"):
         verdict = confirm(path, certificate.check())
