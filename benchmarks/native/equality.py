@@ -123,8 +123,12 @@ class Bench:
         text = re.sub(r"palpate/\S+\.py:\d+", "", text)
         key = f"{hashlib.sha256(text.encode()).hexdigest()[:16]} {law.module.name}: {title}, {ticks}"
         if key not in self.known:
-            self.known[key] = ask()
-            write_json(self.file, {"written_by": "palpate", **self.known})
+            value = ask()
+            now = (
+                json.loads(self.file.read_text()) if self.file.exists() else {}
+            )  # another run may have written
+            self.known = {"written_by": "palpate", **self.known, **now, key: value}
+            write_json(self.file, self.known)
         print(f"{law.module.name}: {title}: {self.known[key]}", flush=True)
         return self.known[key]
 
