@@ -96,9 +96,7 @@ def test_both_have_the_same_matrices(name):
 
 def test_it_holds_by_both(proof, file):
     assert proof.check().holds
-    told = check(json.dumps(file))
-    assert [text.split(":")[0] for text in told] == ["held", "one-sided", "adapting", "adapting"]
-    assert "readings 0 to 2 ticks old" in told[2]  # the sensor's own are 0 to 1.04
+    assert check(json.dumps(file)) == sum(len(claim.cells) for claim in proof.claims)
 
 
 def test_it_runs_by_itself(proof, tmp_path):
@@ -113,7 +111,7 @@ def test_it_runs_by_itself(proof, tmp_path):
         check=False,
     )
     assert told.returncode == 0, told.stderr
-    assert told.stdout.startswith("held: K + B/theta 1000 to 2e+04 N/m")
+    assert told.stdout.startswith("holds: ")
 
 
 def forged(file, path, value):
