@@ -312,9 +312,10 @@ class ExactClaim:
 
     def _weights(self, P: Ball, bound: Exact) -> Ball:
         """W with |D y|^2 <= y^T W y in the norm P: by columns of D's bound, by the inequality of Cauchy and Schwarz."""
-        middle = abs(P.middle[: self.p, : self.p])
-        sizes = [Fraction(1.000001 * float(column @ middle @ column / ONE) ** 0.5) for column in bound.T]
-        return Ball.of(np.diag([v * sum(sizes) for v in sizes]))
+        middle, tiny = abs(P.middle[: self.p, : self.p]), Fraction(1, ONE)
+        sizes = [column @ middle @ column / ONE for column in bound.T]
+        many = sum(v > tiny for v in sizes) * (1 + Fraction(1, 1 << 40))
+        return Ball.of(np.diag([v * (many if v > tiny else 1 << 60) for v in sizes]))
 
     def _contracts(self, P: Ball, W: Ball | None, Phi: Ball, fed: Ball) -> bool:
         """Whether |Phi x| + |D x| < |x| in the norm P, D the distance of the exponential from its corners."""
