@@ -137,18 +137,17 @@ class ExactClaim:
             z = [2 * Fraction(v) for v in own.get("damping_interval") or (own["damping"],) * 2]
             self.ends = [(w[0] ** 2, w[1] ** 2), (z[0] * w[0], z[1] * w[1])]
         self.filter = polynomial(arm["sensor"].get("low_pass", "none"))
-        self.low, self.high, self.least, self.most = map(
-            Fraction, map(claim.get, ("low", "high", "least", "most"))
-        )
+        names = ("low", "high", "least", "most")
+        self.low, self.high, self.least, self.most = (Fraction(claim[name]) for name in names)
         self.shares, self.ages = [Fraction(v) for v in claim["shares"]], list(claim["ages"])
         self.parts = claim.get("parts", 1)
         self.w0, self.k0, self.wf = (Fraction(claim["units"][name]) for name in ("w0", "k0", "wf"))
         self.order, self.readings = len(self.filter) - 1, self.ages[1] + self.unsure
         self.p, self._moved, self._last = 2 + self.order, {}, -10  # type: ignore[var-annotated]
-        names, late = "t" if self.torque else "c", self.delay + 1 if self.torque else max(self.delay, 1)
+        sent, late = "t" if self.torque else "c", self.delay + 1 if self.torque else max(self.delay, 1)
         self.state = ["x", "v", *(f"f{i + 1}" for i in range(self.order))]
         self.state += [*(f"r{i + 1}" for i in range(self.readings)), "u", "c0"]
-        self.state += [f"{names}{i}" for i in range(1, late)]
+        self.state += [f"{sent}{i}" for i in range(1, late)]
         self._sound()
 
     def _sound(self) -> None:
