@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate.wires import Command, Limits, LostError, guard
-from palpate.wires.guard import Guard, unsafe
+from palpate.wires import Command, Limits, LostError, press
+from palpate.wires.press import Guard, unsafe
 from palpate.wires.protocol import EndedError, SilentError
 
 LIMITS = Limits(force=40.0, speed=0.05, travel=0.01, seconds=20.0)
@@ -53,7 +53,7 @@ class Wire:
 @pytest.fixture
 def clock(monkeypatch):
     made = Clock()
-    monkeypatch.setattr(guard, "_now", made)
+    monkeypatch.setattr(press, "_now", made)
     return made
 
 

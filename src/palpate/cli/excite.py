@@ -250,7 +250,7 @@ class OutputOptions(PictureOptions, FileOptions):
 
     def check_all(self) -> None:
         """Check every path before any work is done."""
-        from palpate.report.excitation.files import check_ending
+        from palpate.report.excitation.table import check_ending
 
         if self.out is not None:
             check_ending(self.out)
@@ -307,7 +307,7 @@ def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | 
     if found.feasible:
         _write(found, rate, output.out, output.experiment)
     if picture is not None:
-        from palpate.report.excitation.figure import write_figure
+        from palpate.report.excitation.page import write_figure
 
         write_figure(found, picture)
     if output.report is not None:
@@ -321,19 +321,19 @@ def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | 
 
 
 def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
-    from palpate.report.excitation import files
+    from palpate.report.excitation import table
 
     if out is not None:
-        files.write_force(found, out, float(rate))
+        table.write_force(found, out, float(rate))
     if experiment is not None:
-        write_text(experiment, files.experiment(found))
+        write_text(experiment, table.experiment(found))
 
 
 def _print(
     found: Design, helps: list[Remedy], written: list[Path | None], picture: Path | None, json: bool
 ) -> None:
     if json:
-        from palpate.report.excitation.files import summary
+        from palpate.report.excitation.table import summary
 
         print_answer(summary(found, helps))
         return

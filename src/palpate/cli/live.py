@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._progress import COMPILING
-from palpate.cli._terminal import print_lines, say
+from palpate.cli._terminal import COMPILING, print_lines, say
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE

@@ -13,8 +13,7 @@ from cyclopts import Group, Parameter
 from palpate.cli._answer import print_answer
 from palpate.cli._one_log import OneLog
 from palpate.cli._program import command
-from palpate.cli._progress import bar
-from palpate.cli._terminal import console, show_answer
+from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
@@ -203,7 +202,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
         return read_table(places.table, places.columns.split(",") if places.columns else ())
     if places.columns is not None:
         raise InputError("--columns is of --table; the place in logs is given with --place")
-    from palpate.logs.gathered import gather_logs
+    from palpate.logs.columns import gather_logs
 
     with bar(console(stderr=True)) as progress:
 

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._interrupts import noticed
-from palpate.cli._progress import COMPILING, simulated
-from palpate.cli._terminal import console, place, show_answer
+from palpate.cli._streams import noticed
+from palpate.cli._terminal import COMPILING, console, place, show_answer, simulated
 from palpate.cli.options.figures import DRAWN, FigureOptions
 from palpate.cli.options.flags import FLAG, WHOLE
 from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
@@ -159,11 +158,11 @@ def _draw(
     """Figures, page and film of a run."""
     about = record.meta["experiment"]
     if "loop" in record.meta:
-        from palpate.report.run.one_direction import write_one_direction
+        from palpate.report.run.figures import write_one_direction
 
         write_one_direction(record, folder, summary, source, drawn.endings, drawn.dpi)
         return
-    from palpate.report.identification.source import sha256_of
+    from palpate.report.identification.words import sha256_of
     from palpate.report.run.figures import draw
     from palpate.report.run.page import Content, run_page
 
@@ -205,15 +204,14 @@ def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> 
 
 
 def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
-    from palpate.report.run.table import notes, tables
-    from palpate.report.run.words import sentence
+    from palpate.report.run.table import notes, sentence, tables
 
     summary = ran.summary
     if as_json:
         print_answer(summary)
         return
     if "loop" in ran.record.meta:
-        from palpate.report.run.one_direction import one_direction_tables
+        from palpate.report.run.figures import one_direction_tables
 
         shown_tables = one_direction_tables(ran.record, summary)
     else:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._progress import COMPILING, counted
-from palpate.cli._terminal import confirmed, console, place, say, show_answer
+from palpate.cli._terminal import COMPILING, confirmed, console, counted, place, say, show_answer
 from palpate.cli.options.figures import FigureOptions
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of

@@ -6,12 +6,12 @@ from dataclasses import fields
 
 import numpy as np
 
+from palpate.identification.causes import Code, Warn
 from palpate.identification.contacts import Contacts
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.filters.state_variable import Chain, block_means
-from palpate.identification.options import Options
-from palpate.identification.prior import LAG
+from palpate.identification.options import LAG, Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import (
     DynamicStiffness,
@@ -26,7 +26,6 @@ from palpate.identification.result import (
 from palpate.identification.sampling import Channels
 from palpate.identification.selection import Choice
 from palpate.identification.verdicts import Terms
-from palpate.identification.warning_codes import Code, Warn
 from palpate.signals import Estimate
 from palpate.units import impedance_units
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.warning_codes import Warn
+from palpate.identification.causes import Warn
 from palpate.results import Compared, Readable, Result
 from palpate.signals import Estimate
 

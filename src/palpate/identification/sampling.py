@@ -8,9 +8,9 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
+from palpate.identification.causes import Code, Warn, from_word
 from palpate.identification.filters.state_variable import block_means
-from palpate.identification.saturation import at_limit
-from palpate.identification.warning_codes import Code, Warn, from_word
+from palpate.identification.sample_clock import at_limit
 from palpate.records import Record
 from palpate.signals.samples import fresh_rows
 

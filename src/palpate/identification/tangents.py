@@ -17,8 +17,8 @@ from numpy.polynomial import chebyshev
 from palpate.arrays import Array
 from palpate.identification.free_motion import Drift
 from palpate.identification.least_squares import noise_of
+from palpate.identification.options import Lag
 from palpate.identification.pooling import random_effects, student
-from palpate.identification.prior import Lag
 from palpate.identification.sampling import Channels
 from palpate.identification.strokes import Stroke
 

@@ -6,16 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.identification.causes import NOISE, cause_of
-from palpate.identification.estimators.answer import Answer
+from palpate.identification.causes import NOISE, Code, Warn, cause_of
+from palpate.identification.estimators.answer import Answer, Prediction, unrecovered
 from palpate.identification.estimators.fit import Fit
-from palpate.identification.estimators.prediction import Prediction
-from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.evidence import stiffness_of
-from palpate.identification.prior import LAG, Lag
+from palpate.identification.options import LAG, Lag
 from palpate.identification.result import Parameter, Verdict, WorkingPoint
 from palpate.identification.selection import Choice
-from palpate.identification.warning_codes import Code, Warn
 from palpate.units import impedance_units
 
 _FAR = 2.0

@@ -29,7 +29,7 @@ from palpate.live.view import (
     ViewScene,
     check_ahead,
 )
-from palpate.press.loops import series_of
+from palpate.press.engines import series_of
 from palpate.press.pilots import Cautious
 from palpate.press.prepare import Question, prepared
 from palpate.press.pressing import JOINT_LIMIT

@@ -12,7 +12,7 @@ from palpate.errors import InputError
 from palpate.files.limits import Limits
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag
-from palpate.logs.bags.fields import leaves
+from palpate.logs.bags.reading import leaves
 from palpate.logs.columns import ColumnStatistics
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.own_runs import is_run

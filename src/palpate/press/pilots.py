@@ -14,10 +14,9 @@ from palpate.controllers.proportional_integral import integral_gain
 from palpate.errors import InputError, unknown
 from palpate.force import ForceLoop
 from palpate.force.gains import Gains
-from palpate.press.protocol import Command, Sense, Wire
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.troubles import Troubles
+from palpate.press.tool import Command, Sense, Troubles, Wire
 from palpate.signals.types import Task
 
 CAUTIOUS = "cautious"

@@ -21,9 +21,9 @@ from palpate.bench.sequence import (
     Ending,
 )
 from palpate.press.pilots import Acted, Pilot
-from palpate.press.plan import Plan
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.tool import Plan
 from palpate.records import Record
 
 Progress = Callable[[float, str], None]

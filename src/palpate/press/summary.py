@@ -16,7 +16,7 @@ from palpate.errors import InputError
 from palpate.force.arm import PositionLoop
 from palpate.force.gains import Gains
 from palpate.identification.sample_clock import sample_clock_of
-from palpate.press.loops import series_of
+from palpate.press.engines import series_of
 from palpate.press.setting import Place
 from palpate.press.tool import held_tool
 from palpate.records import Record

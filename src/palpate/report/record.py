@@ -10,9 +10,9 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.look.columns import with_peaks
+from palpate.report.look.assets import with_peaks
+from palpate.report.numbers import as_html, as_text
 from palpate.report.page import Table, embedded, render
-from palpate.report.result_text import as_html, as_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def draw(record: Record) -> Figure:
 
 def page(record: Record) -> str:
     """The table and the figure as a page."""
-    from palpate.report.svg import svg
+    from palpate.report.page import svg
 
     figures = []
     if any(np.isfinite(record[name]).any() for name in record.columns if name != _clock(record)):

@@ -13,9 +13,9 @@ import msgspec
 
 from palpate.errors import InputError
 from palpate.wires.apart import ApartWire
+from palpate.wires.at_rest import turned
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError, Triple
 from palpate.wires.ros2_tool import JointTool, PoseTool, Tool, seconds
-from palpate.wires.turns import turned
 
 FORM = "ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=reaction"
 _KEPT = 32

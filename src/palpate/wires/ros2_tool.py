@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.wires.at_rest import from_matrix_by_columns
 from palpate.wires.protocol import LostError, Quaternion, Triple
-from palpate.wires.turns import from_matrix_by_columns
 
 _NEARLY = 0.02
 """Smallest singular value of the Jacobian at which joints are still moved [m]: there 20 mm/s take a joint 1 rad/s."""

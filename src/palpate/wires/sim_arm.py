@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from palpate.wires import sim_protocol as protocol
+from palpate.wires import sim as protocol
 from palpate.wires.rehearsal import OneDirection, arm_of, paced, ready, words_of
 
 _REST = 10

@@ -13,8 +13,8 @@ from typing import Any
 
 from palpate.errors import InputError
 from palpate.wires.apart import ApartWire
+from palpate.wires.at_rest import from_rotation_vector
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError
-from palpate.wires.turns import from_rotation_vector
 
 _READ = ["timestamp", "actual_TCP_pose", "actual_TCP_force", "robot_status_bits", "safety_status_bits"]
 _POLL = 2e-4

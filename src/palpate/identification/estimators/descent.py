@@ -12,7 +12,7 @@ from palpate.arrays import Array
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import solve
 from palpate.identification.models import Model, Motion, NonlinearParameter
-from palpate.identification.prior import LAG, NOTHING, Lag, Prior
+from palpate.identification.options import LAG, NOTHING, Lag, Prior
 
 _ROUNDS = 30
 _CONVERGED = 1e-6

@@ -8,24 +8,33 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.averaging import Member, averaged, mean_budget, members, of_octaves
-from palpate.identification.estimators.budget import Budget, Spread
-from palpate.identification.estimators.by_octave import Solution, System, system_of
-from palpate.identification.estimators.descent import linearised, slope_of_lag
-from palpate.identification.estimators.effects import FRICTION, effect_columns
-from palpate.identification.estimators.fit import fit
-from palpate.identification.estimators.noise_lines import (
+from palpate.identification.estimators.answer import Answer, Prediction
+from palpate.identification.estimators.averaging import (
+    Member,
+    averaged,
     derivative_products,
+    mean_budget,
+    members,
+    of_octaves,
     position_lines,
     seen,
     sensor_lines,
 )
-from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of
-from palpate.identification.estimators.prediction import Prediction
+from palpate.identification.estimators.budget import FRICTION, Budget, Spread, effect_columns
+from palpate.identification.estimators.descent import linearised, slope_of_lag
+from palpate.identification.estimators.fit import fit
+from palpate.identification.estimators.octaves import (
+    Octaves,
+    Segment,
+    Solution,
+    System,
+    longest_of,
+    octaves_of,
+    system_of,
+)
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model
-from palpate.identification.prior import LAG, mass_std
+from palpate.identification.options import LAG, mass_std
 from palpate.identification.problem import Problem
 
 

@@ -8,9 +8,8 @@ from math import hypot, sqrt
 from rich.console import Console
 from rich.text import Text
 
-from palpate.identification.causes import cause_of
+from palpate.identification.causes import Code, cause_of
 from palpate.identification.result import Identification, Parameter, Verdict
-from palpate.identification.warning_codes import Code
 from palpate.report.identification.words import (
     ADVICE,
     CALLED,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.report import style
 from palpate.report.identification import evidence_panels as evidence
-from palpate.report.identification import fit_panels as fit
-from palpate.report.identification import trust_panels as trust
+from palpate.report.identification import evidence_panels as fit
+from palpate.report.identification import evidence_panels as trust
 from palpate.report.identification.words import MARKS, formatted, model_line, sentence, subtitle
 from palpate.text import printable
 

@@ -9,9 +9,8 @@ from palpate.identification.result import Identification, Parameter
 from palpate.report.identification import figure
 from palpate.report.identification import page as pages
 from palpate.report.identification.answer import show
-from palpate.report.identification.source import Source
-from palpate.report.identification.words import formatted, sentence
-from palpate.report.result_text import as_html, printed
+from palpate.report.identification.words import Source, formatted, sentence
+from palpate.report.numbers import as_html, printed
 from palpate.text import printable
 
 if TYPE_CHECKING:

@@ -16,15 +16,11 @@ from palpate.report import style
 from palpate.report.answer import Card
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, formatted
-from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts, text_of
-from palpate.report.look.columns import packed, thinned
+from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed, scripts, text_of, thinned
 from palpate.report.numbers import quantity
-from palpate.report.page import embedded, render
-from palpate.report.run.cards import force_cards
+from palpate.report.page import embedded, render, svg
 from palpate.report.run.figures import drawings
-from palpate.report.run.table import force_rows, thesis_table
-from palpate.report.run.words import alerts, motors, sentence
-from palpate.report.svg import svg
+from palpate.report.run.table import alerts, force_cards, force_rows, motors, sentence, thesis_table
 from palpate.robots.arm3 import Arm3
 from palpate.text import printable
 
