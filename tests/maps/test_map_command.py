@@ -62,6 +62,29 @@ def test_files_are_written_and_a_page_holds_the_numbers(table, tmp_path, capsys)
     assert main(["map", "--table", str(table), *words]) == 0  # its own files are replaced
 
 
+def test_further_columns_are_mapped_beside_the_stiffness(table, tmp_path, capsys):
+    rows = table.read_text(encoding="utf-8").splitlines()
+    x = [float(row.split(",")[0]) for row in rows[1:]]
+    wide = tmp_path / "wide.csv"
+    lines = [
+        f"{row},{0.2 + 0.005 * at:.4f},{'' if at > 55 else 2.0 + 0.02 * at}"
+        for row, at in zip(rows[1:], x, strict=True)
+    ]
+    wide.write_text("\n".join([f"{rows[0]},loss,depth_mm", *lines]), encoding="utf-8")
+    files = ["--csv", str(tmp_path / "map.csv"), "--report", str(tmp_path / "map.html")]
+    assert main(["map", "--table", str(wide), "--fields", "loss,depth_mm", "--json", *files]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["units"] == {"stiffness": "N/m", "loss": "1", "depth": "m"}
+    for row in answer["map"]:
+        assert row["loss"] == pytest.approx(0.2 + 5.0 * row["x"], abs=0.01)
+        assert row["depth_low"] <= row["depth"] <= row["depth_high"]
+        assert row["depth"] == pytest.approx(2e-3 + 0.02 * row["x"], abs=1e-4)
+    assert "depth_high" in polars.read_csv(tmp_path / "map.csv").columns
+    assert "Depth. Half-width of its 95 % interval" in (tmp_path / "map.html").read_text(encoding="utf-8")
+    assert main(["map", "--table", str(wide), "--fields", "half_N/mm"]) == 2
+    assert "has already" in capsys.readouterr().err
+
+
 def test_logs_of_presses_are_identified_and_placed(tmp_path, capsys):
     press = polars.read_csv(PRESS)
     for i, (x, y) in enumerate([(0.0, 0.0), (20.0, 0.0), (0.0, 20.0), (20.0, 20.0)]):

@@ -46,6 +46,9 @@ class PlaceOptions:
         Columns of the table, as x:mm,y:mm,K:N/mm,half:N/mm.
     place
         Columns of a log that hold its place, as x:mm,y:mm or x,y,z; the pose's position if not given.
+    fields
+        Columns of a table that are mapped beside the stiffness, as loss,depth_mm:mm; of logs, relaxation, loss,
+        loss tangent and depth are mapped where presses show them.
     each_contact
         Each contact of a log is a press of its own, at its own place; else a log is one press.
     """
@@ -53,6 +56,7 @@ class PlaceOptions:
     table: Path | None = None
     columns: str | None = None
     place: str | None = None
+    fields: str | None = None
     each_contact: Annotated[bool, FLAG] = False
 
 
@@ -199,9 +203,10 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
     if places.table is not None:
         if places.place is not None:
             raise InputError("--place is of logs; the columns of a table are given with --columns")
-        return read_table(places.table, places.columns.split(",") if places.columns else ())
-    if places.columns is not None:
-        raise InputError("--columns is of --table; the place in logs is given with --place")
+        columns, fields = (each.split(",") if each else () for each in (places.columns, places.fields))
+        return read_table(places.table, columns, fields)
+    if places.columns is not None or places.fields is not None:
+        raise InputError("--columns and --fields are of --table; the place in logs is given with --place")
     from palpate.logs.columns import gather_logs
 
     with bar(console(stderr=True)) as progress:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.maps.lumps import Lump
 from palpate.maps.result import MapResult
 from palpate.report import style
@@ -17,6 +18,7 @@ from palpate.report.page import Table, embedded, svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure
 
 _GOALS = {
@@ -136,6 +138,15 @@ def page(result: MapResult, title: str, command: str) -> str:
                 "caption": "Half-width of the 95 % interval. Numbers: where to press next, for "
                 f"{_GOALS[result.request.goal]}.",
             },
+            *(
+                {
+                    "source": embedded(svg(draw_field(result, name)), "image/svg+xml"),
+                    "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
+                    f"{plain(_shown(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
+                    f"{_shown(result, name)[1]}.",
+                }
+                for name, field in result.fields.items()
+            ),
         ],
         figures=[
             {
@@ -205,22 +216,24 @@ def _press_rows(result: MapResult) -> list[tuple[str, str, str]]:
     return [(name, place(where), f"{quantity(k, 'N/m')} ± {plain(half, 2)}") for name, where, k, half in told]
 
 
+def _title(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _shown(result: MapResult, name: str) -> tuple[float, str]:
+    """Factor and symbol of the unit in which a field is shown."""
+    unit = result.presses.units[name]
+    return {"m": (1e3, "mm"), "1": (100.0, "%")}.get(unit, (1.0, unit))
+
+
 def draw_map(result: MapResult) -> Figure:
     """The stiffness over the surface, the presses, the contour of the threshold and its band."""
     from matplotlib.colors import LogNorm
 
-    seen, grid = result.prediction, result.grid
+    seen, grid, threshold = result.prediction, result.grid, result.request.stiffer_than
     with style.inked(9.0):
-        figure, (axis,) = style.grid((5.0, 4.4))
-        values = np.where(grid.inside, seen.stiffness, np.nan).reshape(grid.shape)
-        image = axis.pcolormesh(
-            1e3 * grid.across, 1e3 * grid.along, values, cmap="Blues_r", norm=LogNorm(), rasterized=True
-        )
-        bar = figure.colorbar(
-            image, ax=axis, location="top", shrink=0.7, label="stiffness [N/m]", format="{x:g}"
-        )
+        figure, axis, bar = _picture(result, seen.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm())
         bar.ax.xaxis.set_minor_formatter("{x:g}")
-        threshold = result.request.stiffer_than
         if threshold is not None:
             probability = np.where(grid.inside, seen.exceeds(threshold), np.nan).reshape(grid.shape)
             axis.contour(1e3 * grid.across, 1e3 * grid.along, probability, [0.025, 0.5, 0.975], colors="white",
@@ -229,32 +242,46 @@ def draw_map(result: MapResult) -> Figure:
         axis.plot(*at.T, "o", mfc="white", mec=style.INK, markersize=4, mew=0.9)
         begin, end = (1e3 * point for point in _cut_ends(result))
         axis.plot(*zip(begin, end, strict=True), color="white", linewidth=0.9, linestyle=(0, (5, 4)))
-        _square(axis, result)
     return figure
 
 
 def draw_interval(result: MapResult) -> Figure:
     """The half-width of the interval over the surface, and the next presses by their numbers."""
-    grid = result.grid
+    half = 100.0 * np.expm1(1.96 * np.hypot(result.prediction.std, result.request.common))
     with style.inked(9.0):
-        figure, (axis,) = style.grid((5.0, 4.4))
-        half = 100.0 * np.expm1(1.96 * np.hypot(result.prediction.std, result.request.common))
-        values = np.where(grid.inside, half, np.nan).reshape(grid.shape)
-        image = axis.pcolormesh(1e3 * grid.across, 1e3 * grid.along, values, cmap="Greys_r", rasterized=True)
-        figure.colorbar(image, ax=axis, location="top", shrink=0.7, label="half-width, 95 % [%]")
+        figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys_r")
         coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
         for k, (x, y) in enumerate(coordinates):
             box = {"boxstyle": "circle,pad=0.25", "fc": style.CARD, "ec": style.INK, "lw": 0.9}
             axis.text(x, y, str(k + 1), ha="center", va="center", fontsize=8, bbox=box, color=style.INK)
-        _square(axis, result)
     return figure
 
 
-def _square(axis: Axes, result: MapResult) -> None:
+def draw_field(result: MapResult, name: str) -> Figure:
+    """A further field over the surface, and the presses that show it."""
+    (factor, symbol), known = _shown(result, name), np.isfinite(result.presses.fields[name])
+    with style.inked(9.0):
+        label = f"{_title(name).lower()} [{symbol}]"
+        figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
+        at = 1e3 * result.map.surface.coordinates(result.map.places[known])
+        axis.plot(*at.T, "o", mfc="white", mec=style.INK, markersize=4, mew=0.9)
+    return figure
+
+
+def _picture(
+    result: MapResult, values: Array, label: str, colours: str, **norm: Any
+) -> tuple[Figure, Axes, Colorbar]:
+    """A quantity at the grid over the surface, with its bar of colours."""
+    grid = result.grid
+    figure, (axis,) = style.grid((5.0, 4.4))
+    shown = np.where(grid.inside, values, np.nan).reshape(grid.shape)
+    image = axis.pcolormesh(1e3 * grid.across, 1e3 * grid.along, shown, cmap=colours, rasterized=True, **norm)
+    bar = figure.colorbar(image, ax=axis, location="top", shrink=0.7, label=label, format="{x:g}")
     axis.grid(visible=False)
     axis.set_aspect("equal")
     names = ("along the first axis", "along the second axis") if result.map.surface.is_curved else ("x", "y")
     axis.set(xlabel=f"{names[0]} [mm]", ylabel=f"{names[1]} [mm]")
+    return figure, axis, bar
 
 
 def _cut_ends(result: MapResult) -> tuple[Any, Any]:
